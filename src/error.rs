@@ -1,0 +1,61 @@
+//! Why a call was refused or failed.
+
+use crate::world::StepReport;
+
+/// Why a call was refused or failed. A call that answers with an error has changed nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Error {
+    /// An argument is out of its range; the message names it and its value.
+    InvalidArgument(String),
+    /// The id names something that was destroyed, or nothing at all.
+    StaleId(String),
+    /// A storage of fixed capacity is full.
+    Capacity(String),
+    /// Memory could not be reserved.
+    OutOfMemory,
+    /// The step could not be taken: nothing moved, pending forces and poses stay pending.
+    Unstable(StepReport),
+    /// Valid, but this build or this combination does not offer it.
+    Unsupported(String),
+    /// A file could not be read or written; the message names the file and the line or byte.
+    Io(String),
+    /// A fault inside the library: the world refuses every further call.
+    Internal(String),
+}
+
+/// What calls that can fail return.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An [`Error::InvalidArgument`] with this message.
+    pub(crate) fn invalid(message: impl Into<String>) -> Self {
+        Error::InvalidArgument(message.into())
+    }
+}
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Error::InvalidArgument(message)
+            | Error::StaleId(message)
+            | Error::Capacity(message)
+            | Error::Unsupported(message)
+            | Error::Io(message)
+            | Error::Internal(message) => f.write_str(message),
+            Error::OutOfMemory => f.write_str("out of memory"),
+            Error::Unstable(report) => write!(
+                f,
+                "the step could not be taken: the longest stable substep is {} s, {} substeps are allowed",
+                report.stable_substep, report.substeps_allowed
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<std::collections::TryReserveError> for Error {
+    fn from(_: std::collections::TryReserveError) -> Self {
+        Error::OutOfMemory
+    }
+}

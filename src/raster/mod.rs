@@ -1,0 +1,1 @@
+//! One depth-buffer rasteriser, for pictures and for contact in image space.
