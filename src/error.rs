@@ -14,7 +14,12 @@ pub enum Error {
     /// Memory could not be reserved.
     OutOfMemory,
     /// The step could not be taken: nothing moved, pending forces and poses stay pending.
-    Unstable(StepReport),
+    Unstable {
+        /// What is known about the step that was not taken.
+        report: StepReport,
+        /// How many substeps were allowed, or asked for.
+        allowed: u32,
+    },
     /// Valid, but this build or this combination does not offer it.
     Unsupported(String),
     /// A file could not be read or written; the message names the file and the line or byte.
@@ -43,10 +48,10 @@ impl std::fmt::Display for Error {
             | Error::Io(message)
             | Error::Internal(message) => f.write_str(message),
             Error::OutOfMemory => f.write_str("out of memory"),
-            Error::Unstable(report) => write!(
+            Error::Unstable { report, allowed } => write!(
                 f,
-                "the step could not be taken: the longest stable substep is {} s, {} substeps are allowed",
-                report.stable_substep, report.substeps_allowed
+                "the step could not be taken in the {allowed} substeps allowed: the longest stable one is {} s",
+                report.stable_substep
             ),
         }
     }

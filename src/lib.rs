@@ -1,9 +1,19 @@
 //! Soft tissue for programs that already have a loop.
-#![warn(missing_docs)]
 
+mod body;
+mod contact;
+mod diagnostics;
 mod error;
+mod memory;
 pub mod mesh;
 pub mod raster;
+mod slots;
+mod solver;
+mod springs;
 mod world;
 
+pub use body::{Body, BodyDefinition, Solver, Storage, Values};
+pub use contact::{Detection, Pose, Shape, ToolDefinition};
+pub use diagnostics::{Energy, StorageReport};
 pub use error::{Error, Result};
+pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};

@@ -1,5 +1,9 @@
 //! Meshes: topology, shapes, files.
 
+mod topology;
+
+pub use topology::{boundary, edges, is_closed};
+
 use glam::Vec3;
 
 /// Nodes joined by triangles, tetrahedra or both. Positions in metres; triangles outward by the right-hand rule.

@@ -1,0 +1,55 @@
+//! Damping of nodes against the world, solved exactly over a step: `m v' = f - gamma v` (Halic et al., section 3).
+//!
+//! Over a time t with a constant force, `v(t) = v e^-s + f t/m (1 - e^-s)/s` with s = gamma t / m. The paper's factor
+//! per step becomes the same decay and the same terminal velocity at every step.
+
+use crate::error::Result;
+use crate::memory;
+
+/// What half a substep does to each node's velocity; kept only by bodies that have node damping.
+#[derive(Debug)]
+pub(crate) struct NodeDamping {
+    /// gamma / m of each node, 1/s; 0 where the mass is 0.
+    rates: Vec<f32>,
+    /// `e^-s` over half a substep.
+    pub decay: Vec<f32>,
+    /// `t (1 - e^-s)/s` over half a substep, s.
+    pub gain: Vec<f32>,
+    /// The substep that the factors are for, s.
+    substep: f32,
+}
+
+impl NodeDamping {
+    pub fn new(rates: Vec<f32>) -> Result<Self> {
+        Ok(Self {
+            decay: memory::filled(1.0, rates.len())?,
+            gain: memory::filled(0.0, rates.len())?,
+            rates,
+            substep: 0.0,
+        })
+    }
+
+    pub fn rates(&self) -> &[f32] {
+        &self.rates
+    }
+
+    /// Makes the factors those of half of `substep`.
+    pub fn prepare(&mut self, substep: f32) {
+        if substep == self.substep {
+            return;
+        }
+        let half = 0.5 * f64::from(substep);
+        let mut last = (f32::NAN, 1.0, 0.0);
+        for ((&rate, decay), gain) in self.rates.iter().zip(&mut self.decay).zip(&mut self.gain) {
+            // Most bodies have few different rates, mostly side by side.
+            if rate != last.0 {
+                let s = f64::from(rate) * half;
+                let lost = -libm::expm1(-s);
+                let weight = if s > 0.0 { lost / s } else { 1.0 };
+                last = (rate, (1.0 - lost) as f32, (half * weight) as f32);
+            }
+            (*decay, *gain) = (last.1, last.2);
+        }
+        self.substep = substep;
+    }
+}

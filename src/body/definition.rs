@@ -1,0 +1,336 @@
+//! What a body is made of, as the caller gives it, and the checks at the door.
+
+use glam::Vec3;
+
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// One value for all, or one for each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Values<'a> {
+    /// The same value for all.
+    Uniform(f32),
+    /// A value for each, in order.
+    Each(&'a [f32]),
+}
+
+impl Values<'_> {
+    /// The value of number `index`.
+    #[inline]
+    pub fn get(&self, index: usize) -> f32 {
+        match self {
+            Values::Uniform(value) => *value,
+            Values::Each(values) => values[index],
+        }
+    }
+
+    /// Whether every value is zero.
+    pub(crate) fn all_zero(&self) -> bool {
+        match self {
+            Values::Uniform(value) => *value == 0.0,
+            Values::Each(values) => values.iter().all(|&value| value == 0.0),
+        }
+    }
+}
+
+/// How a body keeps its springs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Storage {
+    /// Laid out for the processor.
+    #[default]
+    Packed,
+    /// A linked list per node (Halic et al., section 4, "efficient storage").
+    Efficient,
+    /// One array with a row per node (Halic et al., section 4, "fast link").
+    FastLink,
+    /// A chain of arrays per node (Halic et al., section 4, "dynamic bulk allocation").
+    DynamicBulk,
+}
+
+/// How a body is moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Solver {
+    /// Explicit, with as many substeps as it needs to be stable.
+    #[default]
+    Verlet,
+    /// Stable at any step.
+    Implicit,
+    /// The accurate reference.
+    Newton,
+}
+
+/// What a body is made of. Plain data, used only during [`World::create_body`](crate::World::create_body).
+#[derive(Clone, Copy, Debug)]
+pub struct BodyDefinition<'a> {
+    /// Where each node is, in metres.
+    pub positions: &'a [Vec3],
+    /// Where each node would be at rest, in metres; `None`: as in `positions`.
+    pub rest_positions: Option<&'a [Vec3]>,
+    /// The mass of each node in kilograms; in [`Values::Each`] 0 pins a node for good.
+    pub masses: Values<'a>,
+    /// Damping of each node against the world, in N s/m, at least 0.
+    pub node_dampings: Values<'a>,
+    /// The two nodes of each spring, each pair once; `None`: the edges of the triangles and tetrahedra, each once.
+    pub springs: Option<&'a [[u32; 2]]>,
+    /// The stiffness of each spring in N/m, at least 0.
+    pub stiffnesses: Values<'a>,
+    /// The rest length of each spring in metres, at least 0; `None`: from the rest positions.
+    pub rest_lengths: Option<&'a [f32]>,
+    /// Damping along each spring in N s/m, at least 0.
+    pub spring_dampings: Values<'a>,
+    /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the boundary of the
+    /// tetrahedra.
+    pub triangles: &'a [[u32; 3]],
+    /// Tetrahedra, four nodes each.
+    pub tetrahedra: &'a [[u32; 4]],
+    /// How the springs are kept.
+    pub storage: Storage,
+    /// The row width or chunk size of the storage; 0: chosen from the springs given.
+    pub springs_per_node: u32,
+    /// How the body is moved.
+    pub solver: Solver,
+}
+
+impl Default for BodyDefinition<'_> {
+    /// No nodes yet; 1 g a node, 100 N/m a spring, no damping.
+    fn default() -> Self {
+        Self {
+            positions: &[],
+            rest_positions: None,
+            masses: Values::Uniform(0.001),
+            node_dampings: Values::Uniform(0.0),
+            springs: None,
+            stiffnesses: Values::Uniform(100.0),
+            rest_lengths: None,
+            spring_dampings: Values::Uniform(0.0),
+            triangles: &[],
+            tetrahedra: &[],
+            storage: Storage::Packed,
+            springs_per_node: 0,
+            solver: Solver::Verlet,
+        }
+    }
+}
+
+/// A spring between two nodes, checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spring {
+    pub nodes: [u32; 2],
+    pub stiffness: f32,
+    pub rest_length: f32,
+    pub damping: f32,
+}
+
+impl BodyDefinition<'_> {
+    /// Refuses whatever is out of range, with a message that names it.
+    pub(crate) fn check(&self) -> Result<()> {
+        let nodes = self.positions.len();
+        if nodes == 0 || nodes > u32::MAX as usize / 2 {
+            return Err(Error::invalid(format!(
+                "node_count is {nodes}: must be from 1 to {}",
+                u32::MAX / 2
+            )));
+        }
+        finite_vectors("positions", self.positions)?;
+        if let Some(rest) = self.rest_positions {
+            expect_count("rest_positions", rest.len(), nodes)?;
+            finite_vectors("rest_positions", rest)?;
+        }
+        self.check_masses()?;
+        check_values("node_damping", &self.node_dampings, nodes)?;
+        node_indices("triangles", self.triangles, nodes)?;
+        node_indices("tetrahedra", self.tetrahedra, nodes)?;
+        match self.springs {
+            Some(springs) => self.check_springs(springs)?,
+            None => {
+                for (name, given) in [
+                    ("stiffnesses", matches!(self.stiffnesses, Values::Each(_))),
+                    ("rest_lengths", self.rest_lengths.is_some()),
+                    ("spring_dampings", matches!(self.spring_dampings, Values::Each(_))),
+                ] {
+                    if given {
+                        return Err(Error::invalid(format!(
+                            "{name} is given while springs is not: there is no order of springs to give it in"
+                        )));
+                    }
+                }
+                check_values("stiffness", &self.stiffnesses, 0)?;
+                check_values("spring_damping", &self.spring_dampings, 0)?;
+            }
+        }
+        self.check_offered()
+    }
+
+    fn check_masses(&self) -> Result<()> {
+        // A smaller mass has no finite inverse.
+        const SMALLEST_MASS: f32 = 1e-37;
+        match self.masses {
+            Values::Uniform(mass) if !(mass >= SMALLEST_MASS && mass.is_finite()) => Err(Error::invalid(format!(
+                "node_mass is {mass}: must be above 0 and finite"
+            ))),
+            Values::Uniform(_) => Ok(()),
+            Values::Each(masses) => {
+                expect_count("masses", masses.len(), self.positions.len())?;
+                match masses
+                    .iter()
+                    .position(|&mass| mass != 0.0 && !(mass >= SMALLEST_MASS && mass.is_finite()))
+                {
+                    None => Ok(()),
+                    Some(node) => Err(Error::invalid(format!(
+                        "masses[{node}] is {}: must be 0 or above, and finite",
+                        masses[node]
+                    ))),
+                }
+            }
+        }
+    }
+
+    fn check_springs(&self, springs: &[[u32; 2]]) -> Result<()> {
+        node_indices("springs", springs, self.positions.len())?;
+        check_values("stiffness", &self.stiffnesses, springs.len())?;
+        check_values("spring_damping", &self.spring_dampings, springs.len())?;
+        if let Some(lengths) = self.rest_lengths {
+            check_values("rest_length", &Values::Each(lengths), springs.len())?;
+        }
+        // Each pair once: equal pairs are neighbours once sorted.
+        let mut pairs: Vec<(u64, u32)> = memory::reserved(springs.len())?;
+        for (index, &[a, b]) in springs.iter().enumerate() {
+            pairs.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), index as u32));
+        }
+        pairs.sort_unstable();
+        match pairs.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            None => Ok(()),
+            Some(pair) => Err(Error::invalid(format!(
+                "springs[{}] joins nodes {:?}, as springs[{}] does: each pair once",
+                pair[1].1, springs[pair[1].1 as usize], pair[0].1
+            ))),
+        }
+    }
+
+    fn check_offered(&self) -> Result<()> {
+        if self.storage != Storage::Packed {
+            return Err(Error::Unsupported(format!(
+                "storage is {:?}: this version offers Packed alone",
+                self.storage
+            )));
+        }
+        if self.solver != Solver::Verlet {
+            return Err(Error::Unsupported(format!(
+                "solver is {:?}: this version offers Verlet alone",
+                self.solver
+            )));
+        }
+        Ok(())
+    }
+
+    /// The springs with their rest lengths, from the definition or from the edges of its elements.
+    pub(crate) fn resolved_springs(&self) -> Result<Vec<Spring>> {
+        let edges;
+        let pairs = match self.springs {
+            Some(springs) => springs,
+            None => {
+                edges = crate::mesh::edges(self.triangles, self.tetrahedra)?;
+                &edges
+            }
+        };
+        let rest = self.rest_positions.unwrap_or(self.positions);
+        let mut springs = memory::reserved(pairs.len())?;
+        for (index, &nodes) in pairs.iter().enumerate() {
+            let rest_length = match self.rest_lengths {
+                Some(lengths) => lengths[index],
+                None => distance(rest[nodes[0] as usize], rest[nodes[1] as usize]),
+            };
+            if !rest_length.is_finite() {
+                return Err(Error::invalid(format!(
+                    "springs[{index}] would be {rest_length} m long: positions lie too far apart"
+                )));
+            }
+            springs.push(Spring {
+                nodes,
+                stiffness: self.stiffnesses.get(index),
+                rest_length,
+                damping: self.spring_dampings.get(index),
+            });
+        }
+        Ok(springs)
+    }
+}
+
+/// The distance of two points, in metres, without overflow or loss on the way.
+pub(crate) fn distance(a: Vec3, b: Vec3) -> f32 {
+    (b.as_dvec3() - a.as_dvec3()).length() as f32
+}
+
+pub(crate) fn expect_count(name: &str, count: usize, expected: usize) -> Result<()> {
+    if count == expected {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "{name} has {count} entries: must have {expected}"
+    )))
+}
+
+pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
+    if vector.is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is {vector}: must be finite")))
+}
+
+pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {
+    match vectors.iter().position(|vector| !vector.is_finite()) {
+        None => Ok(()),
+        Some(node) => Err(Error::invalid(format!(
+            "{name}[{node}] is {}: must be finite",
+            vectors[node]
+        ))),
+    }
+}
+
+pub(crate) fn not_negative(name: &str, value: f32) -> Result<()> {
+    if value >= 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "{name} is {value}: must be at least 0 and finite"
+    )))
+}
+
+/// Checks `values` of which each must be finite and at least 0; `name` in the singular.
+fn check_values(name: &str, values: &Values, count: usize) -> Result<()> {
+    match values {
+        Values::Uniform(value) => not_negative(name, *value),
+        Values::Each(values) => {
+            let plural = plural(name);
+            expect_count(&plural, values.len(), count)?;
+            match values.iter().position(|&value| !(value >= 0.0 && value.is_finite())) {
+                None => Ok(()),
+                Some(index) => not_negative(&format!("{plural}[{index}]"), values[index]),
+            }
+        }
+    }
+}
+
+fn plural(name: &str) -> String {
+    match name.strip_suffix("ss") {
+        Some(_) => format!("{name}es"),
+        None => format!("{name}s"),
+    }
+}
+
+/// Checks that each element joins existing nodes, no node twice.
+fn node_indices<const N: usize>(name: &str, elements: &[[u32; N]], nodes: usize) -> Result<()> {
+    for (index, element) in elements.iter().enumerate() {
+        for (corner, &node) in element.iter().enumerate() {
+            if node as usize >= nodes {
+                return Err(Error::invalid(format!(
+                    "{name}[{index}] names node {node}: there are {nodes} nodes"
+                )));
+            }
+            if element[..corner].contains(&node) {
+                return Err(Error::invalid(format!("{name}[{index}] names node {node} twice")));
+            }
+        }
+    }
+    Ok(())
+}

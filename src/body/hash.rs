@@ -1,0 +1,44 @@
+//! The bits of a body that its next step depends on.
+
+use super::Body;
+use crate::diagnostics::StateHasher;
+
+impl Body {
+    pub(crate) fn hash_state(&self, hasher: &mut StateHasher) {
+        hasher.write_u64(self.node_count() as u64);
+        for value in self.origin.to_array() {
+            hasher.write_u64(value.to_bits());
+        }
+        let mut vectors = vec![self.state.positions(), self.state.velocities()];
+        // Without damping the forces follow from the positions.
+        if self.springs.damped() && self.forces_current {
+            vectors.push(self.state.forces());
+        }
+        if self.forces_applied {
+            vectors.extend(&self.applied);
+        }
+        for vectors in vectors {
+            for component in vectors.components() {
+                hasher.write_floats(component);
+            }
+        }
+        hasher.write_floats(&self.masses);
+        hasher.write_floats(&self.inverse_masses);
+        if let Some(damping) = &self.damping {
+            hasher.write_floats(damping.rates());
+        }
+        for node in 0..self.node_count() {
+            for link in self.springs.links(node) {
+                hasher.write_u64(u64::from(link.neighbour));
+                hasher.write_floats(&[link.stiffness, link.rest_length, link.damping]);
+            }
+        }
+        for pin in self.pins.iter() {
+            hasher.write_u64(u64::from(pin.node));
+            if let Some(target) = pin.target {
+                hasher.write_floats(&target.to_array());
+            }
+        }
+        hasher.write_floats(&[self.stability.limit.unwrap_or(-1.0), self.stability.travel]);
+    }
+}

@@ -1,0 +1,300 @@
+//! A body: nodes with mass, joined by springs.
+
+mod damping;
+mod definition;
+mod edit;
+mod hash;
+mod origin;
+mod pins;
+mod state;
+mod vectors;
+
+use glam::{DVec3, Vec3};
+
+pub(crate) use damping::NodeDamping;
+pub use definition::{BodyDefinition, Solver, Storage, Values};
+pub(crate) use definition::{Spring, finite_vector, not_negative};
+pub(crate) use origin::Bounds;
+pub(crate) use vectors::Vectors;
+
+use crate::contact::Contacts;
+use crate::diagnostics::{Energy, StorageReport};
+use crate::error::Result;
+use crate::memory;
+use crate::solver::Stability;
+use crate::springs::Packed;
+use origin::shift_towards;
+use pins::Pins;
+use state::State;
+
+/// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
+///
+/// Coordinates and indices are the caller's throughout.
+#[derive(Debug)]
+pub struct Body {
+    pub(crate) springs: Packed,
+    /// kg, 0 for nodes that are pinned for good.
+    pub(crate) masses: Vec<f32>,
+    /// 1/kg, 0 for nodes that are pinned.
+    pub(crate) inverse_masses: Vec<f32>,
+    pub(crate) damping: Option<NodeDamping>,
+    pub(crate) pins: Pins,
+    pub(crate) surface: Vec<[u32; 3]>,
+    pub(crate) state: State,
+    /// Where the coordinates of the state begin.
+    pub(crate) origin: DVec3,
+    /// Velocities at the time of the positions, for bodies whose springs have damping.
+    pub(crate) predicted_velocities: Option<Vectors>,
+    /// Forces from outside for the next step, N; kept from the first force on.
+    pub(crate) applied: Option<Vectors>,
+    pub(crate) contacts: Option<Contacts>,
+    pub(crate) stability: Stability,
+    /// The mean rest length of all springs, m; infinite where there are none.
+    pub(crate) mean_rest_length: f32,
+    rest_length_sum: f64,
+    /// Whether the state's forces belong to its positions and velocities.
+    forces_current: bool,
+    /// Whether `applied` holds anything.
+    forces_applied: bool,
+    /// Positions of a coarser step; kept only in worlds with a tolerance.
+    coarse: Option<Vectors>,
+    published_positions: Vec<Vec3>,
+    published_velocities: Vec<Vec3>,
+}
+
+/// What a world asks of its bodies.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Needs {
+    pub tolerance: bool,
+    /// 0: no contacts.
+    pub tools: usize,
+}
+
+impl Body {
+    pub(crate) fn new(definition: &BodyDefinition, needs: Needs) -> Result<Self> {
+        definition.check()?;
+        let node_count = definition.positions.len();
+        let springs = definition.resolved_springs()?;
+        let packed = Packed::new(node_count, &springs)?;
+        let rest_length_sum = springs.iter().map(|spring| f64::from(spring.rest_length)).sum();
+        let mut pins = Pins::default();
+        let mut masses = memory::reserved(node_count)?;
+        let mut inverse_masses = memory::reserved(node_count)?;
+        for node in 0..node_count {
+            let mass = definition.masses.get(node);
+            masses.push(mass);
+            inverse_masses.push(if mass > 0.0 { 1.0 / mass } else { 0.0 });
+            if mass == 0.0 {
+                pins.insert(node as u32)?;
+            }
+        }
+        let damping = if definition.node_dampings.all_zero() {
+            None
+        } else {
+            let mut rates = memory::reserved(node_count)?;
+            rates.extend((0..node_count).map(|node| definition.node_dampings.get(node) * inverse_masses[node]));
+            Some(NodeDamping::new(rates)?)
+        };
+        let surface = if definition.triangles.is_empty() {
+            crate::mesh::boundary(definition.tetrahedra)?
+        } else {
+            memory::copied(definition.triangles)?
+        };
+        let zeros = |wanted: bool| wanted.then(|| Vectors::zeros(node_count)).transpose();
+        let mut body = Self {
+            predicted_velocities: zeros(packed.damped())?,
+            coarse: zeros(needs.tolerance)?,
+            springs: packed,
+            masses,
+            inverse_masses,
+            damping,
+            pins,
+            surface,
+            state: State::new(node_count)?,
+            origin: DVec3::ZERO,
+            applied: None,
+            contacts: None,
+            stability: Stability::UNKNOWN,
+            mean_rest_length: f32::INFINITY,
+            rest_length_sum,
+            forces_current: false,
+            forces_applied: false,
+            published_positions: memory::filled(Vec3::ZERO, node_count)?,
+            published_velocities: memory::filled(Vec3::ZERO, node_count)?,
+        };
+        body.count_rest_lengths();
+        body.place(definition.positions);
+        if needs.tools > 0 {
+            body.make_contacts(needs.tools)?;
+        }
+        Ok(body)
+    }
+
+    /// How many nodes it has.
+    pub fn node_count(&self) -> usize {
+        self.masses.len()
+    }
+
+    /// Where each node is, in metres, in the caller's order.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.published_positions
+    }
+
+    /// How fast each node moves at the time of the positions, in m/s, in the caller's order; a pinned node moves as it
+    /// was led in the last step.
+    pub fn velocities(&self) -> &[Vec3] {
+        &self.published_velocities
+    }
+
+    /// The triangles that are drawn and touched, outward: those of its definition, or the boundary of its tetrahedra.
+    pub fn surface(&self) -> &[[u32; 3]] {
+        &self.surface
+    }
+
+    /// Its energy at the time of the positions.
+    pub fn energy(&self, gravity: Vec3) -> Energy {
+        Energy::of(self, gravity)
+    }
+
+    /// How much memory its springs take.
+    pub fn storage_report(&self) -> StorageReport {
+        let (bytes_used, bytes_reserved) = self.springs.bytes();
+        StorageReport {
+            node_count: self.node_count(),
+            spring_count: self.springs.spring_count(),
+            bytes_used,
+            bytes_reserved,
+        }
+    }
+
+    /// The box about all nodes, in its own coordinates.
+    pub(crate) fn bounds(&self) -> Bounds {
+        Bounds::of(self.state.positions().iter())
+    }
+
+    pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
+        match &mut self.contacts {
+            Some(contacts) => contacts.reserve(tools)?,
+            None => self.contacts = Some(Contacts::new(self.node_count(), &self.surface, tools)?),
+        }
+        Ok(())
+    }
+
+    /// Puts the nodes at these places, in the caller's coordinates.
+    fn place(&mut self, positions: &[Vec3]) {
+        self.origin = shift_towards(Bounds::of(positions.iter().copied()));
+        let local = self.state.positions_mut();
+        for (node, position) in positions.iter().enumerate() {
+            local.set(node, (position.as_dvec3() - self.origin).as_vec3());
+        }
+        self.published_positions.copy_from_slice(positions);
+        self.forces_current = false;
+        self.stability = Stability::UNKNOWN;
+        if let Some(contacts) = &mut self.contacts {
+            contacts.forget();
+        }
+    }
+
+    /// Makes sure that the state's forces belong to its positions and velocities.
+    pub(crate) fn refresh_forces(&mut self) {
+        if self.forces_current {
+            return;
+        }
+        let (positions, velocities, forces) = self.state.forces_mut();
+        for node in 0..positions.len() {
+            let force = if self.springs.damped() {
+                self.springs.damped_force(node, positions, velocities)
+            } else {
+                self.springs.force(node, positions)
+            };
+            forces.set(node, force);
+        }
+    }
+
+    /// Keeps the newest positions of the step in progress, for [`Body::difference_from_coarse`].
+    pub(crate) fn keep_coarse_positions(&mut self) {
+        if let Some(coarse) = &mut self.coarse {
+            coarse.copy_from(self.state.newest().0);
+        }
+    }
+
+    /// The longest way between a node's newest position and the one kept, m; infinite where one is not finite.
+    pub(crate) fn difference_from_coarse(&self) -> f32 {
+        let Some(coarse) = &self.coarse else {
+            return 0.0;
+        };
+        let newest = self.state.newest().0;
+        let largest = newest
+            .iter()
+            .zip(coarse.iter())
+            .fold(0.0_f32, |largest, (fine, coarse)| {
+                let square = fine.distance_squared(coarse);
+                if square <= largest { largest } else { square }
+            });
+        if largest.is_finite() {
+            largest.sqrt()
+        } else {
+            f32::INFINITY
+        }
+    }
+
+    /// Makes the step in progress, of `substeps` substeps, the current state.
+    pub(crate) fn commit(&mut self, substeps: u32, stability: Stability) {
+        self.state.commit();
+        self.stability = stability;
+        self.forces_current = true;
+        for pin in self.pins.iter_mut() {
+            pin.force = (pin.force_sum / f64::from(substeps)).as_vec3();
+        }
+        self.clear_pending();
+        self.publish();
+        self.follow();
+    }
+
+    /// Forgets the forces and the ways of pins that were meant for the last step.
+    pub(crate) fn clear_pending(&mut self) {
+        for pin in self.pins.iter_mut() {
+            pin.target = None;
+        }
+        if self.forces_applied
+            && let Some(applied) = &mut self.applied
+        {
+            applied.clear();
+        }
+        self.forces_applied = false;
+    }
+
+    fn publish(&mut self) {
+        for (published, local) in self.published_positions.iter_mut().zip(self.state.positions().iter()) {
+            *published = (local.as_dvec3() + self.origin).as_vec3();
+        }
+        for (published, velocity) in self.published_velocities.iter_mut().zip(self.state.velocities().iter()) {
+            *published = velocity;
+        }
+    }
+
+    /// Moves the origin of its coordinates after it.
+    fn follow(&mut self) {
+        let shift = shift_towards(self.bounds());
+        if shift == DVec3::ZERO {
+            return;
+        }
+        self.origin += shift;
+        let positions = self.state.positions_mut();
+        for node in 0..positions.len() {
+            positions.set(node, (positions.get(node).as_dvec3() - shift).as_vec3());
+        }
+        if let Some(contacts) = &mut self.contacts {
+            contacts.forget();
+        }
+    }
+
+    fn count_rest_lengths(&mut self) {
+        let count = self.springs.spring_count();
+        self.mean_rest_length = if count == 0 {
+            f32::INFINITY
+        } else {
+            (self.rest_length_sum / count as f64) as f32
+        };
+    }
+}

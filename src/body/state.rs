@@ -1,0 +1,138 @@
+//! What a step changes, kept so that a step that fails can be forgotten.
+
+use super::vectors::Vectors;
+use crate::error::Result;
+
+/// Positions, velocities and spring forces of all nodes, with room for a step in progress.
+///
+/// A step reads what is current and writes beside it; nothing is current before [`State::commit`]. Positions take three
+/// places, because a substep reads one and writes another while the first of the step must survive.
+#[derive(Debug)]
+pub(crate) struct State {
+    positions: [Vectors; 3],
+    velocities: [Vectors; 2],
+    forces: [Vectors; 2],
+    /// The place of the current positions.
+    current: usize,
+    /// The place of the newest positions of the step in progress.
+    latest: usize,
+    /// The place of the current velocities and forces.
+    settled: usize,
+}
+
+/// What a substep reads and writes.
+pub(crate) struct Substep<'a> {
+    /// Velocities and spring forces when the step began.
+    pub first_velocities: &'a Vectors,
+    pub first_forces: &'a Vectors,
+    /// Positions now.
+    pub positions: &'a Vectors,
+    /// Positions at the end of the substep.
+    pub next_positions: &'a mut Vectors,
+    /// Velocities, half a substep ahead of or behind the positions within a step.
+    pub velocities: &'a mut Vectors,
+    /// Where the last substep leaves its spring forces.
+    pub forces: &'a mut Vectors,
+}
+
+impl State {
+    pub fn new(node_count: usize) -> Result<Self> {
+        let zeros = || Vectors::zeros(node_count);
+        Ok(Self {
+            positions: [zeros()?, zeros()?, zeros()?],
+            velocities: [zeros()?, zeros()?],
+            forces: [zeros()?, zeros()?],
+            current: 0,
+            latest: 0,
+            settled: 0,
+        })
+    }
+
+    pub fn positions(&self) -> &Vectors {
+        &self.positions[self.current]
+    }
+
+    pub fn positions_mut(&mut self) -> &mut Vectors {
+        &mut self.positions[self.current]
+    }
+
+    pub fn velocities(&self) -> &Vectors {
+        &self.velocities[self.settled]
+    }
+
+    pub fn velocities_mut(&mut self) -> &mut Vectors {
+        &mut self.velocities[self.settled]
+    }
+
+    /// The spring forces at the current positions and velocities.
+    pub fn forces(&self) -> &Vectors {
+        &self.forces[self.settled]
+    }
+
+    /// Positions, velocities, and the spring forces to be written.
+    pub fn forces_mut(&mut self) -> (&Vectors, &Vectors, &mut Vectors) {
+        (
+            &self.positions[self.current],
+            &self.velocities[self.settled],
+            &mut self.forces[self.settled],
+        )
+    }
+
+    /// Starts a step over, from what is current.
+    pub fn begin(&mut self) {
+        self.latest = self.current;
+    }
+
+    pub fn substep(&mut self) -> Substep<'_> {
+        let next = self.next();
+        let [a, b, c] = &mut self.positions;
+        let (positions, next_positions) = match (self.latest, next) {
+            (0, 1) => (&*a, b),
+            (0, _) => (&*a, c),
+            (1, 0) => (&*b, a),
+            (1, _) => (&*b, c),
+            (_, 0) => (&*c, a),
+            _ => (&*c, b),
+        };
+        let [first_velocities, velocities] = current_and_next(&mut self.velocities, self.settled);
+        let [first_forces, forces] = current_and_next(&mut self.forces, self.settled);
+        Substep {
+            first_velocities,
+            first_forces,
+            positions,
+            next_positions,
+            velocities,
+            forces,
+        }
+    }
+
+    /// The positions just written become the newest of the step in progress.
+    pub fn advance(&mut self) {
+        self.latest = self.next();
+    }
+
+    /// The newest positions and velocities of the step in progress.
+    pub fn newest(&self) -> (&Vectors, &Vectors) {
+        (&self.positions[self.latest], &self.velocities[1 - self.settled])
+    }
+
+    /// Makes the step in progress the current state.
+    pub fn commit(&mut self) {
+        self.current = self.latest;
+        self.settled = 1 - self.settled;
+    }
+
+    /// The place that holds neither the first nor the newest positions of the step.
+    fn next(&self) -> usize {
+        if self.latest == self.current {
+            (self.current + 1) % 3
+        } else {
+            3 - self.current - self.latest
+        }
+    }
+}
+
+fn current_and_next(pair: &mut [Vectors; 2], current: usize) -> [&mut Vectors; 2] {
+    let [a, b] = pair;
+    if current == 0 { [a, b] } else { [b, a] }
+}

@@ -1,0 +1,178 @@
+//! Which features of a body are near a tool: a list that stays good while nothing has moved far.
+
+use glam::{DVec3, Vec3};
+
+use super::features::Features;
+use super::path::{Solid, ToolPath};
+use crate::body::{Bounds, Vectors};
+use crate::error::Result;
+use crate::memory;
+
+/// Features that can meet a tool before anything moves further than the slack that they were gathered with.
+///
+/// Being in the list has no other consequence than being looked at, so that results do not depend on when it is made.
+#[derive(Debug)]
+pub(super) struct Candidates {
+    near: Vec<u32>,
+    /// The room that the list covers, one for each tool.
+    zones: Vec<Zone>,
+    /// How far nodes may still move, m.
+    slack: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Zone {
+    /// About all that a tool sweeps, with the slack that nodes need.
+    Box { slot: usize, bounds: Bounds },
+    /// About what lies behind a plane that does not move.
+    Behind { slot: usize, point: Vec3, normal: Vec3 },
+    /// About what a moving plane sweeps.
+    Between {
+        slot: usize,
+        first: (Vec3, Vec3),
+        last: (Vec3, Vec3),
+    },
+}
+
+impl Candidates {
+    pub fn new(features: &Features) -> Result<Self> {
+        Ok(Self {
+            near: memory::reserved(features.count())?,
+            zones: Vec::new(),
+            slack: -1.0,
+        })
+    }
+
+    /// Makes room for `tools` tools.
+    pub fn reserve(&mut self, tools: usize) -> Result<()> {
+        self.zones.try_reserve(tools.saturating_sub(self.zones.len()))?;
+        Ok(())
+    }
+
+    pub fn near(&self) -> &[u32] {
+        &self.near
+    }
+
+    /// Forgets the list.
+    pub fn invalidate(&mut self) {
+        self.slack = -1.0;
+    }
+
+    /// Whether the list is good for these tools on their ways.
+    pub fn covers(&self, tools: &[ToolPath], origin: DVec3) -> bool {
+        tools.len() == self.zones.len()
+            && tools
+                .iter()
+                .zip(&self.zones)
+                .all(|(tool, zone)| match (*zone, Zone::of(tool, origin)) {
+                    (
+                        Zone::Box { slot, bounds },
+                        Zone::Box {
+                            slot: other,
+                            bounds: swept,
+                        },
+                    ) => slot == other && bounds.contains(&swept),
+                    (Zone::Between { .. }, _) => false,
+                    (zone, other) => zone == other,
+                })
+    }
+
+    /// Takes `distance` from the slack: whether the list is still good when the nodes have moved so far.
+    pub fn spend(&mut self, distance: f32) -> bool {
+        self.slack -= distance;
+        self.slack >= 0.0
+    }
+
+    /// Makes the list anew: all features that can come within `margin` of a tool while no node moves further than
+    /// `slack` and no tool leaves its way by more than `slack`.
+    pub fn gather(
+        &mut self,
+        features: &Features,
+        positions: &Vectors,
+        tools: &[ToolPath],
+        origin: DVec3,
+        margin: f32,
+        slack: f32,
+    ) {
+        self.near.clear();
+        self.zones.clear();
+        self.slack = slack;
+        for tool in tools {
+            self.zones.push(match Zone::of(tool, origin) {
+                Zone::Box { slot, bounds } => Zone::Box {
+                    slot,
+                    bounds: bounds.extended(slack),
+                },
+                plane => plane,
+            });
+        }
+        let reach = margin + slack;
+        let everything = Bounds::of(positions.iter());
+        if !self.zones.iter().any(|zone| zone.meets(&everything, reach)) {
+            return;
+        }
+        let boxes = self.zones.iter().any(|zone| matches!(zone, Zone::Box { .. }));
+        // Only nodes can be the first to meet a plane.
+        let count = if boxes {
+            features.count()
+        } else {
+            features.node_count as usize
+        };
+        for index in 0..count as u32 {
+            let feature = features.get(index);
+            let nodes = feature.nodes();
+            let bounds = Bounds::of(nodes.iter().map(|&node| positions.get(node as usize)));
+            let meets =
+                |zone: &Zone| (nodes.len() == 1 || matches!(zone, Zone::Box { .. })) && zone.meets(&bounds, reach);
+            if self.zones.iter().any(meets) {
+                self.near.push(index);
+            }
+        }
+    }
+}
+
+impl Zone {
+    fn of(tool: &ToolPath, origin: DVec3) -> Self {
+        if let Some(sweep) = tool.sweep(origin) {
+            return Zone::Box {
+                slot: tool.slot,
+                bounds: sweep.bounds,
+            };
+        }
+        let plane = |fraction: f64| match tool.solid_at(fraction, origin) {
+            Solid::HalfSpace { point, normal } => (point, normal),
+            Solid::Rounded { a, .. } => (a, Vec3::Y),
+        };
+        let (first, last) = (plane(0.0), plane(1.0));
+        if first == last {
+            Zone::Behind {
+                slot: tool.slot,
+                point: first.0,
+                normal: first.1,
+            }
+        } else {
+            Zone::Between {
+                slot: tool.slot,
+                first,
+                last,
+            }
+        }
+    }
+
+    /// Whether something within `bounds` may come into the zone when it moves by `reach`.
+    fn meets(&self, bounds: &Bounds, reach: f32) -> bool {
+        let behind = |point: Vec3, normal: Vec3| {
+            // The box's lowest corner against the plane.
+            let lowest = Vec3::select(normal.cmpge(Vec3::ZERO), bounds.min, bounds.max);
+            (lowest - point).dot(normal) <= reach
+        };
+        match *self {
+            Zone::Box { bounds: zone, .. } => zone.extended(reach).overlaps(bounds),
+            Zone::Behind { point, normal, .. } => behind(point, normal),
+            // A turning plane passes between its ends: nothing is ruled out.
+            Zone::Between { first, last, .. } => {
+                first.1 != last.1 || behind(first.0, first.1) || behind(last.0, last.1)
+            }
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! One contact: a node, edge or face that a tool does not let pass.
+
+use glam::Vec3;
+
+use super::features::Feature;
+use crate::body::Vectors;
+
+/// A contact over one substep.
+///
+/// The weighted velocity of its nodes along the normal is at least `least_speed`: so much that at the end of the substep
+/// they are clear of the tool. Across the normal Coulomb friction holds them to the tool's surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Constraint {
+    pub feature: Feature,
+    /// Weights of the feature's nodes, 1 in sum.
+    pub weights: [f32; 3],
+    /// Away from the tool, of unit length.
+    pub normal: Vec3,
+    least_speed: f32,
+    /// The tool's surface at the contact, m/s.
+    pub surface_velocity: Vec3,
+    /// From the tool's position to the contact, m.
+    pub arm: Vec3,
+    /// How deep the nodes were inside at the start, m; not above 0 where they were outside.
+    pub depth: f32,
+    pub friction: f32,
+    /// The tool's place among those near the body.
+    pub tool: usize,
+    /// The mass that an impulse at the contact moves, kg.
+    effective_mass: f32,
+    /// What it has given so far, N s, at least 0.
+    impulse: f32,
+    /// What friction has given so far, N s.
+    friction_impulse: Vec3,
+}
+
+impl Constraint {
+    /// A contact that has given nothing yet; `None` where all of its nodes are pinned.
+    pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, inverse_masses: &[f32]) -> Option<Self> {
+        let inverse_mass: f32 = feature
+            .nodes()
+            .iter()
+            .zip(weights)
+            .map(|(&node, weight)| inverse_masses[node as usize] * weight * weight)
+            .sum();
+        (inverse_mass > 0.0).then(|| Self {
+            feature,
+            weights,
+            normal,
+            least_speed: 0.0,
+            surface_velocity: Vec3::ZERO,
+            arm: Vec3::ZERO,
+            depth: 0.0,
+            friction: 0.0,
+            tool: 0,
+            effective_mass: 1.0 / inverse_mass,
+            impulse: 0.0,
+            friction_impulse: Vec3::ZERO,
+        })
+    }
+
+    /// Lets the nodes come closer to the tool's surface by `gap` within the substep, and no further; where they are
+    /// inside, not deeper.
+    pub fn allow_gap(&mut self, gap: f32, substep: f32) {
+        self.depth = -gap;
+        self.least_speed = self.surface_velocity.dot(self.normal) - gap.max(0.0) / substep;
+    }
+
+    /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
+    pub fn solve(&mut self, velocities: &mut Vectors, inverse_masses: &[f32]) -> f32 {
+        let velocity = self.velocity(velocities);
+        let missing = self.least_speed - velocity.dot(self.normal);
+        let impulse = (self.impulse + missing * self.effective_mass).max(0.0);
+        let change = impulse - self.impulse;
+        self.impulse = impulse;
+        let mut given = self.normal * change;
+        if self.friction > 0.0 {
+            let slip = (velocity - self.surface_velocity).reject_from_normalized(self.normal);
+            let wanted = self.friction_impulse - slip * self.effective_mass;
+            let friction = wanted.clamp_length_max(self.friction * impulse);
+            given += friction - self.friction_impulse;
+            self.friction_impulse = friction;
+        }
+        for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
+            let node = node as usize;
+            let velocity = velocities.get(node) + given * (weight * inverse_masses[node]);
+            velocities.set(node, velocity);
+        }
+        given.length() / self.effective_mass
+    }
+
+    /// What the tissue received, N s.
+    pub fn given(&self) -> Vec3 {
+        self.normal * self.impulse + self.friction_impulse
+    }
+
+    /// Moves the nodes out of the tool by `part` of how deep they were, without giving them speed.
+    pub fn push_out(&self, positions: &mut Vectors, inverse_masses: &[f32], part: f32) {
+        let push = self.normal * (self.depth * part * self.effective_mass);
+        for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
+            let node = node as usize;
+            let position = positions.get(node) + push * (weight * inverse_masses[node]);
+            positions.set(node, position);
+        }
+    }
+
+    fn velocity(&self, velocities: &Vectors) -> Vec3 {
+        self.feature
+            .nodes()
+            .iter()
+            .zip(self.weights)
+            .map(|(&node, weight)| velocities.get(node as usize) * weight)
+            .sum()
+    }
+}

@@ -1,0 +1,338 @@
+//! The contacts of one body with all tools, found and resolved in every substep.
+//!
+//! A contact acts on velocities: an impulse, never pulling, by which the body ends the substep clear of the tool (a
+//! speculative contact; sequential impulses, Catto 2005). Nothing is stored as a penalty, so that contact neither
+//! shortens the substep nor gives energy back, and the impulses are the tool's force.
+
+use glam::{DVec3, Vec3};
+
+use super::candidates::Candidates;
+use super::constraint::Constraint;
+use super::features::{Feature, Features};
+use super::path::{Motion, Solid, ToolPath};
+use super::sweep::{Corners, Segment};
+use crate::body::{Bounds, Vectors};
+use crate::error::Result;
+use crate::memory;
+
+/// Contacts that are solved together at most; what is beyond is solved once each.
+const TOGETHER: usize = 1 << 16;
+
+/// Sweeps over the contacts of a substep at most.
+const SWEEPS: u32 = 64;
+
+/// The sweeps end when the last changed velocities by less than this part of what the first did.
+const CONVERGED: f32 = 1e-4;
+
+/// The part of a depth that is taken back in one substep, where something began inside a tool.
+const PUSHED_OUT: f32 = 0.2;
+
+/// What a tool received from a body in the step in progress, N s and N m s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Load {
+    pub impulse: DVec3,
+    pub angular_impulse: DVec3,
+}
+
+/// The contacts of one body; kept only in worlds that have tools.
+#[derive(Debug)]
+pub(crate) struct Contacts {
+    features: Features,
+    candidates: Candidates,
+    constraints: Vec<Constraint>,
+    /// By the place of a tool among those of the step.
+    loads: Vec<Load>,
+    /// The box of all velocities that contacts gave in this substep.
+    given: Bounds,
+}
+
+/// One substep of a body near tools.
+pub(crate) struct Meeting<'a> {
+    pub tools: &'a [ToolPath],
+    /// Where the body's coordinates begin.
+    pub origin: DVec3,
+    /// The step, s.
+    pub dt: f32,
+    /// Fractions of the step at which the substep starts and ends.
+    pub start: f64,
+    pub end: f64,
+    /// s
+    pub substep: f32,
+    /// Whether positions change: not with the last half kick of a step.
+    pub drifts: bool,
+    /// No node is faster, m/s.
+    pub fastest: f32,
+    pub inverse_masses: &'a [f32],
+    pub positions: &'a Vectors,
+    pub velocities: &'a mut Vectors,
+    pub next_positions: &'a mut Vectors,
+}
+
+impl Contacts {
+    /// For a body with this surface, in a world with `tools` tools.
+    pub fn new(node_count: usize, surface: &[[u32; 3]], tools: usize) -> Result<Self> {
+        let features = Features::new(node_count, surface)?;
+        let mut contacts = Self {
+            candidates: Candidates::new(&features)?,
+            constraints: memory::reserved(features.count().min(TOGETHER))?,
+            features,
+            loads: Vec::new(),
+            given: Bounds::EMPTY,
+        };
+        contacts.reserve(tools)?;
+        Ok(contacts)
+    }
+
+    /// Makes room for `tools` tools.
+    pub fn reserve(&mut self, tools: usize) -> Result<()> {
+        self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
+        self.candidates.reserve(tools)
+    }
+
+    /// Starts a step over.
+    pub fn begin(&mut self, tools: &[ToolPath], origin: DVec3) {
+        self.loads.clear();
+        self.loads.resize(tools.len(), Load::default());
+        if !self.candidates.covers(tools, origin) {
+            self.candidates.invalidate();
+        }
+    }
+
+    /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
+    pub fn forget(&mut self) {
+        self.candidates.invalidate();
+    }
+
+    /// What each tool of the step received.
+    pub fn loads(&self) -> &[Load] {
+        &self.loads
+    }
+
+    /// The box of all velocities, given that of those before the contacts.
+    pub fn velocities(&self, before: Bounds) -> Bounds {
+        before.with(self.given.min).with(self.given.max)
+    }
+
+    /// Gives the impulses that keep the body out of the tools, and moves what they touch.
+    pub fn resolve(&mut self, mut meeting: Meeting) {
+        self.given = Bounds {
+            min: Vec3::ZERO,
+            max: Vec3::ZERO,
+        };
+        if meeting.tools.is_empty() {
+            return;
+        }
+        self.find_candidates(&meeting);
+        if self.candidates.near().is_empty() {
+            return;
+        }
+        self.constraints.clear();
+        for place in 0..meeting.tools.len() {
+            let tool = &meeting.tools[place];
+            let motion = tool.motion(meeting.start.min(1.0), meeting.end.min(1.0), meeting.dt, meeting.origin);
+            for candidate in 0..self.candidates.near().len() {
+                let feature = self.features.get(self.candidates.near()[candidate]);
+                self.touch(&mut meeting, place, &motion, feature);
+            }
+        }
+        self.solve(&mut meeting);
+    }
+
+    fn find_candidates(&mut self, meeting: &Meeting) {
+        let tool_speed = meeting
+            .tools
+            .iter()
+            .fold(0.0_f32, |speed, tool| speed.max(tool.speed(meeting.dt)));
+        let travel = meeting.substep * (meeting.fastest + tool_speed);
+        if self.candidates.spend(travel) {
+            return;
+        }
+        let bounds = Bounds::of(meeting.positions.iter());
+        let slack = (8.0 * travel).max(0.005 * (bounds.max - bounds.min).length());
+        self.candidates.gather(
+            &self.features,
+            meeting.positions,
+            meeting.tools,
+            meeting.origin,
+            meeting.substep * tool_speed,
+            slack,
+        );
+        self.candidates.spend(travel);
+    }
+
+    /// Adds the contacts of one feature with one tool.
+    fn touch(&mut self, meeting: &mut Meeting, tool: usize, motion: &Motion, feature: Feature) {
+        match motion.from {
+            Solid::HalfSpace { point, .. } => {
+                if feature.nodes().len() == 1 {
+                    let found = meet_plane(meeting, motion, feature, point);
+                    self.add(meeting, tool, found);
+                }
+            }
+            Solid::Rounded { .. } => {
+                let segment = motion.segment(meeting.substep, meeting.drifts);
+                if feature.nodes().len() == 3 && !segment.is_point() {
+                    for end in 0..2 {
+                        let found = meet_rounded(meeting, motion, feature, &segment.end(end));
+                        self.add(meeting, tool, found);
+                    }
+                } else {
+                    let found = meet_rounded(meeting, motion, feature, &segment);
+                    self.add(meeting, tool, found);
+                }
+            }
+        }
+    }
+
+    fn add(&mut self, meeting: &mut Meeting, tool: usize, found: Option<Constraint>) {
+        let Some(mut constraint) = found else {
+            return;
+        };
+        constraint.tool = tool;
+        if self.constraints.len() < self.constraints.capacity() {
+            self.constraints.push(constraint);
+        } else {
+            constraint.solve(meeting.velocities, meeting.inverse_masses);
+            self.settle(meeting, &constraint);
+        }
+    }
+
+    fn solve(&mut self, meeting: &mut Meeting) {
+        let mut first = 0.0_f32;
+        for sweep in 0..SWEEPS {
+            let mut largest = 0.0_f32;
+            for constraint in &mut self.constraints {
+                largest = largest.max(constraint.solve(meeting.velocities, meeting.inverse_masses));
+            }
+            if sweep == 0 {
+                first = largest;
+            }
+            if !(largest > CONVERGED * first) {
+                break;
+            }
+        }
+        for index in 0..self.constraints.len() {
+            let constraint = self.constraints[index];
+            self.settle(meeting, &constraint);
+        }
+        if meeting.drifts {
+            for constraint in &self.constraints {
+                if constraint.depth > 0.0 {
+                    constraint.push_out(meeting.next_positions, meeting.inverse_masses, PUSHED_OUT);
+                }
+            }
+        }
+    }
+
+    /// Adds what a contact gave to its tool's load, and moves its nodes.
+    fn settle(&mut self, meeting: &mut Meeting, constraint: &Constraint) {
+        let load = &mut self.loads[constraint.tool];
+        let received = -constraint.given().as_dvec3();
+        load.impulse += received;
+        load.angular_impulse += constraint.arm.as_dvec3().cross(received);
+        for &node in constraint.feature.nodes() {
+            let node = node as usize;
+            let velocity = meeting.velocities.get(node);
+            self.given = self.given.with(velocity);
+            if meeting.drifts && meeting.inverse_masses[node] > 0.0 {
+                let position = meeting.positions.get(node) + velocity * meeting.substep;
+                meeting.next_positions.set(node, position);
+            }
+        }
+    }
+}
+
+impl Motion {
+    /// The segment within a rounded tool over the substep; with the last half kick of a step as if it went on.
+    fn segment(&self, substep: f32, drifts: bool) -> Segment {
+        let (
+            Solid::Rounded { a, b, radius },
+            Solid::Rounded {
+                a: last_a, b: last_b, ..
+            },
+        ) = (self.from, self.to)
+        else {
+            return Segment {
+                ends: [Vec3::INFINITY; 2],
+                steps: [Vec3::ZERO; 2],
+                radius: 0.0,
+            };
+        };
+        let steps = if drifts {
+            [last_a - a, last_b - b]
+        } else {
+            [a, b].map(|end| self.velocity_at(end) * substep)
+        };
+        Segment {
+            ends: [a, b],
+            steps,
+            radius,
+        }
+    }
+
+    /// How fast the tool's matter at `point` moves, m/s.
+    fn velocity_at(&self, point: Vec3) -> Vec3 {
+        self.velocity + self.spin.cross(point - self.centre)
+    }
+}
+
+/// The contact of a node with a plane over the substep.
+fn meet_plane(meeting: &Meeting, motion: &Motion, feature: Feature, point: Vec3) -> Option<Constraint> {
+    let (Solid::HalfSpace { normal: first, .. }, Solid::HalfSpace { normal, .. }) = (motion.from, motion.to) else {
+        return None;
+    };
+    let node = feature.nodes()[0] as usize;
+    let position = meeting.positions.get(node);
+    let gap = (position - point).dot(first);
+    let foot = position - first * gap;
+    let surface_velocity = motion.velocity_at(foot);
+    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * meeting.substep;
+    let margin = surface_velocity.length() * meeting.substep;
+    if !(gap <= closing.max(0.0) + margin) {
+        return None;
+    }
+    let mut constraint = Constraint::new(feature, [1.0, 0.0, 0.0], normal, meeting.inverse_masses)?;
+    constraint.surface_velocity = surface_velocity;
+    constraint.arm = foot - motion.centre;
+    constraint.friction = motion.friction;
+    constraint.allow_gap(gap, meeting.substep);
+    Some(constraint)
+}
+
+/// The contact of a feature with a rounded tool over the substep.
+fn meet_rounded(meeting: &Meeting, motion: &Motion, feature: Feature, segment: &Segment) -> Option<Constraint> {
+    let mut corners = Corners {
+        points: [Vec3::ZERO; 3],
+        steps: [Vec3::ZERO; 3],
+        count: feature.nodes().len(),
+    };
+    for (corner, &node) in feature.nodes().iter().enumerate() {
+        corners.points[corner] = meeting.positions.get(node as usize);
+        corners.steps[corner] = meeting.velocities.get(node as usize) * meeting.substep;
+    }
+    let separation = corners.approach(segment, segment.travel())?;
+    if !separation.inside {
+        return None;
+    }
+    let step = segment.steps[0].lerp(segment.steps[1], separation.along);
+    let start = segment.ends[0].lerp(segment.ends[1], separation.along);
+    // A feature through the middle of the tool has no side of its own: it is carried ahead of the tool.
+    let normal = separation
+        .offset
+        .try_normalize()
+        .or_else(|| step.try_normalize())
+        .unwrap_or(Vec3::Y);
+    let mut constraint = Constraint::new(feature, separation.weights, normal, meeting.inverse_masses)?;
+    let matter: Vec3 = corners
+        .points
+        .iter()
+        .zip(separation.weights)
+        .map(|(point, weight)| *point * weight)
+        .sum();
+    let surface = normal * segment.radius;
+    constraint.surface_velocity = step / meeting.substep + motion.spin.cross(surface);
+    constraint.arm = start + step * if meeting.drifts { 1.0 } else { 0.0 } + surface - motion.centre;
+    constraint.friction = motion.friction;
+    constraint.allow_gap((matter - start).dot(normal) - segment.radius, meeting.substep);
+    Some(constraint)
+}

@@ -1,0 +1,137 @@
+//! When a moving node, edge or face first touches a moving rounded tool: conservative advancement.
+
+use glam::Vec3;
+
+use super::distance::{closest_of_segments, closest_on_segment, closest_on_triangle};
+
+/// A gap of this part of the tool's radius counts as touching.
+const TOUCHING: f32 = 1e-4;
+
+/// Advances of one search. A search that takes more grazes the tool, and ends where it is, still clear of it.
+const ADVANCES: u32 = 32;
+
+/// The corners of a node, edge or face over a substep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corners {
+    pub points: [Vec3; 3],
+    pub steps: [Vec3; 3],
+    pub count: usize,
+}
+
+/// The segment within a rounded tool over a substep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    pub ends: [Vec3; 2],
+    pub steps: [Vec3; 2],
+    pub radius: f32,
+}
+
+/// The closest points of a feature and a tool's segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Separation {
+    /// From the segment to the feature.
+    pub offset: Vec3,
+    /// The feature's point, as weights of its corners.
+    pub weights: [f32; 3],
+    /// The segment's point, 0 to 1.
+    pub along: f32,
+    /// Whether the feature's point lies within it, and not at its border, where a smaller feature is met instead.
+    pub inside: bool,
+}
+
+impl Segment {
+    /// One of its ends alone.
+    pub fn end(&self, index: usize) -> Self {
+        Self {
+            ends: [self.ends[index]; 2],
+            steps: [self.steps[index]; 2],
+            ..*self
+        }
+    }
+
+    pub fn is_point(&self) -> bool {
+        self.ends[0] == self.ends[1] && self.steps[0] == self.steps[1]
+    }
+
+    /// How far its ends go.
+    pub fn travel(&self) -> f32 {
+        self.steps[0].length().max(self.steps[1].length())
+    }
+}
+
+impl Corners {
+    /// The closest points at `time`, a fraction of the substep. A face is compared with the segment's first end alone:
+    /// its interior is closest to one of the ends, its border is the edges' concern.
+    pub fn separation(&self, segment: &Segment, time: f32) -> Separation {
+        let corner = |index: usize| self.points[index] + self.steps[index] * time;
+        let [a, b] = [0, 1].map(|end| segment.ends[end] + segment.steps[end] * time);
+        let within = |weight: f32| weight > 0.0 && weight < 1.0;
+        match self.count {
+            1 => {
+                let along = closest_on_segment(corner(0), a, b);
+                Separation {
+                    offset: corner(0) - a.lerp(b, along),
+                    weights: [1.0, 0.0, 0.0],
+                    along,
+                    inside: true,
+                }
+            }
+            2 => {
+                let (p, q) = (corner(0), corner(1));
+                let (on_edge, along) = closest_of_segments(p, q, a, b);
+                Separation {
+                    offset: p.lerp(q, on_edge) - a.lerp(b, along),
+                    weights: [1.0 - on_edge, on_edge, 0.0],
+                    along,
+                    inside: within(on_edge),
+                }
+            }
+            _ => {
+                let (p, q, r) = (corner(0), corner(1), corner(2));
+                let weights = closest_on_triangle(a, p, q, r);
+                Separation {
+                    offset: p * weights[0] + q * weights[1] + r * weights[2] - a,
+                    weights,
+                    along: 0.0,
+                    inside: weights.iter().all(|&weight| within(weight)),
+                }
+            }
+        }
+    }
+
+    /// How much closer they can come over the whole substep.
+    pub fn closing(&self, segment: &Segment) -> f32 {
+        let mut closing = 0.0_f32;
+        for step in &self.steps[..self.count] {
+            for end in &segment.steps {
+                closing = closing.max(step.distance_squared(*end));
+            }
+        }
+        closing.sqrt()
+    }
+
+    /// The separation when they first touch, or at the end of the substep where they do not; `None` where they stay
+    /// further apart than the radius and `margin`.
+    pub fn approach(&self, segment: &Segment, margin: f32) -> Option<Separation> {
+        let closing = self.closing(segment);
+        let mut separation = self.separation(segment, 0.0);
+        let mut gap = separation.offset.length() - segment.radius;
+        if !(gap <= closing + margin) {
+            return None;
+        }
+        let mut time = 0.0;
+        for _ in 0..ADVANCES {
+            if gap <= TOUCHING * segment.radius {
+                return Some(separation);
+            }
+            time += gap / closing;
+            if !(time < 1.0) {
+                let last = self.separation(segment, 1.0);
+                return (last.offset.length() - segment.radius <= margin).then_some(last);
+            }
+            separation = self.separation(segment, time);
+            gap = separation.offset.length() - segment.radius;
+        }
+        Some(separation)
+    }
+}

@@ -1,0 +1,26 @@
+//! A hash over everything that the next step depends on, to the bit.
+
+use xxhash_rust::xxh3::Xxh3Default;
+
+/// Adds up bits; equal states give equal hashes.
+pub(crate) struct StateHasher(Xxh3Default);
+
+impl StateHasher {
+    pub fn new() -> Self {
+        Self(Xxh3Default::new())
+    }
+
+    pub fn write_u64(&mut self, value: u64) {
+        self.0.update(&value.to_le_bytes());
+    }
+
+    pub fn write_floats(&mut self, values: &[f32]) {
+        for value in values {
+            self.0.update(&value.to_bits().to_le_bytes());
+        }
+    }
+
+    pub fn finish(&self) -> u64 {
+        self.0.digest()
+    }
+}

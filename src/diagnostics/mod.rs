@@ -1,0 +1,20 @@
+//! What a world says about itself: energy, memory, a hash of its state.
+
+mod energy;
+mod hash;
+
+pub use energy::Energy;
+pub(crate) use hash::StateHasher;
+
+/// How much memory the springs of a body take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StorageReport {
+    /// Nodes of the body.
+    pub node_count: usize,
+    /// Springs of the body, each counted once.
+    pub spring_count: usize,
+    /// Bytes taken by the springs that exist.
+    pub bytes_used: usize,
+    /// Bytes held from the allocator, with what is spare.
+    pub bytes_reserved: usize,
+}

@@ -1,0 +1,108 @@
+//! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
+
+use crate::error::{Error, Result};
+
+/// Things in places that are used again.
+#[derive(Debug)]
+pub(crate) struct Slots<T> {
+    slots: Vec<Slot<T>>,
+    /// What they are, for messages.
+    noun: &'static str,
+}
+
+#[derive(Debug)]
+struct Slot<T> {
+    /// How many things have lived here.
+    generation: u32,
+    content: Option<T>,
+}
+
+/// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct SlotId {
+    pub index1: u32,
+    pub generation: u32,
+}
+
+impl<T> Slots<T> {
+    pub fn new(noun: &'static str) -> Self {
+        Self {
+            slots: Vec::new(),
+            noun,
+        }
+    }
+
+    /// How many places there are, free ones too.
+    pub fn places(&self) -> usize {
+        self.slots.len()
+    }
+
+    pub fn insert(&mut self, content: T) -> Result<SlotId> {
+        let usable = |slot: &Slot<T>| slot.content.is_none() && slot.generation < u32::MAX;
+        let index = match self.slots.iter().position(usable) {
+            Some(index) => index,
+            None => {
+                self.slots.try_reserve(1)?;
+                self.slots.push(Slot {
+                    generation: 0,
+                    content: None,
+                });
+                self.slots.len() - 1
+            }
+        };
+        let slot = &mut self.slots[index];
+        slot.generation += 1;
+        slot.content = Some(content);
+        Ok(SlotId {
+            index1: index as u32 + 1,
+            generation: slot.generation,
+        })
+    }
+
+    pub fn remove(&mut self, id: SlotId) -> Result<T> {
+        let index = self.index(id)?;
+        self.slots[index].content.take().ok_or_else(|| stale(self.noun, id))
+    }
+
+    pub fn get(&self, id: SlotId) -> Result<&T> {
+        let index = self.index(id)?;
+        self.slots[index].content.as_ref().ok_or_else(|| stale(self.noun, id))
+    }
+
+    pub fn get_mut(&mut self, id: SlotId) -> Result<&mut T> {
+        let index = self.index(id)?;
+        let Slots { slots, noun } = self;
+        slots[index].content.as_mut().ok_or_else(|| stale(noun, id))
+    }
+
+    /// All that live, with their places.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &T)> {
+        self.slots
+            .iter()
+            .enumerate()
+            .filter_map(|(index, slot)| slot.content.as_ref().map(|content| (index, content)))
+    }
+
+    /// All that live, with their places.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
+        self.slots
+            .iter_mut()
+            .enumerate()
+            .filter_map(|(index, slot)| slot.content.as_mut().map(|content| (index, content)))
+    }
+
+    fn index(&self, id: SlotId) -> Result<usize> {
+        let index = (id.index1 as usize).wrapping_sub(1);
+        match self.slots.get(index) {
+            Some(slot) if slot.generation == id.generation && slot.content.is_some() => Ok(index),
+            _ => Err(stale(self.noun, id)),
+        }
+    }
+}
+
+fn stale(noun: &str, id: SlotId) -> Error {
+    Error::StaleId(format!(
+        "{noun} {{{}, {}}} does not exist, or no longer",
+        id.index1, id.generation
+    ))
+}

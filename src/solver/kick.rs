@@ -1,0 +1,49 @@
+//! What forces do to a velocity: the half kicks of leapfrog, with the damping of nodes solved exactly.
+
+use glam::Vec3;
+
+use crate::body::{NodeDamping, Vectors};
+
+/// The kicks of one substep.
+///
+/// A full kick is two half kicks with the same force, so that a step cut into several, or followed by another, moves
+/// as one long one would.
+pub(super) struct Kick<'a> {
+    pub substep: f32,
+    pub gravity: Vec3,
+    pub inverse_masses: &'a [f32],
+    pub applied: Option<&'a Vectors>,
+    pub damping: Option<&'a NodeDamping>,
+}
+
+impl Kick<'_> {
+    #[inline(always)]
+    pub fn half(&self, node: usize, velocity: Vec3, force: Vec3) -> Vec3 {
+        let acceleration = self.acceleration(node, force);
+        match self.damping {
+            None => velocity + acceleration * (0.5 * self.substep),
+            Some(damping) => velocity * damping.decay[node] + acceleration * damping.gain[node],
+        }
+    }
+
+    #[inline(always)]
+    pub fn full(&self, node: usize, velocity: Vec3, force: Vec3) -> Vec3 {
+        let acceleration = self.acceleration(node, force);
+        match self.damping {
+            None => velocity + acceleration * self.substep,
+            Some(damping) => {
+                let (decay, gain) = (damping.decay[node], damping.gain[node]);
+                velocity * (decay * decay) + acceleration * (gain * (1.0 + decay))
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn acceleration(&self, node: usize, force: Vec3) -> Vec3 {
+        let force = match self.applied {
+            None => force,
+            Some(applied) => force + applied.get(node),
+        };
+        force * self.inverse_masses[node] + self.gravity
+    }
+}
