@@ -1,6 +1,7 @@
 //! Soft tissue for programs that already have a loop.
 
 mod body;
+pub mod capi;
 mod contact;
 mod diagnostics;
 mod error;

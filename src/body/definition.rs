@@ -66,7 +66,7 @@ pub struct BodyDefinition<'a> {
     pub positions: &'a [Vec3],
     /// Where each node would be at rest, in metres; `None`: as in `positions`.
     pub rest_positions: Option<&'a [Vec3]>,
-    /// The mass of each node in kilograms; in [`Values::Each`] 0 pins a node for good.
+    /// The mass of each node in kilograms, above 0; in [`Values::Each`] 0 pins a node for good.
     pub masses: Values<'a>,
     /// Damping of each node against the world, in N s/m, at least 0.
     pub node_dampings: Values<'a>,
@@ -92,15 +92,15 @@ pub struct BodyDefinition<'a> {
 }
 
 impl Default for BodyDefinition<'_> {
-    /// No nodes yet; 1 g a node, 100 N/m a spring, no damping.
+    /// No nodes, masses or stiffnesses yet; no damping.
     fn default() -> Self {
         Self {
             positions: &[],
             rest_positions: None,
-            masses: Values::Uniform(0.001),
+            masses: Values::Uniform(0.0),
             node_dampings: Values::Uniform(0.0),
             springs: None,
-            stiffnesses: Values::Uniform(100.0),
+            stiffnesses: Values::Uniform(0.0),
             rest_lengths: None,
             spring_dampings: Values::Uniform(0.0),
             triangles: &[],

@@ -120,7 +120,7 @@ fn run_to_tolerance(body: &mut Body, request: &StepRequest, substeps: u32, stabi
             Run::TooLong(stable_substep) => return Outcome::Unstable { stable_substep },
         }
         let error = body.difference_from_coarse();
-        if !(error > request.tolerance) {
+        if error <= request.tolerance || error.is_infinite() {
             return finish(body, substeps, newest, error);
         }
     }

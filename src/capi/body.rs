@@ -1,0 +1,629 @@
+//! Bodies.
+
+use glam::Vec3;
+
+use super::guard::{guard, sinew_world, with_world, with_world_mut};
+use super::memory::{self, Versioned};
+use super::status::sinew_status;
+use crate::body::{Body, BodyDefinition, Solver, Storage, Values};
+use crate::error::{Error, Result};
+use crate::slots::SlotId;
+use crate::world::BodyId;
+
+/// A body: a plain value, all zero is "none".
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_body_id {
+    /// Which place, from 1.
+    pub index1: u32,
+    /// Which of the bodies that lived there.
+    pub generation: u32,
+}
+
+/// The default: laid out for the processor.
+pub const SINEW_STORAGE_PACKED: u32 = 0;
+/// A linked list per node, every link allocated on its own.
+pub const SINEW_STORAGE_EFFICIENT: u32 = 1;
+/// One array, springs_per_node places per node.
+pub const SINEW_STORAGE_FAST_LINK: u32 = 2;
+/// Per node, a chain of arrays of springs_per_node places.
+pub const SINEW_STORAGE_DYNAMIC_BULK: u32 = 3;
+
+/// Explicit, as many substeps as it needs to be stable.
+pub const SINEW_SOLVER_VERLET: u32 = 0;
+/// Stable at any step.
+pub const SINEW_SOLVER_IMPLICIT: u32 = 1;
+/// The accurate reference: converged implicit steps, slow.
+pub const SINEW_SOLVER_NEWTON: u32 = 2;
+
+/// What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_body_def {
+    /// Set by sinew_body_def_init.
+    pub struct_size: usize,
+    /// 3 node_count floats, m.
+    pub positions: *const f32,
+    /// Nullable: positions.
+    pub rest_positions: *const f32,
+    /// At least 1.
+    pub node_count: usize,
+    /// node_count floats, kg, 0: pinned for good; nullable: node_mass for all.
+    pub masses: *const f32,
+    /// node_count floats, N s/m: the gamma_i of m a = ... - gamma_i v; nullable: node_damping.
+    pub node_dampings: *const f32,
+    /// kg, above 0; no default.
+    pub node_mass: f32,
+    /// N s/m; default 0.
+    pub node_damping: f32,
+    /// 2 spring_count node indices, each pair once; NULL: the edges of triangles and tetrahedra, each once (then no
+    /// per-spring arrays); not NULL with spring_count 0: no springs.
+    pub springs: *const u32,
+    /// Springs given.
+    pub spring_count: usize,
+    /// spring_count floats, N/m; nullable: stiffness for all.
+    pub stiffnesses: *const f32,
+    /// spring_count floats, m; nullable: from the rest positions.
+    pub rest_lengths: *const f32,
+    /// spring_count floats, N s/m along the spring; nullable: spring_damping.
+    pub spring_dampings: *const f32,
+    /// N/m; default 0.
+    pub stiffness: f32,
+    /// N s/m; default 0.
+    pub spring_damping: f32,
+    /// 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra is what is
+    /// drawn and touched.
+    pub triangles: *const u32,
+    /// Triangles given.
+    pub triangle_count: usize,
+    /// 4 tetrahedron_count node indices; nullable.
+    pub tetrahedra: *const u32,
+    /// Tetrahedra given.
+    pub tetrahedron_count: usize,
+    /// SINEW_STORAGE_...
+    pub storage: u32,
+    /// Row width or chunk size; 0, the default: chosen from the springs given.
+    pub springs_per_node: u32,
+    /// SINEW_SOLVER_...
+    pub solver: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+/// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
+/// set_positions or set_velocities, the next change of topology of that body, or its end.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_vec3_view {
+    /// The first.
+    pub data: *const f32,
+    /// How many.
+    pub count: usize,
+    /// Bytes from one to the next.
+    pub stride: usize,
+}
+
+/// J, at the time of the positions.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_energy {
+    /// Set by the caller.
+    pub struct_size: usize,
+    /// Of the nodes that are free to move.
+    pub kinetic: f64,
+    /// Springs and every other inner term.
+    pub elastic: f64,
+    /// Zero at the origin.
+    pub gravitational: f64,
+}
+
+/// How much memory the springs of a body take.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_storage_report {
+    /// Set by the caller.
+    pub struct_size: usize,
+    /// Nodes of the body.
+    pub node_count: usize,
+    /// Each counted once.
+    pub spring_count: usize,
+    /// By springs that exist.
+    pub bytes_used: usize,
+    /// From the allocator, with what is spare.
+    pub bytes_reserved: usize,
+}
+
+// SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
+unsafe impl Versioned for sinew_body_def {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_body_def";
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_energy {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_energy";
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_storage_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_storage_report";
+}
+
+impl sinew_body_id {
+    fn id(self) -> BodyId {
+        BodyId(SlotId {
+            index1: self.index1,
+            generation: self.generation,
+        })
+    }
+}
+
+impl sinew_vec3_view {
+    fn of(vectors: &[Vec3]) -> Self {
+        Self {
+            data: vectors.as_ptr().cast(),
+            count: vectors.len(),
+            stride: size_of::<Vec3>(),
+        }
+    }
+}
+
+impl sinew_body_def {
+    fn defaults() -> Self {
+        Self {
+            struct_size: size_of::<Self>(),
+            positions: std::ptr::null(),
+            rest_positions: std::ptr::null(),
+            node_count: 0,
+            masses: std::ptr::null(),
+            node_dampings: std::ptr::null(),
+            node_mass: 0.0,
+            node_damping: 0.0,
+            springs: std::ptr::null(),
+            spring_count: 0,
+            stiffnesses: std::ptr::null(),
+            rest_lengths: std::ptr::null(),
+            spring_dampings: std::ptr::null(),
+            stiffness: 0.0,
+            spring_damping: 0.0,
+            triangles: std::ptr::null(),
+            triangle_count: 0,
+            tetrahedra: std::ptr::null(),
+            tetrahedron_count: 0,
+            storage: SINEW_STORAGE_PACKED,
+            springs_per_node: 0,
+            solver: SINEW_SOLVER_VERLET,
+            reserved: 0,
+        }
+    }
+
+    /// The definition with its arrays found.
+    ///
+    /// # Safety
+    /// Every array is NULL or has as many entries as the definition states.
+    unsafe fn definition<'a>(&self) -> Result<BodyDefinition<'a>> {
+        memory::reserved("reserved", self.reserved)?;
+        if self.springs.is_null() && self.spring_count > 0 {
+            return Err(Error::invalid(format!(
+                "springs is NULL while spring_count is {}",
+                self.spring_count
+            )));
+        }
+        let springs = self.spring_count;
+        let nodes = self.node_count;
+        // SAFETY: the same contract.
+        unsafe {
+            Ok(BodyDefinition {
+                positions: memory::array("positions", self.positions.cast(), nodes)?,
+                rest_positions: memory::optional_array("rest_positions", self.rest_positions.cast(), nodes)?,
+                masses: values("masses", self.masses, nodes, self.node_mass)?,
+                node_dampings: values("node_dampings", self.node_dampings, nodes, self.node_damping)?,
+                springs: memory::optional_array("springs", self.springs.cast(), springs)?,
+                stiffnesses: values("stiffnesses", self.stiffnesses, springs, self.stiffness)?,
+                rest_lengths: memory::optional_array("rest_lengths", self.rest_lengths, springs)?,
+                spring_dampings: values("spring_dampings", self.spring_dampings, springs, self.spring_damping)?,
+                triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
+                tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
+                storage: match self.storage {
+                    SINEW_STORAGE_PACKED => Storage::Packed,
+                    SINEW_STORAGE_EFFICIENT => Storage::Efficient,
+                    SINEW_STORAGE_FAST_LINK => Storage::FastLink,
+                    SINEW_STORAGE_DYNAMIC_BULK => Storage::DynamicBulk,
+                    unknown => return Err(Error::invalid(format!("storage is {unknown}: no SINEW_STORAGE_..."))),
+                },
+                springs_per_node: self.springs_per_node,
+                solver: match self.solver {
+                    SINEW_SOLVER_VERLET => Solver::Verlet,
+                    SINEW_SOLVER_IMPLICIT => Solver::Implicit,
+                    SINEW_SOLVER_NEWTON => Solver::Newton,
+                    unknown => return Err(Error::invalid(format!("solver is {unknown}: no SINEW_SOLVER_..."))),
+                },
+            })
+        }
+    }
+}
+
+/// The values of an array, or one for all where it is NULL.
+///
+/// # Safety
+/// As [`memory::array`].
+unsafe fn values<'a>(name: &str, pointer: *const f32, count: usize, uniform: f32) -> Result<Values<'a>> {
+    // SAFETY: the same contract.
+    let array = unsafe { memory::optional_array(name, pointer, count) }?;
+    Ok(array.map_or(Values::Uniform(uniform), Values::Each))
+}
+
+/// Runs `call` with a body to look at.
+///
+/// # Safety
+/// `world` is NULL or a world that nobody changes.
+unsafe fn with_body(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    call: impl FnOnce(&Body) -> Result<()>,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world(world, |world| call(world.body(body.id())?)) }
+}
+
+/// Runs `call` with a body to change.
+///
+/// # Safety
+/// `world` is NULL or a world that nobody else uses.
+unsafe fn with_body_mut(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    call: impl FnOnce(&mut Body) -> Result<()>,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world_mut(world, |world| call(world.body_mut(body.id())?)) }
+}
+
+/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_body_def).
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+///
+/// # Safety
+/// `def` is NULL or writable for `struct_size` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_def_init(def: *mut sinew_body_def, struct_size: usize) -> sinew_status {
+    // SAFETY: the same contract.
+    guard(|| unsafe { memory::initialise(def, struct_size, sinew_body_def::defaults()) })
+}
+
+/// Creates a body; copies what `def` points to.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a storage other than PACKED, a solver other than
+/// VERLET), SINEW_STATUS_OUT_OF_MEMORY.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
+/// the lengths that it states; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_create(
+    world: *mut sinew_world,
+    def: *const sinew_body_def,
+    out: *mut sinew_body_id,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let out = memory::output("out", out)?;
+            let def = memory::definition("def", def, sinew_body_def::defaults())?;
+            let BodyId(id) = world.create_body(&def.definition()?)?;
+            *out = sinew_body_id {
+                index1: id.index1,
+                generation: id.generation,
+            };
+            Ok(())
+        })
+    }
+}
+
+/// Destroys a body. Views of its positions and velocities end.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world_mut(world, |world| world.destroy_body(body.id())) }
+}
+
+/// Adds `force`, 3 floats, N, to what acts on a node: constant over the whole next step, cleared when that is
+/// SINEW_STATUS_OK; nothing on a pinned node.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `force` is NULL or 3 floats.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_apply_force(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    node: u32,
+    force: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.apply_force(node, memory::vector("force", force)?)
+        })
+    }
+}
+
+/// Adds a force to what acts on each of `count` nodes, as sinew_body_apply_force does: `nodes` are `count` indices, of
+/// which some may be equal, `forces` 3 `count` floats, N. Both may be NULL where `count` is 0.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then no force is added.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_apply_forces(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    forces: *const f32,
+    count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            let nodes = memory::array("nodes", nodes, count)?;
+            body.apply_forces(nodes, memory::array("forces", forces.cast(), count)?)
+        })
+    }
+}
+
+/// Writes a view of where each node is, m. Nothing is copied; see sinew_vec3_view for how long it lives.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_positions(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut sinew_vec3_view,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = sinew_vec3_view::of(body.positions());
+            Ok(())
+        })
+    }
+}
+
+/// Writes a view of how fast each node moves at the time of the positions, m/s; a pinned node as it was led in the last
+/// step. Nothing is copied; see sinew_vec3_view for how long it lives.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_velocities(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut sinew_vec3_view,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = sinew_vec3_view::of(body.velocities());
+            Ok(())
+        })
+    }
+}
+
+/// Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is swept.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `positions` is NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_positions(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    positions: *const f32,
+    node_count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.set_positions(memory::array("positions", positions.cast(), node_count)?)
+        })
+    }
+}
+
+/// Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `velocities` is NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_velocities(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    velocities: *const f32,
+    node_count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.set_velocities(memory::array("velocities", velocities.cast(), node_count)?)
+        })
+    }
+}
+
+/// Holds a node where it is, from now on; nothing where it is held already.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_body_id, node: u32) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_body_mut(world, body, |body| body.pin(node)) }
+}
+
+/// Lets go of a node, which goes on as it was led in the last step; nothing where it is not held.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_body_id, node: u32) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_body_mut(world, body, |body| body.unpin(node)) }
+}
+
+/// Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_move_pin(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    node: u32,
+    position: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.move_pin(node, memory::vector("position", position)?)
+        })
+    }
+}
+
+/// Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_pin_force(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    node: u32,
+    force: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("force", force.cast::<[f32; 3]>())? = body.pin_force(node)?.to_array();
+            Ok(())
+        })
+    }
+}
+
+/// Joins two nodes by a spring without damping: `stiffness` in N/m, `rest_length` in m, below 0: the current distance.
+/// One spring per pair.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the pair has a spring), SINEW_STATUS_STALE_ID,
+/// SINEW_STATUS_OUT_OF_MEMORY.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_add_spring(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    a: u32,
+    b: u32,
+    stiffness: f32,
+    rest_length: f32,
+) -> sinew_status {
+    // Only a number can mean the current distance: NaN and -infinity are refused as lengths.
+    let current = rest_length < 0.0 && rest_length.is_finite();
+    let rest_length = (!current).then_some(rest_length);
+    // SAFETY: the same contract.
+    unsafe { with_body_mut(world, body, |body| body.add_spring(a, b, stiffness, rest_length)) }
+}
+
+/// Removes the spring between two nodes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where there is none), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_remove_spring(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    a: u32,
+    b: u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_body_mut(world, body, |body| body.remove_spring(a, b)) }
+}
+
+/// Writes the energy of a body. `out->struct_size` is set by the caller.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_energy(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut sinew_energy,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let energy = world.body(body.id())?.energy(world.gravity());
+            memory::report("out", out)?.fill(sinew_energy {
+                struct_size: size_of::<sinew_energy>(),
+                kinetic: energy.kinetic,
+                elastic: energy.elastic,
+                gravitational: energy.gravitational,
+            });
+            Ok(())
+        })
+    }
+}
+
+/// Writes how much memory the springs of a body take. `out->struct_size` is set by the caller.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_storage_report(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut sinew_storage_report,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let report = body.storage_report();
+            memory::report("out", out)?.fill(sinew_storage_report {
+                struct_size: size_of::<sinew_storage_report>(),
+                node_count: report.node_count,
+                spring_count: report.spring_count,
+                bytes_used: report.bytes_used,
+                bytes_reserved: report.bytes_reserved,
+            });
+            Ok(())
+        })
+    }
+}

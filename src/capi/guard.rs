@@ -1,0 +1,138 @@
+//! The border that no panic crosses.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::status::{SINEW_STATUS_OK, fail, sinew_status};
+use crate::error::{Error, Result};
+use crate::world::World;
+
+/// A world: bodies and tools that are stepped together.
+///
+/// As `const sinew_world *` it may be used by any number of threads at once; as `sinew_world *` by one, with nobody else
+/// inside.
+pub struct sinew_world {
+    world: World,
+    /// Set by a fault inside the library; what the world holds is not to be trusted then.
+    faulty: AtomicBool,
+}
+
+impl sinew_world {
+    pub(super) fn new(world: World) -> Self {
+        Self {
+            world,
+            faulty: AtomicBool::new(false),
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.faulty.load(Ordering::Acquire) {
+            return Err(Error::Internal(
+                "the world met a fault inside the library earlier: it can only be destroyed".into(),
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Runs `call`; a panic becomes an error, and every error a status with its message kept.
+pub(super) fn guard(call: impl FnOnce() -> Result<()>) -> sinew_status {
+    match caught(call) {
+        Ok(()) => SINEW_STATUS_OK,
+        Err(error) => fail(error),
+    }
+}
+
+/// Runs `call` with a world to look at.
+///
+/// # Safety
+/// `world` is NULL or a world that is not destroyed, and that nobody changes meanwhile.
+pub(super) unsafe fn with_world(world: *const sinew_world, call: impl FnOnce(&World) -> Result<()>) -> sinew_status {
+    // SAFETY: the caller vouches for the world where the pointer is not NULL.
+    let Some(handle) = (unsafe { world.as_ref() }) else {
+        return fail(Error::invalid("world is NULL"));
+    };
+    guard(|| {
+        handle.check()?;
+        watched(&handle.faulty, || call(&handle.world))
+    })
+}
+
+/// Runs `call` with a world to change.
+///
+/// # Safety
+/// `world` is NULL or a world that is not destroyed, and that nobody else uses meanwhile.
+pub(super) unsafe fn with_world_mut(
+    world: *mut sinew_world,
+    call: impl FnOnce(&mut World) -> Result<()>,
+) -> sinew_status {
+    // SAFETY: the caller vouches for the world where the pointer is not NULL.
+    let Some(handle) = (unsafe { world.as_mut() }) else {
+        return fail(Error::invalid("world is NULL"));
+    };
+    guard(|| {
+        handle.check()?;
+        watched(&handle.faulty, || call(&mut handle.world))
+    })
+}
+
+/// Runs `call` and marks the world faulty where it panics.
+fn watched(faulty: &AtomicBool, call: impl FnOnce() -> Result<()>) -> Result<()> {
+    let result = caught(call);
+    if matches!(result, Err(Error::Internal(_))) {
+        faulty.store(true, Ordering::Release);
+    }
+    result
+}
+
+fn caught(call: impl FnOnce() -> Result<()>) -> Result<()> {
+    // What a panic leaves half done is inside a world, which is marked faulty and never looked at again.
+    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|panic| {
+        let reason = panic
+            .downcast_ref::<&str>()
+            .copied()
+            .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+            .unwrap_or("no reason given");
+        Err(Error::Internal(format!("a fault inside the library: {reason}")))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::status::{SINEW_STATUS_INTERNAL, SINEW_STATUS_INVALID_ARGUMENT};
+    use super::super::world::{
+        sinew_world_create, sinew_world_destroy, sinew_world_get_state_hash, sinew_world_set_gravity, sinew_world_step,
+    };
+    use super::*;
+
+    #[test]
+    fn after_a_fault_a_world_refuses_everything_but_its_end() {
+        let mut world = std::ptr::null_mut();
+        // SAFETY: pointers to live variables throughout, and a world used before its end alone.
+        unsafe {
+            assert_eq!(sinew_world_create(std::ptr::null(), &mut world), SINEW_STATUS_OK);
+            let status = with_world_mut(world, |_| panic!("on purpose"));
+            assert_eq!(status, SINEW_STATUS_INTERNAL);
+            assert_eq!(
+                sinew_world_step(world, 0.01, std::ptr::null_mut()),
+                SINEW_STATUS_INTERNAL
+            );
+            assert_eq!(sinew_world_set_gravity(world, [0.0; 3].as_ptr()), SINEW_STATUS_INTERNAL);
+            let mut hash = 7;
+            assert_eq!(sinew_world_get_state_hash(world, &mut hash), SINEW_STATUS_INTERNAL);
+            assert_eq!(hash, 7);
+            sinew_world_destroy(world);
+
+            assert_eq!(sinew_world_create(std::ptr::null(), &mut world), SINEW_STATUS_OK);
+            let status = with_world(world, |_| panic!("on purpose, while others look too"));
+            assert_eq!(status, SINEW_STATUS_INTERNAL);
+            assert_eq!(
+                sinew_world_step(world, 0.01, std::ptr::null_mut()),
+                SINEW_STATUS_INTERNAL
+            );
+            sinew_world_destroy(world);
+        }
+        assert_eq!(guard(|| panic!("outside any world")), SINEW_STATUS_INTERNAL);
+        assert_eq!(guard(|| Err(Error::invalid("no"))), SINEW_STATUS_INVALID_ARGUMENT);
+    }
+}

@@ -1,0 +1,246 @@
+//! What crosses the border as a pointer: checked, and turned into references and slices.
+
+use std::ffi::CStr;
+
+use glam::Vec3;
+use libc::c_char;
+
+use crate::error::{Error, Result};
+
+/// A struct that begins with `struct_size`, so that it can grow.
+///
+/// # Safety
+/// The type is `repr(C)`, begins with a `usize` named `struct_size`, has no padding that is read, and every pattern of
+/// bits is a value of it.
+pub(super) unsafe trait Versioned: Copy {
+    /// The sizes that earlier headers gave it, and today's last.
+    const SIZES: &'static [usize];
+    /// Its name in the header.
+    const NAME: &'static str;
+}
+
+/// The value that `pointer` points to.
+///
+/// # Safety
+/// `pointer` is NULL or points to a valid `T` that nobody changes meanwhile.
+pub(super) unsafe fn reference<'a, T>(name: &str, pointer: *const T) -> Result<&'a T> {
+    // SAFETY: the caller vouches for a valid T where the pointer is not NULL.
+    unsafe { pointer.as_ref() }.ok_or_else(|| null(name))
+}
+
+/// The place for a result.
+///
+/// # Safety
+/// `pointer` is NULL or points to a valid `T` that nobody else uses meanwhile.
+pub(super) unsafe fn output<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T> {
+    // SAFETY: the caller vouches for a valid T where the pointer is not NULL.
+    unsafe { pointer.as_mut() }.ok_or_else(|| null(name))
+}
+
+/// The array of `count` values that `pointer` points to; NULL is allowed where `count` is 0.
+///
+/// # Safety
+/// `pointer` is NULL or points to `count` values that nobody changes meanwhile.
+pub(super) unsafe fn array<'a, T>(name: &str, pointer: *const T, count: usize) -> Result<&'a [T]> {
+    if pointer.is_null() {
+        return if count == 0 { Ok(&[]) } else { Err(null(name)) };
+    }
+    if !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>().max(1) {
+        return Err(Error::invalid(format!("{name} is no array of {count} entries")));
+    }
+    // SAFETY: not NULL, aligned, of a size that exists; the caller vouches for its content.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// An array that may be left out altogether.
+///
+/// # Safety
+/// As [`array`].
+pub(super) unsafe fn optional_array<'a, T>(name: &str, pointer: *const T, count: usize) -> Result<Option<&'a [T]>> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the same contract.
+    unsafe { array(name, pointer, count) }.map(Some)
+}
+
+/// The 3 floats that `pointer` points to.
+///
+/// # Safety
+/// `pointer` is NULL or points to 3 floats that nobody changes meanwhile.
+pub(super) unsafe fn vector(name: &str, pointer: *const f32) -> Result<Vec3> {
+    // SAFETY: the same contract.
+    unsafe { reference(name, pointer.cast::<[f32; 3]>()) }.map(|&vector| vector.into())
+}
+
+/// The text that `pointer` points to.
+///
+/// # Safety
+/// `pointer` is NULL or points to bytes that end with NUL.
+pub(super) unsafe fn text<'a>(name: &str, pointer: *const c_char) -> Result<&'a str> {
+    if pointer.is_null() {
+        return Err(null(name));
+    }
+    // SAFETY: not NULL; the caller vouches for the NUL at its end.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    text.to_str()
+        .map_err(|error| Error::invalid(format!("{name} is not UTF-8: {error}")))
+}
+
+/// The definition that `pointer` points to, in the size of whatever header the caller was built with; what that header
+/// did not know is as in `defaults`.
+///
+/// # Safety
+/// `pointer` is NULL or points to a T of the size that its `struct_size` states.
+pub(super) unsafe fn definition<T: Versioned>(name: &str, pointer: *const T, defaults: T) -> Result<T> {
+    if pointer.is_null() {
+        return Err(null(name));
+    }
+    // SAFETY: `struct_size` is the first field of every `Versioned`.
+    let size = unsafe { pointer.cast::<usize>().read_unaligned() };
+    known_size::<T>(size)?;
+    let mut definition = defaults;
+    // SAFETY: `size` bytes are there, and fit into T: no known size is larger.
+    unsafe {
+        std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut definition).cast::<u8>(), size);
+    }
+    Ok(definition)
+}
+
+/// Fills the definition at `pointer` with `defaults`, as much of it as `size` says the caller knows.
+///
+/// # Safety
+/// `pointer` is NULL or points to `size` writable bytes.
+pub(super) unsafe fn initialise<T: Versioned>(pointer: *mut T, size: usize, mut defaults: T) -> Result<()> {
+    if pointer.is_null() {
+        return Err(null("def"));
+    }
+    known_size::<T>(size)?;
+    // SAFETY: `struct_size` is the first field of every `Versioned`.
+    unsafe { (&raw mut defaults).cast::<usize>().write(size) };
+    // SAFETY: the caller vouches for `size` bytes, and T has as many: no known size is larger.
+    unsafe { std::ptr::copy_nonoverlapping((&raw const defaults).cast::<u8>(), pointer.cast::<u8>(), size) };
+    Ok(())
+}
+
+/// A result struct of the caller's, found to be usable.
+pub(super) struct Report<T> {
+    pointer: *mut T,
+    size: usize,
+}
+
+/// The result struct at `pointer`, whose `struct_size` the caller has set.
+///
+/// # Safety
+/// `pointer` is NULL or points to as many writable bytes as its `struct_size` states.
+pub(super) unsafe fn report<T: Versioned>(name: &str, pointer: *mut T) -> Result<Report<T>> {
+    if pointer.is_null() {
+        return Err(null(name));
+    }
+    // SAFETY: `struct_size` is the first field of every `Versioned`.
+    let size = unsafe { pointer.cast::<usize>().read_unaligned() };
+    let oldest = T::SIZES[0];
+    if size < oldest {
+        return Err(Error::invalid(format!(
+            "{name}: struct_size is {size}: a {} has at least {oldest} bytes",
+            T::NAME
+        )));
+    }
+    Ok(Report { pointer, size })
+}
+
+impl<T: Versioned> Report<T> {
+    /// Fills what both sides know, and leaves `struct_size` as it is.
+    ///
+    /// # Safety
+    /// The struct is still there.
+    pub unsafe fn fill(&self, mut value: T) {
+        // SAFETY: `struct_size` is the first field of every `Versioned`.
+        unsafe { (&raw mut value).cast::<usize>().write(self.size) };
+        let bytes = self.size.min(size_of::<T>());
+        // SAFETY: the caller vouches for `size` bytes, and the value has at least as many as are copied.
+        unsafe { std::ptr::copy_nonoverlapping((&raw const value).cast::<u8>(), self.pointer.cast::<u8>(), bytes) };
+    }
+}
+
+fn known_size<T: Versioned>(size: usize) -> Result<()> {
+    if T::SIZES.contains(&size) {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "struct_size is {size}: this library knows a {} of {:?} bytes",
+        T::NAME,
+        T::SIZES
+    )))
+}
+
+fn null(name: &str) -> Error {
+    Error::invalid(format!("{name} is NULL"))
+}
+
+/// Refuses a reserved field that is not zero.
+pub(super) fn reserved(name: &str, value: u32) -> Result<()> {
+    if value == 0 {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is {value}: reserved fields are 0")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[repr(C)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Grown {
+        struct_size: usize,
+        old: u64,
+        new: u64,
+    }
+
+    // SAFETY: repr(C), no padding, begins with struct_size.
+    unsafe impl Versioned for Grown {
+        const SIZES: &'static [usize] = &[16, 24];
+        const NAME: &'static str = "grown";
+    }
+
+    const DEFAULTS: Grown = Grown {
+        struct_size: 24,
+        old: 1,
+        new: 2,
+    };
+
+    #[test]
+    fn an_older_definition_gets_defaults_for_what_it_does_not_know() {
+        let given = [16_usize, 7, 99];
+        // SAFETY: 24 bytes are there.
+        let read = unsafe { definition("def", given.as_ptr().cast(), DEFAULTS) };
+        assert_eq!(read.map(|read| (read.old, read.new)), Ok((7, 2)));
+        for unknown in [0, 8, 20, 32] {
+            let given = [unknown, 7, 99, 99];
+            // SAFETY: 32 bytes are there.
+            assert!(unsafe { definition("def", given.as_ptr().cast(), DEFAULTS) }.is_err());
+        }
+    }
+
+    #[test]
+    fn nothing_is_written_beyond_the_size_the_caller_knows() {
+        let mut place = [0_usize, 0, 99];
+        // SAFETY: 24 bytes are there.
+        unsafe { initialise(place.as_mut_ptr().cast(), 16, DEFAULTS) }.expect("a known size");
+        assert_eq!(place, [16, 1, 99]);
+        // SAFETY: 24 bytes are there.
+        unsafe {
+            let report = report::<Grown>("out", place.as_mut_ptr().cast()).expect("a known size");
+            report.fill(Grown { old: 5, ..DEFAULTS });
+        }
+        assert_eq!(place, [16, 5, 99]);
+        let mut newer = [40_usize, 0, 0, 99, 99];
+        // SAFETY: 40 bytes are there.
+        unsafe {
+            let report = report::<Grown>("out", newer.as_mut_ptr().cast()).expect("a newer size");
+            report.fill(DEFAULTS);
+        }
+        assert_eq!(newer, [40, 1, 2, 99, 99]);
+    }
+}

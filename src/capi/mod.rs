@@ -1,0 +1,15 @@
+//! The C interface: a thin room in front of the Rust one, and the only one that sees raw pointers.
+//!
+//! `include/sinew.h` is generated from here. Every function checks its pointers, catches what might panic, and writes
+//! its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).
+#![allow(unsafe_code)]
+#![allow(non_camel_case_types)]
+
+pub mod body;
+mod guard;
+mod memory;
+// mesh
+// picture
+pub mod status;
+pub mod tool;
+pub mod world;
