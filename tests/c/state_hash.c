@@ -60,7 +60,7 @@ static void set_up(void)
 
 static void what_is_seen(void)
 {
-    const float up[3] = {0, 1, 0}, turned[4] = {0, 1, 0, 0}, weak[3] = {0, -1, 0};
+    const float up[3] = {0, 1, 0}, over[3] = {0, 2, 0}, turned[4] = {0, 1, 0, 0}, weak[3] = {0, -1, 0};
     const sinew_body_def def = square();
     const uint32_t node = 1;
     sinew_body_id second;
@@ -73,8 +73,8 @@ static void what_is_seen(void)
     SEEN(sinew_body_unpin(world, body, 0));
     SEEN(sinew_body_add_spring(world, body, 0, 2, 10.0f, -1.0f));
     SEEN(sinew_body_remove_spring(world, body, 0, 2));
-    SEEN(sinew_tool_set_pose(world, tool, up, NULL));
-    SEEN(sinew_tool_set_pose(world, tool, up, turned));
+    SEEN(sinew_tool_set_pose(world, tool, over, NULL));
+    SEEN(sinew_tool_set_pose(world, tool, over, turned));
     SEEN(sinew_world_set_gravity(world, weak));
     SEEN(sinew_world_step(world, 0.01f, NULL));
     SEEN(sinew_body_create(world, &def, &second));
