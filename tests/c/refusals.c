@@ -190,6 +190,8 @@ static void bodies_springs_and_elements(void)
     BODY_INDICES(triangles, 12);
     BODY_INDICES(tetrahedra, 4);
     BODY(INVALID, "springs", def.springs = renumbered(def.springs, 10, 9, 1));
+    PLAIN_BODY(INVALID, "triangles", def.triangles = renumbered(def.triangles, 12, 1, 0));
+    PLAIN_BODY(INVALID, "tetrahedra", def.tetrahedra = renumbered(def.tetrahedra, 4, 3, 0));
     BODY(INVALID, "springs", def.springs = doubled_springs);
     BODY(INVALID, "springs", def.springs = reversed_springs);
     BODY_FLOATS(stiffnesses, 5, OR_NEGATIVE);
@@ -285,6 +287,8 @@ static void pins(void)
     REFUSES_NO_NODE("node", sinew_body_move_pin(the.world, the.body, node, fine));
     REFUSES_NO_NODE("node", sinew_body_get_pin_force(the.world, the.body, node, out.force));
     REFUSED(INVALID, "node", sinew_body_move_pin(the.world, the.body, 8, fine));
+    REFUSED(INVALID, "node", sinew_body_get_pin_force(the.world, the.body, 8, out.force));
+    REFUSED(INVALID, "node", sinew_body_unpin(the.world, the.body, 2)); /* without mass: pinned for good */
     REFUSED(INVALID, "position", sinew_body_move_pin(the.world, the.body, 0, NULL));
     REFUSED(INVALID, "force", sinew_body_get_pin_force(the.world, the.body, 0, NULL));
     for (i = 0; i < NOT_FINITE; i++)

@@ -17,7 +17,7 @@ enum { BAD_IDS = 6 };
 /* The world that nothing may change: a cloth in motion, a tool, and a force and a pose that wait for the next step. */
 static struct {
     sinew_world *world;
-    sinew_body_id body;             /* a cloth of 9 nodes; 0 is pinned, 8 is not; 0 and 1 are joined, 0 and 8 are not */
+    sinew_body_id body;             /* a cloth of 9 nodes; 0 is pinned, 2 has no mass, 8 is free; 0 and 1 are joined, 0 and 8 are not */
     sinew_tool_id tool;
     sinew_body_id bad_bodies[BAD_IDS];
     sinew_tool_id bad_tools[BAD_IDS];
@@ -180,13 +180,14 @@ static inline const uint32_t *renumbered(const uint32_t *array, size_t count, si
 static inline sinew_body_id a_cloth(void)
 {
     static const float positions[] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 0, 0, 1, 1, 0, 1, 2, 0, 1, 0, 0, 2, 1, 0, 2, 2, 0, 2};
+    static const float masses[] = {0.1f, 0.1f, 0, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f};
     static const uint32_t triangles[] = {0, 3, 1, 1, 3, 4, 1, 4, 2, 2, 4, 5, 3, 6, 4, 4, 6, 7, 4, 7, 5, 5, 7, 8};
     sinew_body_def def;
     sinew_body_id body = {0, 0};
     MUST(sinew_body_def_init(&def, sizeof def));
     def.positions = positions;
     def.node_count = 9;
-    def.node_mass = 0.1f;
+    def.masses = masses;
     def.stiffness = 20.0f;
     def.triangles = triangles;
     def.triangle_count = 8;
