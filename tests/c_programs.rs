@@ -1,0 +1,236 @@
+//! The header and the library as C and C++ programs meet them: every program of `tests/c` compiled as both, linked to
+//! the shared and to the static library, and run; the examples compiled; then under sanitizers and valgrind.
+#![cfg(target_os = "linux")]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use support::{Library, installed, root, skip, succeed};
+
+const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
+
+/// A compiler that is installed, for one language.
+struct Compiler {
+    name: &'static str,
+    /// As `-x` names it.
+    language: &'static str,
+}
+
+const ALL_COMPILERS: [Compiler; 4] = [
+    Compiler {
+        name: "gcc",
+        language: "c",
+    },
+    Compiler {
+        name: "g++",
+        language: "c++",
+    },
+    Compiler {
+        name: "clang",
+        language: "c",
+    },
+    Compiler {
+        name: "clang++",
+        language: "c++",
+    },
+];
+
+impl Compiler {
+    fn installed() -> impl Iterator<Item = &'static Compiler> {
+        ALL_COMPILERS.iter().filter(|compiler| {
+            let there = installed(compiler.name);
+            if !there {
+                skip(&format!("{}, which is not installed", compiler.name));
+            }
+            there
+        })
+    }
+
+    /// All the standards that the header promises.
+    fn standards(&self) -> &'static [&'static str] {
+        match self.language {
+            "c" => &["c99", "c11", "c17"],
+            _ => &["c++11", "c++14", "c++17", "c++20"],
+        }
+    }
+
+    /// The standard that the programs are written in.
+    fn standard(&self) -> &'static str {
+        match self.language {
+            "c" => "c99",
+            _ => "c++17",
+        }
+    }
+
+    /// Compiles a program and links it; where it ends up.
+    fn build(&self, source: &Path, link: Link, options: &[&str]) -> PathBuf {
+        let stem = source.file_stem().expect("a file").to_string_lossy();
+        let kind = options
+            .first()
+            .map_or("", |option| option.trim_start_matches("-fsanitize="));
+        let program = Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join(format!("{stem}-{}-{link:?}{kind}", self.name));
+        let mut command = Command::new(self.name);
+        command
+            .arg(format!("-std={}", self.standard()))
+            .args(WARNINGS)
+            .args(["-O1", "-g", "-pthread"])
+            .args(options)
+            .arg(format!("-DEXPECTED_VERSION={}", version()))
+            .arg("-I")
+            .arg(root().join("include"))
+            .args(["-x", self.language])
+            .arg(source)
+            .args(["-x", "none", "-o"])
+            .arg(&program);
+        let library = Library::get();
+        match link {
+            Link::Shared => command
+                .arg(library.shared())
+                .arg(format!("-Wl,-rpath,{}", library.folder.display())),
+            Link::Static => command
+                .arg(library.archive())
+                .args(&library.native_libraries),
+        };
+        succeed(command.arg("-lm"));
+        program
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Link {
+    Shared,
+    Static,
+}
+
+/// The version of the crate as `sinew_version` gives it.
+fn version() -> u32 {
+    let part = |text: &str| text.parse::<u32>().expect("a number");
+    part(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+        | part(env!("CARGO_PKG_VERSION_MINOR")) << 8
+        | part(env!("CARGO_PKG_VERSION_PATCH"))
+}
+
+/// The C programs of a folder, in the order of their names.
+fn sources(folder: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(root().join(folder)) else {
+        return Vec::new();
+    };
+    let mut sources: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("a folder can be read").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "c"))
+        .collect();
+    sources.sort();
+    sources
+}
+
+/// A program that finds its library by its own path alone: cargo puts older builds on the loader's.
+fn run(command: &mut Command) {
+    succeed(
+        command
+            .env_remove("LD_LIBRARY_PATH")
+            .current_dir(env!("CARGO_TARGET_TMPDIR")),
+    );
+}
+
+fn every_program_runs(link: Link) {
+    let programs = sources("tests/c");
+    assert!(!programs.is_empty(), "there are programs in tests/c");
+    for compiler in Compiler::installed() {
+        for source in &programs {
+            run(&mut Command::new(compiler.build(source, link, &[])));
+        }
+    }
+}
+
+#[test]
+fn programs_run_with_the_shared_library() {
+    every_program_runs(Link::Shared);
+}
+
+#[test]
+fn programs_run_with_the_static_library() {
+    every_program_runs(Link::Static);
+}
+
+#[test]
+fn the_examples_compile_as_c_and_as_cxx() {
+    for compiler in Compiler::installed() {
+        for source in sources("c_examples") {
+            compiler.build(&source, Link::Shared, &[]);
+            compiler.build(&source, Link::Static, &[]);
+        }
+    }
+}
+
+#[test]
+fn the_header_stands_alone_in_every_standard() {
+    let alone = Path::new(env!("CARGO_TARGET_TMPDIR")).join("alone.c");
+    std::fs::write(&alone, "#include \"sinew.h\"\n#include \"sinew.h\"\n")
+        .expect("a file can be written");
+    for compiler in Compiler::installed() {
+        for standard in compiler.standards() {
+            succeed(
+                Command::new(compiler.name)
+                    .arg(format!("-std={standard}"))
+                    .args(WARNINGS)
+                    .arg("-fsyntax-only")
+                    .arg("-I")
+                    .arg(root().join("include"))
+                    .args(["-x", compiler.language])
+                    .arg(&alone),
+            );
+        }
+    }
+}
+
+/// Whether the compiler's address and undefined-behaviour sanitizers are there and work.
+fn sanitizers_work(compiler: &Compiler, options: &[&str]) -> bool {
+    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nothing.c");
+    let program = source.with_extension("out");
+    std::fs::write(&source, "int main(void) { return 0; }\n").expect("a file can be written");
+    let built = Command::new(compiler.name)
+        .args(options)
+        .arg(&source)
+        .arg("-o")
+        .arg(&program)
+        .output();
+    built.is_ok_and(|output| output.status.success())
+        && Command::new(&program)
+            .output()
+            .is_ok_and(|output| output.status.success())
+}
+
+#[test]
+fn sanitizers_find_nothing() {
+    let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler, &options))
+    else {
+        return skip("the sanitizers, which no compiler here has");
+    };
+    for source in sources("tests/c") {
+        run(&mut Command::new(compiler.build(
+            &source,
+            Link::Shared,
+            &options,
+        )));
+    }
+}
+
+#[test]
+fn valgrind_finds_nothing() {
+    if !installed("valgrind") {
+        return skip("valgrind, which is not installed");
+    }
+    let Some(compiler) = Compiler::installed().next() else {
+        return;
+    };
+    for source in sources("tests/c") {
+        let program = compiler.build(&source, Link::Shared, &["-gdwarf-4"]);
+        run(Command::new("valgrind")
+            .args(["--quiet", "--leak-check=full", "--error-exitcode=9"])
+            .arg(program));
+    }
+}

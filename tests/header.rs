@@ -1,0 +1,81 @@
+//! `include/sinew.h` is what cbindgen makes of `src/capi`, and says the version of the crate.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn committed() -> String {
+    fs::read_to_string(root().join("include/sinew.h")).expect("include/sinew.h")
+}
+
+/// The header made anew, in memory. Only `src/capi` is read, so no constant of another room slips in.
+fn generated() -> String {
+    let config = cbindgen::Config::from_file(root().join("cbindgen.toml")).expect("cbindgen.toml");
+    let bindings = cbindgen::Builder::new()
+        .with_config(config)
+        .with_src(root().join("src/capi/mod.rs"))
+        .generate()
+        .expect("cbindgen reads src/capi");
+    let mut header = Vec::new();
+    bindings.write(&mut header);
+    String::from_utf8(header).expect("the header is UTF-8")
+}
+
+/// What follows each `#define`, but for the include guard.
+fn defines(header: &str) -> impl Iterator<Item = (&str, &str)> {
+    header
+        .lines()
+        .filter_map(|line| line.strip_prefix("#define "))
+        .filter(|rest| *rest != "SINEW_H")
+        .map(|rest| rest.split_once(' ').unwrap_or((rest, "")))
+}
+
+#[test]
+fn the_committed_header_is_the_generated_one() {
+    let header = generated();
+    let place = root().join("include/sinew.h");
+    if std::env::var_os("SINEW_WRITE_HEADER").is_some() {
+        fs::create_dir_all(root().join("include")).expect("include/ can be made");
+        fs::write(&place, &header).expect("include/sinew.h can be written");
+    }
+    if fs::read_to_string(&place).ok().as_deref() == Some(header.as_str()) {
+        return;
+    }
+    let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join("sinew.h");
+    fs::write(&fresh, &header).expect("the target directory can be written");
+    panic!(
+        "include/sinew.h is not what src/capi declares. The new one is {}; to take it over:\n\
+         SINEW_WRITE_HEADER=1 cargo test --test header",
+        fresh.display()
+    );
+}
+
+#[test]
+fn the_version_macros_are_the_crates_version() {
+    let header = committed();
+    let value_of = |name: &str| {
+        let mut values = defines(&header).filter(|(define, _)| *define == name);
+        let (_, value) = values.next().unwrap_or_else(|| panic!("no {name}"));
+        assert_eq!(values.next(), None, "{name} is defined twice");
+        value.trim().to_owned()
+    };
+    for (name, expected) in [
+        ("SINEW_VERSION_MAJOR", env!("CARGO_PKG_VERSION_MAJOR")),
+        ("SINEW_VERSION_MINOR", env!("CARGO_PKG_VERSION_MINOR")),
+        ("SINEW_VERSION_PATCH", env!("CARGO_PKG_VERSION_PATCH")),
+    ] {
+        assert_eq!(value_of(name), expected, "{name}");
+    }
+}
+
+#[test]
+fn every_macro_carries_the_prefix() {
+    let header = committed();
+    assert!(defines(&header).count() > 20, "the constants are there");
+    for (name, _) in defines(&header) {
+        assert!(name.starts_with("SINEW_"), "{name} is not ours to define");
+    }
+}

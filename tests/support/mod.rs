@@ -1,0 +1,96 @@
+//! What the tests of the C interface share: the library as it is delivered, and how programs beside cargo are run.
+
+#![allow(dead_code, reason = "every test takes a part of it")]
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The crate's own folder.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Says past the test harness's capture, so that it is seen, what was not tested.
+pub fn skip(what: &str) {
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {what}");
+}
+
+/// Whether a program can be run here.
+pub fn installed(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok()
+}
+
+/// A command that must succeed; its output.
+pub fn succeed(command: &mut Command) -> Output {
+    let output = command
+        .output()
+        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(
+        output.status.success(),
+        "{command:?}: {}\n{}{}",
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    output
+}
+
+/// The release build of the library.
+pub struct Library {
+    /// The folder that holds it under all its names.
+    pub folder: PathBuf,
+    /// What a program linked to the static library needs beside it.
+    pub native_libraries: Vec<String>,
+}
+
+impl Library {
+    /// Built once, in a folder of its own: what `cargo test` leaves in `target/<profile>` may be of another build.
+    pub fn get() -> &'static Self {
+        static LIBRARY: OnceLock<Library> = OnceLock::new();
+        LIBRARY.get_or_init(Self::build)
+    }
+
+    /// The shared library.
+    pub fn shared(&self) -> PathBuf {
+        self.folder.join("libsinew.so")
+    }
+
+    /// The static library.
+    pub fn archive(&self) -> PathBuf {
+        self.folder.join("libsinew.a")
+    }
+
+    fn build() -> Self {
+        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("library");
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let output = succeed(
+            Command::new(cargo)
+                .args(["rustc", "--release", "--lib", "--target-dir"])
+                .arg(&target)
+                .args(["--", "--print", "native-static-libs"])
+                .current_dir(root()),
+        );
+        let said = String::from_utf8_lossy(&output.stderr);
+        let native_libraries = said
+            .lines()
+            .find_map(|line| line.split_once("native-static-libs: "))
+            .unwrap_or_else(|| panic!("rustc names the native libraries:\n{said}"))
+            .1
+            .split_whitespace()
+            .map(str::to_owned)
+            .collect();
+        let folder = target.join("release");
+        #[cfg(unix)]
+        {
+            let named = folder.join("libsinew.so.0.1");
+            let _ = std::fs::remove_file(&named);
+            std::os::unix::fs::symlink("libsinew.so", &named).expect("a link beside the library");
+        }
+        Self {
+            folder,
+            native_libraries,
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! What the shared library shows to a linker: exactly the functions of the header, under its versioned name.
+#![cfg(target_os = "linux")]
+
+mod support;
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use support::{Library, installed, root, skip, succeed};
+
+/// The functions that the header declares: every `sinew_...(` outside a comment.
+fn declared() -> BTreeSet<String> {
+    let header = std::fs::read_to_string(root().join("include/sinew.h")).expect("include/sinew.h");
+    let mut code = String::new();
+    let mut rest = header.as_str();
+    while let Some((before, after)) = rest.split_once("/*") {
+        code.push_str(before);
+        rest = after.split_once("*/").expect("comments end").1;
+    }
+    code.push_str(rest);
+    code.lines()
+        .filter(|line| !line.starts_with('#'))
+        .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
+        .map(str::to_owned)
+        .collect()
+}
+
+fn exported() -> BTreeSet<String> {
+    let output = succeed(
+        Command::new("nm")
+            .args(["-D", "--defined-only", "--format=posix"])
+            .arg(Library::get().shared()),
+    );
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn the_exported_symbols_are_the_headers_functions() {
+    if !installed("nm") {
+        return skip("the exported symbols: nm is not installed");
+    }
+    let (declared, exported) = (declared(), exported());
+    assert!(
+        declared.contains("sinew_world_step"),
+        "the header was read: {declared:?}"
+    );
+    let missing: Vec<_> = declared.difference(&exported).collect();
+    let unknown: Vec<_> = exported.difference(&declared).collect();
+    assert!(missing.is_empty(), "declared and not exported: {missing:?}");
+    assert!(unknown.is_empty(), "exported and not declared: {unknown:?}");
+    for name in &exported {
+        assert!(name.starts_with("sinew_"), "{name} has not the prefix");
+    }
+}
+
+#[test]
+fn the_static_library_defines_the_same_functions() {
+    if !installed("nm") {
+        return skip("the static library's symbols: nm is not installed");
+    }
+    let output = succeed(
+        Command::new("nm")
+            .args(["--defined-only", "--extern-only", "--format=posix"])
+            .arg(Library::get().archive()),
+    );
+    let defined: BTreeSet<String> = String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| name.starts_with("sinew_"))
+        .map(str::to_owned)
+        .collect();
+    assert_eq!(defined, declared());
+}
+
+#[test]
+fn the_shared_library_is_called_by_its_version() {
+    if !installed("readelf") {
+        return skip("the soname: readelf is not installed");
+    }
+    let output = succeed(
+        Command::new("readelf")
+            .arg("-d")
+            .arg(Library::get().shared()),
+    );
+    let said = String::from_utf8_lossy(&output.stdout);
+    let soname = said
+        .lines()
+        .find(|line| line.contains("SONAME"))
+        .and_then(|line| line.split(['[', ']']).nth(1));
+    let expected = concat!(
+        "libsinew.so.",
+        env!("CARGO_PKG_VERSION_MAJOR"),
+        ".",
+        env!("CARGO_PKG_VERSION_MINOR")
+    );
+    assert_eq!(soname, Some(expected));
+}
