@@ -1,10 +1,21 @@
-//! Meshes: topology, shapes, files.
+//! Meshes: topology, tidying, shapes, files.
+//!
+//! [`load`] reads a file, [`Mesh::cloth`], [`Mesh::block`] and [`Mesh::organ`] make a shape, and [`tidy`] cleans a mesh
+//! that is already in memory.
 
+mod file;
+mod organ;
+mod shapes;
+mod tidy;
 mod topology;
 
-pub use topology::{boundary, edges, is_closed};
+use glam::{DVec3, Vec3};
 
-use glam::Vec3;
+use crate::{Error, Result};
+
+pub use file::{MeshFormat, load};
+pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
+pub use topology::{boundary, edges, is_closed};
 
 /// Nodes joined by triangles, tetrahedra or both. Positions in metres; triangles outward by the right-hand rule.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,4 +26,105 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Four node indices each.
     pub tetrahedra: Vec<[u32; 4]>,
+}
+
+impl Mesh {
+    /// Whether the mesh can be used at all: every position finite, every index that of a node.
+    ///
+    /// Errors: [`Error::InvalidArgument`] naming the first node, triangle or tetrahedron that is not.
+    pub fn check(&self) -> Result<()> {
+        let node_count = self.positions.len();
+        // The last index is kept for "no node".
+        if node_count > NO_NODE as usize {
+            return Err(Error::invalid(format!(
+                "{node_count} nodes: at most {NO_NODE} are possible"
+            )));
+        }
+        if let Some(node) = self.positions.iter().position(|p| !p.is_finite()) {
+            let position = self.positions[node];
+            return Err(Error::invalid(format!(
+                "the position of node {node} is {position}"
+            )));
+        }
+        check_indices("triangle", &self.triangles, node_count)?;
+        check_indices("tetrahedron", &self.tetrahedra, node_count)
+    }
+
+    /// Every edge of the triangles and tetrahedra once: see [`edges`].
+    pub fn edges(&self) -> Result<Vec<[u32; 2]>> {
+        edges(&self.triangles, &self.tetrahedra)
+    }
+
+    /// The surface, outward: the [`boundary`] of the tetrahedra; without tetrahedra, the triangles.
+    ///
+    /// Errors: [`Error::OutOfMemory`].
+    pub fn surface(&self) -> Result<Vec<[u32; 3]>> {
+        if !self.tetrahedra.is_empty() {
+            return boundary(&self.tetrahedra);
+        }
+        let mut surface = Vec::new();
+        surface.try_reserve_exact(self.triangles.len())?;
+        surface.extend_from_slice(&self.triangles);
+        Ok(surface)
+    }
+
+    /// The volume in m³: that of the tetrahedra, those inside out counting as negative; without tetrahedra, what the
+    /// triangles enclose, negative if they face inward and without meaning if they are not closed.
+    ///
+    /// Errors: [`Error::InvalidArgument`] where [`Mesh::check`] gives it.
+    pub fn volume(&self) -> Result<f64> {
+        self.check()?;
+        if !self.tetrahedra.is_empty() {
+            let volumes = self.tetrahedra.iter().map(|&t| self.corners(t));
+            return Ok(volumes.map(tetrahedron_volume).sum());
+        }
+        // Seen from a point of the mesh rather than from the origin, a body far away loses no digits.
+        let apex = self.positions.first().map_or(DVec3::ZERO, |p| p.as_dvec3());
+        let cones = self.triangles.iter().map(|&t| self.corners(t));
+        Ok(cones
+            .map(|[a, b, c]| tetrahedron_volume([apex, a, b, c]))
+            .sum())
+    }
+
+    /// Where the nodes of an element are; the mesh has been checked.
+    fn corners<const N: usize>(&self, element: [u32; N]) -> [DVec3; N] {
+        element.map(|node| self.positions[node as usize].as_dvec3())
+    }
+}
+
+/// The volume of a tetrahedron: positive if `b`, `c`, `d` turn counter-clockwise seen from outside, `a` behind them.
+fn tetrahedron_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
+    (b - a).dot((c - a).cross(d - a)) / 6.0
+}
+
+fn check_indices<const N: usize>(
+    what: &str,
+    elements: &[[u32; N]],
+    node_count: usize,
+) -> Result<()> {
+    for (i, element) in elements.iter().enumerate() {
+        if let Some(node) = element.iter().find(|&&node| node as usize >= node_count) {
+            return Err(Error::invalid(format!(
+                "{what} {i} names node {node}; there are {node_count}"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// `push` that fails instead of aborting when memory runs out.
+fn try_push<T>(list: &mut Vec<T>, item: T) -> Result<()> {
+    if list.len() == list.capacity() {
+        list.try_reserve(1)?;
+    }
+    list.push(item);
+    Ok(())
+}
+
+/// `count` copies of `value`, reserved fallibly.
+fn try_filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>> {
+    let mut list = Vec::new();
+    list.try_reserve_exact(count)?;
+    list.resize(count, value);
+    Ok(list)
 }

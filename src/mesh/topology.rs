@@ -24,7 +24,9 @@ pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32
 
     let mut edges = Vec::new();
     edges.try_reserve_exact(packed.len())?;
-    let unpacked = packed.iter().map(|&edge| [(edge >> 32) as u32, edge as u32]);
+    let unpacked = packed
+        .iter()
+        .map(|&edge| [(edge >> 32) as u32, edge as u32]);
     edges.extend(unpacked.filter(|[a, b]| a != b));
     Ok(edges)
 }
@@ -46,8 +48,7 @@ pub fn boundary(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
     let mut once = Vec::new();
     for same in faces.chunk_by(|a, b| a.0 == b.0) {
         if let [(_, face)] = same {
-            once.try_reserve(1)?;
-            once.push(*face);
+            super::try_push(&mut once, *face)?;
         }
     }
     once.sort_unstable();

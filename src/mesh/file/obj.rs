@@ -1,0 +1,132 @@
+//! Wavefront OBJ.
+//!
+//! Read here rather than by a crate because the vertices must keep their numbers, a fault its line, and a malformed file
+//! must never panic.
+
+use glam::DVec3;
+
+use super::scanner::{Scanner, parse, shown};
+use super::{RawMesh, check_vertex_count};
+use crate::Result;
+use crate::mesh::try_push;
+
+/// Statements that say nothing about points, triangles, lines: looks, groups, smooth surfaces.
+const IGNORED: [&str; 34] = [
+    "vn",
+    "vt",
+    "vp",
+    "g",
+    "o",
+    "s",
+    "mg",
+    "usemtl",
+    "mtllib",
+    "usemap",
+    "maplib",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "shadow_obj",
+    "trace_obj",
+    "ctech",
+    "stech",
+    "cstype",
+    "deg",
+    "bmat",
+    "step",
+    "curv",
+    "curv2",
+    "surf",
+    "parm",
+    "trim",
+    "hole",
+    "scrv",
+    "sp",
+    "end",
+    "con",
+    "call",
+];
+
+pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
+    let mut raw = RawMesh::default();
+    // A face may come before its vertices: the largest corner and its place are checked at the end.
+    let mut largest = None;
+    let mut words = Vec::new();
+    let mut corners = Vec::new();
+    while scanner.remaining() > 0 {
+        let place = next_statement(scanner, &mut words)?;
+        let fail = |message: String| scanner.fail_at(place, message);
+        match words.as_slice() {
+            [] => {}
+            [b"v", x, y, z, ..] => {
+                let mut vertex = [0.0; 3];
+                for (coordinate, word) in vertex.iter_mut().zip([x, y, z]) {
+                    *coordinate = parse(word)
+                        .filter(|number: &f64| number.is_finite())
+                        .ok_or_else(|| fail(format!("{} is no finite number", shown(word))))?;
+                }
+                try_push(&mut raw.vertices, DVec3::from(vertex))?;
+                check_vertex_count(scanner, raw.vertices.len())?;
+            }
+            [b"v", ..] => return Err(fail("a vertex needs x, y and z".into())),
+            [b"f", words @ ..] if words.len() >= 3 => {
+                corners.clear();
+                for word in words {
+                    let corner = corner(word, raw.vertices.len())
+                        .ok_or_else(|| fail(format!("{} names no vertex", shown(word))))?;
+                    largest = largest.max(Some((corner, place)));
+                    try_push(&mut corners, corner)?;
+                }
+                raw.add_polygon(&corners)?;
+            }
+            [b"f", ..] => return Err(fail("a face needs three corners".into())),
+            [b"l" | b"p", ..] => raw.ignored_cells += 1,
+            [word, ..] if IGNORED.iter().any(|name| name.as_bytes() == *word) => {}
+            [word, ..] => return Err(fail(format!("{} is no statement", shown(word)))),
+        }
+    }
+    match (largest, raw.vertices.len()) {
+        (Some((corner, place)), count) if corner as usize >= count => Err(scanner.fail_at(
+            place,
+            format!(
+                "vertex {} is not there: there are {count}",
+                corner as u64 + 1
+            ),
+        )),
+        _ => Ok(raw),
+    }
+}
+
+/// Gathers the words of the next statement: a line, or several where each but the last ends in a backslash. Returns its
+/// place.
+fn next_statement<'a>(scanner: &mut Scanner<'a>, words: &mut Vec<&'a [u8]>) -> Result<usize> {
+    words.clear();
+    let mut place = None;
+    loop {
+        let line = scanner.line();
+        let place = *place.get_or_insert(scanner.place());
+        let text = line.split(|&byte| byte == b'#').next().unwrap_or(line);
+        let continued = text.trim_ascii_end().strip_suffix(b"\\");
+        let text = continued.unwrap_or(text);
+        for word in text.split(u8::is_ascii_whitespace) {
+            if !word.is_empty() {
+                try_push(words, word)?;
+            }
+        }
+        if continued.is_none() || scanner.remaining() == 0 {
+            return Ok(place);
+        }
+    }
+}
+
+/// The vertex of a face's corner, `v`, `v/vt`, `v//vn` or `v/vt/vn`: from 1 on, or backwards from -1, the latest.
+fn corner(word: &[u8], vertex_count: usize) -> Option<u32> {
+    let number: i64 = parse(word.split(|&byte| byte == b'/').next()?)?;
+    let vertex = match number {
+        0 => return None,
+        1.. => number - 1,
+        _ => number.checked_add(i64::try_from(vertex_count).ok()?)?,
+    };
+    u32::try_from(vertex).ok()
+}
