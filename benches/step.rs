@@ -1,5 +1,5 @@
 //! Placeholder.
-use criterion::{criterion_group, criterion_main, Criterion};
+use criterion::{Criterion, criterion_group, criterion_main};
 fn step(_: &mut Criterion) {}
 criterion_group!(benches, step);
 criterion_main!(benches);
