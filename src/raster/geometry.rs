@@ -1,6 +1,7 @@
 //! A scene as one list of triangles, ready to be rasterised.
 
 use super::scene::{Lines, Look, Scene, Shape, Surface, bounds};
+use super::shade::linear;
 use super::tessellate::{self, Tessellation};
 use super::view::View;
 use crate::{Error, Result};
@@ -20,6 +21,8 @@ pub(crate) struct Geometry {
 /// What a run of triangles belongs to.
 pub(crate) struct Part {
     pub look: Look,
+    /// The look's colour as light.
+    pub colour: Vec3,
     pub kind: Kind,
 }
 
@@ -170,7 +173,11 @@ impl Geometry {
         self.normals.try_reserve_exact(positions)?;
         self.triangles.try_reserve_exact(triangles)?;
         self.part_of.try_reserve_exact(triangles)?;
-        self.parts.push(Part { look, kind });
+        self.parts.push(Part {
+            look,
+            colour: linear(look.colour),
+            kind,
+        });
         u32::try_from(self.positions.len()).map_err(|_| too_many())
     }
 

@@ -233,7 +233,7 @@ impl<'a> Painter<'a> {
                 for (i, colour) in colours.iter_mut().enumerate().filter(|(i, _)| hidden(*i)) {
                     if let Some(ghost) = ghosts[i] {
                         let look = &self.geometry.part(behind[i].triangle).look;
-                        let outline = (1.0 - ghost.facing).powi(3);
+                        let outline = (1.0 - ghost.facing).powi(2);
                         let strength = look.show_through.clamp(0.0, 1.0) * (0.3 + 0.7 * outline);
                         *colour = colour.lerp(ghost.colour, strength);
                     }
@@ -285,18 +285,12 @@ impl<'a> Painter<'a> {
         let depth = samples.iter().map(|sample| sample.depth).sum::<f32>() / samples.len() as f32;
         let position = self.view.unproject(x, y, f64::from(depth));
         let to_eye = (self.view.origin().as_vec3() - position).normalize_or_zero();
-        let mut normal = Vec3::ZERO;
-        let mut front = true;
-        for sample in samples {
-            let (own, own_front) =
-                self.geometry
-                    .normal(sample.triangle, sample.all_weights(), to_eye);
-            normal += own;
-            front &= own_front;
-        }
-        let normal = normal.normalize_or_zero();
+        // Normals change little within a pixel of one surface.
+        let (normal, front) = self
+            .geometry
+            .normal(first.triangle, first.all_weights(), to_eye);
         let footprint = self.view.metres_per_pixel(f64::from(depth)) as f32 * FINE as f32;
-        let mut colour = shade::linear(look.colour);
+        let mut colour = part.colour;
         let mut remaining = 1.0;
         if let Kind::Ground(pattern) = &part.kind {
             let facing = normal.dot(to_eye).max(0.1);

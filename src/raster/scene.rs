@@ -23,7 +23,7 @@ pub struct Look {
 impl Look {
     /// The wet, dark red of a liver.
     pub const TISSUE: Look = Look {
-        colour: [0.73, 0.27, 0.23],
+        colour: [0.62, 0.24, 0.20],
         gloss: 0.75,
         two_sided: false,
         mesh_edges: 0.0,
@@ -32,7 +32,7 @@ impl Look {
 
     /// A light membrane with both sides alike and its mesh drawn faintly.
     pub const CLOTH: Look = Look {
-        colour: [0.88, 0.66, 0.55],
+        colour: [0.80, 0.58, 0.52],
         gloss: 0.3,
         two_sided: true,
         mesh_edges: 0.3,
@@ -41,7 +41,7 @@ impl Look {
 
     /// An instrument, visible through the tissue that hides it.
     pub const INSTRUMENT: Look = Look {
-        colour: [0.42, 0.56, 0.68],
+        colour: [0.50, 0.57, 0.64],
         gloss: 0.9,
         two_sided: false,
         mesh_edges: 0.0,
@@ -159,7 +159,7 @@ pub struct Scene<'a> {
 impl Scene<'_> {
     /// A camera that has the bodies in the frame, and of the instruments what is near them.
     ///
-    /// The arguments are those of [`Camera::fitted`]. An instrument counts as far as half the bodies' size around their
+    /// The arguments are those of [`Camera::fitted`]. An instrument counts as far as a quarter of the bodies' size around their
     /// box, so that a long shaft leaves the frame instead of making the tissue small.
     ///
     /// # Errors
@@ -172,7 +172,7 @@ impl Scene<'_> {
         aspect: f32,
     ) -> Result<Camera> {
         let (low, high) = bounds(self.body_points());
-        let room = Vec3::splat((high - low).length() / 2.0);
+        let room = Vec3::splat((high - low).length() / 4.0);
         let no_bodies = low.x > high.x;
         let near_bodies = |point: &Vec3| {
             no_bodies || (point.cmpge(low - room).all() && point.cmple(high + room).all())

@@ -5,12 +5,12 @@ use super::scene::Look;
 use glam::{Vec2, Vec3};
 
 /// The key light, warm and from the upper left of the camera.
-const KEY: Vec3 = Vec3::new(1.06, 1.0, 0.92);
+const KEY: Vec3 = Vec3::new(0.90, 0.86, 0.80);
 /// The fill light, cool and from the lower right.
 const FILL: Vec3 = Vec3::new(0.13, 0.16, 0.20);
 /// Light from above and from below.
-const SKY: Vec3 = Vec3::new(0.40, 0.43, 0.47);
-const BOUNCE: Vec3 = Vec3::new(0.25, 0.22, 0.21);
+const SKY: Vec3 = Vec3::new(0.36, 0.38, 0.41);
+const BOUNCE: Vec3 = Vec3::new(0.20, 0.18, 0.17);
 /// What wet surfaces reflect at their outlines.
 const RIM: Vec3 = Vec3::new(0.50, 0.55, 0.62);
 /// The background, at the upper and the lower edge of the picture.
@@ -50,13 +50,14 @@ impl Lights {
     /// The colour of a place with this look and (linear) colour.
     pub fn shade(&self, look: &Look, colour: Vec3, place: &Place) -> Vec3 {
         let inside = !place.front && !look.two_sided;
+        let lit = place.lit * (0.6 + 0.4 * place.open);
         let albedo = if inside { colour * 0.35 } else { colour };
         let normal = place.normal;
         // Where some colour is scattered inside, it also leaves past the edge of the shadow.
         let wrap = albedo * 0.35;
         let diffuse = ((Vec3::splat(normal.dot(self.key)) + wrap) / (Vec3::ONE + wrap))
             .max(Vec3::ZERO)
-            * (Vec3::splat(place.lit) + (1.0 - place.lit) * 0.25 * wrap);
+            * (Vec3::splat(lit) + (1.0 - lit) * 0.25 * wrap);
         let fill = (normal.dot(self.fill) * 0.5 + 0.5) * place.open;
         let height = normal.dot(self.up) * 0.5 + 0.5;
         // Light that was reflected by the neighbours takes their colour: folds are deeper red, not grey.
@@ -71,8 +72,8 @@ impl Lights {
         let gloss = if inside { 0.3 * look.gloss } else { look.gloss };
         let wet = gloss * gloss;
         let rim = RIM * (wet * (1.0 - facing).powi(4) * height * place.open);
-        let broad = self.highlight(place, 0.55 - 0.2 * gloss) * 0.35 * gloss;
-        let sharp = self.highlight(place, 0.34 - 0.22 * gloss) * 0.45 * wet;
+        let broad = self.highlight(place, 0.62 - 0.2 * gloss) * 0.6 * gloss;
+        let sharp = self.highlight(place, 0.40 - 0.22 * gloss) * 0.9 * wet;
         body * (1.0 - 0.1 * wet) + rim + KEY * ((broad + sharp) * place.lit)
     }
 
