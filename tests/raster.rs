@@ -343,7 +343,7 @@ fn a_fitted_camera_has_all_points_and_no_more() {
             direction = Vec3::Y;
         }
         let aspect = random.within(0.3, 3.0) as f32;
-        let angle = random.within(0.1, 2.5) as f32;
+        let angle = random.within(0.1, 1.6) as f32;
         let (width, height) = ((aspect * 1000.0).round() as u32, 1000);
         let camera = Camera::fitted(
             points.iter().copied(),

@@ -73,7 +73,7 @@ impl Camera {
             sides = [0.0; 4];
         }
         let size = (bounds.1 - bounds.0).length();
-        let smallest = if size > 0.0 { 0.01 * size } else { 1.0 };
+        let smallest = if size > 0.0 { 0.002 * size } else { 1.0 };
         let along = ((sides[0] + sides[1]) / (2.0 * tangent_x))
             .max((sides[2] + sides[3]) / (2.0 * tangent_y))
             .max(bounds.1.z + smallest);

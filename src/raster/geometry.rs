@@ -1,6 +1,6 @@
 //! A scene as one list of triangles, ready to be rasterised.
 
-use super::scene::{Lines, Look, Scene, Shape, Surface, bounds};
+use super::scene::{Lines, Look, Scene, Shape, Surface};
 use super::shade::linear;
 use super::tessellate::{self, Tessellation};
 use super::view::View;
@@ -56,12 +56,9 @@ impl Geometry {
         for lines in &scene.lines {
             geometry.add_lines(lines, view, height)?;
         }
-        let (low, high) = bounds(scene.body_points());
-        let (centre, mut radius) = if low.x <= high.x {
+        let (centre, mut radius) = scene.extent().map_or((Vec3::ZERO, 0.0), |(low, high)| {
             ((low + high) / 2.0, (high - low).length() / 2.0)
-        } else {
-            (Vec3::ZERO, 0.0)
-        };
+        });
         if radius == 0.0 {
             radius = 1.0;
         }

@@ -7,7 +7,9 @@ use crate::Result;
 use glam::Vec3;
 
 /// Places looked at around each pixel, on a spiral.
-const TAPS: u32 = 16;
+const TAPS: usize = 16;
+/// How dark hidden places become.
+const STRENGTH: f32 = 1.2;
 /// Turns of the spiral; with 16 taps this leaves no direction out.
 const TURNS: f32 = 7.0;
 /// Pixels in a row or column whose spirals are turned differently, and over which the result is averaged.
@@ -60,56 +62,44 @@ impl Occlusion {
             depths,
             open: filled(width * height, 1.0)?,
         };
-        for y in 0..height {
-            for x in 0..width {
-                let place = y * width + x;
-                if occlusion.depths[place].is_finite() {
-                    occlusion.open[place] = occlusion.gather(small, &normals, x, y, reach);
-                }
+        let mut positions = filled(width * height, Vec3::ZERO)?;
+        for (place, position) in positions.iter_mut().enumerate() {
+            let depth = occlusion.depths[place];
+            if depth.is_finite() {
+                let (x, y) = ((place % width) as f64 + 0.5, (place / width) as f64 + 0.5);
+                *position = small.unproject(x, y, f64::from(depth));
+            }
+        }
+        let spirals = spirals();
+        for place in 0..width * height {
+            if occlusion.depths[place].is_finite() {
+                let (x, y) = (place % width, place / width);
+                let spiral = &spirals[y % BLUR * BLUR + x % BLUR];
+                let pixels =
+                    reach / small.metres_per_pixel(f64::from(occlusion.depths[place])) as f32;
+                let radius = pixels.clamp(2.0, width as f32 / 4.0);
+                let way = |dx: f32, dy: f32| {
+                    let column = x as f32 + 0.5 + dx * radius;
+                    let row = y as f32 + 0.5 + dy * radius;
+                    let inside =
+                        column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32;
+                    let other = if inside {
+                        row as usize * width + column as usize
+                    } else {
+                        place
+                    };
+                    let known = occlusion.depths[other].is_finite();
+                    if known {
+                        positions[other] - positions[place]
+                    } else {
+                        Vec3::ZERO
+                    }
+                };
+                occlusion.open[place] = open_sky(spiral, normals[place], reach, way);
             }
         }
         occlusion.blur(reach)?;
         Ok(occlusion)
-    }
-
-    /// The share of the sky that is open at a pixel.
-    fn gather(&self, view: &View, normals: &[Vec3], x: usize, y: usize, reach: f32) -> f32 {
-        let place = y * self.width + x;
-        let at = |x: usize, y: usize| {
-            let depth = f64::from(self.depths[y * self.width + x]);
-            view.unproject(x as f64 + 0.5, y as f64 + 0.5, depth)
-        };
-        let here = at(x, y);
-        let depth = self.depths[place];
-        let radius = f64::from(reach) / view.metres_per_pixel(f64::from(depth));
-        let radius = (radius as f32).clamp(2.0, self.width as f32 / 4.0);
-        let turn = ((x % BLUR) * BLUR + (y % BLUR)) as f32 / (BLUR * BLUR) as f32;
-        // Below this height over the tangent plane it is the roundness of the surface itself.
-        let bias = 0.04 * reach;
-        let mut hidden = 0.0;
-        for tap in 0..TAPS {
-            let share = (tap as f32 + 0.5) / TAPS as f32;
-            let angle = std::f32::consts::TAU * (share * TURNS + turn);
-            let (down, across) = angle.sin_cos();
-            let column = x as f32 + 0.5 + across * share * radius;
-            let row = y as f32 + 0.5 + down * share * radius;
-            if column < 0.0 || row < 0.0 {
-                continue;
-            }
-            let (column, row) = (column as usize, row as usize);
-            if column >= self.width || row >= self.height {
-                continue;
-            }
-            if !self.depths[row * self.width + column].is_finite() {
-                continue;
-            }
-            let way = at(column, row) - here;
-            let height = (way.dot(normals[place]) - bias).max(0.0);
-            let squared = way.length_squared();
-            let falloff = (1.0 - squared / (reach * reach)).max(0.0);
-            hidden += falloff * height / (squared + 0.01 * reach * reach) * reach * 0.5;
-        }
-        (1.0 - 1.6 * hidden / TAPS as f32).clamp(0.0, 1.0)
     }
 
     /// Averages over the pixels whose spirals differ, along rows and then columns, within one surface.
@@ -162,6 +152,37 @@ impl Occlusion {
         }
         (sum / total).clamp(0.0, 1.0)
     }
+}
+
+/// The offsets of the taps, up to 1, for each place in the pattern of turns.
+fn spirals() -> [[[f32; 2]; TAPS]; BLUR * BLUR] {
+    std::array::from_fn(|pattern| {
+        let turn = pattern as f32 / (BLUR * BLUR) as f32;
+        std::array::from_fn(|tap| {
+            let share = (tap as f32 + 0.5) / TAPS as f32;
+            let angle = std::f32::consts::TAU * (share * TURNS + turn);
+            [share * angle.cos(), share * angle.sin()]
+        })
+    })
+}
+
+/// The share of the sky that is open at a place with this normal; `way` leads to what is seen at an offset.
+fn open_sky(
+    spiral: &[[f32; 2]; TAPS],
+    normal: Vec3,
+    reach: f32,
+    way: impl Fn(f32, f32) -> Vec3,
+) -> f32 {
+    // Below this height over the tangent plane it is the roundness of the surface itself.
+    let bias = 0.03 * reach;
+    let mut hidden = 0.0;
+    for &[across, down] in spiral {
+        let way = way(across, down);
+        let height = (way.dot(normal) - bias).max(0.0);
+        let squared = way.length_squared() / (reach * reach);
+        hidden += (1.0 - squared).max(0.0) * (height / reach) / (squared + 0.01);
+    }
+    (1.0 - STRENGTH * hidden / TAPS as f32).clamp(0.0, 1.0)
 }
 
 fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>> {

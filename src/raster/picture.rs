@@ -4,7 +4,7 @@ use super::camera::Camera;
 use super::fragment::Window;
 use super::geometry::{Geometry, Kind};
 use super::occlusion::Occlusion;
-use super::scene::{Scene, bounds};
+use super::scene::Scene;
 use super::shade::{self, Encoder, Lights, Place};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
@@ -14,7 +14,7 @@ use glam::Vec3;
 /// Samples per pixel along each axis.
 const FINE: u32 = 2;
 /// Samples that are kept at once; a large picture is drawn in bands of rows.
-const BAND: u32 = 1 << 20;
+const BAND: u32 = 1 << 18;
 /// The longer side of the picture that ambient occlusion is computed in.
 const SMALL: f64 = 640.0;
 /// The longest side of a picture.
@@ -107,12 +107,10 @@ impl<'a> Painter<'a> {
     ) -> Result<Self> {
         let [right, up, forward] = view.axes().map(|axis| axis.as_vec3());
         let lights = Lights::new([right, up, -forward]);
-        let (low, high) = bounds(scene.body_points());
-        let extent = if low.x < high.x || low.y < high.y || low.z < high.z {
-            (high - low).length()
-        } else {
-            1.0
-        };
+        let extent = scene
+            .extent()
+            .map_or(0.0, |(low, high)| (high - low).length());
+        let extent = if extent > 0.0 { extent } else { 1.0 };
         let longest = f64::from(size[0].max(size[1]));
         let scale = (SMALL / longest).min(1.0);
         let small = size.map(|length| ((f64::from(length) * scale).round() as u32).max(1));

@@ -186,6 +186,15 @@ impl Scene<'_> {
         Camera::fitted(points, direction, up, field_of_view, aspect)
     }
 
+    /// The box around the bodies; around the instruments where there are none.
+    pub(crate) fn extent(&self) -> Option<(Vec3, Vec3)> {
+        let instruments = self.shapes.iter().flat_map(|(shape, _)| shape.outline());
+        let finite = instruments.filter(|point| point.is_finite());
+        [bounds(self.body_points()), bounds(finite)]
+            .into_iter()
+            .find(|(low, high)| low.x <= high.x)
+    }
+
     /// The finite points of surfaces and lines.
     pub(crate) fn body_points(&self) -> impl Iterator<Item = Vec3> {
         let surfaces = self.surfaces.iter().map(|surface| surface.positions);

@@ -102,7 +102,7 @@ pub(crate) fn ground(pattern: &Ground, position: Vec3, footprint: f32) -> (f32, 
     let offset = position - pattern.centre;
     let place = Vec2::from_array(pattern.axes.map(|axis| offset.dot(axis))) / pattern.cell;
     let width = (footprint / pattern.cell).max(1e-4);
-    let saw = |value: f32| ((value / 2.0).rem_euclid(1.0) - 0.5).abs();
+    let saw = |value: f32| (value / 2.0 - (value / 2.0).floor() - 0.5).abs();
     let [across, along] = place
         .to_array()
         .map(|value| 2.0 * (saw(value - width / 2.0) - saw(value + width / 2.0)) / width);

@@ -53,6 +53,8 @@ pub fn rasterise_triangle(
     let reciprocals = [va.reciprocal, vb.reciprocal, vc.reciprocal];
     let depths = [va.depth, vb.depth, vc.depth];
     let steps = [0, 1, 2].map(|i| edges[i].step_x as f64 / area * reciprocals[i]);
+    let total_step = steps[0] + steps[1] + steps[2];
+    let moment_step = dot(steps, depths);
     let width = right - left;
     for y in top..=bottom {
         let (first, last) = edges.iter().fold((0, width), |(first, last), edge| {
@@ -62,14 +64,14 @@ pub fn rasterise_triangle(
         if first <= last {
             // Weight over depth is linear on the screen, also in perspective.
             let starts = [0, 1, 2].map(|i| edges[i].value as f64 / area * reciprocals[i]);
+            let total = starts[0] + starts[1] + starts[2];
+            let moment = dot(starts, depths);
             for x in first..=last {
                 let offset = x as f64;
-                let shares = [0, 1, 2].map(|i| starts[i] + offset * steps[i]);
-                let scale = 1.0 / (shares[0] + shares[1] + shares[2]);
-                let weights = shares.map(|share| share * scale);
-                let depth =
-                    weights[0] * depths[0] + weights[1] * depths[1] + weights[2] * depths[2];
-                let [wa, wb, wc] = weights.map(|weight| weight as f32);
+                let scale = 1.0 / (total + offset * total_step);
+                let depth = (moment + offset * moment_step) * scale;
+                let [wa, wb, wc] =
+                    [0, 1, 2].map(|i| ((starts[i] + offset * steps[i]) * scale) as f32);
                 sink(Fragment {
                     x: (left + x) as u32,
                     y: y as u32,
@@ -125,6 +127,10 @@ fn snap(vertex: &PixelVertex) -> Option<(i64, i64)> {
     let usable = inside && vertex.depth.is_finite() && vertex.reciprocal.is_finite();
     let fixed = |value: f64| (value * ONE as f64).round() as i64;
     usable.then(|| (fixed(vertex.x), fixed(vertex.y)))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Twice the signed area of a, b, c.

@@ -161,6 +161,9 @@ impl View {
         points: [Homogeneous; 3],
         mut sink: impl FnMut(Fragment),
     ) {
+        if beyond(window, &points) {
+            return;
+        }
         if points
             .iter()
             .all(|point| self.planes(point).iter().all(|&d| d >= 0.0))
@@ -260,6 +263,17 @@ impl Corner {
             weights: [0, 1, 2].map(|i| mix(self.weights[i], other.weights[i])),
         }
     }
+}
+
+/// Whether all points lie beyond the same side of a window; linear like clipping, and so right on both sides of the eye.
+fn beyond(window: &Window, points: &[Homogeneous; 3]) -> bool {
+    let all = |outside: &dyn Fn(&Homogeneous) -> bool| points.iter().all(outside);
+    let [left, top] = [window.left, window.top].map(f64::from);
+    let [right, bottom] = [window.right, window.bottom].map(f64::from);
+    all(&|point| point.y < top * point.w)
+        || all(&|point| point.y > bottom * point.w)
+        || all(&|point| point.x < left * point.w)
+        || all(&|point| point.x > right * point.w)
 }
 
 /// The part of a convex polygon on the positive side of a plane (Sutherland and Hodgman, 1974).
