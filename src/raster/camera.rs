@@ -1,0 +1,137 @@
+//! Where a picture is taken from.
+
+use super::view::{View, axes};
+use crate::{Error, Result};
+use glam::{DVec3, Vec3};
+
+/// How much of the half width or height a fitted view leaves free on each side.
+const MARGIN: f64 = 0.06;
+
+/// The near plane, as a share of the distance from the eye to the target.
+const NEAR: f64 = 1e-3;
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where the camera is, in metres.
+    pub eye: Vec3,
+    /// What it looks at, in metres; the middle of the picture.
+    pub target: Vec3,
+    /// What points upwards in the picture, of any length. Along the view, another axis is chosen.
+    pub up: Vec3,
+    /// Angle between the upper and the lower edge of the picture, in radians, above 0 and below pi.
+    pub field_of_view: f32,
+}
+
+impl Camera {
+    /// The nearest camera in this direction that has all `points` in the frame, 6 % away from its edges.
+    ///
+    /// `direction` points from the scene towards the camera, `aspect` is width over height. The fit is exact: at least
+    /// one pair of opposite edges is touched. Points that are not finite are passed over. A single point is seen from
+    /// 1 m away; without points that is the origin. A direction of zero or `up` along it is replaced.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: a direction, up or angle that is not finite, an angle not between 0 and pi, an aspect
+    /// that is not above 0.
+    pub fn fitted(
+        points: impl IntoIterator<Item = Vec3>,
+        direction: Vec3,
+        up: Vec3,
+        field_of_view: f32,
+        aspect: f32,
+    ) -> Result<Self> {
+        check_direction("direction", direction)?;
+        check_direction("up", up)?;
+        check_angle(field_of_view)?;
+        if !(aspect > 0.0 && aspect.is_finite()) {
+            return Err(Error::invalid(format!("aspect is {aspect}, not above 0")));
+        }
+        let direction = if direction.as_dvec3().length_squared() > 0.0 {
+            direction
+        } else {
+            Vec3::Z
+        };
+        let [right, upwards, forward] = axes(-direction, up);
+        let tangent_y = f64::from(field_of_view / 2.0).tan() * (1.0 - MARGIN);
+        let tangent_x = tangent_y * f64::from(aspect);
+
+        // Each side of the frame is a plane through the eye: the farthest point beyond it decides where it has to be.
+        let mut sides = [f64::NEG_INFINITY; 4];
+        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for point in points.into_iter().filter(|point| point.is_finite()) {
+            let point = point.as_dvec3();
+            let seen = DVec3::new(point.dot(right), point.dot(upwards), -point.dot(forward));
+            bounds = (bounds.0.min(seen), bounds.1.max(seen));
+            let reach = [seen.x, -seen.x, seen.y, -seen.y];
+            for (i, side) in sides.iter_mut().enumerate() {
+                let tangent = if i < 2 { tangent_x } else { tangent_y };
+                *side = side.max(reach[i] + tangent * seen.z);
+            }
+        }
+        if bounds.0.x > bounds.1.x {
+            bounds = (DVec3::ZERO, DVec3::ZERO);
+            sides = [0.0; 4];
+        }
+        let size = (bounds.1 - bounds.0).length();
+        let smallest = if size > 0.0 { 0.002 * size } else { 1.0 };
+        let along = ((sides[0] + sides[1]) / (2.0 * tangent_x))
+            .max((sides[2] + sides[3]) / (2.0 * tangent_y))
+            .max(bounds.1.z + smallest);
+        let across =
+            right * ((sides[0] - sides[1]) / 2.0) + upwards * ((sides[2] - sides[3]) / 2.0);
+        let middle = (bounds.0.z + bounds.1.z) / 2.0;
+        Ok(Camera {
+            eye: (across - forward * along).as_vec3(),
+            target: (across - forward * middle).as_vec3(),
+            up: upwards.as_vec3(),
+            field_of_view,
+        })
+    }
+
+    /// The view of `width` x `height` square pixels.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: a coordinate that is not finite, an eye at the target, an angle not between 0 and pi,
+    /// a width or height of 0 or above 32768.
+    pub fn view(&self, width: u32, height: u32) -> Result<View> {
+        for (name, size) in [("width", width), ("height", height)] {
+            if size == 0 || size > 32_768 {
+                return Err(Error::invalid(format!("{name} is {size}, not 1 to 32768")));
+            }
+        }
+        check_direction("eye", self.eye)?;
+        check_direction("target", self.target)?;
+        check_direction("up", self.up)?;
+        check_angle(self.field_of_view)?;
+        let forward = self.target.as_dvec3() - self.eye.as_dvec3();
+        let distance = forward.length();
+        if distance == 0.0 {
+            return Err(Error::invalid("the camera's eye is at its target"));
+        }
+        let focal_length = f64::from(height) / 2.0 / f64::from(self.field_of_view / 2.0).tan();
+        Ok(View::perspective(
+            self.eye,
+            (forward / distance).as_vec3(),
+            self.up,
+            focal_length,
+            [width, height],
+            NEAR * distance,
+        ))
+    }
+}
+
+fn check_direction(name: &str, vector: Vec3) -> Result<()> {
+    if vector.is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is {vector}, not finite")))
+}
+
+fn check_angle(field_of_view: f32) -> Result<()> {
+    if field_of_view > 0.0 && field_of_view < std::f32::consts::PI {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "field_of_view is {field_of_view}, not between 0 and pi"
+    )))
+}

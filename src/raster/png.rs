@@ -1,0 +1,77 @@
+//! Pictures to PNG files.
+
+use super::picture::Image;
+use crate::{Error, Result};
+use std::path::Path;
+
+impl Image {
+    /// Writes the picture as a PNG file: eight bits per channel, sRGB.
+    ///
+    /// It is written under another name beside `path` and then renamed, so that a write that fails leaves what was there.
+    ///
+    /// # Errors
+    /// [`Error::Io`]: the file could not be written. [`Error::InvalidArgument`]: not `width` x `height` pixels.
+    /// [`Error::Unsupported`]: the crate was built without its feature `pictures`.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
+        let expected = u64::from(self.width) * u64::from(self.height);
+        if expected == 0 || self.pixels.len() as u64 != expected {
+            return Err(Error::invalid(format!(
+                "{} pixels are not {} x {}",
+                self.pixels.len(),
+                self.width,
+                self.height
+            )));
+        }
+        write(self, path.as_ref())
+    }
+}
+
+#[cfg(not(feature = "pictures"))]
+fn write(_image: &Image, _path: &Path) -> Result<()> {
+    Err(Error::Unsupported(
+        "sinew was built without its feature pictures".into(),
+    ))
+}
+
+#[cfg(feature = "pictures")]
+fn write(image: &Image, path: &Path) -> Result<()> {
+    let failure = |cause: &dyn std::fmt::Display| Error::Io(format!("{}: {cause}", path.display()));
+    let name = path
+        .file_name()
+        .ok_or_else(|| failure(&"not the name of a file"))?;
+    let mut temporary = std::ffi::OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}", unique()));
+    let temporary = path.with_file_name(temporary);
+    let written = encode(image, &temporary)
+        .and_then(|()| std::fs::rename(&temporary, path).map_err(png::EncodingError::from));
+    written.map_err(|cause| {
+        // Whether there is anything left to remove changes nothing about the failure.
+        let _ = std::fs::remove_file(&temporary);
+        failure(&cause)
+    })
+}
+
+/// A number that no other write, here or in another process, uses at the same time.
+#[cfg(feature = "pictures")]
+fn unique() -> String {
+    use std::sync::atomic::{AtomicU32, Ordering};
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    format!("{}-{count}", std::process::id())
+}
+
+#[cfg(feature = "pictures")]
+fn encode(image: &Image, path: &Path) -> std::result::Result<(), png::EncodingError> {
+    let file = std::fs::OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(path)?;
+    let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), image.width, image.height);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(image.pixels.as_flattened())?;
+    writer.finish()
+}

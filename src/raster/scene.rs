@@ -1,0 +1,235 @@
+//! What a picture shows.
+
+use super::camera::Camera;
+use crate::Result;
+use glam::Vec3;
+
+/// How a thing looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Red, green, blue as on a screen (sRGB), 0 to 1.
+    pub colour: [f32; 3],
+    /// From 0, dull, to 1, wet.
+    pub gloss: f32,
+    /// Whether both sides are outsides, as of a cloth. Else the side away from the normals is drawn darker, as the
+    /// inside of something cut open.
+    pub two_sided: bool,
+    /// How strongly the edges of the mesh are drawn, from 0, not at all, to 1.
+    pub mesh_edges: f32,
+    /// How strongly it shows through what hides it, from 0, not at all, to 1; strongest at its outline.
+    pub show_through: f32,
+}
+
+impl Look {
+    /// The wet, dark red of a liver.
+    pub const TISSUE: Look = Look {
+        colour: [0.62, 0.24, 0.20],
+        gloss: 0.75,
+        two_sided: false,
+        mesh_edges: 0.0,
+        show_through: 0.0,
+    };
+
+    /// A light membrane with both sides alike and its mesh drawn faintly.
+    pub const CLOTH: Look = Look {
+        colour: [0.80, 0.58, 0.52],
+        gloss: 0.3,
+        two_sided: true,
+        mesh_edges: 0.3,
+        show_through: 0.0,
+    };
+
+    /// An instrument, visible through the tissue that hides it.
+    pub const INSTRUMENT: Look = Look {
+        colour: [0.50, 0.57, 0.64],
+        gloss: 0.9,
+        two_sided: false,
+        mesh_edges: 0.0,
+        show_through: 0.6,
+    };
+
+    /// A plane to stand on.
+    pub const GROUND: Look = Look {
+        colour: [0.85, 0.86, 0.88],
+        gloss: 0.05,
+        two_sided: false,
+        mesh_edges: 0.0,
+        show_through: 0.0,
+    };
+
+    /// Springs of a body that has no surface.
+    pub const SPRINGS: Look = Look {
+        colour: [0.70, 0.33, 0.27],
+        gloss: 0.2,
+        two_sided: true,
+        mesh_edges: 0.0,
+        show_through: 0.0,
+    };
+
+    /// The same in another colour (sRGB, 0 to 1).
+    pub const fn coloured(self, colour: [f32; 3]) -> Look {
+        Look { colour, ..self }
+    }
+
+    /// The same with the edges of the mesh drawn this strongly, 0 to 1.
+    pub const fn with_mesh_edges(self, mesh_edges: f32) -> Look {
+        Look { mesh_edges, ..self }
+    }
+}
+
+/// Triangles between points.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface<'a> {
+    /// Where the points are, in metres.
+    pub positions: &'a [Vec3],
+    /// Three indices each, outward by the right-hand rule.
+    pub triangles: &'a [[u32; 3]],
+    /// How it looks.
+    pub look: Look,
+}
+
+/// Straight lines between points, such as springs.
+#[derive(Clone, Copy, Debug)]
+pub struct Lines<'a> {
+    /// Where the points are, in metres.
+    pub positions: &'a [Vec3],
+    /// Two indices each.
+    pub pairs: &'a [[u32; 2]],
+    /// Thickness in the picture, in thousandths of its height.
+    pub thickness: f32,
+    /// How they look.
+    pub look: Look,
+}
+
+/// The shape of an instrument or of the surroundings, in world coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A ball.
+    Sphere {
+        /// Its middle, in metres.
+        centre: Vec3,
+        /// In metres.
+        radius: f32,
+    },
+    /// All points within `radius` of a segment.
+    Capsule {
+        /// One end of the segment, in metres.
+        start: Vec3,
+        /// Its other end, in metres.
+        end: Vec3,
+        /// In metres.
+        radius: f32,
+    },
+    /// The boundary of a half-space, drawn as a faint checkerboard that fades out around the scene; invisible from
+    /// behind.
+    Plane {
+        /// Any point of it, in metres.
+        point: Vec3,
+        /// Towards the free side, of any length.
+        normal: Vec3,
+    },
+}
+
+/// Everything that a picture shows; borrows the bodies' arrays.
+///
+/// ```
+/// use glam::Vec3;
+/// use sinew::raster::{Look, Scene, Shape, Surface};
+///
+/// let positions = [Vec3::ZERO, Vec3::X, Vec3::NEG_Z];
+/// let mut scene = Scene::default();
+/// scene.surfaces.push(Surface { positions: &positions, triangles: &[[0, 1, 2]], look: Look::CLOTH });
+/// let ball = Shape::Sphere { centre: Vec3::new(0.3, 0.2, -0.3), radius: 0.2 };
+/// scene.shapes.push((ball, Look::INSTRUMENT));
+/// let camera = scene.camera(Vec3::new(1.0, 0.6, 1.4), Vec3::Y, 0.6, 4.0 / 3.0)?;
+/// let image = scene.draw(&camera, 320, 240)?;
+/// assert_eq!(image.pixels.len(), 320 * 240);
+/// # Ok::<(), sinew::Error>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Scene<'a> {
+    /// Bodies with triangles, and instruments that are meshes.
+    pub surfaces: Vec<Surface<'a>>,
+    /// Bodies without triangles.
+    pub lines: Vec<Lines<'a>>,
+    /// Instruments and surroundings.
+    pub shapes: Vec<(Shape, Look)>,
+}
+
+impl Scene<'_> {
+    /// A camera that has the bodies in the frame, and of the instruments what is near them.
+    ///
+    /// The arguments are those of [`Camera::fitted`]. An instrument counts as far as a quarter of the bodies' size around their
+    /// box, so that a long shaft leaves the frame instead of making the tissue small.
+    ///
+    /// # Errors
+    /// Those of [`Camera::fitted`].
+    pub fn camera(
+        &self,
+        direction: Vec3,
+        up: Vec3,
+        field_of_view: f32,
+        aspect: f32,
+    ) -> Result<Camera> {
+        let (low, high) = bounds(self.body_points());
+        let room = Vec3::splat((high - low).length() / 4.0);
+        let no_bodies = low.x > high.x;
+        let near_bodies = |point: &Vec3| {
+            no_bodies || (point.cmpge(low - room).all() && point.cmple(high + room).all())
+        };
+        let instruments = self
+            .shapes
+            .iter()
+            .flat_map(|(shape, _)| shape.outline())
+            .filter(near_bodies);
+        let points = self.body_points().chain(instruments);
+        Camera::fitted(points, direction, up, field_of_view, aspect)
+    }
+
+    /// The box around the bodies; around the instruments where there are none.
+    pub(crate) fn extent(&self) -> Option<(Vec3, Vec3)> {
+        let instruments = self.shapes.iter().flat_map(|(shape, _)| shape.outline());
+        let finite = instruments.filter(|point| point.is_finite());
+        [bounds(self.body_points()), bounds(finite)]
+            .into_iter()
+            .find(|(low, high)| low.x <= high.x)
+    }
+
+    /// The finite points of surfaces and lines.
+    pub(crate) fn body_points(&self) -> impl Iterator<Item = Vec3> {
+        let surfaces = self.surfaces.iter().map(|surface| surface.positions);
+        let lines = self.lines.iter().map(|lines| lines.positions);
+        surfaces
+            .chain(lines)
+            .flatten()
+            .copied()
+            .filter(|point| point.is_finite())
+    }
+}
+
+impl Shape {
+    /// Points on its surface, enough to frame it; none for a plane.
+    pub(crate) fn outline(&self) -> Vec<Vec3> {
+        let (start, end, radius) = match *self {
+            Shape::Sphere { centre, radius } => (centre, centre, radius),
+            Shape::Capsule { start, end, radius } => (start, end, radius),
+            Shape::Plane { .. } => return Vec::new(),
+        };
+        // Along the segment too: the part near the bodies counts where the ends may be far.
+        const STOPS: u8 = 16;
+        let directions = super::tessellate::directions();
+        let stops = if start == end { 0 } else { STOPS };
+        (0..=stops)
+            .map(|stop| start.lerp(end, f32::from(stop) / f32::from(STOPS)))
+            .flat_map(|centre| directions.map(|direction| centre + radius * direction))
+            .collect()
+    }
+}
+
+/// The box around points; without any, low is above high.
+pub(crate) fn bounds(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {
+    points.fold(
+        (Vec3::INFINITY, Vec3::NEG_INFINITY),
+        |(low, high), point| (low.min(point), high.max(point)),
+    )
+}

@@ -1,0 +1,146 @@
+//! Shadows of the key light: the scene's depth as the light sees it.
+
+use super::fragment::Window;
+use super::geometry::{Geometry, Kind};
+use super::scene::bounds;
+use super::view::View;
+use crate::Result;
+use glam::Vec3;
+
+/// Texels along each side.
+const SIZE: u32 = 1024;
+/// Texels across the filter, which softens the edges of shadows.
+const TAPS: usize = 8;
+/// Texels along each side of a tile; a filter covers at most four tiles.
+const TILE: usize = 8;
+const TILES: usize = SIZE as usize / TILE;
+
+/// A shadow map (Williams, "Casting curved shadows on curved surfaces", 1978), softened
+/// by percentage-closer filtering (Reeves et al., "Rendering antialiased shadows with depth maps", 1987).
+pub(crate) struct ShadowMap {
+    view: View,
+    depths: Vec<f32>,
+    /// The least and the greatest depth of each tile: most places are outside of all penumbras.
+    tiles: Vec<(f32, f32)>,
+    texel: f32,
+}
+
+impl ShadowMap {
+    /// The shadows of everything solid in light from `direction` (towards the light, length one).
+    pub fn new(geometry: &Geometry, direction: Vec3) -> Result<Self> {
+        let solid = || {
+            (0..geometry.triangles.len() as u32)
+                .filter(|&triangle| geometry.part(triangle).kind == Kind::Solid)
+        };
+        let points = || {
+            solid()
+                .flat_map(|triangle| geometry.corners(triangle))
+                .filter(|point| point.is_finite())
+        };
+        let (low, high) = bounds(points());
+        let (centre, radius) = if low.x <= high.x {
+            let centre = (low + high) / 2.0;
+            let far = points().map(|point| point.distance(centre));
+            (centre, far.fold(0.0, f32::max))
+        } else {
+            (Vec3::ZERO, 1.0)
+        };
+        let half_width = radius * 1.05;
+        let view = View::orthographic(
+            centre + direction * half_width,
+            -direction,
+            Vec3::Y,
+            f64::from(SIZE) / f64::from(2.0 * half_width),
+            SIZE,
+            SIZE,
+        );
+        let count = SIZE as usize * SIZE as usize;
+        let mut depths = Vec::new();
+        depths.try_reserve_exact(count)?;
+        depths.resize(count, f32::INFINITY);
+        let window = Window::new(SIZE, SIZE);
+        for triangle in solid() {
+            view.triangle(&window, geometry.corners(triangle), |fragment| {
+                let place = fragment.y as usize * SIZE as usize + fragment.x as usize;
+                if let Some(depth) = depths.get_mut(place) {
+                    *depth = depth.min(fragment.depth);
+                }
+            });
+        }
+        Ok(ShadowMap {
+            view,
+            tiles: tiles(&depths)?,
+            depths,
+            texel: 2.0 * half_width / SIZE as f32,
+        })
+    }
+
+    /// How much of the light reaches a point of a surface, 0 to 1.
+    pub fn lit(&self, position: Vec3, normal: Vec3) -> f32 {
+        // Off the surface, so that it does not shade itself.
+        let Some(place) = self.view.project(position + normal * (3.0 * self.texel)) else {
+            return 1.0;
+        };
+        let depth = place.depth as f32 - self.texel;
+        let (x, y) = (place.x as f32 - 0.5, place.y as f32 - 0.5);
+        let (low, high) = (TAPS as f32 / 2.0, (SIZE - TAPS as u32 / 2) as f32 - 1.0);
+        if !(x >= low && y >= low && x < high && y < high) {
+            return 1.0;
+        }
+        let first = |value: f32| value as usize + 1 - TAPS / 2;
+        let (left, top) = (first(x), first(y));
+        let [mut least, mut greatest] = [f32::INFINITY, f32::NEG_INFINITY];
+        for row in [top / TILE, (top + TAPS - 1) / TILE] {
+            for column in [left / TILE, (left + TAPS - 1) / TILE] {
+                if let Some(tile) = self.tiles.get(row * TILES + column) {
+                    least = least.min(tile.0);
+                    greatest = greatest.max(tile.1);
+                }
+            }
+        }
+        if depth <= least {
+            return 1.0;
+        }
+        if depth > greatest {
+            return 0.0;
+        }
+        let (across, down) = (weights(x.fract()), weights(y.fract()));
+        let mut light = 0.0;
+        for (i, weight) in down.iter().enumerate() {
+            let start = (top + i) * SIZE as usize + left;
+            let texels = self.depths.get(start..start + TAPS).unwrap_or(&[]);
+            for (texel, share) in texels.iter().zip(across) {
+                light += if *texel >= depth { weight * share } else { 0.0 };
+            }
+        }
+        light
+    }
+}
+
+/// The least and the greatest depth of each tile.
+fn tiles(depths: &[f32]) -> Result<Vec<(f32, f32)>> {
+    let mut tiles = Vec::new();
+    tiles.try_reserve_exact(TILES * TILES)?;
+    tiles.resize(TILES * TILES, (f32::INFINITY, f32::NEG_INFINITY));
+    for (y, row) in depths.chunks_exact(SIZE as usize).enumerate() {
+        for (x, texels) in row.chunks_exact(TILE).enumerate() {
+            let tile = &mut tiles[y / TILE * TILES + x];
+            for &depth in texels {
+                *tile = (tile.0.min(depth), tile.1.max(depth));
+            }
+        }
+    }
+    Ok(tiles)
+}
+
+/// Weights of the texels around a place, `t` past the middle of the inner left one: a smooth bump, (1 - d^2)^2 in the
+/// distance d over half the filter's width, whose sum is 1.
+fn weights(t: f32) -> [f32; TAPS] {
+    let half = TAPS as f32 / 2.0;
+    let bump = std::array::from_fn(|i| {
+        let distance = (i as f32 + 1.0 - half - t) / half;
+        (1.0 - distance * distance).max(0.0).powi(2)
+    });
+    let sum: f32 = bump.iter().sum();
+    bump.map(|weight: f32| weight / sum)
+}

@@ -1,0 +1,338 @@
+//! From space to pixels.
+
+use super::fragment::{Fragment, GUARD, PixelVertex, Window};
+use super::line::rasterise_line;
+use super::triangle::rasterise_triangle;
+use glam::{DVec3, Vec3};
+
+/// A camera or a parallel projection bound to a grid of pixels: where each point of space falls, and how deep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    origin: DVec3,
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+    centre: [f64; 2],
+    /// Pixels per metre: at depth 1 in perspective, everywhere else.
+    scale: f64,
+    near: f64,
+    perspective: bool,
+}
+
+/// A point before the division by `w`; every clipping plane is linear in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Homogeneous {
+    x: f64,
+    y: f64,
+    w: f64,
+    depth: f64,
+}
+
+/// A corner of a clipped polygon, with the weights of the triangle or line that it was cut from.
+#[derive(Clone, Copy, Default)]
+struct Corner {
+    point: Homogeneous,
+    weights: [f64; 3],
+}
+
+/// A triangle cut by five planes has at most eight corners.
+const MAX_CORNERS: usize = 8;
+
+impl View {
+    /// A parallel projection of `width` x `height` pixels.
+    ///
+    /// `origin` falls on the middle of the picture and has depth 0; what lies behind it is clipped. `forward` is the
+    /// viewing direction, `up` what points upwards in the picture (an `up` along `forward` is replaced),
+    /// `pixels_per_metre` the scale. A direction or scale that is zero or not finite gives a view that shows nothing.
+    pub fn orthographic(
+        origin: Vec3,
+        forward: Vec3,
+        up: Vec3,
+        pixels_per_metre: f64,
+        width: u32,
+        height: u32,
+    ) -> Self {
+        View::new(
+            origin,
+            forward,
+            up,
+            pixels_per_metre,
+            [width, height],
+            0.0,
+            false,
+        )
+    }
+
+    /// A perspective view; `focal_length` in pixels, `near` in metres.
+    pub(crate) fn perspective(
+        origin: Vec3,
+        forward: Vec3,
+        up: Vec3,
+        focal_length: f64,
+        size: [u32; 2],
+        near: f64,
+    ) -> Self {
+        View::new(origin, forward, up, focal_length, size, near, true)
+    }
+
+    fn new(
+        origin: Vec3,
+        forward: Vec3,
+        up: Vec3,
+        scale: f64,
+        size: [u32; 2],
+        near: f64,
+        perspective: bool,
+    ) -> Self {
+        let [right, up, forward] = axes(forward, up);
+        View {
+            origin: origin.as_dvec3(),
+            right,
+            up,
+            forward,
+            centre: size.map(|length| f64::from(length) / 2.0),
+            scale,
+            near,
+            perspective,
+        }
+    }
+
+    /// Where a point falls, or nothing if it lies in front of the near plane or is not finite.
+    pub fn project(&self, point: Vec3) -> Option<PixelVertex> {
+        let point = self.transform(point);
+        (point.depth >= self.near && point.is_finite()).then(|| point.divide(self.perspective))
+    }
+
+    /// The point of space at this depth behind these pixel coordinates.
+    pub fn unproject(&self, x: f64, y: f64, depth: f64) -> Vec3 {
+        let reach = if self.perspective { depth } else { 1.0 } / self.scale;
+        let along = self.right * ((x - self.centre[0]) * reach);
+        let upwards = self.up * ((self.centre[1] - y) * reach);
+        (self.origin + along + upwards + self.forward * depth).as_vec3()
+    }
+
+    /// Calls `sink` for each pixel that a triangle covers, as [`rasterise_triangle`] does, clipped by the near plane.
+    ///
+    /// [`Fragment::weights`] belong to `points`, also where the triangle was clipped. A point that is not finite: no
+    /// fragments.
+    pub fn triangle(&self, window: &Window, points: [Vec3; 3], sink: impl FnMut(Fragment)) {
+        self.transformed_triangle(window, points.map(|point| self.transform(point)), sink);
+    }
+
+    /// Calls `sink` for each pixel of a line, as [`rasterise_line`] does, clipped by the near plane.
+    pub fn line(&self, window: &Window, points: [Vec3; 2], mut sink: impl FnMut(Fragment)) {
+        let [a, b] = points.map(|point| self.transform(point));
+        if !a.is_finite() || !b.is_finite() {
+            return;
+        }
+        let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let [mut a, mut b] =
+            [(a, corners[0]), (b, corners[1])].map(|(point, weights)| Corner { point, weights });
+        let distance = |corner: &Corner| corner.point.depth - self.near;
+        match (distance(&a) < 0.0, distance(&b) < 0.0) {
+            (true, true) => return,
+            (true, false) => a = b.towards(&a, distance(&b), distance(&a)),
+            (false, true) => b = a.towards(&b, distance(&a), distance(&b)),
+            (false, false) => {}
+        }
+        let ends = [a, b].map(|corner| corner.point.divide(self.perspective));
+        rasterise_line(window, &ends, |fragment| {
+            sink(reweighted(fragment, [&a, &b, &Corner::default()]));
+        });
+    }
+
+    /// What [`View::triangle`] does first, for callers that draw a vertex many times.
+    pub(crate) fn transform(&self, point: Vec3) -> Homogeneous {
+        let offset = point.as_dvec3() - self.origin;
+        let depth = offset.dot(self.forward);
+        let w = if self.perspective { depth } else { 1.0 };
+        Homogeneous {
+            x: self.scale * offset.dot(self.right) + self.centre[0] * w,
+            y: self.centre[1] * w - self.scale * offset.dot(self.up),
+            w,
+            depth,
+        }
+    }
+
+    /// [`View::triangle`] for points that [`View::transform`] has seen.
+    pub(crate) fn transformed_triangle(
+        &self,
+        window: &Window,
+        points: [Homogeneous; 3],
+        mut sink: impl FnMut(Fragment),
+    ) {
+        if beyond(window, &points) {
+            return;
+        }
+        if points
+            .iter()
+            .all(|point| self.planes(point).iter().all(|&d| d >= 0.0))
+        {
+            let vertices = points.map(|point| point.divide(self.perspective));
+            rasterise_triangle(window, &vertices, sink);
+            return;
+        }
+        if !points.iter().all(Homogeneous::is_finite) {
+            return;
+        }
+        let mut polygon = [Corner::default(); MAX_CORNERS];
+        for (i, &point) in points.iter().enumerate() {
+            polygon[i].point = point;
+            polygon[i].weights[i] = 1.0;
+        }
+        let mut count = 3;
+        for plane in 0..5 {
+            (polygon, count) = cut(&polygon[..count], |corner| {
+                self.planes(&corner.point)[plane]
+            });
+        }
+        for i in 2..count {
+            let corners = [&polygon[0], &polygon[i - 1], &polygon[i]];
+            // What was cut lies on the guard band but for rounding.
+            let vertices = corners.map(|corner| {
+                let vertex = corner.point.divide(self.perspective);
+                PixelVertex {
+                    x: vertex.x.clamp(-GUARD, GUARD),
+                    y: vertex.y.clamp(-GUARD, GUARD),
+                    ..vertex
+                }
+            });
+            rasterise_triangle(window, &vertices, |fragment| {
+                sink(reweighted(fragment, corners));
+            });
+        }
+    }
+
+    /// Signed distances, to scale, from the near plane and the four sides of the guard band; negative outside.
+    fn planes(&self, point: &Homogeneous) -> [f64; 5] {
+        let guard = GUARD * point.w;
+        [
+            point.depth - self.near,
+            guard + point.x,
+            guard - point.x,
+            guard + point.y,
+            guard - point.y,
+        ]
+    }
+
+    /// Metres across one pixel at this depth.
+    pub(crate) fn metres_per_pixel(&self, depth: f64) -> f64 {
+        if self.perspective { depth } else { 1.0 }.abs() / self.scale
+    }
+
+    /// Where the view is from.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Right, up and forward, of length one.
+    pub(crate) fn axes(&self) -> [DVec3; 3] {
+        [self.right, self.up, self.forward]
+    }
+}
+
+impl Homogeneous {
+    fn is_finite(&self) -> bool {
+        self.x.is_finite() && self.y.is_finite() && self.w.is_finite() && self.depth.is_finite()
+    }
+
+    fn divide(&self, perspective: bool) -> PixelVertex {
+        PixelVertex {
+            x: self.x / self.w,
+            y: self.y / self.w,
+            depth: self.depth,
+            reciprocal: if perspective { 1.0 / self.depth } else { 1.0 },
+        }
+    }
+}
+
+impl Corner {
+    /// Where the way from here, inside by `inside`, to `other`, outside by `outside` < 0, meets the plane. Always from
+    /// inside out, so that two triangles cut their common edge at the same point.
+    fn towards(&self, other: &Corner, inside: f64, outside: f64) -> Corner {
+        let share = inside / (inside - outside);
+        let mix = |from: f64, to: f64| from + share * (to - from);
+        let (a, b) = (&self.point, &other.point);
+        Corner {
+            point: Homogeneous {
+                x: mix(a.x, b.x),
+                y: mix(a.y, b.y),
+                w: mix(a.w, b.w),
+                depth: mix(a.depth, b.depth),
+            },
+            weights: [0, 1, 2].map(|i| mix(self.weights[i], other.weights[i])),
+        }
+    }
+}
+
+/// Whether all points lie beyond the same side of a window; linear like clipping, and so right on both sides of the eye.
+fn beyond(window: &Window, points: &[Homogeneous; 3]) -> bool {
+    let all = |outside: &dyn Fn(&Homogeneous) -> bool| points.iter().all(outside);
+    let [left, top] = [window.left, window.top].map(f64::from);
+    let [right, bottom] = [window.right, window.bottom].map(f64::from);
+    all(&|point| point.y < top * point.w)
+        || all(&|point| point.y > bottom * point.w)
+        || all(&|point| point.x < left * point.w)
+        || all(&|point| point.x > right * point.w)
+}
+
+/// The part of a convex polygon on the positive side of a plane (Sutherland and Hodgman, 1974).
+fn cut(polygon: &[Corner], distance: impl Fn(&Corner) -> f64) -> ([Corner; MAX_CORNERS], usize) {
+    let mut result = [Corner::default(); MAX_CORNERS];
+    let mut count = 0;
+    let mut push = |corner: Corner| {
+        if let Some(place) = result.get_mut(count) {
+            *place = corner;
+            count += 1;
+        }
+    };
+    for (i, current) in polygon.iter().enumerate() {
+        let previous = &polygon[(i + polygon.len() - 1) % polygon.len()];
+        let (here, before) = (distance(current), distance(previous));
+        match (before >= 0.0, here >= 0.0) {
+            (true, true) => push(*current),
+            (true, false) => push(previous.towards(current, before, here)),
+            (false, true) => {
+                push(current.towards(previous, here, before));
+                push(*current);
+            }
+            (false, false) => {}
+        }
+    }
+    (result, count)
+}
+
+/// A fragment of a clipped piece, with weights of the whole.
+fn reweighted(fragment: Fragment, corners: [&Corner; 3]) -> Fragment {
+    let weight = |i: usize| -> f32 {
+        (0..3)
+            .map(|k| f64::from(fragment.weights[k]) * corners[k].weights[i])
+            .sum::<f64>() as f32
+    };
+    Fragment {
+        weights: [weight(0), weight(1), weight(2)],
+        ..fragment
+    }
+}
+
+/// Right, up and forward of a viewer, orthonormal; an `up` along the viewing direction gives way to the axis of space
+/// that is farthest from it.
+pub(crate) fn axes(forward: Vec3, up: Vec3) -> [DVec3; 3] {
+    let forward = forward.as_dvec3().normalize_or_zero();
+    let up = up.as_dvec3().normalize_or_zero();
+    let mut right = forward.cross(up);
+    if right.length_squared() < 1e-10 {
+        let size = forward.abs();
+        let replacement = if size.z <= size.x && size.z <= size.y {
+            DVec3::Z
+        } else if size.x <= size.y {
+            DVec3::X
+        } else {
+            DVec3::Y
+        };
+        // Seen from straight above, what is far is up: -z before +z, as a right-handed floor plan has it.
+        right = forward.cross(-replacement);
+    }
+    let right = right.normalize_or_zero();
+    [right, right.cross(forward), forward]
+}
