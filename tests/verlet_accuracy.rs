@@ -138,13 +138,17 @@ fn damped_oscillators_converge_at_order_two_and_decay_alike() {
         along.spring_damping = (rate * reduced) as f32;
         for (name, parts) in [("nodes", at_nodes), ("springs", along)] {
             let errors = [1.0, 2.0, 4.0].map(|finer| {
-                let (error, decay) = damped_error(&parts, zeta, (0.1 / finer / omega()) as f32, (100.0 * finer) as usize);
+                let (error, decay) =
+                    damped_error(&parts, zeta, (0.1 / finer / omega()) as f32, (100.0 * finer) as usize);
                 assert!(decay.abs() < 1e-3, "{name}, zeta {zeta}: decay is off by {decay:e}");
                 error
             });
             for pair in errors.windows(2) {
                 let order = (pair[0] / pair[1]).log2();
-                assert!((order - 2.0).abs() < 0.05, "{name}, zeta {zeta}: order {order}, {errors:?}");
+                assert!(
+                    (order - 2.0).abs() < 0.05,
+                    "{name}, zeta {zeta}: order {order}, {errors:?}"
+                );
             }
         }
     }
@@ -223,7 +227,11 @@ fn bodies_fall_alike_far_from_the_origin() {
                 );
                 let velocity = centre(&scene.velocities());
                 let off = velocity.distance(DVec3::NEG_Y * (f64::from(g) * t)) / (f64::from(g) * t);
-                assert!(off < 1e-4, "{} nodes at {offset} m, {t} s: velocity {off:e}", parts.positions.len());
+                assert!(
+                    off < 1e-4,
+                    "{} nodes at {offset} m, {t} s: velocity {off:e}",
+                    parts.positions.len()
+                );
             }
         }
     }
@@ -338,12 +346,18 @@ fn a_pendulum_from_150_degrees_keeps_its_period() {
         reference.run(f64::from(h) / f64::from(finer), finer as usize);
         reference.positions[1].x
     });
-    assert!((period / expected - 1.0).abs() < 1e-4, "{period} s, in f64 {expected} s");
+    assert!(
+        (period / expected - 1.0).abs() < 1e-4,
+        "{period} s, in f64 {expected} s"
+    );
 
     let mean = arithmetic_geometric_mean(1.0, (start / 2.0).cos());
     let rigid = TAU / f64::from(g).sqrt() / mean;
     let lengthened = rigid * (1.0 + 1.98 * f64::from(g) / f64::from(stiffness));
-    assert!((period / lengthened - 1.0).abs() < 1e-4, "{period} s, by formula {lengthened} s");
+    assert!(
+        (period / lengthened - 1.0).abs() < 1e-4,
+        "{period} s, by formula {lengthened} s"
+    );
 }
 
 /// The mean period of an oscillation about zero over three periods, from samples `h` apart.

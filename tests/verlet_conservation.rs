@@ -38,7 +38,11 @@ fn two_masses_keep_their_energy() {
     let (first, last, spread) = energy_over_a_million_steps(&mut scene, (x / omega) as f32);
     assert!((last / first - 1.0).abs() < 1e-4, "drift {:e}", last / first - 1.0);
     let expected = x * x / 4.0;
-    assert!((spread / start / expected - 1.0).abs() < 0.02, "{} for {expected}", spread / start);
+    assert!(
+        (spread / start / expected - 1.0).abs() < 0.02,
+        "{} for {expected}",
+        spread / start
+    );
 }
 
 /// The modes of a block trade energy, and each shows (h omega)²/8 less or more of its own: at h omega = 0.5 the mean of a
@@ -153,7 +157,10 @@ fn the_motion_is_that_of_the_discrete_equations() {
     reference.applied[loaded] = force;
     let h = 2e-3_f32;
     for _ in 0..100 {
-        scene.body_mut().apply_force(loaded as u32, force.as_vec3()).expect("a force");
+        scene
+            .body_mut()
+            .apply_force(loaded as u32, force.as_vec3())
+            .expect("a force");
         assert_eq!(scene.step(h).substeps, 1);
         reference.step(f64::from(h));
         let error = largest_difference(&scene.positions(), &reference.positions) / parts.size();

@@ -40,7 +40,10 @@ fn watch(scene: &mut Scene, name: &str, h: f32, steps: usize, most: f64) {
         scene.step(h);
         assert!(scene.is_finite(), "{name}, step {step} of {h} s");
         let energy = scene.energy();
-        assert!(energy <= most, "{name}, step {step} of {h} s: {energy} J, at most {most}");
+        assert!(
+            energy <= most,
+            "{name}, step {step} of {h} s: {energy} J, at most {most}"
+        );
     }
 }
 
@@ -286,7 +289,10 @@ fn the_work_of_a_pin_is_the_energy_of_the_body() {
     }
     // The force holds the pin's own weight too, and its height counts; its speed does not.
     let gained = scene.energy() - start;
-    assert!(mass > 0.0 && (gained / work - 1.0).abs() < 2e-3, "{gained} J gained from {work} J");
+    assert!(
+        mass > 0.0 && (gained / work - 1.0).abs() < 2e-3,
+        "{gained} J gained from {work} J"
+    );
 }
 
 #[test]
@@ -325,7 +331,10 @@ fn frames_of_changing_length_lead_to_the_same_rest_shape() {
         let h = 1e-3 * (15.5 + 14.5 * random.signed());
         let substeps = uneven.step(h).substeps;
         let gained = uneven.energy() - least;
-        assert!(gained <= SHADOW * given, "{gained} J of {given} after {h} s in {substeps}");
+        assert!(
+            gained <= SHADOW * given,
+            "{gained} J of {given} after {h} s in {substeps}"
+        );
     }
     let error = largest_difference(&uneven.positions(), &even.positions()) / parts.size();
     assert!(error < 1e-5, "{error:e}");
@@ -339,13 +348,20 @@ fn a_force_of_a_million_newtons_leaves_the_body_finite_or_unchanged() {
         let mut scene = Scene::new(&parts, FREE);
         let node = parts.positions.len() - 1;
         let before = scene.positions()[node];
-        scene.body_mut().apply_force(node as u32, Vec3::new(6e5, 8e5, 0.0)).expect("a force");
+        scene
+            .body_mut()
+            .apply_force(node as u32, Vec3::new(6e5, 8e5, 0.0))
+            .expect("a force");
         step_or_refuse(&mut scene, h);
         let pushed = scene.positions()[node] - before;
         let work = pushed.dot(DVec3::new(6e5, 8e5, 0.0));
         for _ in 0..100 {
             step_or_refuse(&mut scene, h);
-            assert!(scene.energy() <= SHADOW * SHADOW * work, "h {h}: {} J of {work}", scene.energy());
+            assert!(
+                scene.energy() <= SHADOW * SHADOW * work,
+                "h {h}: {} J of {work}",
+                scene.energy()
+            );
         }
     }
 }
@@ -391,6 +407,31 @@ fn steps_from_ten_microseconds_to_a_second_never_leave_the_finite() {
     }
 }
 
+#[test]
+fn steps_of_absurd_length_are_taken_or_refused() {
+    let parts = Parts::block([1, 1, 1], 0.05, 0.01, 100.0);
+    let free = Parts::nodes(vec![Vec3::ZERO, Vec3::X], 1.0);
+    for parts in [parts, free] {
+        for h in [1e-45, 1e-38, 1e-20, 10.0, 1e10, 1e30, f32::MAX] {
+            let mut scene = Scene::new(&parts, gravity());
+            for _ in 0..3 {
+                step_or_refuse(&mut scene, h);
+            }
+            scene
+                .body_mut()
+                .set_velocities(&vec![Vec3::ZERO; parts.positions.len()])
+                .expect("velocities");
+            step_or_refuse(&mut scene, 1e-3);
+        }
+        for h in [0.0, -1e-3, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut scene = Scene::new(&parts, gravity());
+            let before = scene.world.state_hash();
+            assert!(matches!(scene.world.step(h), Err(Error::InvalidArgument(_))));
+            assert_eq!(scene.world.state_hash(), before);
+        }
+    }
+}
+
 /// The bound on the step must not go stale where a small stiff part of a large body changes.
 #[test]
 fn a_stiff_corner_of_a_large_body_stays_stable() {
@@ -423,10 +464,19 @@ fn a_stiff_corner_of_a_large_body_stays_stable() {
         scene.step(0.1);
     }
     let still = scene.energy();
-    scene.body_mut().apply_force(0, Vec3::new(0.3, 0.2, 0.1)).expect("a force");
+    scene
+        .body_mut()
+        .apply_force(0, Vec3::new(0.3, 0.2, 0.1))
+        .expect("a force");
     let at = scene.positions()[0];
     scene.step(1e-3);
     let given = (scene.positions()[0] - at).dot(DVec3::new(0.3, 0.2, 0.1));
     assert!(given > 0.0);
-    watch(&mut scene, "drawn out", FRAME, 300, still + SHADOW * SHADOW * given + 1e-6 * still);
+    watch(
+        &mut scene,
+        "drawn out",
+        FRAME,
+        300,
+        still + SHADOW * SHADOW * given + 1e-6 * still,
+    );
 }

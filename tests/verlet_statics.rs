@@ -33,7 +33,12 @@ fn a_chain_hangs_as_far_at_every_step() {
     let length = f64::from(spacing) * links as f64;
     // The slowest mode has omega = 3.3 1/s. A node in f32 stops h omega² dx = rate ulp / 2 short of its place: the
     // shorter the step, the less the damping may be.
-    for (h, rate, duration) in [(1.0_f32, 2.0_f32, 40.0_f32), (1.0 / 60.0, 2.0, 30.0), (5e-3, 1.0, 60.0), (1e-3, 0.2, 250.0)] {
+    for (h, rate, duration) in [
+        (1.0_f32, 2.0_f32, 40.0_f32),
+        (1.0 / 60.0, 2.0, 30.0),
+        (5e-3, 1.0, 60.0),
+        (1e-3, 0.2, 250.0),
+    ] {
         damp(&mut parts, rate);
         let mut scene = Scene::new(&parts, gravity());
         scene.run(h, (duration / h).ceil() as usize);
@@ -68,13 +73,23 @@ fn a_chain_held_at_both_ends_hangs_as_the_discrete_catenary() {
     let (mut horizontal, mut vertical) = (weight * 5.0, weight * 9.0);
     for _ in 0..60 {
         let (e, d) = (end(horizontal, vertical), 1e-6);
-        let (dh, dv) = ((end(horizontal + d, vertical) - e) / d, (end(horizontal, vertical + d) - e) / d);
+        let (dh, dv) = (
+            (end(horizontal + d, vertical) - e) / d,
+            (end(horizontal, vertical + d) - e) / d,
+        );
         let determinant = dh.x * dv.y - dv.x * dh.y;
         horizontal -= (e.x * dv.y - dv.x * e.y) / determinant;
         vertical -= (dh.x * e.y - e.x * dh.y) / determinant;
     }
     assert!(end(horizontal, vertical).length() < 1e-12, "no catenary found");
-    let expected = catenary(horizontal, vertical, links, weight, f64::from(spacing), f64::from(stiffness));
+    let expected = catenary(
+        horizontal,
+        vertical,
+        links,
+        weight,
+        f64::from(spacing),
+        f64::from(stiffness),
+    );
 
     let mut parts = Parts::chain(links + 1, Vec3::X, mass, stiffness);
     for (i, position) in parts.positions.iter_mut().enumerate() {
@@ -147,7 +162,9 @@ fn error_at_rest(parts: &Parts, loads: &[DVec3], expected: impl Fn(DVec3) -> DVe
 /// The springs that a cell of the cubic lattice owns.
 fn cubic_cell(spacing: f64, stiffness: f64) -> Vec<(DVec3, f64)> {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-    [x, y, z, x + y, x - y, y + z, y - z, z + x, z - x].map(|d| (d * spacing, stiffness)).to_vec()
+    [x, y, z, x + y, x - y, y + z, y - z, z + x, z - x]
+        .map(|d| (d * spacing, stiffness))
+        .to_vec()
 }
 
 #[test]
@@ -162,7 +179,10 @@ fn a_lattice_patch_stretches_as_its_lattice() {
     for strain in [1e-5, -1e-5, 1e-3, -1e-3] {
         let f = uniaxial(0, 1.0 + strain, &[1, 2], &springs, volume);
         let measured = stress(f, &springs, volume).col(0).x / strain / young - 1.0;
-        assert!((measured - 0.7 * strain).abs() < 0.1 * strain.abs() + 1e-6, "{strain}: E shifts by {measured}");
+        assert!(
+            (measured - 0.7 * strain).abs() < 0.1 * strain.abs() + 1e-6,
+            "{strain}: E shifts by {measured}"
+        );
         let poisson = (1.0 - f.col(1).y) / strain;
         assert!((poisson - 0.25).abs() < 10.0 * strain.abs(), "nu {poisson}");
     }
@@ -179,7 +199,11 @@ fn a_lattice_patch_stretches_as_its_lattice() {
             .positions
             .iter()
             .map(|p| {
-                let outward = if p.x == 0.0 { -1.0 } else { f64::from(u8::from(p.x == far)) };
+                let outward = if p.x == 0.0 {
+                    -1.0
+                } else {
+                    f64::from(u8::from(p.x == far))
+                };
                 DVec3::X * (outward * traction * a * a * edge(p.y) * edge(p.z))
             })
             .collect();

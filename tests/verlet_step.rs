@@ -29,7 +29,14 @@ fn a_step_keeps_its_tolerance() {
         parts.node_dampings.fill(damping);
         for tolerance in [1e-3_f32, 1e-4, 1e-5] {
             for h in [1e-3_f32, 1.0 / 60.0, 0.05] {
-                let mut scene = Scene::new(&parts, WorldDefinition { gravity: GRAVITY, tolerance, ..FREE });
+                let mut scene = Scene::new(
+                    &parts,
+                    WorldDefinition {
+                        gravity: GRAVITY,
+                        tolerance,
+                        ..FREE
+                    },
+                );
                 for step in 0..4 {
                     let mut reference = parts.reference(GRAVITY);
                     reference.positions = scene.positions();
@@ -58,7 +65,14 @@ fn a_step_keeps_its_tolerance() {
 fn a_finer_tolerance_takes_more_substeps() {
     let parts = swinging(22);
     let substeps = [0.0, 1e-3, 1e-5].map(|tolerance| {
-        let mut scene = Scene::new(&parts, WorldDefinition { gravity: GRAVITY, tolerance, ..FREE });
+        let mut scene = Scene::new(
+            &parts,
+            WorldDefinition {
+                gravity: GRAVITY,
+                tolerance,
+                ..FREE
+            },
+        );
         let report = scene.step(0.02);
         assert_eq!(report.error_estimate == 0.0, tolerance == 0.0);
         report.substeps
@@ -81,9 +95,22 @@ fn seen(scene: &Scene) -> (u64, Vec<DVec3>, Vec<DVec3>, Vec3, f64) {
 fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
     // Refused because stability needs too many substeps, because of the tolerance, and because substeps are fixed.
     let definitions = [
-        WorldDefinition { gravity: GRAVITY, max_substeps: 20, ..FREE },
-        WorldDefinition { gravity: GRAVITY, max_substeps: 20, tolerance: 1e-5, ..FREE },
-        WorldDefinition { gravity: GRAVITY, substeps: 2, ..FREE },
+        WorldDefinition {
+            gravity: GRAVITY,
+            max_substeps: 20,
+            ..FREE
+        },
+        WorldDefinition {
+            gravity: GRAVITY,
+            max_substeps: 20,
+            tolerance: 1e-5,
+            ..FREE
+        },
+        WorldDefinition {
+            gravity: GRAVITY,
+            substeps: 2,
+            ..FREE
+        },
     ];
     for spring_damping in [0.0, 0.02] {
         for definition in definitions {
@@ -94,7 +121,10 @@ fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
                 scene.run(1e-3, 20);
                 let last = parts.positions.len() as u32 - 1;
                 let target = parts.positions[0] + Vec3::new(0.01, 0.02, 0.03);
-                scene.body_mut().apply_force(last, Vec3::new(1.0, 2.0, 3.0)).expect("a force");
+                scene
+                    .body_mut()
+                    .apply_force(last, Vec3::new(1.0, 2.0, 3.0))
+                    .expect("a force");
                 scene.body_mut().move_pin(0, target).expect("a pin");
                 scene
             };
@@ -121,7 +151,14 @@ fn a_refused_step_changes_nothing_and_what_is_pending_stays() {
 
 #[test]
 fn one_body_that_cannot_be_stepped_holds_back_all() {
-    let mut scene = Scene::new(&swinging(24), WorldDefinition { gravity: GRAVITY, max_substeps: 50, ..FREE });
+    let mut scene = Scene::new(
+        &swinging(24),
+        WorldDefinition {
+            gravity: GRAVITY,
+            max_substeps: 50,
+            ..FREE
+        },
+    );
     let mut stiff = swinging(25);
     stiff.stiffnesses.fill(1e8);
     let stiff = scene.world.create_body(&stiff.definition()).expect("a body");
@@ -130,7 +167,14 @@ fn one_body_that_cannot_be_stepped_holds_back_all() {
     assert!(matches!(scene.world.step(0.01), Err(Error::Unstable { .. })));
     assert_eq!(scene.world.state_hash(), before);
     scene.world.destroy_body(stiff).expect("the body");
-    let mut alone = Scene::new(&swinging(24), WorldDefinition { gravity: GRAVITY, max_substeps: 50, ..FREE });
+    let mut alone = Scene::new(
+        &swinging(24),
+        WorldDefinition {
+            gravity: GRAVITY,
+            max_substeps: 50,
+            ..FREE
+        },
+    );
     alone.body_mut().apply_force(20, Vec3::X).expect("a force");
     scene.step(0.01);
     alone.step(0.01);
@@ -139,7 +183,10 @@ fn one_body_that_cannot_be_stepped_holds_back_all() {
 
 #[test]
 fn a_body_that_overflows_is_put_back_and_the_others_step() {
-    let definition = WorldDefinition { gravity: GRAVITY, ..FREE };
+    let definition = WorldDefinition {
+        gravity: GRAVITY,
+        ..FREE
+    };
     let mut scene = Scene::new(&swinging(26), definition);
     let mut alone = Scene::new(&swinging(26), definition);
     let light = Parts::chain(3, Vec3::X, 1e-6, 1e-4);
@@ -167,7 +214,10 @@ fn a_body_that_overflows_is_put_back_and_the_others_step() {
         alone.step(0.01);
         fresh.step(0.01);
     }
-    assert_eq!(scene.world.body(blown).expect("the body").positions(), fresh.body().positions());
+    assert_eq!(
+        scene.world.body(blown).expect("the body").positions(),
+        fresh.body().positions()
+    );
     assert_eq!(scene.positions(), alone.positions());
 }
 
@@ -201,7 +251,13 @@ fn sorted(mut pairs: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
 #[test]
 fn springs_come_and_go_as_in_the_equations() {
     let parts = swinging(27);
-    let mut scene = Scene::new(&parts, WorldDefinition { gravity: GRAVITY, ..FREE });
+    let mut scene = Scene::new(
+        &parts,
+        WorldDefinition {
+            gravity: GRAVITY,
+            ..FREE
+        },
+    );
     let mut reference = parts.reference(GRAVITY);
     let mut pairs = parts.springs.clone();
     let mut random = Random::new(28);
@@ -210,7 +266,11 @@ fn springs_come_and_go_as_in_the_equations() {
     for event in 0..300 {
         match edit(&mut scene, &mut pairs, &mut random) {
             Some((pair, true)) => {
-                let place = reference.springs.iter().position(|spring| spring.0 == pair).expect("a spring");
+                let place = reference
+                    .springs
+                    .iter()
+                    .position(|spring| spring.0 == pair)
+                    .expect("a spring");
                 reference.springs.remove(place);
                 removed += 1;
             }
@@ -221,7 +281,10 @@ fn springs_come_and_go_as_in_the_equations() {
             }
             None => {}
         }
-        assert_eq!(sorted(scene.body().spring_pairs().expect("pairs")), sorted(pairs.clone()));
+        assert_eq!(
+            sorted(scene.body().spring_pairs().expect("pairs")),
+            sorted(pairs.clone())
+        );
         assert_eq!(scene.body().storage_report().spring_count, pairs.len());
         assert_eq!(scene.step(h).substeps, 1);
         reference.step(f64::from(h));
@@ -234,7 +297,13 @@ fn springs_come_and_go_as_in_the_equations() {
 #[test]
 fn an_edited_body_moves_as_one_made_afresh() {
     let parts = swinging(29);
-    let mut scene = Scene::new(&parts, WorldDefinition { gravity: GRAVITY, ..FREE });
+    let mut scene = Scene::new(
+        &parts,
+        WorldDefinition {
+            gravity: GRAVITY,
+            ..FREE
+        },
+    );
     let mut random = Random::new(30);
     let mut pairs = parts.springs.clone();
     // Rest lengths and stiffnesses are given anew, so that both bodies have the same to the bit.
@@ -249,7 +318,10 @@ fn an_edited_body_moves_as_one_made_afresh() {
             springs.remove(&pair);
             if !removed {
                 scene.body_mut().remove_spring(pair[0], pair[1]).expect("a spring");
-                scene.body_mut().add_spring(pair[1], pair[0], 15.0, Some(0.06)).expect("a spring");
+                scene
+                    .body_mut()
+                    .add_spring(pair[1], pair[0], 15.0, Some(0.06))
+                    .expect("a spring");
                 springs.insert(pair, (15.0, 0.06));
             }
         }
@@ -259,13 +331,22 @@ fn an_edited_body_moves_as_one_made_afresh() {
     fresh.positions = scene.body().positions().to_vec();
     fresh.springs = springs.keys().copied().collect();
     (fresh.stiffnesses, fresh.rest_lengths) = springs.values().copied().unzip();
-    let mut fresh = Scene::new(&fresh, WorldDefinition { gravity: GRAVITY, ..FREE });
+    let mut fresh = Scene::new(
+        &fresh,
+        WorldDefinition {
+            gravity: GRAVITY,
+            ..FREE
+        },
+    );
     let velocities = scene.body().velocities().to_vec();
     fresh.body_mut().set_velocities(&velocities).expect("velocities");
     for _ in 0..20 {
         let (edited, made) = (scene.step(1e-3), fresh.step(1e-3));
         assert_eq!(edited.substeps, made.substeps);
-        assert!((edited.stable_substep / made.stable_substep - 1.0).abs() < 0.2, "{edited:?} {made:?}");
+        assert!(
+            (edited.stable_substep / made.stable_substep - 1.0).abs() < 0.2,
+            "{edited:?} {made:?}"
+        );
         let error = largest_difference(&scene.positions(), &fresh.positions()) / parts.size();
         assert!(error < 1e-6, "{error:e}");
     }
@@ -288,7 +369,11 @@ fn springs_removed_in_motion_keep_momentum() {
             })
         };
         let start = momentum(&scene);
-        let scale: f64 = velocities.iter().zip(&parts.masses).map(|(v, m)| f64::from(v.length() * m)).sum();
+        let scale: f64 = velocities
+            .iter()
+            .zip(&parts.masses)
+            .map(|(v, m)| f64::from(v.length() * m))
+            .sum();
         let mut left = parts.springs.clone();
         while !left.is_empty() {
             let [a, b] = left.swap_remove(random.below(left.len()));
@@ -298,7 +383,11 @@ fn springs_removed_in_motion_keep_momentum() {
             let now = momentum(&scene);
             let linear = now.0.distance(start.0) / scale;
             let angular = now.1.distance(start.1) / (scale * parts.size());
-            assert!(linear < 1e-6 && angular < 1e-6, "{} left: {linear:e}, {angular:e}", left.len());
+            assert!(
+                linear < 1e-6 && angular < 1e-6,
+                "{} left: {linear:e}, {angular:e}",
+                left.len()
+            );
         }
         // Without springs nothing pulls any more.
         let last = scene.velocities();
