@@ -150,20 +150,26 @@ fn the_motion_is_that_of_the_discrete_equations() {
     for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
         *damping = 0.5 * mass;
     }
-    let mut scene = Scene::new(&parts, WorldDefinition { gravity, ..FREE });
-    let mut reference = parts.reference(gravity);
-    let force = DVec3::new(0.05, 0.1, -0.1);
-    let loaded = parts.positions.len() - 1;
-    reference.applied[loaded] = force;
-    let h = 2e-3_f32;
-    for _ in 0..100 {
-        scene
-            .body_mut()
-            .apply_force(loaded as u32, force.as_vec3())
-            .expect("a force");
-        assert_eq!(scene.step(h).substeps, 1);
-        reference.step(f64::from(h));
-        let error = largest_difference(&scene.positions(), &reference.positions) / parts.size();
-        assert!(error < 1e-6, "{error:e}");
+    // One long step with whole kicks inside moves as many short ones.
+    for substeps in [1, 5] {
+        let definition = WorldDefinition {
+            gravity,
+            substeps,
+            ..FREE
+        };
+        let mut scene = Scene::new(&parts, definition);
+        let mut reference = parts.reference(gravity);
+        let force = DVec3::new(0.05, 0.1, -0.1);
+        let loaded = parts.positions.len() - 1;
+        reference.applied[loaded] = force;
+        let dt = 2e-3 * substeps as f32;
+        for _ in 0..100 / substeps {
+            let body = scene.body_mut();
+            body.apply_force(loaded as u32, force.as_vec3()).expect("a force");
+            assert_eq!(scene.step(dt).substeps, substeps);
+            reference.run(f64::from(dt) / f64::from(substeps), substeps as usize);
+            let error = largest_difference(&scene.positions(), &reference.positions) / parts.size();
+            assert!(error < 1e-6, "{substeps} substeps: {error:e}");
+        }
     }
 }
