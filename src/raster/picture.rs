@@ -36,8 +36,8 @@ pub struct Image {
 impl Scene<'_> {
     /// A picture of the scene, anti-aliased with four samples per pixel. The same scene gives the same picture.
     ///
-    /// Triangles and lines with a coordinate that is not finite are left out. Beside the picture it takes about 40 bytes
-    /// per triangle and 60 MB.
+    /// Triangles and lines with a coordinate that is not finite are left out. Beside the picture it takes about 50 bytes
+    /// per triangle and 30 MB.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: a width or height that is not 1 to 16384, an index without a position, a camera that
