@@ -297,7 +297,7 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
         up: Vec3::Y,
         field_of_view: 0.7,
     };
-    let (width, height) = (640, 480);
+    let (width, height) = (1600, 1200);
     let mut scene = Scene::default();
     let empty = scene.draw(&camera, width, height).expect("a picture");
     scene
@@ -322,11 +322,9 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
     let major = focal * (r2 * (d2 - r2)).sqrt() / (z2 - r2);
     let minor = focal * (r2 / (z2 - r2)).sqrt();
     let area = std::f64::consts::PI * major * minor;
-    // A pixel at the outline is touched by half of its area on average.
-    let outline = std::f64::consts::PI * (major + minor);
-    let expected = area + 0.35 * outline;
-    let error = (changed as f64 - expected).abs() / area;
-    assert!(error < 0.01, "{changed} {expected} {area}");
+    // A pixel at the outline counts even if a quarter of it is covered: at this size 0.3 % too much.
+    let error = (changed as f64 - area).abs() / area;
+    assert!(error < 0.01, "{changed} {area}");
 }
 
 #[test]
