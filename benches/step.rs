@@ -1,5 +1,5 @@
 //! Placeholder.
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{criterion_group, criterion_main, Criterion};
 fn step(_: &mut Criterion) {}
 criterion_group!(benches, step);
 criterion_main!(benches);
