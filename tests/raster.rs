@@ -320,10 +320,7 @@ fn a_fitted_camera_has_all_points_and_no_more() {
         assert!(x < 0.945 && y < 0.945, "{x} {y}");
         if x.max(y) < 0.935 {
             // Only where the camera is as close as it may be: 2 % of at most 2 sqrt(3) times the stretch.
-            assert!(
-                nearest < 0.07 * f64::from(stretch.max_element()),
-                "{nearest} {x} {y}"
-            );
+            assert!(nearest < 0.07 * f64::from(stretch.max_element()), "{nearest} {x} {y}");
             close += 1;
         }
         let towards = (camera.eye - camera.target).normalize();

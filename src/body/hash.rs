@@ -39,6 +39,10 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
-        hasher.write_floats(&[self.stability.limit.unwrap_or(-1.0), self.stability.travel]);
+        let stability = &self.carry.stability;
+        hasher.write_floats(&[stability.limit.unwrap_or(-1.0), stability.travel]);
+        for bits in self.carry.gravity.bits() {
+            hasher.write_u64(bits);
+        }
     }
 }

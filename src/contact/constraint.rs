@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::features::Feature;
-use crate::body::Vectors;
+use crate::body::{Mobility, Vectors};
 
 /// A contact over one substep.
 ///
@@ -36,12 +36,12 @@ pub(super) struct Constraint {
 
 impl Constraint {
     /// A contact that has given nothing yet; `None` where all of its nodes are pinned.
-    pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, inverse_masses: &[f32]) -> Option<Self> {
+    pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, mobility: &Mobility) -> Option<Self> {
         let inverse_mass: f32 = feature
             .nodes()
             .iter()
             .zip(weights)
-            .map(|(&node, weight)| inverse_masses[node as usize] * weight * weight)
+            .map(|(&node, weight)| mobility.of(node as usize) * weight * weight)
             .sum();
         (inverse_mass > 0.0).then(|| Self {
             feature,
@@ -67,7 +67,7 @@ impl Constraint {
     }
 
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
-    pub fn solve(&mut self, velocities: &mut Vectors, inverse_masses: &[f32]) -> f32 {
+    pub fn solve(&mut self, velocities: &mut Vectors, mobility: &Mobility) -> f32 {
         let velocity = self.velocity(velocities);
         let missing = self.least_speed - velocity.dot(self.normal);
         let impulse = (self.impulse + missing * self.effective_mass).max(0.0);
@@ -83,7 +83,7 @@ impl Constraint {
         }
         for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
             let node = node as usize;
-            let velocity = velocities.get(node) + given * (weight * inverse_masses[node]);
+            let velocity = velocities.get(node) + given * (weight * mobility.of(node));
             velocities.set(node, velocity);
         }
         given.length() / self.effective_mass
@@ -95,11 +95,11 @@ impl Constraint {
     }
 
     /// Moves the nodes out of the tool by `part` of how deep they were, without giving them speed.
-    pub fn push_out(&self, positions: &mut Vectors, inverse_masses: &[f32], part: f32) {
+    pub fn push_out(&self, positions: &mut Vectors, mobility: &Mobility, part: f32) {
         let push = self.normal * (self.depth * part * self.effective_mass);
         for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
             let node = node as usize;
-            let position = positions.get(node) + push * (weight * inverse_masses[node]);
+            let position = positions.get(node) + push * (weight * mobility.of(node));
             positions.set(node, position);
         }
     }

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 
 use glam::{DVec3, IVec3};
 
-use super::{Mesh, boundary, is_closed, tetrahedron_volume, try_filled, try_push};
+use super::{Mesh, boundary, is_closed, tetrahedron_volume};
+use crate::memory;
 use crate::{Error, Result};
 
 /// A lattice edge whose end is nearer to the surface than this share of its length moves there: the shares for the long
@@ -195,7 +196,7 @@ struct Stuffing {
 
 impl Stuffing {
     fn new(lattice: Lattice) -> Result<Stuffing> {
-        let mut sides = try_filled(0i8, lattice.node_count())?;
+        let mut sides = memory::filled(0i8, lattice.node_count())?;
         for (node, side) in sides.iter_mut().enumerate() {
             let value = inside(lattice.position(lattice.site(node)));
             *side = if value > 0.0 {
@@ -306,7 +307,7 @@ impl Stuffing {
         self.node_names.try_reserve(1)?;
         let name = self.positions.len() as u32;
         self.node_names.insert(node, name);
-        try_push(&mut self.positions, place)?;
+        memory::push(&mut self.positions, place)?;
         Ok(name)
     }
 
@@ -319,7 +320,7 @@ impl Stuffing {
         self.cut_names.try_reserve(1)?;
         let name = self.positions.len() as u32;
         self.cut_names.insert((inner, outer), name);
-        try_push(&mut self.positions, place)?;
+        memory::push(&mut self.positions, place)?;
         Ok(name)
     }
 
@@ -413,6 +414,6 @@ impl Stuffing {
         if tetrahedron_volume(corners) < 0.0 {
             tetrahedron.swap(2, 3);
         }
-        try_push(&mut self.tetrahedra, tetrahedron)
+        memory::push(&mut self.tetrahedra, tetrahedron)
     }
 }

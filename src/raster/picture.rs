@@ -8,6 +8,7 @@ use super::scene::Scene;
 use super::shade::{self, Encoder, Lights, Place};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
+use crate::memory;
 use crate::{Error, Result};
 use glam::Vec3;
 
@@ -51,8 +52,7 @@ impl Scene<'_> {
         let view = camera.view(width * FINE, height * FINE)?;
         let geometry = Geometry::new(self, &view, height)?;
         let painter = Painter::new(&geometry, camera, view, [width, height], self)?;
-        let mut pixels = Vec::new();
-        pixels.try_reserve_exact(width as usize * height as usize)?;
+        let mut pixels = memory::reserved(width as usize * height as usize)?;
         painter.paint(&mut pixels)?;
         Ok(Image { width, height, pixels })
     }
@@ -120,18 +120,15 @@ impl<'a> Painter<'a> {
     /// Appends all pixels, band by band.
     fn paint(&self, pixels: &mut Vec<[u8; 4]>) -> Result<()> {
         let positions = &self.geometry.positions;
-        let mut points = Vec::new();
-        points.try_reserve_exact(positions.len())?;
+        let mut points = memory::reserved(positions.len())?;
         points.extend(positions.iter().map(|&point| self.view.transform(point)));
         let ghosts = self.geometry.parts.iter().any(|part| part.look.show_through > 0.0);
 
         let fine_width = self.width * FINE;
         let rows = (BAND / fine_width / FINE).clamp(1, self.height);
         let count = (rows * FINE * fine_width) as usize;
-        let mut front = Vec::new();
-        front.try_reserve_exact(count)?;
-        let mut behind = Vec::new();
-        behind.try_reserve_exact(if ghosts { count } else { 0 })?;
+        let mut front = memory::reserved(count)?;
+        let mut behind = memory::reserved(if ghosts { count } else { 0 })?;
         for top in (0..self.height).step_by(rows as usize) {
             let bottom = (top + rows).min(self.height);
             self.find_nearest(&points, top, bottom, &mut front, |_| true);
@@ -207,14 +204,7 @@ impl<'a> Painter<'a> {
     }
 
     /// The colour of a pixel, and of the hidden instrument that shows through it.
-    fn pixel(
-        &self,
-        x: u32,
-        y: u32,
-        front: &Samples,
-        behind: Option<&Samples>,
-        background: Vec3,
-    ) -> Vec3 {
+    fn pixel(&self, x: u32, y: u32, front: &Samples, behind: Option<&Samples>, background: Vec3) -> Vec3 {
         let mut colours = self
             .shade_samples(x, y, front, background, false)
             .map(|shaded| shaded.map_or(background, |shaded| shaded.colour));
@@ -271,13 +261,7 @@ impl<'a> Painter<'a> {
     }
 
     /// The colour at a place in the fine grid that these samples, all of one part, stand for; `hidden`: behind something.
-    fn shade(
-        &self,
-        [x, y]: [f64; 2],
-        samples: &[Sample],
-        background: Vec3,
-        hidden: bool,
-    ) -> Option<Shaded> {
+    fn shade(&self, [x, y]: [f64; 2], samples: &[Sample], background: Vec3, hidden: bool) -> Option<Shaded> {
         let first = samples.first()?;
         let part = self.geometry.part(first.triangle);
         let look = &part.look;

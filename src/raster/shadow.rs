@@ -5,6 +5,7 @@ use super::geometry::{Geometry, Kind};
 use super::scene::bounds;
 use super::view::View;
 use crate::Result;
+use crate::memory;
 use glam::Vec3;
 
 /// Texels along each side.
@@ -50,8 +51,7 @@ impl ShadowMap {
             SIZE,
         );
         let count = SIZE as usize * SIZE as usize;
-        let mut depths = Vec::new();
-        depths.try_reserve_exact(count)?;
+        let mut depths = memory::reserved(count)?;
         depths.resize(count, f32::INFINITY);
         let window = Window::new(SIZE, SIZE);
         for triangle in solid() {

@@ -11,6 +11,8 @@ use crate::body::{NodeDamping, Vectors};
 pub(super) struct Kick<'a> {
     pub substep: f32,
     pub gravity: Vec3,
+    /// What gravity gives to a node without damping in this kick, whole or half, m/s.
+    pub fall: Vec3,
     pub inverse_masses: &'a [f32],
     pub applied: Option<&'a Vectors>,
     pub damping: Option<&'a NodeDamping>,
@@ -21,8 +23,8 @@ impl Kick<'_> {
     pub fn half(&self, node: usize, velocity: Vec3, force: Vec3) -> Vec3 {
         let acceleration = self.acceleration(node, force);
         match self.damping {
-            None => velocity + acceleration * (0.5 * self.substep),
-            Some(damping) => velocity * damping.decay[node] + acceleration * damping.gain[node],
+            None => velocity + (acceleration * (0.5 * self.substep) + self.fall),
+            Some(damping) => velocity * damping.decay[node] + (acceleration + self.gravity) * damping.gain[node],
         }
     }
 
@@ -30,10 +32,10 @@ impl Kick<'_> {
     pub fn full(&self, node: usize, velocity: Vec3, force: Vec3) -> Vec3 {
         let acceleration = self.acceleration(node, force);
         match self.damping {
-            None => velocity + acceleration * self.substep,
+            None => velocity + (acceleration * self.substep + self.fall),
             Some(damping) => {
                 let (decay, gain) = (damping.decay[node], damping.gain[node]);
-                velocity * (decay * decay) + acceleration * (gain * (1.0 + decay))
+                velocity * (decay * decay) + (acceleration + self.gravity) * (gain * (1.0 + decay))
             }
         }
     }
@@ -44,6 +46,6 @@ impl Kick<'_> {
             None => force,
             Some(applied) => force + applied.get(node),
         };
-        force * self.inverse_masses[node] + self.gravity
+        force * self.inverse_masses[node]
     }
 }

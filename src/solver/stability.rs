@@ -32,6 +32,14 @@ impl Stability {
         travel: 0.0,
     };
 
+    /// What holds at these positions.
+    pub fn estimate(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
+        Self {
+            limit: Some(longest_stable_substep(springs, inverse_masses, positions)),
+            travel: 0.0,
+        }
+    }
+
     /// Whether the estimate still holds in a body whose springs are `rest_length` long on average.
     pub fn holds(&self, rest_length: f32) -> bool {
         self.limit.is_some() && self.travel <= TRAVEL_BEFORE_ESTIMATE * rest_length
@@ -39,7 +47,7 @@ impl Stability {
 }
 
 /// The longest stable substep at these positions, s; infinity where there is no limit.
-pub(crate) fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> f32 {
+fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> f32 {
     let mut stiffest = 0.0_f32;
     let mut most_damped = 0.0_f32;
     for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
