@@ -70,8 +70,7 @@ impl Compiler {
         let kind = options
             .first()
             .map_or("", |option| option.trim_start_matches("-fsanitize="));
-        let program = Path::new(env!("CARGO_TARGET_TMPDIR"))
-            .join(format!("{stem}-{}-{link:?}{kind}", self.name));
+        let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{stem}-{}-{link:?}{kind}", self.name));
         let mut command = Command::new(self.name);
         command
             .arg(format!("-std={}", self.standard()))
@@ -90,9 +89,7 @@ impl Compiler {
             Link::Shared => command
                 .arg(library.shared())
                 .arg(format!("-Wl,-rpath,{}", library.folder.display())),
-            Link::Static => command
-                .arg(library.archive())
-                .args(&library.native_libraries),
+            Link::Static => command.arg(library.archive()).args(&library.native_libraries),
         };
         succeed(command.arg("-lm"));
         program
@@ -168,8 +165,7 @@ fn the_examples_compile_as_c_and_as_cxx() {
 #[test]
 fn the_header_stands_alone_in_every_standard() {
     let alone = Path::new(env!("CARGO_TARGET_TMPDIR")).join("alone.c");
-    std::fs::write(&alone, "#include \"sinew.h\"\n#include \"sinew.h\"\n")
-        .expect("a file can be written");
+    std::fs::write(&alone, "#include \"sinew.h\"\n#include \"sinew.h\"\n").expect("a file can be written");
     for compiler in Compiler::installed() {
         for standard in compiler.standards() {
             succeed(
@@ -206,16 +202,11 @@ fn sanitizers_work(compiler: &Compiler, options: &[&str]) -> bool {
 #[test]
 fn sanitizers_find_nothing() {
     let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
-    let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler, &options))
-    else {
+    let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler, &options)) else {
         return skip("the sanitizers, which no compiler here has");
     };
     for source in sources("tests/c") {
-        run(&mut Command::new(compiler.build(
-            &source,
-            Link::Shared,
-            &options,
-        )));
+        run(&mut Command::new(compiler.build(&source, Link::Shared, &options)));
     }
 }
 

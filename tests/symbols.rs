@@ -81,11 +81,7 @@ fn the_shared_library_is_called_by_its_version() {
     if !installed("readelf") {
         return skip("the soname: readelf is not installed");
     }
-    let output = succeed(
-        Command::new("readelf")
-            .arg("-d")
-            .arg(Library::get().shared()),
-    );
+    let output = succeed(Command::new("readelf").arg("-d").arg(Library::get().shared()));
     let said = String::from_utf8_lossy(&output.stdout);
     let soname = said
         .lines()
