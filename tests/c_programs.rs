@@ -7,7 +7,7 @@ mod support;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use support::{Library, installed, root, skip, succeed};
+use support::{Library, failure, installed, root, skip, succeed};
 
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 
@@ -123,23 +123,27 @@ fn sources(folder: &str) -> Vec<PathBuf> {
     sources
 }
 
-/// A program that finds its library by its own path alone: cargo puts older builds on the loader's.
-fn run(command: &mut Command) {
-    succeed(
-        command
-            .env_remove("LD_LIBRARY_PATH")
-            .current_dir(env!("CARGO_TARGET_TMPDIR")),
-    );
+/// Runs all of these programs and tells of every one that fails. Each finds its library by its own path alone: cargo puts
+/// older builds on the loader's.
+fn run_all(programs: impl Iterator<Item = Command>) {
+    let failures: Vec<String> = programs
+        .filter_map(|mut program| {
+            program
+                .env_remove("LD_LIBRARY_PATH")
+                .current_dir(env!("CARGO_TARGET_TMPDIR"));
+            failure(&mut program)
+        })
+        .collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 fn every_program_runs(link: Link) {
     let programs = sources("tests/c");
     assert!(!programs.is_empty(), "there are programs in tests/c");
-    for compiler in Compiler::installed() {
-        for source in &programs {
-            run(&mut Command::new(compiler.build(source, link, &[])));
-        }
-    }
+    run_all(Compiler::installed().flat_map(|compiler| {
+        let built = programs.iter().map(move |source| compiler.build(source, link, &[]));
+        built.map(Command::new)
+    }));
 }
 
 #[test]
@@ -205,9 +209,8 @@ fn sanitizers_find_nothing() {
     let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler, &options)) else {
         return skip("the sanitizers, which no compiler here has");
     };
-    for source in sources("tests/c") {
-        run(&mut Command::new(compiler.build(&source, Link::Shared, &options)));
-    }
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| Command::new(compiler.build(&source, Link::Shared, &options))));
 }
 
 #[test]
@@ -218,10 +221,12 @@ fn valgrind_finds_nothing() {
     let Some(compiler) = Compiler::installed().next() else {
         return;
     };
-    for source in sources("tests/c") {
-        let program = compiler.build(&source, Link::Shared, &["-gdwarf-4"]);
-        run(Command::new("valgrind")
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| {
+        let mut valgrind = Command::new("valgrind");
+        valgrind
             .args(["--quiet", "--leak-check=full", "--error-exitcode=9"])
-            .arg(program));
-    }
+            .arg(compiler.build(&source, Link::Shared, &["-gdwarf-4"]));
+        valgrind
+    }));
 }
