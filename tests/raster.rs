@@ -2,8 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use sinew::raster::{
-    Camera, Fragment, Image, Lines, Look, PixelVertex, Scene, Shape, Surface, View, Window,
-    rasterise_triangle,
+    Camera, Fragment, Image, Lines, Look, PixelVertex, Scene, Shape, Surface, View, Window, rasterise_triangle,
 };
 use std::collections::BTreeSet;
 
@@ -57,9 +56,8 @@ fn triangulation(random: &mut Random, size: f64, splits: usize) -> Vec<[(f64, f6
             snap(a.0 + u * (b.0 - a.0) + v * (c.0 - a.0), steps),
             snap(a.1 + u * (b.1 - a.1) + v * (c.1 - a.1), steps),
         );
-        let doubled = |p: (f64, f64), q: (f64, f64), r: (f64, f64)| {
-            (q.0 - p.0) * (r.1 - p.1) - (q.1 - p.1) * (r.0 - p.0)
-        };
+        let doubled =
+            |p: (f64, f64), q: (f64, f64), r: (f64, f64)| (q.0 - p.0) * (r.1 - p.1) - (q.1 - p.1) * (r.0 - p.0);
         let parts = [[a, b, middle], [b, c, middle], [c, a, middle]];
         let inside = parts
             .iter()
@@ -79,10 +77,7 @@ fn a_triangulation_covers_each_pixel_once() {
     let mut random = Random(11);
     for _ in 0..20 {
         let mut counts = vec![0; size * size];
-        for (i, triangle) in triangulation(&mut random, size as f64, 400)
-            .into_iter()
-            .enumerate()
-        {
+        for (i, triangle) in triangulation(&mut random, size as f64, 400).into_iter().enumerate() {
             let [a, b, c] = triangle.map(|(x, y)| flat(x, y));
             // Both orientations: the fill rule must not depend on it.
             let vertices = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
@@ -113,13 +108,7 @@ fn clipped_triangles_still_cover_each_pixel_once() {
     }
     let rows: BTreeSet<Vec<i32>> = counts
         .chunks(160)
-        .map(|row| {
-            row.iter()
-                .copied()
-                .collect::<BTreeSet<_>>()
-                .into_iter()
-                .collect()
-        })
+        .map(|row| row.iter().copied().collect::<BTreeSet<_>>().into_iter().collect())
         .collect();
     // Each row is all sky or all ground.
     assert_eq!(rows, BTreeSet::from([vec![0], vec![1]]));
@@ -128,13 +117,7 @@ fn clipped_triangles_still_cover_each_pixel_once() {
 }
 
 /// Depth along `forward` where the ray meets the plane of a triangle.
-fn plane_depth(
-    origin: DVec3,
-    direction: DVec3,
-    corners: [DVec3; 3],
-    eye: DVec3,
-    forward: DVec3,
-) -> f64 {
+fn plane_depth(origin: DVec3, direction: DVec3, corners: [DVec3; 3], eye: DVec3, forward: DVec3) -> f64 {
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let way = normal.dot(corners[0] - origin) / normal.dot(direction);
     (origin + way * direction - eye).dot(forward)
@@ -230,33 +213,20 @@ fn unproject_undoes_project() {
         up: Vec3::Y,
         field_of_view: 0.8,
     };
-    let parallel = View::orthographic(
-        Vec3::new(0.0, 5.0, 0.0),
-        Vec3::NEG_Y,
-        Vec3::Y,
-        90.0,
-        300,
-        200,
-    );
+    let parallel = View::orthographic(Vec3::new(0.0, 5.0, 0.0), Vec3::NEG_Y, Vec3::Y, 90.0, 300, 200);
     let mut random = Random(4);
     for view in [camera.view(300, 200).expect("a valid camera"), parallel] {
         for _ in 0..100 {
             let point = random.point(1.0);
             let pixel = view.project(point).expect("in front of the camera");
-            assert!(
-                view.unproject(pixel.x, pixel.y, pixel.depth)
-                    .distance(point)
-                    < 1e-6
-            );
+            assert!(view.unproject(pixel.x, pixel.y, pixel.depth).distance(point) < 1e-6);
         }
     }
 }
 
 fn red_and_blue(order: [usize; 2]) -> Image {
     let triangles = [[0, 1, 2], [0, 2, 3]];
-    let square = |z: f32| {
-        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, z))
-    };
+    let square = |z: f32| [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| Vec3::new(x, y, z));
     let squares = [square(0.0), square(0.3)];
     let looks = [
         Look::TISSUE.coloured([0.9, 0.1, 0.1]),
@@ -300,24 +270,13 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
     let (width, height) = (640, 480);
     let mut scene = Scene::default();
     let empty = scene.draw(&camera, width, height).expect("a picture");
-    scene
-        .shapes
-        .push((Shape::Sphere { centre, radius }, Look::INSTRUMENT));
+    scene.shapes.push((Shape::Sphere { centre, radius }, Look::INSTRUMENT));
     let image = scene.draw(&camera, width, height).expect("a picture");
-    let changed = image
-        .pixels
-        .iter()
-        .zip(&empty.pixels)
-        .filter(|(a, b)| a != b)
-        .count();
+    let changed = image.pixels.iter().zip(&empty.pixels).filter(|(a, b)| a != b).count();
     // The outline of a sphere is where a cone about the line to its centre meets the image plane: an ellipse with
     // semi-axes f r sqrt(d^2 - r^2) / (z^2 - r^2) and f r / sqrt(z^2 - r^2), d and z the centre's distance and depth.
     let offset = (centre - eye).as_dvec3();
-    let (d2, z2, r2) = (
-        offset.length_squared(),
-        offset.z * offset.z,
-        f64::from(radius).powi(2),
-    );
+    let (d2, z2, r2) = (offset.length_squared(), offset.z * offset.z, f64::from(radius).powi(2));
     let focal = f64::from(height) / 2.0 / 0.35_f64.tan();
     let major = focal * (r2 * (d2 - r2)).sqrt() / (z2 - r2);
     let minor = focal * (r2 / (z2 - r2)).sqrt();
@@ -335,9 +294,7 @@ fn a_fitted_camera_has_all_points_and_no_more() {
     for round in 0..200 {
         let stretch = random.point(1.0).abs() + Vec3::splat(0.05);
         let shift = random.point(5.0);
-        let points: Vec<_> = (0..50)
-            .map(|_| shift + stretch * random.point(1.0))
-            .collect();
+        let points: Vec<_> = (0..50).map(|_| shift + stretch * random.point(1.0)).collect();
         let mut direction = random.point(1.0);
         if round % 10 == 0 {
             direction = Vec3::Y;
@@ -370,12 +327,7 @@ fn a_fitted_camera_has_all_points_and_no_more() {
 #[test]
 fn a_camera_is_found_for_degenerate_scenes() {
     let fit = |points: &[Vec3]| Camera::fitted(points.iter().copied(), Vec3::Z, Vec3::Z, 0.6, 1.0);
-    for points in [
-        &[][..],
-        &[Vec3::ONE],
-        &[Vec3::NAN, Vec3::ONE],
-        &[Vec3::ZERO, Vec3::Z],
-    ] {
+    for points in [&[][..], &[Vec3::ONE], &[Vec3::NAN, Vec3::ONE], &[Vec3::ZERO, Vec3::Z]] {
         let camera = fit(points).expect("a camera");
         let view = camera.view(100, 100).expect("a view");
         for &point in points.iter().filter(|point| point.is_finite()) {
@@ -411,11 +363,7 @@ fn broken_triangles_neither_draw_nor_hang() {
     assert_eq!(count([a, a, a]), 0);
     assert_eq!(count([a, b, b * 2.0]), 0);
     assert_eq!(
-        count([
-            a + Vec3::Z * 9.0,
-            b + Vec3::Z * 9.0,
-            Vec3::new(0.0, 1.0, 9.0)
-        ]),
+        count([a + Vec3::Z * 9.0, b + Vec3::Z * 9.0, Vec3::new(0.0, 1.0, 9.0)]),
         0
     );
     let huge = f32::MAX / 4.0;
@@ -468,10 +416,7 @@ fn wrong_arguments_are_refused() {
         field_of_view: 0.7,
     };
     let refused = |result: sinew::Result<Image>| {
-        assert!(
-            matches!(result, Err(sinew::Error::InvalidArgument(_))),
-            "{result:?}"
-        );
+        assert!(matches!(result, Err(sinew::Error::InvalidArgument(_))), "{result:?}");
     };
     let mut scene = Scene::default();
     for (width, height) in [(0, 10), (10, 0), (16_385, 1), (1, u32::MAX)] {
@@ -536,11 +481,7 @@ mod files {
         let pixels = (0..width * height)
             .map(|_| [0; 4].map(|_| random.within(0.0, 256.0) as u8))
             .collect();
-        Image {
-            width,
-            height,
-            pixels,
-        }
+        Image { width, height, pixels }
     }
 
     fn directory(name: &str) -> std::path::PathBuf {
@@ -575,9 +516,7 @@ mod files {
             };
             assert!(message.contains(&path.display().to_string()), "{message}");
         }
-        let left = std::fs::read_dir(&directory)
-            .expect("the directory")
-            .count();
+        let left = std::fs::read_dir(&directory).expect("the directory").count();
         assert_eq!(left, 1);
         let mut broken = noise(3, 3);
         broken.width = 4;

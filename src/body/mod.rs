@@ -151,6 +151,19 @@ impl Body {
         &self.surface
     }
 
+    /// The two nodes of each spring, each once, the lower first.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn spring_pairs(&self) -> Result<Vec<[u32; 2]>> {
+        let mut pairs = memory::reserved(self.springs.spring_count())?;
+        for node in 0..self.node_count() {
+            let upwards = self.springs.links(node).filter(|link| link.neighbour as usize > node);
+            pairs.extend(upwards.map(|link| [node as u32, link.neighbour]));
+        }
+        Ok(pairs)
+    }
+
     /// Its energy at the time of the positions.
     pub fn energy(&self, gravity: Vec3) -> Energy {
         Energy::of(self, gravity)

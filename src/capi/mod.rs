@@ -8,8 +8,8 @@
 pub mod body;
 mod guard;
 mod memory;
-// mesh
-// picture
+pub mod mesh;
+pub mod picture;
 pub mod status;
 pub mod tool;
 pub mod world;

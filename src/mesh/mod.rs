@@ -42,9 +42,7 @@ impl Mesh {
         }
         if let Some(node) = self.positions.iter().position(|p| !p.is_finite()) {
             let position = self.positions[node];
-            return Err(Error::invalid(format!(
-                "the position of node {node} is {position}"
-            )));
+            return Err(Error::invalid(format!("the position of node {node} is {position}")));
         }
         check_indices("triangle", &self.triangles, node_count)?;
         check_indices("tetrahedron", &self.tetrahedra, node_count)
@@ -81,9 +79,7 @@ impl Mesh {
         // Seen from a point of the mesh rather than from the origin, a body far away loses no digits.
         let apex = self.positions.first().map_or(DVec3::ZERO, |p| p.as_dvec3());
         let cones = self.triangles.iter().map(|&t| self.corners(t));
-        Ok(cones
-            .map(|[a, b, c]| tetrahedron_volume([apex, a, b, c]))
-            .sum())
+        Ok(cones.map(|[a, b, c]| tetrahedron_volume([apex, a, b, c])).sum())
     }
 
     /// Where the nodes of an element are; the mesh has been checked.
@@ -97,11 +93,7 @@ fn tetrahedron_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).dot((c - a).cross(d - a)) / 6.0
 }
 
-fn check_indices<const N: usize>(
-    what: &str,
-    elements: &[[u32; N]],
-    node_count: usize,
-) -> Result<()> {
+fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: usize) -> Result<()> {
     for (i, element) in elements.iter().enumerate() {
         if let Some(node) = element.iter().find(|&&node| node as usize >= node_count) {
             return Err(Error::invalid(format!(

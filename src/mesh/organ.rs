@@ -47,18 +47,13 @@ impl Mesh {
             )));
         }
         // The body is two units long here.
-        let lattice = Lattice::around_body(2.0 * relative / MEAN_EDGE).ok_or_else(|| {
-            Error::invalid(format!(
-                "spacing is {spacing} m: too fine to count the nodes"
-            ))
-        })?;
+        let lattice = Lattice::around_body(2.0 * relative / MEAN_EDGE)
+            .ok_or_else(|| Error::invalid(format!("spacing is {spacing} m: too fine to count the nodes")))?;
         let (nodes, tetrahedra) = Stuffing::new(lattice)?.fill()?;
 
         // Exactly as long as asked for, and about the origin; the shape, and so the angles, stay.
         let low = nodes.iter().fold(DVec3::INFINITY, |low, p| low.min(*p));
-        let high = nodes
-            .iter()
-            .fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
+        let high = nodes.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
         let scale = f64::from(length) / (high.x - low.x);
         let mut mesh = Mesh {
             tetrahedra,
@@ -139,11 +134,7 @@ impl Lattice {
 
     /// The number of a node, if it belongs to the lattice.
     fn node(&self, site: Site) -> Option<usize> {
-        let size = if site.middle {
-            self.cubes
-        } else {
-            self.cubes + 1
-        };
+        let size = if site.middle { self.cubes } else { self.cubes + 1 };
         if site.cell.cmplt(IVec3::ZERO).any() || site.cell.cmpge(size).any() {
             return None;
         }
@@ -157,11 +148,7 @@ impl Lattice {
         let middle = node >= self.corner_count();
         let size = if middle { self.cubes } else { self.cubes + 1 };
         let [row, rows, _] = size.as_u64vec3().to_array();
-        let rest = if middle {
-            node - self.corner_count()
-        } else {
-            node
-        } as u64;
+        let rest = if middle { node - self.corner_count() } else { node } as u64;
         let (x, y, z) = (rest % row, rest / row % rows, rest / row / rows);
         Site {
             middle,
@@ -176,15 +163,8 @@ impl Lattice {
 
     /// The nodes that a node shares an edge with, and whether it is a long one.
     fn neighbours(&self, site: Site) -> impl Iterator<Item = (usize, bool)> {
-        let long = [
-            IVec3::X,
-            IVec3::Y,
-            IVec3::Z,
-            IVec3::NEG_X,
-            IVec3::NEG_Y,
-            IVec3::NEG_Z,
-        ]
-        .map(|step| (site.cell + step, site.middle, true));
+        let long = [IVec3::X, IVec3::Y, IVec3::Z, IVec3::NEG_X, IVec3::NEG_Y, IVec3::NEG_Z]
+            .map(|step| (site.cell + step, site.middle, true));
         // The middle of a cube has the cube's number; it is joined to that corner and the next ones.
         let towards = if site.middle { 1 } else { -1 };
         let short = std::array::from_fn::<_, 8, _>(|i| {
@@ -366,8 +346,7 @@ impl Stuffing {
             }
             // A pyramid on the cut face of two inside.
             [_, _, 0, _] => {
-                let (top, p_cut, q_cut) =
-                    (self.name(r)?, self.name_cut(p, s)?, self.name_cut(q, s)?);
+                let (top, p_cut, q_cut) = (self.name(r)?, self.name_cut(p, s)?, self.name_cut(q, s)?);
                 let (p_name, q_name) = (self.name(p)?, self.name(q)?);
                 if self.leads(p, q, s) {
                     self.add([top, p_name, q_name, p_cut])?;
@@ -383,8 +362,7 @@ impl Stuffing {
                 let far = [self.name(q)?, self.name_cut(q, r)?, self.name_cut(q, s)?];
                 let place = |name: u32| self.positions[name as usize];
                 // The cut face belongs to this tetrahedron alone: its shorter diagonal.
-                let one_first = place(near[1]).distance(place(far[2]))
-                    <= place(near[2]).distance(place(far[1]));
+                let one_first = place(near[1]).distance(place(far[2])) <= place(near[2]).distance(place(far[1]));
                 let order = match (self.leads(q, p, r), self.leads(q, p, s), one_first) {
                     (true, false, _) => [2, 0, 1],
                     (false, true, _) => [1, 0, 2],
@@ -401,11 +379,7 @@ impl Stuffing {
                 sides.sort_by(|&a, &b| self.leads(a, b, s).cmp(&self.leads(b, a, s)));
                 let [p, q, r] = sides;
                 let near = [self.name(p)?, self.name(q)?, self.name(r)?];
-                let far = [
-                    self.name_cut(p, s)?,
-                    self.name_cut(q, s)?,
-                    self.name_cut(r, s)?,
-                ];
+                let far = [self.name_cut(p, s)?, self.name_cut(q, s)?, self.name_cut(r, s)?];
                 self.add_prism(near, far)
             }
         }

@@ -8,20 +8,8 @@ use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
 /// face are cut in opposite ways, so that the diagonals meet.
-const EVEN_CELL: [[usize; 4]; 5] = [
-    [0, 3, 5, 6],
-    [1, 0, 3, 5],
-    [2, 0, 6, 3],
-    [4, 0, 5, 6],
-    [7, 3, 6, 5],
-];
-const ODD_CELL: [[usize; 4]; 5] = [
-    [1, 2, 4, 7],
-    [0, 1, 4, 2],
-    [3, 1, 2, 7],
-    [5, 1, 7, 4],
-    [6, 2, 4, 7],
-];
+const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
+const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 4, 2], [3, 1, 2, 7], [5, 1, 7, 4], [6, 2, 4, 7]];
 
 impl Mesh {
     /// A rectangle in the plane y = 0 about the origin, facing up (+y): `size` along x and z in metres, above 0, in
@@ -37,12 +25,10 @@ impl Mesh {
         let mut mesh = Mesh::default();
         mesh.positions.try_reserve_exact(xs.len() * zs.len())?;
         for &z in &zs {
-            mesh.positions
-                .extend(xs.iter().map(|&x| Vec3::new(x, 0.0, z)));
+            mesh.positions.extend(xs.iter().map(|&x| Vec3::new(x, 0.0, z)));
         }
         let row = xs.len() as u32;
-        mesh.triangles
-            .try_reserve_exact(2 * (xs.len() - 1) * (zs.len() - 1))?;
+        mesh.triangles.try_reserve_exact(2 * (xs.len() - 1) * (zs.len() - 1))?;
         for z in 0..cells[1] {
             for x in 0..cells[0] {
                 let a = x + z * row;
@@ -68,12 +54,10 @@ impl Mesh {
         let ys = axis("y", size[1], cells[1])?;
         let zs = axis("z", size[2], cells[2])?;
         let mut mesh = Mesh::default();
-        mesh.positions
-            .try_reserve_exact(xs.len() * ys.len() * zs.len())?;
+        mesh.positions.try_reserve_exact(xs.len() * ys.len() * zs.len())?;
         for &z in &zs {
             for &y in &ys {
-                mesh.positions
-                    .extend(xs.iter().map(|&x| Vec3::new(x, y, z)));
+                mesh.positions.extend(xs.iter().map(|&x| Vec3::new(x, y, z)));
             }
         }
         let row = xs.len() as u32;
@@ -82,11 +66,7 @@ impl Mesh {
             for y in 0..cells[1] {
                 for x in 0..cells[0] {
                     let first = x + y * row + z * layer;
-                    let pattern = if (x ^ y ^ z) & 1 == 0 {
-                        &EVEN_CELL
-                    } else {
-                        &ODD_CELL
-                    };
+                    let pattern = if (x ^ y ^ z) & 1 == 0 { &EVEN_CELL } else { &ODD_CELL };
                     for corners in pattern {
                         let tetrahedron = corners.map(|corner| {
                             let corner = corner as u32;

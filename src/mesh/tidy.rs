@@ -98,8 +98,7 @@ pub fn tidy(mesh: &Mesh) -> Result<LoadedMesh> {
     raw.vertices.try_reserve_exact(mesh.positions.len())?;
     raw.triangles.try_reserve_exact(mesh.triangles.len())?;
     raw.tetrahedra.try_reserve_exact(mesh.tetrahedra.len())?;
-    raw.vertices
-        .extend(mesh.positions.iter().map(|p| p.as_dvec3()));
+    raw.vertices.extend(mesh.positions.iter().map(|p| p.as_dvec3()));
     raw.triangles.extend_from_slice(&mesh.triangles);
     raw.tetrahedra.extend_from_slice(&mesh.tetrahedra);
     raw.tidy()
@@ -239,10 +238,7 @@ fn rename<const N: usize>(elements: &mut Vec<[u32; N]>, names: &[u32]) -> usize 
 }
 
 /// Keeps the first of all elements with the same key, in their order; returns how many were dropped.
-fn keep_first<const N: usize>(
-    elements: &mut Vec<[u32; N]>,
-    key: impl Fn(&[u32; N]) -> [u32; N],
-) -> Result<usize> {
+fn keep_first<const N: usize>(elements: &mut Vec<[u32; N]>, key: impl Fn(&[u32; N]) -> [u32; N]) -> Result<usize> {
     let mut order = Vec::new();
     order.try_reserve_exact(elements.len())?;
     order.extend(elements.iter().enumerate().map(|(i, e)| (key(e), i)));
@@ -274,10 +270,7 @@ fn weld(vertices: &[DVec3], used: &[bool]) -> Result<Vec<u32>> {
     // 250 000 cells along the diagonal: 21 bits an axis.
     let cell_of = |position: DVec3| {
         if cell_size > 0.0 {
-            ((position - low) / cell_size)
-                .max(DVec3::ZERO)
-                .as_u64vec3()
-                .to_array()
+            ((position - low) / cell_size).max(DVec3::ZERO).as_u64vec3().to_array()
         } else {
             [0; 3]
         }

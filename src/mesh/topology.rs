@@ -24,9 +24,7 @@ pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32
 
     let mut edges = Vec::new();
     edges.try_reserve_exact(packed.len())?;
-    let unpacked = packed
-        .iter()
-        .map(|&edge| [(edge >> 32) as u32, edge as u32]);
+    let unpacked = packed.iter().map(|&edge| [(edge >> 32) as u32, edge as u32]);
     edges.extend(unpacked.filter(|[a, b]| a != b));
     Ok(edges)
 }

@@ -77,8 +77,7 @@ impl Camera {
         let along = ((sides[0] + sides[1]) / (2.0 * tangent_x))
             .max((sides[2] + sides[3]) / (2.0 * tangent_y))
             .max(bounds.1.z + smallest);
-        let across =
-            right * ((sides[0] - sides[1]) / 2.0) + upwards * ((sides[2] - sides[3]) / 2.0);
+        let across = right * ((sides[0] - sides[1]) / 2.0) + upwards * ((sides[2] - sides[3]) / 2.0);
         let middle = (bounds.0.z + bounds.1.z) / 2.0;
         Ok(Camera {
             eye: (across - forward * along).as_vec3(),

@@ -100,11 +100,8 @@ impl Geometry {
             let [Some(a), Some(b)] = projected else {
                 continue;
             };
-            let half_widths =
-                [a, b].map(|end| (half_pixels * view.metres_per_pixel(end.depth)) as f32);
-            if let Some((positions, normals, triangles)) =
-                tessellate::ribbon(ends, half_widths, eye)
-            {
+            let half_widths = [a, b].map(|end| (half_pixels * view.metres_per_pixel(end.depth)) as f32);
+            if let Some((positions, normals, triangles)) = tessellate::ribbon(ends, half_widths, eye) {
                 let first = self.positions.len() as u32;
                 self.positions.extend(positions);
                 self.normals.extend(normals);
@@ -114,13 +111,7 @@ impl Geometry {
         Ok(())
     }
 
-    fn add_shape(
-        &mut self,
-        shape: &Shape,
-        look: &Look,
-        eye: Vec3,
-        (middle, radius): (Vec3, f32),
-    ) -> Result<()> {
+    fn add_shape(&mut self, shape: &Shape, look: &Look, eye: Vec3, (middle, radius): (Vec3, f32)) -> Result<()> {
         match *shape {
             Shape::Sphere { centre, radius } => {
                 let sphere = tessellate::capsule(centre, centre, radius);
@@ -180,11 +171,8 @@ impl Geometry {
 
     fn add_triangles(&mut self, first: u32, triangles: &[[u32; 3]]) {
         let part = (self.parts.len() - 1) as u32;
-        self.triangles.extend(
-            triangles
-                .iter()
-                .map(|triangle| triangle.map(|index| first + index)),
-        );
+        self.triangles
+            .extend(triangles.iter().map(|triangle| triangle.map(|index| first + index)));
         self.part_of.resize(self.triangles.len(), part);
     }
 
@@ -215,20 +203,14 @@ impl Geometry {
 
 fn check_indices(indices: &[u32], count: usize) -> Result<()> {
     match indices.iter().find(|&&index| index as usize >= count) {
-        Some(index) => Err(Error::invalid(format!(
-            "index {index} of {count} positions"
-        ))),
+        Some(index) => Err(Error::invalid(format!("index {index} of {count} positions"))),
         None => Ok(()),
     }
 }
 
 /// Two axes in the plane, along those of the world where it is level or upright.
 fn ground_axes(normal: Vec3) -> [Vec3; 2] {
-    let helper = if normal.x.abs() < 0.9 {
-        Vec3::X
-    } else {
-        Vec3::Z
-    };
+    let helper = if normal.x.abs() < 0.9 { Vec3::X } else { Vec3::Z };
     let first = (helper - normal * helper.dot(normal)).normalize_or_zero();
     [first, normal.cross(first)]
 }
@@ -237,8 +219,5 @@ fn ground_axes(normal: Vec3) -> [Vec3; 2] {
 fn round_length(length: f32) -> f32 {
     let power = 10.0_f32.powf(length.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|step| step * power);
-    steps
-        .into_iter()
-        .find(|&step| step <= length)
-        .unwrap_or(power)
+    steps.into_iter().find(|&step| step <= length).unwrap_or(power)
 }

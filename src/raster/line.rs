@@ -7,17 +7,10 @@ use super::fragment::{Fragment, PixelVertex, Window};
 ///
 /// The start belongs to the line and the end does not, so a chain of lines visits no centre twice. A line with a
 /// coordinate that is not finite has no fragments, nor has one that is shorter than the way to the next centre.
-pub fn rasterise_line(
-    window: &Window,
-    vertices: &[PixelVertex; 2],
-    mut sink: impl FnMut(Fragment),
-) {
+pub fn rasterise_line(window: &Window, vertices: &[PixelVertex; 2], mut sink: impl FnMut(Fragment)) {
     let [a, b] = vertices;
     let finite = [a, b].iter().all(|vertex| {
-        vertex.x.is_finite()
-            && vertex.y.is_finite()
-            && vertex.depth.is_finite()
-            && vertex.reciprocal.is_finite()
+        vertex.x.is_finite() && vertex.y.is_finite() && vertex.depth.is_finite() && vertex.reciprocal.is_finite()
     });
     if !finite {
         return;
@@ -92,10 +85,7 @@ mod tests {
     #[test]
     fn a_closed_chain_visits_each_centre_once() {
         let corners = [(1.5, 1.5), (5.5, 1.5), (5.5, 6.5), (1.5, 6.5), (1.5, 1.5)];
-        let mut all: Vec<_> = corners
-            .windows(2)
-            .flat_map(|pair| pixels([pair[0], pair[1]]))
-            .collect();
+        let mut all: Vec<_> = corners.windows(2).flat_map(|pair| pixels([pair[0], pair[1]])).collect();
         assert_eq!(all.len(), 18);
         all.sort_unstable();
         all.dedup();

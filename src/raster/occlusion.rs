@@ -29,13 +29,7 @@ pub(crate) struct Occlusion {
 impl Occlusion {
     /// For a picture seen in `view`; `small` is the same view of `size` pixels, `scale` pixels for one of the picture.
     /// `reach`, in metres, is how far something may be and still hide the sky.
-    pub fn new(
-        geometry: &Geometry,
-        small: &View,
-        size: [u32; 2],
-        scale: f64,
-        reach: f32,
-    ) -> Result<Self> {
+    pub fn new(geometry: &Geometry, small: &View, size: [u32; 2], scale: f64, reach: f32) -> Result<Self> {
         let [width, height] = size.map(|length| length as usize);
         let mut depths = filled(width * height, f32::INFINITY)?;
         let mut normals = filled(width * height, Vec3::ZERO)?;
@@ -75,14 +69,12 @@ impl Occlusion {
             if occlusion.depths[place].is_finite() {
                 let (x, y) = (place % width, place / width);
                 let spiral = &spirals[y % BLUR * BLUR + x % BLUR];
-                let pixels =
-                    reach / small.metres_per_pixel(f64::from(occlusion.depths[place])) as f32;
+                let pixels = reach / small.metres_per_pixel(f64::from(occlusion.depths[place])) as f32;
                 let radius = pixels.clamp(2.0, width as f32 / 4.0);
                 let way = |dx: f32, dy: f32| {
                     let column = x as f32 + 0.5 + dx * radius;
                     let row = y as f32 + 0.5 + dy * radius;
-                    let inside =
-                        column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32;
+                    let inside = column >= 0.0 && row >= 0.0 && column < width as f32 && row < height as f32;
                     let other = if inside {
                         row as usize * width + column as usize
                     } else {
@@ -140,8 +132,7 @@ impl Occlusion {
         let (mut sum, mut total) = (0.0, 1e-6);
         for (j, vertical) in [1.0 - down, down].into_iter().enumerate() {
             for (i, horizontal) in [1.0 - across, across].into_iter().enumerate() {
-                let place =
-                    (top + j).min(self.height - 1) * self.width + (left + i).min(self.width - 1);
+                let place = (top + j).min(self.height - 1) * self.width + (left + i).min(self.width - 1);
                 let difference = (self.depths[place] - depth).abs() / reach;
                 let weight = horizontal * vertical / (0.02 + difference).powi(2) + 1e-9;
                 if weight.is_finite() {
@@ -167,12 +158,7 @@ fn spirals() -> [[[f32; 2]; TAPS]; BLUR * BLUR] {
 }
 
 /// The share of the sky that is open at a place with this normal; `way` leads to what is seen at an offset.
-fn open_sky(
-    spiral: &[[f32; 2]; TAPS],
-    normal: Vec3,
-    reach: f32,
-    way: impl Fn(f32, f32) -> Vec3,
-) -> f32 {
+fn open_sky(spiral: &[[f32; 2]; TAPS], normal: Vec3, reach: f32, way: impl Fn(f32, f32) -> Vec3) -> f32 {
     // Below this height over the tangent plane it is the roundness of the surface itself.
     let bias = 0.03 * reach;
     let mut hidden = 0.0;

@@ -45,9 +45,7 @@ impl Scene<'_> {
     pub fn draw(&self, camera: &Camera, width: u32, height: u32) -> Result<Image> {
         for (name, size) in [("width", width), ("height", height)] {
             if size == 0 || size > MAX_SIZE {
-                return Err(Error::invalid(format!(
-                    "{name} is {size}, not 1 to {MAX_SIZE}"
-                )));
+                return Err(Error::invalid(format!("{name} is {size}, not 1 to {MAX_SIZE}")));
             }
         }
         let view = camera.view(width * FINE, height * FINE)?;
@@ -56,11 +54,7 @@ impl Scene<'_> {
         let mut pixels = Vec::new();
         pixels.try_reserve_exact(width as usize * height as usize)?;
         painter.paint(&mut pixels)?;
-        Ok(Image {
-            width,
-            height,
-            pixels,
-        })
+        Ok(Image { width, height, pixels })
     }
 }
 
@@ -98,18 +92,10 @@ struct Shaded {
 type Samples = [Sample; (FINE * FINE) as usize];
 
 impl<'a> Painter<'a> {
-    fn new(
-        geometry: &'a Geometry,
-        camera: &Camera,
-        view: View,
-        size: [u32; 2],
-        scene: &Scene,
-    ) -> Result<Self> {
+    fn new(geometry: &'a Geometry, camera: &Camera, view: View, size: [u32; 2], scene: &Scene) -> Result<Self> {
         let [right, up, forward] = view.axes().map(|axis| axis.as_vec3());
         let lights = Lights::new([right, up, -forward]);
-        let extent = scene
-            .extent()
-            .map_or(0.0, |(low, high)| (high - low).length());
+        let extent = scene.extent().map_or(0.0, |(low, high)| (high - low).length());
         let extent = if extent > 0.0 { extent } else { 1.0 };
         let longest = f64::from(size[0].max(size[1]));
         let scale = (SMALL / longest).min(1.0);
@@ -137,11 +123,7 @@ impl<'a> Painter<'a> {
         let mut points = Vec::new();
         points.try_reserve_exact(positions.len())?;
         points.extend(positions.iter().map(|&point| self.view.transform(point)));
-        let ghosts = self
-            .geometry
-            .parts
-            .iter()
-            .any(|part| part.look.show_through > 0.0);
+        let ghosts = self.geometry.parts.iter().any(|part| part.look.show_through > 0.0);
 
         let fine_width = self.width * FINE;
         let rows = (BAND / fine_width / FINE).clamp(1, self.height);
@@ -203,18 +185,17 @@ impl<'a> Painter<'a> {
                 continue;
             }
             let corners = corners.map(|index| points[index as usize]);
-            self.view
-                .transformed_triangle(&window, corners, |fragment| {
-                    let place = (fragment.y - window.top) * width + fragment.x;
-                    let sample = &mut samples[place as usize];
-                    if fragment.depth < sample.depth {
-                        *sample = Sample {
-                            depth: fragment.depth,
-                            triangle,
-                            weights: [fragment.weights[0], fragment.weights[1]],
-                        };
-                    }
-                });
+            self.view.transformed_triangle(&window, corners, |fragment| {
+                let place = (fragment.y - window.top) * width + fragment.x;
+                let sample = &mut samples[place as usize];
+                if fragment.depth < sample.depth {
+                    *sample = Sample {
+                        depth: fragment.depth,
+                        triangle,
+                        weights: [fragment.weights[0], fragment.weights[1]],
+                    };
+                }
+            });
         }
     }
 
@@ -284,9 +265,7 @@ impl<'a> Painter<'a> {
         let position = self.view.unproject(x, y, f64::from(depth));
         let to_eye = (self.view.origin().as_vec3() - position).normalize_or_zero();
         // Normals change little within a pixel of one surface.
-        let (normal, front) = self
-            .geometry
-            .normal(first.triangle, first.all_weights(), to_eye);
+        let (normal, front) = self.geometry.normal(first.triangle, first.all_weights(), to_eye);
         let footprint = self.view.metres_per_pixel(f64::from(depth)) as f32 * FINE as f32;
         let mut colour = part.colour;
         let mut remaining = 1.0;

@@ -36,15 +36,13 @@ fn write(_image: &Image, _path: &Path) -> Result<()> {
 #[cfg(feature = "pictures")]
 fn write(image: &Image, path: &Path) -> Result<()> {
     let failure = |cause: &dyn std::fmt::Display| Error::Io(format!("{}: {cause}", path.display()));
-    let name = path
-        .file_name()
-        .ok_or_else(|| failure(&"not the name of a file"))?;
+    let name = path.file_name().ok_or_else(|| failure(&"not the name of a file"))?;
     let mut temporary = std::ffi::OsString::from(".");
     temporary.push(name);
     temporary.push(format!(".{}", unique()));
     let temporary = path.with_file_name(temporary);
-    let written = encode(image, &temporary)
-        .and_then(|()| std::fs::rename(&temporary, path).map_err(png::EncodingError::from));
+    let written =
+        encode(image, &temporary).and_then(|()| std::fs::rename(&temporary, path).map_err(png::EncodingError::from));
     written.map_err(|cause| {
         // Whether there is anything left to remove changes nothing about the failure.
         let _ = std::fs::remove_file(&temporary);
@@ -63,10 +61,7 @@ fn unique() -> String {
 
 #[cfg(feature = "pictures")]
 fn encode(image: &Image, path: &Path) -> std::result::Result<(), png::EncodingError> {
-    let file = std::fs::OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(path)?;
+    let file = std::fs::OpenOptions::new().write(true).create_new(true).open(path)?;
     let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), image.width, image.height);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);

@@ -164,19 +164,11 @@ impl Scene<'_> {
     ///
     /// # Errors
     /// Those of [`Camera::fitted`].
-    pub fn camera(
-        &self,
-        direction: Vec3,
-        up: Vec3,
-        field_of_view: f32,
-        aspect: f32,
-    ) -> Result<Camera> {
+    pub fn camera(&self, direction: Vec3, up: Vec3, field_of_view: f32, aspect: f32) -> Result<Camera> {
         let (low, high) = bounds(self.body_points());
         let room = Vec3::splat((high - low).length() / 4.0);
         let no_bodies = low.x > high.x;
-        let near_bodies = |point: &Vec3| {
-            no_bodies || (point.cmpge(low - room).all() && point.cmple(high + room).all())
-        };
+        let near_bodies = |point: &Vec3| no_bodies || (point.cmpge(low - room).all() && point.cmple(high + room).all());
         let instruments = self
             .shapes
             .iter()
@@ -228,8 +220,7 @@ impl Shape {
 
 /// The box around points; without any, low is above high.
 pub(crate) fn bounds(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {
-    points.fold(
-        (Vec3::INFINITY, Vec3::NEG_INFINITY),
-        |(low, high), point| (low.min(point), high.max(point)),
-    )
+    points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| {
+        (low.min(point), high.max(point))
+    })
 }

@@ -55,16 +55,13 @@ impl Lights {
         let normal = place.normal;
         // Where some colour is scattered inside, it also leaves past the edge of the shadow.
         let wrap = albedo * 0.35;
-        let diffuse = ((Vec3::splat(normal.dot(self.key)) + wrap) / (Vec3::ONE + wrap))
-            .max(Vec3::ZERO)
+        let diffuse = ((Vec3::splat(normal.dot(self.key)) + wrap) / (Vec3::ONE + wrap)).max(Vec3::ZERO)
             * (Vec3::splat(lit) + (1.0 - lit) * 0.25 * wrap);
         let fill = (normal.dot(self.fill) * 0.5 + 0.5) * place.open;
         let height = normal.dot(self.up) * 0.5 + 0.5;
         // Light that was reflected by the neighbours takes their colour: folds are deeper red, not grey.
-        let open = Vec3::splat(place.open).lerp(
-            Vec3::splat(place.open) / (Vec3::ONE - albedo * (1.0 - place.open)),
-            0.7,
-        );
+        let open =
+            Vec3::splat(place.open).lerp(Vec3::splat(place.open) / (Vec3::ONE - albedo * (1.0 - place.open)), 0.7);
         let ambient = BOUNCE.lerp(SKY, height) * open;
         let body = albedo * (KEY * diffuse + FILL * fill + ambient);
 

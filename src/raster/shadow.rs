@@ -28,10 +28,8 @@ pub(crate) struct ShadowMap {
 impl ShadowMap {
     /// The shadows of everything solid in light from `direction` (towards the light, length one).
     pub fn new(geometry: &Geometry, direction: Vec3) -> Result<Self> {
-        let solid = || {
-            (0..geometry.triangles.len() as u32)
-                .filter(|&triangle| geometry.part(triangle).kind == Kind::Solid)
-        };
+        let solid =
+            || (0..geometry.triangles.len() as u32).filter(|&triangle| geometry.part(triangle).kind == Kind::Solid);
         let points = || {
             solid()
                 .flat_map(|triangle| geometry.corners(triangle))

@@ -52,9 +52,7 @@ pub(crate) fn disc(centre: Vec3, normal: Vec3, radius: f32) -> Tessellation {
         let (y, x) = (TAU * step as f32 / RIM as f32).sin_cos();
         centre + (side * x + other * y) * radius
     }));
-    let triangles = (0..RIM)
-        .map(|step| [0, 1 + step, 1 + (step + 1) % RIM])
-        .collect();
+    let triangles = (0..RIM).map(|step| [0, 1 + step, 1 + (step + 1) % RIM]).collect();
     (positions, vec![normal; RIM as usize + 1], triangles)
 }
 
@@ -84,11 +82,7 @@ pub(crate) fn directions() -> [Vec3; 26] {
 /// vertex (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", 1998). Zero where there is none.
 ///
 /// `normals` has one place per position, all zero; indices have been checked.
-pub(crate) fn add_vertex_normals(
-    positions: &[Vec3],
-    triangles: impl Iterator<Item = [u32; 3]>,
-    normals: &mut [Vec3],
-) {
+pub(crate) fn add_vertex_normals(positions: &[Vec3], triangles: impl Iterator<Item = [u32; 3]>, normals: &mut [Vec3]) {
     for triangle in triangles {
         let corners = triangle.map(|index| positions[index as usize]);
         let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]);

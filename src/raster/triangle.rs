@@ -15,13 +15,8 @@ const HALF: i64 = ONE / 2;
 /// Pixel (x, y) has its centre at (x + 0.5, y + 0.5), y growing downwards. `Fragment::front` is true where the vertices
 /// appear counter-clockwise to the viewer. A triangle without area, with a coordinate that is not finite or one farther
 /// than [`GUARD`] from the origin has no fragments; [`View::triangle`](super::View::triangle) clips before it comes here.
-pub fn rasterise_triangle(
-    window: &Window,
-    vertices: &[PixelVertex; 3],
-    mut sink: impl FnMut(Fragment),
-) {
-    let [Some(a), Some(b), Some(c)] = [snap(&vertices[0]), snap(&vertices[1]), snap(&vertices[2])]
-    else {
+pub fn rasterise_triangle(window: &Window, vertices: &[PixelVertex; 3], mut sink: impl FnMut(Fragment)) {
+    let [Some(a), Some(b), Some(c)] = [snap(&vertices[0]), snap(&vertices[1]), snap(&vertices[2])] else {
         return;
     };
     let signed_area = cross(a, b, c);
@@ -70,8 +65,7 @@ pub fn rasterise_triangle(
                 let offset = x as f64;
                 let scale = 1.0 / (total + offset * total_step);
                 let depth = (moment + offset * moment_step) * scale;
-                let [wa, wb, wc] =
-                    [0, 1, 2].map(|i| ((starts[i] + offset * steps[i]) * scale) as f32);
+                let [wa, wb, wc] = [0, 1, 2].map(|i| ((starts[i] + offset * steps[i]) * scale) as f32);
                 sink(Fragment {
                     x: (left + x) as u32,
                     y: y as u32,

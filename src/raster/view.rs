@@ -44,23 +44,8 @@ impl View {
     /// `origin` falls on the middle of the picture and has depth 0; what lies behind it is clipped. `forward` is the
     /// viewing direction, `up` what points upwards in the picture (an `up` along `forward` is replaced),
     /// `pixels_per_metre` the scale. A direction or scale that is zero or not finite gives a view that shows nothing.
-    pub fn orthographic(
-        origin: Vec3,
-        forward: Vec3,
-        up: Vec3,
-        pixels_per_metre: f64,
-        width: u32,
-        height: u32,
-    ) -> Self {
-        View::new(
-            origin,
-            forward,
-            up,
-            pixels_per_metre,
-            [width, height],
-            0.0,
-            false,
-        )
+    pub fn orthographic(origin: Vec3, forward: Vec3, up: Vec3, pixels_per_metre: f64, width: u32, height: u32) -> Self {
+        View::new(origin, forward, up, pixels_per_metre, [width, height], 0.0, false)
     }
 
     /// A perspective view; `focal_length` in pixels, `near` in metres.
@@ -75,15 +60,7 @@ impl View {
         View::new(origin, forward, up, focal_length, size, near, true)
     }
 
-    fn new(
-        origin: Vec3,
-        forward: Vec3,
-        up: Vec3,
-        scale: f64,
-        size: [u32; 2],
-        near: f64,
-        perspective: bool,
-    ) -> Self {
+    fn new(origin: Vec3, forward: Vec3, up: Vec3, scale: f64, size: [u32; 2], near: f64, perspective: bool) -> Self {
         let [right, up, forward] = axes(forward, up);
         View {
             origin: origin.as_dvec3(),
@@ -126,8 +103,7 @@ impl View {
             return;
         }
         let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let [mut a, mut b] =
-            [(a, corners[0]), (b, corners[1])].map(|(point, weights)| Corner { point, weights });
+        let [mut a, mut b] = [(a, corners[0]), (b, corners[1])].map(|(point, weights)| Corner { point, weights });
         let distance = |corner: &Corner| corner.point.depth - self.near;
         match (distance(&a) < 0.0, distance(&b) < 0.0) {
             (true, true) => return,
@@ -164,10 +140,7 @@ impl View {
         if beyond(window, &points) {
             return;
         }
-        if points
-            .iter()
-            .all(|point| self.planes(point).iter().all(|&d| d >= 0.0))
-        {
+        if points.iter().all(|point| self.planes(point).iter().all(|&d| d >= 0.0)) {
             let vertices = points.map(|point| point.divide(self.perspective));
             rasterise_triangle(window, &vertices, sink);
             return;
@@ -182,9 +155,7 @@ impl View {
         }
         let mut count = 3;
         for plane in 0..5 {
-            (polygon, count) = cut(&polygon[..count], |corner| {
-                self.planes(&corner.point)[plane]
-            });
+            (polygon, count) = cut(&polygon[..count], |corner| self.planes(&corner.point)[plane]);
         }
         for i in 2..count {
             let corners = [&polygon[0], &polygon[i - 1], &polygon[i]];

@@ -38,11 +38,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
                     return Err(scanner.fail("elements before the nodes"));
                 };
                 read_elements(scanner, version, nodes, &mut raw)?;
-                scanner.expect(if section == b"$ELM" {
-                    "$ENDELM"
-                } else {
-                    "$EndElements"
-                })?;
+                scanner.expect(if section == b"$ELM" { "$ENDELM" } else { "$EndElements" })?;
                 has_elements = true;
             }
             ([b'$', name @ ..], _) if !is_known(name) => skip_section(scanner, name)?,
@@ -57,10 +53,8 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
 
 /// Whether a section is one that is read, so that another of its kind must not be skipped.
 fn is_known(name: &[u8]) -> bool {
-    matches!(
-        name,
-        b"MeshFormat" | b"NOD" | b"Nodes" | b"ELM" | b"Elements"
-    ) || name.starts_with(b"End")
+    matches!(name, b"MeshFormat" | b"NOD" | b"Nodes" | b"ELM" | b"Elements")
+        || name.starts_with(b"End")
         || name.starts_with(b"END")
 }
 
@@ -79,8 +73,7 @@ fn read_version(scanner: &mut Scanner) -> Result<Version> {
     match scanner.integer("file type")? {
         0 => {}
         1 => {
-            return Err(scanner
-                .fail("a binary Gmsh file; only ASCII can be read: save it with -format msh2"));
+            return Err(scanner.fail("a binary Gmsh file; only ASCII can be read: save it with -format msh2"));
         }
         other => return Err(scanner.fail(format!("file type {other} is neither 0 nor 1"))),
     }
@@ -95,9 +88,7 @@ fn skip_section(scanner: &mut Scanner, name: &[u8]) -> Result<()> {
     scanner.line();
     while scanner.remaining() > 0 {
         let line = scanner.line().trim_ascii();
-        let end = line
-            .strip_prefix(b"$End")
-            .or_else(|| line.strip_prefix(b"$END"));
+        let end = line.strip_prefix(b"$End").or_else(|| line.strip_prefix(b"$END"));
         if end == Some(name) {
             return Ok(());
         }
@@ -106,11 +97,7 @@ fn skip_section(scanner: &mut Scanner, name: &[u8]) -> Result<()> {
 }
 
 /// Reads the nodes; returns the vertex of each tag. Tags need be neither dense nor in order.
-fn read_nodes(
-    scanner: &mut Scanner,
-    version: Version,
-    raw: &mut RawMesh,
-) -> Result<HashMap<u64, u32>> {
+fn read_nodes(scanner: &mut Scanner, version: Version, raw: &mut RawMesh) -> Result<HashMap<u64, u32>> {
     let mut nodes = HashMap::new();
     let add = |scanner: &Scanner, nodes: &mut HashMap<u64, u32>, tag: u64| -> Result<()> {
         check_vertex_count(scanner, nodes.len() + 1)?;
@@ -160,12 +147,7 @@ fn read_nodes(
     Ok(nodes)
 }
 
-fn read_elements(
-    scanner: &mut Scanner,
-    version: Version,
-    nodes: &HashMap<u64, u32>,
-    raw: &mut RawMesh,
-) -> Result<()> {
+fn read_elements(scanner: &mut Scanner, version: Version, nodes: &HashMap<u64, u32>, raw: &mut RawMesh) -> Result<()> {
     if version != Version::FourOne {
         for _ in 0..scanner.count("elements", 6)? {
             scanner.integer("element number")?;
@@ -209,12 +191,7 @@ fn read_elements(
 }
 
 /// Reads the nodes of an element and adds it to the mesh.
-fn read_element(
-    scanner: &mut Scanner,
-    kind: u64,
-    nodes: &HashMap<u64, u32>,
-    raw: &mut RawMesh,
-) -> Result<()> {
+fn read_element(scanner: &mut Scanner, kind: u64, nodes: &HashMap<u64, u32>, raw: &mut RawMesh) -> Result<()> {
     let count = node_count(scanner, kind)?;
     let mut corners = [0; 10];
     for corner in &mut corners[..count] {

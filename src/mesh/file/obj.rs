@@ -89,10 +89,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     match (largest, raw.vertices.len()) {
         (Some((corner, place)), count) if corner as usize >= count => Err(scanner.fail_at(
             place,
-            format!(
-                "vertex {} is not there: there are {count}",
-                corner as u64 + 1
-            ),
+            format!("vertex {} is not there: there are {count}", corner as u64 + 1),
         )),
         _ => Ok(raw),
     }

@@ -145,19 +145,14 @@ impl<'a> Scanner<'a> {
     /// A finite number.
     pub fn number(&mut self, what: &str) -> Result<f64> {
         let word = self.word(what)?;
-        let number =
-            parse(word).ok_or_else(|| self.fail(format!("{} is no {what}", shown(word))))?;
+        let number = parse(word).ok_or_else(|| self.fail(format!("{} is no {what}", shown(word))))?;
         self.finite(number, what)
     }
 
     /// Three finite numbers.
     pub fn point(&mut self) -> Result<DVec3> {
         let what = "coordinate";
-        Ok(DVec3::new(
-            self.number(what)?,
-            self.number(what)?,
-            self.number(what)?,
-        ))
+        Ok(DVec3::new(self.number(what)?, self.number(what)?, self.number(what)?))
     }
 
     /// A number, unless it is not finite.
@@ -174,9 +169,7 @@ impl<'a> Scanner<'a> {
         let room = self.remaining() / bytes_each.max(1);
         match usize::try_from(count) {
             Ok(count) if count <= room => Ok(count),
-            _ => Err(self.fail(format!(
-                "{count} {what}, but the file ends after {room} at most"
-            ))),
+            _ => Err(self.fail(format!("{count} {what}, but the file ends after {room} at most"))),
         }
     }
 

@@ -13,9 +13,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
         .strip_prefix(b"# vtk DataFile Version ")
         .and_then(|version| parse(version.trim_ascii()))
         .filter(|version| (1.0..6.0).contains(version))
-        .ok_or_else(|| {
-            scanner.fail("\"# vtk DataFile Version\" and a number from 1 to 5 should be here")
-        })?;
+        .ok_or_else(|| scanner.fail("\"# vtk DataFile Version\" and a number from 1 to 5 should be here"))?;
     scanner.line(); // the title
     let encoding = scanner.word("ASCII or BINARY")?;
     let binary = is(encoding, "BINARY");
@@ -108,12 +106,8 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
             raw.ignored_cells += 1;
             Ok(())
         }
-        (TRIANGLE, &[a, b, c]) | (QUADRATIC_TRIANGLE, &[a, b, c, _, _, _]) => {
-            try_push(&mut raw.triangles, [a, b, c])
-        }
-        (QUAD, &[a, b, c, d]) | (QUADRATIC_QUAD, &[a, b, c, d, _, _, _, _]) => {
-            raw.add_polygon(&[a, b, c, d])
-        }
+        (TRIANGLE, &[a, b, c]) | (QUADRATIC_TRIANGLE, &[a, b, c, _, _, _]) => try_push(&mut raw.triangles, [a, b, c]),
+        (QUAD, &[a, b, c, d]) | (QUADRATIC_QUAD, &[a, b, c, d, _, _, _, _]) => raw.add_polygon(&[a, b, c, d]),
         (PIXEL, &[a, b, c, d]) => raw.add_polygon(&[a, b, d, c]),
         (POLYGON, &[_, _, _, ..]) => raw.add_polygon(corners),
         (TRIANGLE_STRIP, &[_, _, _, ..]) => {
@@ -125,8 +119,7 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
             }
             Ok(())
         }
-        (TETRAHEDRON, &[a, b, c, d])
-        | (QUADRATIC_TETRAHEDRON, &[a, b, c, d, _, _, _, _, _, _]) => {
+        (TETRAHEDRON, &[a, b, c, d]) | (QUADRATIC_TETRAHEDRON, &[a, b, c, d, _, _, _, _, _, _]) => {
             try_push(&mut raw.tetrahedra, [a, b, c, d])
         }
         _ => Err(scanner.fail(format!(
@@ -164,9 +157,7 @@ impl Cells {
             let total = scanner.count("numbers of cells", 2)?;
             begin_data(scanner)?;
             cells.ends.try_reserve_exact(count)?;
-            cells
-                .points
-                .try_reserve_exact(total.saturating_sub(count))?;
+            cells.points.try_reserve_exact(total.saturating_sub(count))?;
             for _ in 0..count {
                 let length = integer(scanner, DataType::I32)?;
                 let before = cells.points.len() + cells.ends.len() + 1;
@@ -196,9 +187,7 @@ impl Cells {
         for i in 0..offset_count {
             let offset = integer(scanner, data_type)?;
             if offset < latest || offset > total as u64 || (i == 0 && offset != 0) {
-                return Err(scanner.fail(format!(
-                    "offset {offset} after {latest}, of {total} points of cells"
-                )));
+                return Err(scanner.fail(format!("offset {offset} after {latest}, of {total} points of cells")));
             }
             latest = offset;
             if i > 0 {
@@ -219,12 +208,7 @@ impl Cells {
     }
 
     /// Reads a point of the current cell.
-    fn add_point(
-        &mut self,
-        scanner: &mut Scanner,
-        data_type: DataType,
-        vertex_count: usize,
-    ) -> Result<()> {
+    fn add_point(&mut self, scanner: &mut Scanner, data_type: DataType, vertex_count: usize) -> Result<()> {
         let point = integer(scanner, data_type)?;
         let point = scanner.vertex(point, 0, vertex_count)?;
         try_push(&mut self.points, point)

@@ -1,0 +1,1125 @@
+/* sinew: soft tissue for programs that already have a loop.
+ *
+ * Units are SI: metres, kilograms, seconds, newtons, joules, radians. A vector is three packed
+ * floats, x y z; a quaternion x y z w. Nodes are numbered and ordered as the caller gave them.
+ *
+ * Every function that can fail returns a sinew_status, writes its outputs only on SINEW_STATUS_OK
+ * and, failed, changes nothing; sinew_last_error says in words what was wrong. What is refused
+ * everywhere: NULL where it is not allowed, NaN and infinity, an index out of range, an unknown
+ * constant, a negative mass or stiffness, a reserved field that is not zero.
+ *
+ * const sinew_world *: any number of threads at once. sinew_world *: one thread, nobody else inside
+ * that world. Two worlds share nothing.
+ *
+ * A definition is filled by its init function, then changed, and read during the call only. What
+ * the caller creates, the caller destroys; bodies and tools end with their world. A view is borrowed
+ * and says how long it lives. Set struct_size to sizeof of the struct as this header declares it.
+ *
+ * Made by cbindgen from src/capi; do not edit. */
+
+#ifndef SINEW_H
+#define SINEW_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/**
+ * The default: laid out for the processor.
+ */
+#define SINEW_STORAGE_PACKED 0
+
+/**
+ * A linked list per node, every link allocated on its own.
+ */
+#define SINEW_STORAGE_EFFICIENT 1
+
+/**
+ * One array, springs_per_node places per node.
+ */
+#define SINEW_STORAGE_FAST_LINK 2
+
+/**
+ * Per node, a chain of arrays of springs_per_node places.
+ */
+#define SINEW_STORAGE_DYNAMIC_BULK 3
+
+/**
+ * Explicit, as many substeps as it needs to be stable.
+ */
+#define SINEW_SOLVER_VERLET 0
+
+/**
+ * Stable at any step.
+ */
+#define SINEW_SOLVER_IMPLICIT 1
+
+/**
+ * The accurate reference: converged implicit steps, slow.
+ */
+#define SINEW_SOLVER_NEWTON 2
+
+/**
+ * By the file's name: .obj .stl .vtk .msh .node .ele.
+ */
+#define SINEW_MESH_FORMAT_AUTO 0
+
+/**
+ * Wavefront OBJ.
+ */
+#define SINEW_MESH_FORMAT_OBJ 1
+
+/**
+ * STL, binary or ASCII.
+ */
+#define SINEW_MESH_FORMAT_STL 2
+
+/**
+ * VTK legacy: unstructured grids and polygonal data, ASCII or binary.
+ */
+#define SINEW_MESH_FORMAT_VTK 3
+
+/**
+ * Gmsh, versions 1, 2 and 4.1, ASCII.
+ */
+#define SINEW_MESH_FORMAT_GMSH 4
+
+/**
+ * TetGen: .node and .ele side by side, whichever is named.
+ */
+#define SINEW_MESH_FORMAT_TETGEN 5
+
+/**
+ * In node_of_vertex: the vertex was dropped.
+ */
+#define SINEW_NO_NODE 4294967295
+
+/**
+ * The first number of the version that this header is of.
+ */
+#define SINEW_VERSION_MAJOR 0
+
+/**
+ * The second.
+ */
+#define SINEW_VERSION_MINOR 1
+
+/**
+ * The third.
+ */
+#define SINEW_VERSION_PATCH 0
+
+/**
+ * All three: major << 16 | minor << 8 | patch.
+ */
+#define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)
+
+/**
+ * A ball about the origin.
+ */
+#define SINEW_SHAPE_SPHERE 0
+
+/**
+ * A cylinder along y about the origin, with round caps.
+ */
+#define SINEW_SHAPE_CAPSULE 1
+
+/**
+ * The plane y = 0 with free space above.
+ */
+#define SINEW_SHAPE_PLANE 2
+
+/**
+ * A closed mesh.
+ */
+#define SINEW_SHAPE_MESH 3
+
+/**
+ * Exact distances, swept over the step.
+ */
+#define SINEW_DETECTION_EXACT 0
+
+/**
+ * Virtual rays cast through a depth buffer.
+ */
+#define SINEW_DETECTION_IMAGE_SPACE 1
+
+/**
+ * A sampled signed distance; for meshes alone.
+ */
+#define SINEW_DETECTION_DISTANCE_FIELD 2
+
+/**
+ * A mesh: positions, triangles and tetrahedra. It belongs to the caller, never changes, and may be read by any number of
+ * threads at once.
+ */
+typedef struct sinew_mesh sinew_mesh;
+
+/**
+ * A world: bodies and tools that are stepped together.
+ *
+ * As `const sinew_world *` it may be used by any number of threads at once; as `sinew_world *` by one, with nobody else
+ * inside.
+ */
+typedef struct sinew_world sinew_world;
+
+/**
+ * The answer of every function that can fail: one of the `SINEW_STATUS_...`.
+ */
+typedef int32_t sinew_status;
+
+/**
+ * What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
+ */
+typedef struct sinew_body_def {
+  /**
+   * Set by sinew_body_def_init.
+   */
+  size_t struct_size;
+  /**
+   * 3 node_count floats, m.
+   */
+  const float *positions;
+  /**
+   * Nullable: positions.
+   */
+  const float *rest_positions;
+  /**
+   * At least 1.
+   */
+  size_t node_count;
+  /**
+   * node_count floats, kg, 0: pinned for good; nullable: node_mass for all.
+   */
+  const float *masses;
+  /**
+   * node_count floats, N s/m: the gamma_i of m a = ... - gamma_i v; nullable: node_damping.
+   */
+  const float *node_dampings;
+  /**
+   * kg, above 0; no default.
+   */
+  float node_mass;
+  /**
+   * N s/m; default 0.
+   */
+  float node_damping;
+  /**
+   * 2 spring_count node indices, each pair once; NULL: the edges of triangles and tetrahedra, each once (then no
+   * per-spring arrays); not NULL with spring_count 0: no springs.
+   */
+  const uint32_t *springs;
+  /**
+   * Springs given.
+   */
+  size_t spring_count;
+  /**
+   * spring_count floats, N/m; nullable: stiffness for all.
+   */
+  const float *stiffnesses;
+  /**
+   * spring_count floats, m; nullable: from the rest positions.
+   */
+  const float *rest_lengths;
+  /**
+   * spring_count floats, N s/m along the spring; nullable: spring_damping.
+   */
+  const float *spring_dampings;
+  /**
+   * N/m; default 0.
+   */
+  float stiffness;
+  /**
+   * N s/m; default 0.
+   */
+  float spring_damping;
+  /**
+   * 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra is what is
+   * drawn and touched.
+   */
+  const uint32_t *triangles;
+  /**
+   * Triangles given.
+   */
+  size_t triangle_count;
+  /**
+   * 4 tetrahedron_count node indices; nullable.
+   */
+  const uint32_t *tetrahedra;
+  /**
+   * Tetrahedra given.
+   */
+  size_t tetrahedron_count;
+  /**
+   * SINEW_STORAGE_...
+   */
+  uint32_t storage;
+  /**
+   * Row width or chunk size; 0, the default: chosen from the springs given.
+   */
+  uint32_t springs_per_node;
+  /**
+   * SINEW_SOLVER_...
+   */
+  uint32_t solver;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_body_def;
+
+/**
+ * A body: a plain value, all zero is "none".
+ */
+typedef struct sinew_body_id {
+  /**
+   * Which place, from 1.
+   */
+  uint32_t index1;
+  /**
+   * Which of the bodies that lived there.
+   */
+  uint32_t generation;
+} sinew_body_id;
+
+/**
+ * Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
+ * set_positions or set_velocities, the next change of topology of that body, or its end.
+ */
+typedef struct sinew_vec3_view {
+  /**
+   * The first.
+   */
+  const float *data;
+  /**
+   * How many.
+   */
+  size_t count;
+  /**
+   * Bytes from one to the next.
+   */
+  size_t stride;
+} sinew_vec3_view;
+
+/**
+ * J, at the time of the positions.
+ */
+typedef struct sinew_energy {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Of the nodes that are free to move.
+   */
+  double kinetic;
+  /**
+   * Springs and every other inner term.
+   */
+  double elastic;
+  /**
+   * Zero at the origin.
+   */
+  double gravitational;
+} sinew_energy;
+
+/**
+ * How much memory the springs of a body take.
+ */
+typedef struct sinew_storage_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Nodes of the body.
+   */
+  size_t node_count;
+  /**
+   * Each counted once.
+   */
+  size_t spring_count;
+  /**
+   * By springs that exist.
+   */
+  size_t bytes_used;
+  /**
+   * From the allocator, with what is spare.
+   */
+  size_t bytes_reserved;
+} sinew_storage_report;
+
+/**
+ * What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
+ */
+typedef struct sinew_mesh_view {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * 3 node_count floats, m.
+   */
+  const float *positions;
+  /**
+   * Nodes; each is used.
+   */
+  size_t node_count;
+  /**
+   * 3 triangle_count node indices: what the file or the shape gives as triangles.
+   */
+  const uint32_t *triangles;
+  /**
+   * Triangles.
+   */
+  size_t triangle_count;
+  /**
+   * 4 tetrahedron_count node indices, of positive volume.
+   */
+  const uint32_t *tetrahedra;
+  /**
+   * Tetrahedra.
+   */
+  size_t tetrahedron_count;
+  /**
+   * 3 surface_triangle_count node indices, outward: the boundary of the tetrahedra; without tetrahedra the triangles.
+   */
+  const uint32_t *surface;
+  /**
+   * Triangles of the surface.
+   */
+  size_t surface_triangle_count;
+  /**
+   * vertex_count node indices: for each vertex of the file its node, or SINEW_NO_NODE where it was dropped.
+   */
+  const uint32_t *node_of_vertex;
+  /**
+   * Vertices of the file; of a shape, its nodes.
+   */
+  size_t vertex_count;
+  /**
+   * Vertices that became one node with an earlier one.
+   */
+  size_t welded_vertices;
+  /**
+   * Points that nothing uses.
+   */
+  size_t dropped_vertices;
+  /**
+   * Collapsed or doubled.
+   */
+  size_t dropped_triangles;
+  /**
+   * Collapsed or doubled.
+   */
+  size_t dropped_tetrahedra;
+  /**
+   * Were inside out; two of their nodes were swapped.
+   */
+  size_t flipped_tetrahedra;
+  /**
+   * 1: every edge of the surface is used equally often in both directions; 0: it is open.
+   */
+  uint32_t closed;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_mesh_view;
+
+/**
+ * How a world is drawn. Filled by sinew_picture_def_init.
+ */
+typedef struct sinew_picture_def {
+  /**
+   * Set by sinew_picture_def_init.
+   */
+  size_t struct_size;
+  /**
+   * Pixels, 1 to 16384; default 1280.
+   */
+  uint32_t width;
+  /**
+   * Pixels, 1 to 16384; default 960.
+   */
+  uint32_t height;
+  /**
+   * Where the camera is, m.
+   */
+  float eye[3];
+  /**
+   * What it looks at, m; eye equal to target, the default: a view fitted to the bodies, from `direction`.
+   */
+  float target[3];
+  /**
+   * What is up in the picture; default 0 1 0.
+   */
+  float up[3];
+  /**
+   * For a fitted view: from the scene towards the camera; default 1 0.6 1.4.
+   */
+  float direction[3];
+  /**
+   * rad, vertical, above 0 and below pi; default 0.6.
+   */
+  float field_of_view;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_picture_def;
+
+/**
+ * What a tool is. Filled by sinew_tool_def_init; used only during sinew_tool_create.
+ */
+typedef struct sinew_tool_def {
+  /**
+   * Set by sinew_tool_def_init.
+   */
+  size_t struct_size;
+  /**
+   * SINEW_SHAPE_...: sphere about the origin, capsule along y, plane y = 0 with free space above.
+   */
+  uint32_t shape;
+  /**
+   * m, above 0: sphere, capsule; no default.
+   */
+  float radius;
+  /**
+   * m: capsule, between the centre and a cap's centre.
+   */
+  float half_length;
+  /**
+   * 0.
+   */
+  uint32_t reserved0;
+  /**
+   * Mesh: 3 node_count floats, closed, triangles outward.
+   */
+  const float *positions;
+  /**
+   * Nodes of the mesh.
+   */
+  size_t node_count;
+  /**
+   * 3 triangle_count node indices.
+   */
+  const uint32_t *triangles;
+  /**
+   * Triangles of the mesh.
+   */
+  size_t triangle_count;
+  /**
+   * SINEW_DETECTION_...
+   */
+  uint32_t detection;
+  /**
+   * Coulomb coefficient; default 0.
+   */
+  float friction;
+  /**
+   * Where it is at first, m; default 0 0 0.
+   */
+  float position[3];
+  /**
+   * x y z w; default 0 0 0 1; normalised, zero is refused.
+   */
+  float orientation[4];
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_tool_def;
+
+/**
+ * A tool: a plain value, all zero is "none".
+ */
+typedef struct sinew_tool_id {
+  /**
+   * Which place, from 1.
+   */
+  uint32_t index1;
+  /**
+   * Which of the tools that lived there.
+   */
+  uint32_t generation;
+} sinew_tool_id;
+
+/**
+ * How a world steps. Filled by sinew_world_def_init.
+ */
+typedef struct sinew_world_def {
+  /**
+   * Set by sinew_world_def_init.
+   */
+  size_t struct_size;
+  /**
+   * m/s^2; default 0 -9.81 0.
+   */
+  float gravity[3];
+  /**
+   * 1, the default: the caller's thread alone; 0: one per core.
+   */
+  uint32_t thread_count;
+  /**
+   * 0, the default: as many as stability needs; n: exactly n per step.
+   */
+  uint32_t substeps;
+  /**
+   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE.
+   */
+  uint32_t max_substeps;
+  /**
+   * m; 0, the default: off; above 0, with substeps 0: a step's own position error stays below it.
+   */
+  float tolerance;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_world_def;
+
+/**
+ * What a step did; filled on SINEW_STATUS_OK and SINEW_STATUS_UNSTABLE.
+ */
+typedef struct sinew_step_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * The most that any body took.
+   */
+  uint32_t substeps;
+  /**
+   * s: the longest explicit substep that is stable now, over all bodies; infinity: no limit.
+   */
+  float stable_substep;
+  /**
+   * Bodies that would have become non-finite: put back as they were, the others stepped.
+   */
+  uint32_t bodies_restored;
+  /**
+   * m: how far a position of this step may be off; 0 where tolerance is off.
+   */
+  float error_estimate;
+} sinew_step_report;
+
+/**
+ * Done.
+ */
+#define SINEW_STATUS_OK 0
+
+/**
+ * An argument is out of its range; nothing changed.
+ */
+#define SINEW_STATUS_INVALID_ARGUMENT 1
+
+/**
+ * The id is of something destroyed, or of nothing.
+ */
+#define SINEW_STATUS_STALE_ID 2
+
+/**
+ * A fixed-capacity storage is full.
+ */
+#define SINEW_STATUS_CAPACITY 3
+
+/**
+ * Memory could not be reserved; nothing changed.
+ */
+#define SINEW_STATUS_OUT_OF_MEMORY 4
+
+/**
+ * The step could not be taken: nothing moved, pending forces and poses stay pending.
+ */
+#define SINEW_STATUS_UNSTABLE 5
+
+/**
+ * Valid, but this build or this combination does not offer it.
+ */
+#define SINEW_STATUS_UNSUPPORTED 6
+
+/**
+ * A file could not be read or written.
+ */
+#define SINEW_STATUS_IO 7
+
+/**
+ * A fault inside the library; the world refuses further calls but destroy.
+ */
+#define SINEW_STATUS_INTERNAL 8
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_body_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_body_def_init(struct sinew_body_def *def, size_t struct_size);
+
+/**
+ * Creates a body; copies what `def` points to.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a storage other than PACKED, a solver other than
+ * VERLET), SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
+ * the lengths that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_body_create(struct sinew_world *world,
+                               const struct sinew_body_def *def,
+                               struct sinew_body_id *out);
+
+/**
+ * Destroys a body. Views of its positions and velocities end.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_destroy(struct sinew_world *world, struct sinew_body_id body);
+
+/**
+ * Adds `force`, 3 floats, N, to what acts on a node: constant over the whole next step, cleared when that is
+ * SINEW_STATUS_OK; nothing on a pinned node.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `force` is NULL or 3 floats.
+ */
+sinew_status sinew_body_apply_force(struct sinew_world *world,
+                                    struct sinew_body_id body,
+                                    uint32_t node,
+                                    const float *force);
+
+/**
+ * Adds a force to what acts on each of `count` nodes, as sinew_body_apply_force does: `nodes` are `count` indices, of
+ * which some may be equal, `forces` 3 `count` floats, N. Both may be NULL where `count` is 0.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then no force is added.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_apply_forces(struct sinew_world *world,
+                                     struct sinew_body_id body,
+                                     const uint32_t *nodes,
+                                     const float *forces,
+                                     size_t count);
+
+/**
+ * Writes a view of where each node is, m. Nothing is copied; see sinew_vec3_view for how long it lives.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_body_get_positions(const struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      struct sinew_vec3_view *out);
+
+/**
+ * Writes a view of how fast each node moves at the time of the positions, m/s; a pinned node as it was led in the last
+ * step. Nothing is copied; see sinew_vec3_view for how long it lives.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_body_get_velocities(const struct sinew_world *world,
+                                       struct sinew_body_id body,
+                                       struct sinew_vec3_view *out);
+
+/**
+ * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is swept.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `positions` is NULL or as long as stated.
+ */
+sinew_status sinew_body_set_positions(struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      const float *positions,
+                                      size_t node_count);
+
+/**
+ * Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `velocities` is NULL or as long as stated.
+ */
+sinew_status sinew_body_set_velocities(struct sinew_world *world,
+                                       struct sinew_body_id body,
+                                       const float *velocities,
+                                       size_t node_count);
+
+/**
+ * Holds a node where it is, from now on; nothing where it is held already.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_pin(struct sinew_world *world, struct sinew_body_id body, uint32_t node);
+
+/**
+ * Lets go of a node, which goes on as it was led in the last step; nothing where it is not held.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_unpin(struct sinew_world *world,
+                              struct sinew_body_id body,
+                              uint32_t node);
+
+/**
+ * Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
+ */
+sinew_status sinew_body_move_pin(struct sinew_world *world,
+                                 struct sinew_body_id body,
+                                 uint32_t node,
+                                 const float *position);
+
+/**
+ * Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
+ */
+sinew_status sinew_body_get_pin_force(const struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      uint32_t node,
+                                      float *force);
+
+/**
+ * Joins two nodes by a spring without damping: `stiffness` in N/m, `rest_length` in m, below 0: the current distance.
+ * One spring per pair.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the pair has a spring), SINEW_STATUS_STALE_ID,
+ * SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_add_spring(struct sinew_world *world,
+                                   struct sinew_body_id body,
+                                   uint32_t a,
+                                   uint32_t b,
+                                   float stiffness,
+                                   float rest_length);
+
+/**
+ * Removes the spring between two nodes.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where there is none), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_remove_spring(struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      uint32_t a,
+                                      uint32_t b);
+
+/**
+ * Writes the energy of a body. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_body_get_energy(const struct sinew_world *world,
+                                   struct sinew_body_id body,
+                                   struct sinew_energy *out);
+
+/**
+ * Writes how much memory the springs of a body take. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_body_get_storage_report(const struct sinew_world *world,
+                                           struct sinew_body_id body,
+                                           struct sinew_storage_report *out);
+
+/**
+ * Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements
+ * and points that nothing uses are dropped, tetrahedra that are inside out are turned; the view counts it all. `path` is
+ * UTF-8, `format` a SINEW_MESH_FORMAT_..., `scale` what one unit of the file is in m, above 0. The caller destroys the mesh
+ * with sinew_mesh_destroy.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT; SINEW_STATUS_IO (missing, cut short, malformed, of another format, with indices
+ * out of range or numbers that are not finite: the message names the line or byte); SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `path` is NULL or ends with NUL; `out` is NULL or writable.
+ */
+sinew_status sinew_mesh_load(const char *path,
+                             uint32_t format,
+                             float scale,
+                             struct sinew_mesh **out);
+
+/**
+ * Makes a cloth in the plane y = 0 about the origin, up outward: `size` are its 2 extents along x and z, m, above 0,
+ * `cells` its 2 numbers of cells, at least 1, of two triangles each. The caller destroys it with sinew_mesh_destroy.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `size` is NULL or 2 floats, `cells` NULL or 2 numbers; `out` is NULL or writable.
+ */
+sinew_status sinew_mesh_create_cloth(const float *size,
+                                     const uint32_t *cells,
+                                     struct sinew_mesh **out);
+
+/**
+ * Makes a block of tetrahedra about the origin: `size` are its 3 extents, m, above 0, `cells` its 3 numbers of cells, at
+ * least 1. The caller destroys it with sinew_mesh_destroy.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `size` is NULL or 3 floats, `cells` NULL or 3 numbers; `out` is NULL or writable.
+ */
+sinew_status sinew_mesh_create_block(const float *size,
+                                     const uint32_t *cells,
+                                     struct sinew_mesh **out);
+
+/**
+ * Makes an organ, liver-like, of tetrahedra about the origin: `length` is its longest extent, along x, and `spacing` that
+ * of its nodes, both m, above 0. Thin in y. The caller destroys it with sinew_mesh_destroy.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `out` is NULL or writable.
+ */
+sinew_status sinew_mesh_create_organ(float length,
+                                     float spacing,
+                                     struct sinew_mesh **out);
+
+/**
+ * Writes a view of what a mesh holds; nothing is copied, all is valid until the mesh's end. `out->struct_size` is set by
+ * the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `mesh` is NULL or a mesh that is not destroyed; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_mesh_get_view(const struct sinew_mesh *mesh,
+                                 struct sinew_mesh_view *out);
+
+/**
+ * Destroys a mesh. NULL: nothing.
+ *
+ * # Safety
+ * `mesh` is NULL or a mesh that is not destroyed and that nobody uses any more.
+ */
+void sinew_mesh_destroy(struct sinew_mesh *mesh);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_picture_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_picture_def_init(struct sinew_picture_def *def, size_t struct_size);
+
+/**
+ * Draws all bodies and tools into a PNG file: the surface of a body, or its springs where it has none. `def` may be NULL:
+ * the defaults. `path` is UTF-8; a file that exists is replaced, once the whole picture is written.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_IO, SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (a library
+ * built without pictures).
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `path` is NULL or
+ * ends with NUL.
+ */
+sinew_status sinew_world_save_picture(const struct sinew_world *world,
+                                      const struct sinew_picture_def *def,
+                                      const char *path);
+
+/**
+ * The version of the library that is linked: major << 16 | minor << 8 | patch; compare with SINEW_VERSION.
+ */
+uint32_t sinew_version(void);
+
+/**
+ * The name of a status, such as "SINEW_STATUS_OK"; never NULL, valid for ever.
+ */
+const char *sinew_status_name(sinew_status status);
+
+/**
+ * Writes the message of this thread's last failed call to `buffer`, cut where `capacity` bytes do not hold it, and ended
+ * by NUL. `buffer` may be NULL where `capacity` is 0.
+ *
+ * Returns the bytes that the whole message needs, NUL included; 1, an empty message, where no call has failed.
+ *
+ * # Safety
+ * `buffer` must be writable for `capacity` bytes.
+ */
+size_t sinew_last_error(char *buffer,
+                        size_t capacity);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_tool_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_tool_def_init(struct sinew_tool_def *def, size_t struct_size);
+
+/**
+ * Creates a tool; copies what `def` points to.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (SINEW_SHAPE_MESH, detection other than EXACT),
+ * SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
+ * the lengths that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_tool_create(struct sinew_world *world,
+                               const struct sinew_tool_def *def,
+                               struct sinew_tool_id *out);
+
+/**
+ * Destroys a tool.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_tool_destroy(struct sinew_world *world, struct sinew_tool_id tool);
+
+/**
+ * Moves a tool to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be
+ * NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the orientation is zero), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
+ */
+sinew_status sinew_tool_set_pose(struct sinew_world *world,
+                                 struct sinew_tool_id tool,
+                                 const float *position,
+                                 const float *orientation);
+
+/**
+ * Writes the force, 3 floats, N, and the torque about its position, 3 floats, N m, on a tool: world axes, mean over the
+ * last step.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `force` and `torque` are NULL or writable for 3 floats.
+ */
+sinew_status sinew_tool_get_wrench(const struct sinew_world *world,
+                                   struct sinew_tool_id tool,
+                                   float *force,
+                                   float *torque);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_world_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_world_def_init(struct sinew_world_def *def, size_t struct_size);
+
+/**
+ * Creates an empty world, which the caller destroys with sinew_world_destroy. `def` may be NULL: the defaults.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread_count other than 1),
+ * SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_world_create(const struct sinew_world_def *def,
+                                struct sinew_world **out);
+
+/**
+ * Destroys a world with all that is in it. NULL: nothing.
+ *
+ * # Safety
+ * `world` is NULL or a world that is not destroyed and that nobody uses any more.
+ */
+void sinew_world_destroy(struct sinew_world *world);
+
+/**
+ * Steps everything in the world by `dt` seconds, above 0. `report` may be NULL. Views of positions and velocities end.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT; SINEW_STATUS_UNSTABLE, where the step needs more substeps than max_substeps, or
+ * than the world's fixed substeps: nothing has moved, pending forces and poses stay pending.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_world_step(struct sinew_world *world,
+                              float dt,
+                              struct sinew_step_report *report);
+
+/**
+ * Gives everything this acceleration, 3 floats, m/s^2, from the next step on.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `gravity` is NULL or 3 floats.
+ */
+sinew_status sinew_world_set_gravity(struct sinew_world *world, const float *gravity);
+
+/**
+ * Writes a hash over everything that the next step depends on; to be compared within one version of the library.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_world_get_state_hash(const struct sinew_world *world,
+                                        uint64_t *out);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* SINEW_H */

@@ -1,0 +1,132 @@
+//! Pictures of a world.
+
+use glam::Vec3;
+
+use crate::body::{Body, finite_vector};
+use crate::contact::{Shape, Tool};
+use crate::error::{Error, Result};
+use crate::mesh::is_closed;
+use crate::raster::{self, Camera, Image, Lines, Look, Scene, Surface};
+use crate::world::World;
+
+/// How a world is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureDefinition {
+    /// Pixels, 1 to 16384.
+    pub width: u32,
+    /// Pixels, 1 to 16384.
+    pub height: u32,
+    /// Where the camera is, in metres, and what it looks at; `None`: a view fitted to the bodies.
+    pub eye_and_target: Option<(Vec3, Vec3)>,
+    /// What is up in the picture.
+    pub up: Vec3,
+    /// For a fitted view: from the scene towards the camera.
+    pub direction: Vec3,
+    /// The vertical angle of view, above 0 and below pi, in radians.
+    pub field_of_view: f32,
+}
+
+impl Default for PictureDefinition {
+    /// 1280 x 960 pixels, fitted to the bodies, seen from above and the side.
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 960,
+            eye_and_target: None,
+            up: Vec3::Y,
+            direction: Vec3::new(1.0, 0.6, 1.4),
+            field_of_view: 0.6,
+        }
+    }
+}
+
+impl World {
+    /// A picture of all bodies and tools: the surface of a body, or its springs where it has none.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: something in the definition is out of its range. [`Error::OutOfMemory`].
+    pub fn picture(&self, definition: &PictureDefinition) -> Result<Image> {
+        let springs = self.springs_to_draw()?;
+        let mut scene = Scene::default();
+        for (body, springs) in self.bodies().zip(&springs) {
+            if body.surface().is_empty() {
+                scene.lines.push(Lines {
+                    positions: body.positions(),
+                    pairs: springs,
+                    thickness: 2.0,
+                    look: Look::SPRINGS,
+                });
+            } else {
+                scene.surfaces.push(Surface {
+                    positions: body.positions(),
+                    triangles: body.surface(),
+                    look: if is_closed(body.surface())? {
+                        Look::TISSUE
+                    } else {
+                        Look::CLOTH
+                    },
+                });
+            }
+        }
+        scene.shapes.extend(self.tools().map(shape_of));
+        let camera = definition.camera(&scene)?;
+        scene.draw(&camera, definition.width, definition.height)
+    }
+
+    /// For each body the springs that stand for a surface it does not have.
+    fn springs_to_draw(&self) -> Result<Vec<Vec<[u32; 2]>>> {
+        let springs = |body: &Body| {
+            if body.surface().is_empty() {
+                body.spring_pairs()
+            } else {
+                Ok(Vec::new())
+            }
+        };
+        self.bodies().map(springs).collect()
+    }
+}
+
+impl PictureDefinition {
+    fn camera(&self, scene: &Scene) -> Result<Camera> {
+        let aspect = self.width.max(1) as f32 / self.height.max(1) as f32;
+        let Some((eye, target)) = self.eye_and_target else {
+            return scene.camera(self.direction, self.up, self.field_of_view, aspect);
+        };
+        finite_vector("eye", eye)?;
+        finite_vector("target", target)?;
+        if eye == target {
+            return Err(Error::invalid(format!(
+                "eye and target are both {eye}: there is no direction"
+            )));
+        }
+        Ok(Camera {
+            eye,
+            target,
+            up: self.up,
+            field_of_view: self.field_of_view,
+        })
+    }
+}
+
+fn shape_of(tool: &Tool) -> (raster::Shape, Look) {
+    let centre = tool.pose.position;
+    let up = tool.pose.orientation * Vec3::Y;
+    match tool.shape {
+        Shape::Sphere { radius } => (raster::Shape::Sphere { centre, radius }, Look::INSTRUMENT),
+        Shape::Capsule { radius, half_length } => {
+            let capsule = raster::Shape::Capsule {
+                start: centre - up * half_length,
+                end: centre + up * half_length,
+                radius,
+            };
+            (capsule, Look::INSTRUMENT)
+        }
+        Shape::Plane => (
+            raster::Shape::Plane {
+                point: centre,
+                normal: up,
+            },
+            Look::GROUND,
+        ),
+    }
+}
