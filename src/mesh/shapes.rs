@@ -8,8 +8,8 @@ use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
 /// face are cut in opposite ways, so that the diagonals meet.
-const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
-const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 4, 2], [3, 1, 2, 7], [5, 1, 7, 4], [6, 2, 4, 7]];
+const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 6, 5], [1, 0, 5, 3], [2, 0, 3, 6], [4, 0, 6, 5], [7, 3, 5, 6]];
+const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4]];
 
 impl Mesh {
     /// A rectangle in the plane y = 0 about the origin, facing up (+y): `size` along x and z in metres, above 0, in
