@@ -132,6 +132,7 @@ int main(int argc, char **argv) {
 
     pushed = force[1];
     held = rim_force(world, cloth, masses, shape.node_count);
+    clear_progress();
     if (frame % 10 == 0) {
       printf("%8.2f%11.1f%11.4f%11.4f%12.3f%11u%11.2f\n", time, 1e3 * (RADIUS - place[1]), pushed, held,
              1e3 * depth_inside(nodes, place), (unsigned)report.substeps, 1e3 * spent);
@@ -139,6 +140,7 @@ int main(int argc, char **argv) {
     if (frame == (int)lround(SETTLE / FRAME)) save_picture(world, &picture, chosen.directory, "cloth_before.png");
     show_progress(frame, frame_count);
   }
+  clear_progress();
   save_picture(world, &picture, chosen.directory, "cloth_during.png");
   printf("\nat the end the sphere pushes with %.4f N, the rim holds %.4f N\n", pushed, held);
 

@@ -87,10 +87,11 @@ static inline double smooth(double t) {
 
 /* One line, rewritten in place where a person watches; nothing goes into a file or a pipe. */
 static inline void show_progress(int frame, int frame_count) {
-  if (!isatty(STDERR_FILENO)) return;
-  if (frame < frame_count) fprintf(stderr, "\rframe %d of %d, %d %%", frame, frame_count, 100 * frame / frame_count);
-  else fprintf(stderr, "\r\033[K");
-  fflush(stderr);
+  if (isatty(STDERR_FILENO)) fprintf(stderr, "\rframe %d of %d ", frame, frame_count);
+}
+
+static inline void clear_progress(void) {
+  if (isatty(STDERR_FILENO)) fprintf(stderr, "\r\033[K");
 }
 
 /* directory/name, to be freed. */

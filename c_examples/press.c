@@ -211,6 +211,7 @@ int main(int argc, char **argv) {
     slowest = fmax(slowest, spent);
     peak = fmax(peak, force[up]);
     fprintf(curve, "%.6f,%.6f,%.6f,%u,%.3f\n", time, in, force[up], (unsigned)report.substeps, 1e3 * spent);
+    clear_progress();
     if (frame % 10 == 0) {
       printf("%8.2f%11.2f%11.4f%11.2f%11u%11.2f\n", time, 1e3 * in, force[up],
              1e3 * farthest_moved(nodes, shape.positions), (unsigned)report.substeps, 1e3 * spent);
@@ -218,6 +219,7 @@ int main(int argc, char **argv) {
     if (frame == deepest_frame) save_picture(world, &picture, chosen.directory, "press_during.png");
     show_progress(frame, frame_count);
   }
+  clear_progress();
   save_picture(world, &picture, chosen.directory, "press_after.png");
   printf("\npeak force %.4f N at %.2f mm; %.2f ms per frame, %.2f the slowest: %.1f times real time\n", peak, 1e3 * depth,
          1e3 * total / frame_count, 1e3 * slowest, frame_count * FRAME / total);
