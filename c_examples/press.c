@@ -104,25 +104,22 @@ static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *sha
   return organ;
 }
 
-/* The centre of a tip that just touches the organ from above, over the highest point near the middle. */
+/* The centre of a tip that just touches the organ from above, over a high point near the middle. */
 static void find_contact(const sinew_mesh_view *shape, const bounds *box, double radius, float contact[3]) {
   const int up = box->thin, a = (up + 1) % 3, b = (up + 2) % 3;
-  const double middle = 0.2 * extent(box, box->longest);
+  const float x = (box->low[a] + box->high[a]) / 2, y = (box->low[b] + box->high[b]) / 2;
+  const size_t count = 3 * shape->surface_triangle_count;
+  double best = -HUGE_VAL;
   size_t i;
-  int pass;
-  for (i = 0; i < 3; i++) contact[i] = (box->low[i] + box->high[i]) / 2;
-  for (pass = 0; pass < 2; pass++) { /* first the highest point, then how high the tip must be to clear those round it */
-    const float x = contact[a], y = contact[b];
-    const double reach = pass == 0 ? middle : radius;
-    contact[up] = box->low[up];
-    for (i = 0; i < 3 * shape->surface_triangle_count; i++) {
-      const float *p = shape->positions + 3 * (size_t)shape->surface[i];
-      const double aside = hypot(p[a] - x, p[b] - y);
-      const double height = pass == 0 ? p[up] : p[up] + sqrt(fmax(0, radius * radius - aside * aside));
-      if (aside > reach || height <= contact[up]) continue;
-      contact[up] = (float)height;
-      if (pass == 0) contact[a] = p[a], contact[b] = p[b];
-    }
+  for (i = 0; i < count; i++) { /* the point to press: height counts twice what distance from the middle does */
+    const float *p = shape->positions + 3 * (size_t)shape->surface[i];
+    const double merit = 2 * p[up] - hypot(p[a] - x, p[b] - y);
+    if (merit > best) best = merit, memcpy(contact, p, 3 * sizeof *p);
+  }
+  for (i = 0; i < count; i++) { /* how high a tip over it must be to clear the points around */
+    const float *p = shape->positions + 3 * (size_t)shape->surface[i];
+    const double aside = hypot(p[a] - contact[a], p[b] - contact[b]);
+    if (aside < radius) contact[up] = fmaxf(contact[up], p[up] + (float)sqrt(radius * radius - aside * aside));
   }
 }
 
