@@ -53,54 +53,105 @@ static double tetrahedron_volume(const float *const p[4]) {
               u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
 }
 
-/* A quarter of each tetrahedron's mass goes to each of its corners. The springs are the edges, all of one stiffness k:
- * the body as a whole has Young's modulus E where the sum of k L^2 over its edges is 6 E times its volume. */
-static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *shape, const bounds *box) {
-  const float back = (float)(box->low[box->thin] + BACK * extent(box, box->thin));
-  float *masses = (float *)allocate(shape->node_count, sizeof *masses);
-  float *dampings = (float *)allocate(shape->node_count, sizeof *dampings);
-  double volume = 0, squares = 0, edge_count;
-  size_t i, fixed = 0;
-  sinew_body_def def;
-  sinew_body_id organ;
+typedef struct edge { uint32_t a, b; float stiffness; } edge;
+
+static int compare_edges(const void *left, const void *right) {
+  const edge *l = (const edge *)left, *r = (const edge *)right;
+  if (l->a != r->a) return l->a < r->a ? -1 : 1;
+  return l->b < r->b ? -1 : l->b > r->b;
+}
+
+/* What makes tissue of a mesh. To its four corners a tetrahedron of volume V gives a quarter of its mass each; to its six
+ * edges, which are the springs, a stiffness of E V / L^2 each (Van Gelder 1998), so that slivers make no stiff springs. */
+typedef struct tissue {
+  float *masses, *dampings, *stiffnesses;
+  uint32_t *springs;
+  size_t spring_count;
+  double volume;
+} tissue;
+
+static tissue create_tissue(const sinew_mesh_view *shape) {
+  static const int ends[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+  const size_t edge_count = 6 * shape->tetrahedron_count;
+  edge *edges = (edge *)allocate(edge_count, sizeof *edges);
+  tissue made;
+  size_t i, j;
+  made.masses = (float *)allocate(shape->node_count, sizeof(float));
+  made.dampings = (float *)allocate(shape->node_count, sizeof(float));
+  made.stiffnesses = (float *)allocate(edge_count, sizeof(float));
+  made.springs = (uint32_t *)allocate(2 * edge_count, sizeof(uint32_t));
+  made.spring_count = 0;
+  made.volume = 0;
 
   for (i = 0; i < shape->tetrahedron_count; i++) {
     const uint32_t *corner = shape->tetrahedra + 4 * i;
     const float *p[4];
-    double part;
-    int j, k;
+    double volume;
     for (j = 0; j < 4; j++) p[j] = shape->positions + 3 * (size_t)corner[j];
-    part = tetrahedron_volume(p);
-    volume += part;
-    for (j = 0; j < 4; j++) {
-      masses[corner[j]] += (float)(DENSITY * part / 4);
-      for (k = 0; k < j; k++) squares += distance(p[j], p[k]) * distance(p[j], p[k]);
+    volume = tetrahedron_volume(p);
+    made.volume += volume;
+    for (j = 0; j < 4; j++) made.masses[corner[j]] += (float)(DENSITY * volume / 4);
+    for (j = 0; j < 6; j++) {
+      const uint32_t a = corner[ends[j][0]], b = corner[ends[j][1]];
+      const double length = distance(p[ends[j][0]], p[ends[j][1]]);
+      edge *e = edges + 6 * i + j;
+      e->a = a < b ? a : b;
+      e->b = a < b ? b : a;
+      e->stiffness = (float)(YOUNG * volume / (length * length));
     }
   }
-  for (i = 0; i < shape->node_count; i++) {
-    if (shape->positions[3 * i + (size_t)box->thin] < back) masses[i] = 0, fixed++; /* pinned for good */
-    dampings[i] = (float)DAMPING * masses[i];
+  qsort(edges, edge_count, sizeof *edges, compare_edges);
+  for (i = 0; i < edge_count; i++) { /* tetrahedra that share an edge add up */
+    if (i == 0 || compare_edges(edges + i - 1, edges + i) != 0) {
+      made.springs[2 * made.spring_count] = edges[i].a;
+      made.springs[2 * made.spring_count + 1] = edges[i].b;
+      made.spring_count++;
+    }
+    made.stiffnesses[made.spring_count - 1] += edges[i].stiffness;
   }
-  squares /= 6.0 * (double)shape->tetrahedron_count; /* the mean of L^2 */
-  edge_count = (double)(shape->node_count + shape->tetrahedron_count + shape->surface_triangle_count / 2 - 1); /* Euler */
+  for (i = 0; i < shape->node_count; i++) made.dampings[i] = (float)DAMPING * made.masses[i];
+  free(edges);
+  return made;
+}
 
+static void free_tissue(tissue *made) {
+  free(made->masses);
+  free(made->dampings);
+  free(made->stiffnesses);
+  free(made->springs);
+}
+
+static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *shape, const bounds *box) {
+  const float back = (float)(box->low[box->thin] + BACK * extent(box, box->thin));
+  tissue liver = create_tissue(shape);
+  size_t i, fixed = 0;
+  sinew_body_def def;
+  sinew_body_id organ;
+
+  for (i = 0; i < shape->node_count; i++) {
+    if (shape->positions[3 * i + (size_t)box->thin] > back) continue;
+    liver.masses[i] = 0; /* pinned for good */
+    fixed++;
+  }
   CHECK(sinew_body_def_init(&def, sizeof def));
   def.positions = shape->positions;
   def.node_count = shape->node_count;
+  def.masses = liver.masses;
+  def.node_dampings = liver.dampings;
+  def.springs = liver.springs;
+  def.spring_count = liver.spring_count;
+  def.stiffnesses = liver.stiffnesses;
   def.triangles = shape->surface; /* what the instrument meets and the picture shows */
   def.triangle_count = shape->surface_triangle_count;
   def.tetrahedra = shape->tetrahedra;
   def.tetrahedron_count = shape->tetrahedron_count;
-  def.masses = masses;
-  def.node_dampings = dampings;
-  def.stiffness = (float)(6 * YOUNG * volume / (edge_count * squares));
   CHECK(sinew_body_create(world, &def, &organ));
+
   printf("%.1f x %.1f x %.1f mm, %.0f cm^3, %.0f g\n", 1e3 * extent(box, 0), 1e3 * extent(box, 1), 1e3 * extent(box, 2),
-         1e6 * volume, 1e3 * DENSITY * volume);
-  printf("%zu nodes, %zu of them fixed, %zu tetrahedra, springs of %.2f N/m\n", shape->node_count, fixed,
-         shape->tetrahedron_count, def.stiffness);
-  free(masses);
-  free(dampings);
+         1e6 * liver.volume, 1e3 * DENSITY * liver.volume);
+  printf("%zu nodes, %zu of them fixed, %zu tetrahedra, %zu springs\n", shape->node_count, fixed,
+         shape->tetrahedron_count, liver.spring_count);
+  free_tissue(&liver);
   return organ;
 }
 
