@@ -129,16 +129,21 @@ impl Packed {
         force
     }
 
-    /// The force of all springs and of the damping along them on `node`, in newtons.
+    /// The force of all springs and of the damping along them on `node`, in newtons; for springs with damping alone.
     #[inline(always)]
     pub fn damped_force(&self, node: usize, positions: &Vectors, velocities: &Vectors) -> Vec3 {
         let (position, velocity) = (positions.get(node), velocities.get(node));
+        let links = self.rows[node].links();
+        let springs = self.stiffnesses[links.clone()]
+            .iter()
+            .zip(&self.rest_lengths[links.clone()])
+            .zip(&self.dampings[links.clone()]);
         let mut force = Vec3::ZERO;
-        for link in self.links(node) {
-            let neighbour = link.neighbour as usize;
+        for (&neighbour, ((&stiffness, &rest_length), &damping)) in self.neighbours[links].iter().zip(springs) {
+            let neighbour = neighbour as usize;
             let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
             let rate = direction.dot(velocities.get(neighbour) - velocity);
-            force += direction * (link.stiffness * (length - link.rest_length) + link.damping * rate);
+            force += direction * (stiffness * (length - rest_length) + damping * rate);
         }
         force
     }
