@@ -14,6 +14,8 @@ pub(super) struct Constraint {
     pub feature: Feature,
     /// Weights of the feature's nodes, 1 in sum.
     pub weights: [f32; 3],
+    /// How much each node's velocity changes for an impulse at the contact, 1/kg.
+    answers: [f32; 3],
     /// Away from the tool, of unit length.
     pub normal: Vec3,
     least_speed: f32,
@@ -37,15 +39,19 @@ pub(super) struct Constraint {
 impl Constraint {
     /// A contact that has given nothing yet; `None` where all of its nodes are pinned.
     pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, mobility: &Mobility) -> Option<Self> {
-        let inverse_mass: f32 = feature
-            .nodes()
+        let mut answers = [0.0; 3];
+        for (answer, (&node, weight)) in answers.iter_mut().zip(feature.nodes().iter().zip(weights)) {
+            *answer = mobility.of(node as usize) * weight;
+        }
+        let inverse_mass: f32 = answers
             .iter()
             .zip(weights)
-            .map(|(&node, weight)| mobility.of(node as usize) * weight * weight)
+            .map(|(answer, weight)| answer * weight)
             .sum();
         (inverse_mass > 0.0).then(|| Self {
             feature,
             weights,
+            answers,
             normal,
             least_speed: 0.0,
             surface_velocity: Vec3::ZERO,
@@ -67,12 +73,15 @@ impl Constraint {
     }
 
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
-    pub fn solve(&mut self, velocities: &mut Vectors, mobility: &Mobility) -> f32 {
+    pub fn solve(&mut self, velocities: &mut Vectors) -> f32 {
         let velocity = self.velocity(velocities);
         let missing = self.least_speed - velocity.dot(self.normal);
         let impulse = (self.impulse + missing * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
+        if change == 0.0 && self.friction == 0.0 {
+            return 0.0;
+        }
         let mut given = self.normal * change;
         if self.friction > 0.0 {
             let slip = (velocity - self.surface_velocity).reject_from_normalized(self.normal);
@@ -81,9 +90,9 @@ impl Constraint {
             given += friction - self.friction_impulse;
             self.friction_impulse = friction;
         }
-        for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
+        for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
             let node = node as usize;
-            let velocity = velocities.get(node) + given * (weight * mobility.of(node));
+            let velocity = velocities.get(node) + given * answer;
             velocities.set(node, velocity);
         }
         given.length() / self.effective_mass
@@ -95,11 +104,11 @@ impl Constraint {
     }
 
     /// Moves the nodes out of the tool by `part` of how deep they were, without giving them speed.
-    pub fn push_out(&self, positions: &mut Vectors, mobility: &Mobility, part: f32) {
+    pub fn push_out(&self, positions: &mut Vectors, part: f32) {
         let push = self.normal * (self.depth * part * self.effective_mass);
-        for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
+        for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
             let node = node as usize;
-            let position = positions.get(node) + push * (weight * mobility.of(node));
+            let position = positions.get(node) + push * answer;
             positions.set(node, position);
         }
     }

@@ -192,7 +192,7 @@ impl Contacts {
         if self.constraints.len() < self.constraints.capacity() {
             self.constraints.push(constraint);
         } else {
-            constraint.solve(meeting.velocities, &meeting.mobility);
+            constraint.solve(meeting.velocities);
             self.settle(meeting, &constraint);
         }
     }
@@ -202,7 +202,7 @@ impl Contacts {
         for sweep in 0..SWEEPS {
             let mut largest = 0.0_f32;
             for constraint in &mut self.constraints {
-                largest = largest.max(constraint.solve(meeting.velocities, &meeting.mobility));
+                largest = largest.max(constraint.solve(meeting.velocities));
             }
             if sweep == 0 {
                 first = largest;
@@ -218,7 +218,7 @@ impl Contacts {
         if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
-                    constraint.push_out(meeting.next_positions, &meeting.mobility, PUSHED_OUT);
+                    constraint.push_out(meeting.next_positions, PUSHED_OUT);
                 }
             }
         }
