@@ -18,8 +18,8 @@ impl Body {
             vectors.extend(&self.applied);
         }
         for vectors in vectors {
-            for component in vectors.components() {
-                hasher.write_floats(component);
+            for vector in vectors.iter() {
+                hasher.write_floats(&vector.to_array());
             }
         }
         hasher.write_floats(&self.masses);

@@ -54,13 +54,13 @@ fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &
         if inverse_mass == 0.0 {
             continue;
         }
-        let position = positions.get(node);
+        let position = positions.lanes(node);
         let mut along = Symmetric::default();
         let mut across = 0.0_f32;
         let mut damping = Symmetric::default();
         for link in springs.links(node) {
             let neighbour = link.neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
+            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
             let inverse_mass = inverse_mass + inverse_masses[neighbour];
             let axial = link.stiffness * inverse_mass;
             let transverse = if length > link.rest_length {
@@ -68,10 +68,10 @@ fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &
             } else {
                 0.0
             };
-            along.add_outer(direction, axial - transverse);
+            along.add_outer(direction.into(), axial - transverse);
             across += transverse;
             if link.damping > 0.0 {
-                damping.add_outer(direction, link.damping * inverse_mass);
+                damping.add_outer(direction.into(), link.damping * inverse_mass);
             }
         }
         stiffest = stiffest.max(along.largest_eigenvalue_beyond(stiffest - across) + across);

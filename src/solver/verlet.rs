@@ -5,7 +5,7 @@
 //! the end of a step is the one the next begins with. Damping along springs needs velocities at the time of the
 //! positions: a first visit predicts them, a second uses them (order 2 too; Heun's method).
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 
 use super::attempt::{Carry, StepRequest};
 use super::kick::Kick;
@@ -103,8 +103,8 @@ fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec
     let substep = part.substep;
     let kick = Kick {
         substep,
-        gravity: request.gravity,
-        fall,
+        gravity: request.gravity.into(),
+        fall: fall.into(),
         inverse_masses: &body.inverse_masses,
         applied: body.applied.as_ref(),
         damping: body.damping.as_ref(),
@@ -112,26 +112,27 @@ fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec
     let state = body.state.substep();
     let springs = &body.springs;
     let nodes = 0..kick.inverse_masses.len();
-    let mut velocities = Bounds::EMPTY;
+    let (mut slowest, mut fastest) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
     if part.begins {
         for node in nodes {
-            let force = state.first_forces.get(node);
-            let velocity = kick.half(node, state.first_velocities.get(node), force);
+            let force = state.first_forces.lanes(node);
+            let velocity = kick.half(node, state.first_velocities.lanes(node), force);
             state.velocities.set(node, velocity);
             state
                 .next_positions
-                .set(node, state.positions.get(node) + velocity * substep);
-            velocities = velocities.with(velocity);
+                .set(node, state.positions.lanes(node) + velocity * substep);
+            slowest = slowest.min(velocity);
+            fastest = fastest.max(velocity);
         }
-        return velocities;
+        return bounds(slowest, fastest);
     }
     if let Some(predicted) = &mut body.predicted_velocities {
         for node in nodes.clone() {
             let force = springs.damped_force(node, state.positions, state.velocities);
-            predicted.set(node, kick.half(node, state.velocities.get(node), force));
+            predicted.set(node, kick.half(node, state.velocities.lanes(node), force));
         }
         for pin in body.pins.iter() {
-            predicted.set(pin.node as usize, state.velocities.get(pin.node as usize));
+            predicted.set(pin.node as usize, state.velocities.lanes(pin.node as usize));
         }
     }
     let force_on = |node: usize| match &body.predicted_velocities {
@@ -141,22 +142,31 @@ fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec
     if part.ends {
         for node in nodes {
             let force = force_on(node);
-            let velocity = kick.half(node, state.velocities.get(node), force);
+            let velocity = kick.half(node, state.velocities.lanes(node), force);
             state.forces.set(node, force);
             state.velocities.set(node, velocity);
-            velocities = velocities.with(velocity);
+            slowest = slowest.min(velocity);
+            fastest = fastest.max(velocity);
         }
     } else {
         for node in nodes {
-            let velocity = kick.full(node, state.velocities.get(node), force_on(node));
+            let velocity = kick.full(node, state.velocities.lanes(node), force_on(node));
             state.velocities.set(node, velocity);
             state
                 .next_positions
-                .set(node, state.positions.get(node) + velocity * substep);
-            velocities = velocities.with(velocity);
+                .set(node, state.positions.lanes(node) + velocity * substep);
+            slowest = slowest.min(velocity);
+            fastest = fastest.max(velocity);
         }
     }
-    velocities
+    bounds(slowest, fastest)
+}
+
+fn bounds(min: Vec3A, max: Vec3A) -> Bounds {
+    Bounds {
+        min: min.into(),
+        max: max.into(),
+    }
 }
 
 /// Puts the pinned nodes where they are led, and adds up what holds them.
@@ -170,8 +180,8 @@ fn hold_pins(body: &mut Body, request: &StepRequest, part: &Part) {
             (state.forces.get(node), 0.5)
         } else {
             let force = match &body.predicted_velocities {
-                None => body.springs.force(node, state.positions),
-                Some(predicted) => body.springs.damped_force(node, state.positions, predicted),
+                None => Vec3::from(body.springs.force(node, state.positions)),
+                Some(predicted) => body.springs.damped_force(node, state.positions, predicted).into(),
             };
             (force, 1.0)
         };
