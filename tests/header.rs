@@ -84,3 +84,36 @@ fn every_macro_carries_the_prefix() {
         assert!(name.starts_with("SINEW_"), "{name} is not ours to define");
     }
 }
+
+/// The comment and the first line of every function that the header declares.
+fn functions(header: &str) -> Vec<(String, String)> {
+    let mut comment = String::new();
+    let mut functions = Vec::new();
+    for line in header.lines() {
+        match line {
+            "/**" => comment.clear(),
+            _ if line.starts_with(" *") => comment.push_str(line),
+            _ if line.contains(" sinew_") || line.contains("*sinew_") => {
+                if line.contains('(') {
+                    functions.push((std::mem::take(&mut comment), line.to_owned()));
+                }
+            }
+            _ => comment.clear(),
+        }
+    }
+    functions
+}
+
+#[test]
+fn every_function_says_what_it_does_and_how_it_fails() {
+    let functions = functions(committed());
+    assert!(functions.len() >= 31, "the functions of the contract are there");
+    for (comment, declaration) in functions {
+        assert!(!comment.is_empty(), "undocumented: {declaration}");
+        assert_eq!(
+            comment.contains("Errors: "),
+            declaration.starts_with("sinew_status "),
+            "{declaration}"
+        );
+    }
+}

@@ -65,14 +65,14 @@ static void a_cloth_carries_a_sphere(void)
     double rim = 0;
     uint32_t node;
     pin_the_rim(world, cloth);
-    steps(world, 0.01f, 50);
+    steps(world, 0.01f, 20);
     wrench_of(world, sphere, force, torque);
     CHECK(force[1] == 0.0f);
 
     MUST(sinew_tool_set_pose(world, sphere, pressed, NULL));
     steps(world, 0.01f, 1);
     CHECK(position(world, cloth, centre, 1) < 0.01f - 0.02f + 1e-3f); /* pushed down within that step */
-    steps(world, 0.01f, 150);
+    steps(world, 0.01f, 100);
     wrench_of(world, sphere, force, torque);
     for (node = 0; node < CLOTH_NODES; node++) {
         if (at_the_rim(node)) {
@@ -110,7 +110,7 @@ static void orientations_are_normalised(void)
         const sinew_tool_id capsule = a_tool(world, SINEW_SHAPE_CAPSULE, 0.1f);
         pin_the_rim(world, cloth);
         MUST(sinew_tool_set_pose(world, capsule, place, same[i]));
-        steps(world, 0.01f, 60);
+        steps(world, 0.01f, 40);
         CHECK_NEAR(position(world, cloth, CLOTH_NODES / 2, 1), -0.005, 1e-3); /* upright it would reach down to -0.025 */
         sinew_world_destroy(world);
     }
