@@ -1,6 +1,10 @@
-//! What the tests of the C interface share: the library as it is delivered, and how programs beside cargo are run.
+//! What the tests share: the library as it is delivered, how programs beside cargo are run, bodies and their motion in
+//! `f64`.
 
 #![allow(dead_code, reason = "every test takes a part of it")]
+
+pub mod bodies;
+pub mod reference;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
