@@ -53,12 +53,12 @@ static inline double distance(const float *a, const float *b) {
 typedef struct options {
   const char *directory;      /* -o: where pictures and tables go */
   int frame_count;            /* -n: 0 where not given */
-  const char *arguments[2];   /* the others */
+  const char *arguments[3];   /* the others */
   size_t argument_count;
 } options;
 
 static inline options read_options(int argc, char **argv, size_t most_arguments) {
-  options chosen = {".", 0, {NULL, NULL}, 0};
+  options chosen = {".", 0, {NULL, NULL, NULL}, 0};
   int i;
   for (i = 1; i < argc; i++) {
     if (strcmp(argv[i], "-o") == 0 && i + 1 < argc) chosen.directory = argv[++i];
@@ -112,7 +112,7 @@ static inline FILE *create_file(const char *directory, const char *name) {
 
 /* A camera that stays where it is from picture to picture: it sees all of the box, from its side and a little above. */
 static inline sinew_picture_def camera(const float low[3], const float high[3], int up) {
-  const double side = 0.45, above = 0.5, front = 1.0, distance_to_size = 1.75;
+  const double side = 0.45, above = 0.5, front = 1.0, distance_to_size = 1.4;
   const double step = distance_to_size * distance(low, high) / sqrt(side * side + above * above + front * front);
   sinew_picture_def picture;
   int i;
