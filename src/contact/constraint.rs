@@ -5,6 +5,10 @@ use glam::Vec3;
 use super::features::Feature;
 use crate::body::{Mobility, Vectors};
 
+/// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
+/// need more, and cannot be had: where nothing gives way, the tool goes in.
+const LEVERAGE: f32 = 4.0;
+
 /// A contact over one substep.
 ///
 /// The weighted velocity of its nodes along the normal is at least `least_speed`: so much that at the end of the substep
@@ -30,6 +34,8 @@ pub(super) struct Constraint {
     pub tool: usize,
     /// The mass that an impulse at the contact moves, kg.
     effective_mass: f32,
+    /// How far the contact gives way, 0 to 1: 0 but near pinned nodes, where it would fling away the free ones.
+    give: f32,
     /// What it has given so far, N s, at least 0.
     impulse: f32,
     /// What friction has given so far, N s.
@@ -43,11 +49,12 @@ impl Constraint {
         for (answer, (&node, weight)) in answers.iter_mut().zip(feature.nodes().iter().zip(weights)) {
             *answer = mobility.of(node as usize) * weight;
         }
-        let inverse_mass: f32 = answers
+        let rigid: f32 = answers
             .iter()
             .zip(weights)
             .map(|(answer, weight)| answer * weight)
             .sum();
+        let inverse_mass = answers.iter().fold(rigid, |most, answer| most.max(answer / LEVERAGE));
         (inverse_mass > 0.0).then(|| Self {
             feature,
             weights,
@@ -60,6 +67,7 @@ impl Constraint {
             friction: 0.0,
             tool: 0,
             effective_mass: 1.0 / inverse_mass,
+            give: 1.0 - rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
         })
@@ -76,7 +84,7 @@ impl Constraint {
     pub fn solve(&mut self, velocities: &mut Vectors) -> f32 {
         let velocity = self.velocity(velocities);
         let missing = self.least_speed - velocity.dot(self.normal);
-        let impulse = (self.impulse + missing * self.effective_mass).max(0.0);
+        let impulse = (self.impulse * (1.0 - self.give) + missing * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
         if change == 0.0 && self.friction == 0.0 {
