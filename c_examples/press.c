@@ -302,6 +302,7 @@ int main(int argc, char **argv) {
   fprintf(curve, "time_s,depth_m,force_N,substeps,frame_ms\n");
 
   printf("a tip of %.1f mm radius goes in along -%c to %.1f mm\n\n", 1e3 * radius, "xyz"[up], 1e3 * depth);
+  printf("depth: of the tip below its first contact; moved: how far any node is from where it was, at most\n\n");
   printf("  time s   depth mm    force N   moved mm   substeps   ms/frame\n");
   for (frame = 1; frame <= frame_count; frame++) {
     const double time = frame * FRAME, in = depth_at(time, CLEARANCE * radius, depth), started = seconds_now();
