@@ -222,7 +222,7 @@ static void find_contact(const sinew_mesh_view *shape, const bounds *box, int up
     for (axis = 0; axis < 3; axis++) centre[axis] = (a[axis] + b[axis] + c[axis]) / 3;
     triangle_normal(a, b, c, n);
     level = n[up] / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]); /* the cosine of its slope */
-    merit = 2 * centre[up] - aside(centre, middle, up) + level * ((double)box->high[up] - box->low[up]);
+    merit = centre[up] - aside(centre, middle, up) + level * ((double)box->high[up] - box->low[up]);
     if (level <= 0 || merit <= best) continue;
     best = merit;
     memcpy(contact, centre, sizeof centre);
