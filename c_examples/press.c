@@ -2,17 +2,17 @@
  *
  *   press [-o DIRECTORY] [-n FRAMES] [FILE [SCALE [AXIS]]]
  *
- * FILE is a tetrahedral mesh (.vtk .msh .node), SCALE what one of its units is in metres (1; 0.001 for millimetres), AXIS
- * the one that points up (y). Without a file an organ is made. It is pressed from above and fixed at its back.
+ * FILE is a tetrahedral mesh (.vtk .msh .node), SCALE what one of its units is in metres (1; 0.001 for millimetres),
+ * AXIS the one that points up (y). Without a file an organ is made. It is pressed from above and fixed at its back.
  * Leaves press_before.png, press_during.png, press_after.png and the force curve press.csv in the directory. */
 #include "example.h"
 
 #define YOUNG 5400.0    /* Pa: liver */
 #define DENSITY 1060.0  /* kg/m^3: liver */
 #define DAMPING 20.0    /* 1/s: how fast a free node loses its speed; the tissue comes to rest without swinging */
-#define BACK 0.5        /* cosine: a face is part of the back where its normal is closer than 60 degrees to straight down */
-#define TIP 0.1         /* of the longest extent: the radius of the tip; at least the mean edge, which a coarse mesh needs */
-#define DEPTH 0.6       /* of the radius: how far it goes in, */
+#define BACK 0.5        /* cosine: the back is where the surface looks down, at most 60 degrees aslant */
+#define TIP 0.1         /* of the longest extent: the radius of the tip; never less than the mesh's mean edge */
+#define DEPTH 0.5       /* of the radius: how far it goes in, */
 #define DEEPEST 0.25    /* of the organ's thickness, at most */
 #define CLEARANCE 0.5   /* of the radius: how far above the organ it starts and ends */
 #define PRESS 1.0       /* s: the tip comes down, */
@@ -34,7 +34,7 @@ static bounds find_bounds(const sinew_mesh_view *shape) {
   return box;
 }
 
-static const float *position(const sinew_mesh_view *shape, uint32_t node) { return shape->positions + 3 * (size_t)node; }
+static const float *position(const sinew_mesh_view *shape, uint32_t i) { return shape->positions + 3 * (size_t)i; }
 
 /* The mean side of the surface's triangles. */
 static double mean_edge(const sinew_mesh_view *shape) {
@@ -113,7 +113,7 @@ typedef struct tissue {
  * To a spring of length L it gives a stiffness in proportion to V / L^2 (Van Gelder 1998: no stiff springs in slivers);
  * the sum of k L^2 over all springs is 6 E V, so that the body as a whole has Young's modulus E. */
 static tissue create_tissue(const sinew_mesh_view *shape) {
-  const size_t most = (6 + 2) * shape->tetrahedron_count; /* edges and braces */
+  const size_t most = (6 + 4) * shape->tetrahedron_count; /* edges and braces */
   part *springs = (part *)allocate(most, sizeof *springs), *spring = springs;
   part *faces = (part *)allocate(4 * shape->tetrahedron_count, sizeof *faces), *face = faces, *next;
   double sum = 0;
@@ -207,7 +207,7 @@ static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *sha
   return organ;
 }
 
-/* The centre of a tip that just touches the organ from above: over a triangle that lies high, level, near the middle. */
+/* Where a tip is that just touches the organ from above, over a triangle that lies high, level, near the middle. */
 static void find_contact(const sinew_mesh_view *shape, const bounds *box, int up, double radius, float contact[3]) {
   double best = -HUGE_VAL;
   float middle[3];
@@ -222,7 +222,7 @@ static void find_contact(const sinew_mesh_view *shape, const bounds *box, int up
     for (axis = 0; axis < 3; axis++) centre[axis] = (a[axis] + b[axis] + c[axis]) / 3;
     triangle_normal(a, b, c, n);
     level = n[up] / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]); /* the cosine of its slope */
-    merit = 2 * centre[up] - aside(centre, middle, up) + level * ((double)box->high[up] - box->low[up]);
+    merit = centre[up] - aside(centre, middle, up) + level * ((double)box->high[up] - box->low[up]);
     if (level <= 0 || merit <= best) continue;
     best = merit;
     memcpy(contact, centre, sizeof centre);
@@ -272,7 +272,7 @@ int main(int argc, char **argv) {
     CHECK(sinew_mesh_load(chosen.arguments[0], SINEW_MESH_FORMAT_AUTO, (float)scale, &mesh));
     printf("%s, 1 unit = %g m: ", chosen.arguments[0], scale);
   } else {
-    CHECK(sinew_mesh_create_organ(0.2f, 0.008f, &mesh));
+    CHECK(sinew_mesh_create_organ(0.2f, 0.01f, &mesh));
     printf("an organ: ");
   }
   shape.struct_size = sizeof shape;
@@ -302,6 +302,7 @@ int main(int argc, char **argv) {
   fprintf(curve, "time_s,depth_m,force_N,substeps,frame_ms\n");
 
   printf("a tip of %.1f mm radius goes in along -%c to %.1f mm\n\n", 1e3 * radius, "xyz"[up], 1e3 * depth);
+  printf("depth: of the tip below its first contact; moved: how far any node is from where it was, at most\n\n");
   printf("  time s   depth mm    force N   moved mm   substeps   ms/frame\n");
   for (frame = 1; frame <= frame_count; frame++) {
     const double time = frame * FRAME, in = depth_at(time, CLEARANCE * radius, depth), started = seconds_now();
@@ -333,8 +334,8 @@ int main(int argc, char **argv) {
   }
   clear_progress();
   save_picture(world, &picture, chosen.directory, "press_after.png");
-  printf("\npeak force %.4f N at %.2f mm; %.2f ms per frame, %.2f the slowest: %.1f times real time\n", peak, 1e3 * depth,
-         1e3 * total / frame_count, 1e3 * slowest, frame_count * FRAME / total);
+  printf("\npeak force %.4f N, peak depth %.2f mm; %.2f ms per frame, %.2f the slowest: %.1f times real time\n", peak,
+         1e3 * depth, 1e3 * total / frame_count, 1e3 * slowest, frame_count * FRAME / total);
 
   fclose(curve);
   sinew_mesh_destroy(mesh);
