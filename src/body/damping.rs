@@ -11,8 +11,8 @@ use crate::memory;
 pub(crate) struct NodeDamping {
     /// gamma / m of each node, 1/s; 0 where the mass is 0.
     rates: Vec<f32>,
-    /// `e^-s` over half a substep.
-    pub decay: Vec<f32>,
+    /// `1 - e^-s` over half a substep: what is lost, not what remains, so that small losses keep their digits.
+    pub loss: Vec<f32>,
     /// `t (1 - e^-s)/s` over half a substep, s.
     pub gain: Vec<f32>,
     /// The substep that the factors are for, s.
@@ -22,7 +22,7 @@ pub(crate) struct NodeDamping {
 impl NodeDamping {
     pub fn new(rates: Vec<f32>) -> Result<Self> {
         Ok(Self {
-            decay: memory::filled(1.0, rates.len())?,
+            loss: memory::filled(0.0, rates.len())?,
             gain: memory::filled(0.0, rates.len())?,
             rates,
             substep: 0.0,
@@ -39,16 +39,16 @@ impl NodeDamping {
             return;
         }
         let half = 0.5 * f64::from(substep);
-        let mut last = (f32::NAN, 1.0, 0.0);
-        for ((&rate, decay), gain) in self.rates.iter().zip(&mut self.decay).zip(&mut self.gain) {
+        let mut last = (f32::NAN, 0.0, 0.0);
+        for ((&rate, loss), gain) in self.rates.iter().zip(&mut self.loss).zip(&mut self.gain) {
             // Most bodies have few different rates, mostly side by side.
             if rate != last.0 {
                 let s = f64::from(rate) * half;
                 let lost = -libm::expm1(-s);
                 let weight = if s > 0.0 { lost / s } else { 1.0 };
-                last = (rate, (1.0 - lost) as f32, (half * weight) as f32);
+                last = (rate, lost as f32, (half * weight) as f32);
             }
-            (*decay, *gain) = (last.1, last.2);
+            (*loss, *gain) = (last.1, last.2);
         }
         self.substep = substep;
     }
@@ -71,13 +71,13 @@ impl Mobility<'_> {
     #[inline]
     pub fn of(&self, node: usize) -> f32 {
         let inverse_mass = self.inverse_masses[node];
-        let Some(NodeDamping { decay, gain, .. }) = self.damping else {
+        let Some(NodeDamping { loss, gain, .. }) = self.damping else {
             return inverse_mass;
         };
         let duration = if self.half {
             gain[node] * 2.0
         } else {
-            gain[node] * (1.0 + decay[node])
+            gain[node] * (2.0 - loss[node])
         };
         inverse_mass * (duration / self.substep)
     }

@@ -152,7 +152,6 @@ impl Body {
             rest_length,
             damping: 0.0,
         })?;
-        self.rest_length_sum += f64::from(rest_length);
         self.springs_changed();
         Ok(())
     }
@@ -163,14 +162,12 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or no spring between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
         self.check_pair(a, b)?;
-        let rest_length = self.springs.remove(a, b)?;
-        self.rest_length_sum -= f64::from(rest_length);
+        self.springs.remove(a, b)?;
         self.springs_changed();
         Ok(())
     }
 
     fn springs_changed(&mut self) {
-        self.count_rest_lengths();
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
     }

@@ -40,7 +40,7 @@ impl Body {
             }
         }
         let stability = &self.carry.stability;
-        hasher.write_floats(&[stability.limit.unwrap_or(-1.0), stability.travel]);
+        hasher.write_floats(&[stability.limit.unwrap_or(-1.0), stability.reach]);
         for bits in self.carry.gravity.bits() {
             hasher.write_u64(bits);
         }

@@ -1,5 +1,6 @@
 //! A body: nodes with mass, joined by springs.
 
+mod coarse;
 mod damping;
 mod definition;
 mod edit;
@@ -11,6 +12,7 @@ mod vectors;
 
 use glam::{DVec3, Vec3};
 
+pub(crate) use coarse::CoarseStep;
 pub(crate) use damping::{Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
@@ -24,7 +26,7 @@ use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability};
 use crate::springs::Packed;
 use origin::shift_towards;
-use pins::Pins;
+pub(crate) use pins::Pins;
 use state::State;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
@@ -49,15 +51,12 @@ pub struct Body {
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
     pub(crate) carry: Carry,
-    /// The mean rest length of all springs, m; infinite where there are none.
-    pub(crate) mean_rest_length: f32,
-    rest_length_sum: f64,
     /// Whether the state's forces belong to its positions and velocities.
     forces_current: bool,
     /// Whether `applied` holds anything.
     forces_applied: bool,
-    /// Positions of a coarser step; kept only in worlds with a tolerance.
-    coarse: Option<Vectors>,
+    /// Kept only in worlds with a tolerance.
+    pub(crate) coarse: Option<CoarseStep>,
     published_positions: Vec<Vec3>,
     published_velocities: Vec<Vec3>,
 }
@@ -76,7 +75,6 @@ impl Body {
         let node_count = definition.positions.len();
         let springs = definition.resolved_springs()?;
         let packed = Packed::new(node_count, &springs)?;
-        let rest_length_sum = springs.iter().map(|spring| f64::from(spring.rest_length)).sum();
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
         let mut inverse_masses = memory::reserved(node_count)?;
@@ -100,10 +98,9 @@ impl Body {
         } else {
             memory::copied(definition.triangles)?
         };
-        let zeros = |wanted: bool| wanted.then(|| Vectors::zeros(node_count)).transpose();
         let mut body = Self {
-            predicted_velocities: zeros(packed.damped())?,
-            coarse: zeros(needs.tolerance)?,
+            predicted_velocities: packed.damped().then(|| Vectors::zeros(node_count)).transpose()?,
+            coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
             springs: packed,
             masses,
             inverse_masses,
@@ -121,14 +118,11 @@ impl Body {
                     max: Vec3::ZERO,
                 }),
             },
-            mean_rest_length: f32::INFINITY,
-            rest_length_sum,
             forces_current: false,
             forces_applied: false,
             published_positions: memory::filled(Vec3::ZERO, node_count)?,
             published_velocities: memory::filled(Vec3::ZERO, node_count)?,
         };
-        body.count_rest_lengths();
         body.place(definition.positions);
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
@@ -230,33 +224,6 @@ impl Body {
         }
     }
 
-    /// Keeps the newest positions of the step in progress, for [`Body::difference_from_coarse`].
-    pub(crate) fn keep_coarse_positions(&mut self) {
-        if let Some(coarse) = &mut self.coarse {
-            coarse.copy_from(self.state.newest().0);
-        }
-    }
-
-    /// The longest way between a node's newest position and the one kept, m; infinite where one is not finite.
-    pub(crate) fn difference_from_coarse(&self) -> f32 {
-        let Some(coarse) = &self.coarse else {
-            return 0.0;
-        };
-        let newest = self.state.newest().0;
-        let largest = newest
-            .iter()
-            .zip(coarse.iter())
-            .fold(0.0_f32, |largest, (fine, coarse)| {
-                let square = fine.distance_squared(coarse);
-                if square <= largest { largest } else { square }
-            });
-        if largest.is_finite() {
-            largest.sqrt()
-        } else {
-            f32::INFINITY
-        }
-    }
-
     /// Makes the step in progress, of `substeps` substeps, the current state.
     pub(crate) fn commit(&mut self, substeps: u32, carry: Carry) {
         self.state.commit();
@@ -264,6 +231,9 @@ impl Body {
         self.forces_current = true;
         for pin in self.pins.iter_mut() {
             pin.force = (pin.force_sum / f64::from(substeps)).as_vec3();
+        }
+        if let Some(contacts) = &mut self.contacts {
+            contacts.commit();
         }
         self.clear_pending();
         self.publish();
@@ -306,14 +276,5 @@ impl Body {
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
         }
-    }
-
-    fn count_rest_lengths(&mut self) {
-        let count = self.springs.spring_count();
-        self.mean_rest_length = if count == 0 {
-            f32::INFINITY
-        } else {
-            (self.rest_length_sum / count as f64) as f32
-        };
     }
 }

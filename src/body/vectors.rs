@@ -50,12 +50,26 @@ impl Vectors {
         self.0.fill(Vec3A::ZERO);
     }
 
-    /// The longest of them, as its length squared; infinite or NaN components give infinity.
-    pub fn largest_length_squared(&self) -> f32 {
-        let largest = self.0.iter().fold(0.0_f32, |largest, vector| {
-            let square = vector.length_squared();
-            if square <= largest { largest } else { square }
-        });
-        if largest.is_finite() { largest } else { f32::INFINITY }
+    /// The length of the longest of them; infinite where one is not finite.
+    pub fn largest_length(&self) -> f32 {
+        largest(self.0.iter().map(|vector| vector.length_squared()))
+    }
+
+    /// The longest way between a vector and that of `other` at its place; infinite where one is not finite.
+    pub fn largest_distance(&self, other: &Self) -> f32 {
+        largest(self.0.iter().zip(&other.0).map(|(a, b)| a.distance_squared(*b)))
+    }
+}
+
+/// The root of the largest of `squares`; infinite where one is not finite.
+fn largest(squares: impl Iterator<Item = f32>) -> f32 {
+    let largest = squares.fold(
+        0.0_f32,
+        |largest, square| if square <= largest { largest } else { square },
+    );
+    if largest.is_finite() {
+        largest.sqrt()
+    } else {
+        f32::INFINITY
     }
 }

@@ -9,13 +9,15 @@ use crate::body::{Mobility, Vectors};
 /// need more, and cannot be had: where nothing gives way, the tool goes in.
 const LEVERAGE: f32 = 4.0;
 
-/// A contact over one substep.
+/// A contact over one slice of a substep.
 ///
-/// The weighted velocity of its nodes along the normal is at least `least_speed`: so much that at the end of the substep
+/// The weighted velocity of its nodes along the normal is at least `least_speed`: so much that at the end of the slice
 /// they are clear of the tool. Across the normal Coulomb friction holds them to the tool's surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Constraint {
     pub feature: Feature,
+    /// Where the feature's nodes are when the contact begins.
+    pub starts: [Vec3; 3],
     /// Weights of the feature's nodes, 1 in sum.
     pub weights: [f32; 3],
     /// How much each node's velocity changes for an impulse at the contact, 1/kg.
@@ -44,7 +46,13 @@ pub(super) struct Constraint {
 
 impl Constraint {
     /// A contact that has given nothing yet; `None` where all of its nodes are pinned.
-    pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, mobility: &Mobility) -> Option<Self> {
+    pub fn new(
+        feature: Feature,
+        starts: [Vec3; 3],
+        weights: [f32; 3],
+        normal: Vec3,
+        mobility: &Mobility,
+    ) -> Option<Self> {
         let mut answers = [0.0; 3];
         for (answer, (&node, weight)) in answers.iter_mut().zip(feature.nodes().iter().zip(weights)) {
             *answer = mobility.of(node as usize) * weight;
@@ -57,6 +65,7 @@ impl Constraint {
         let inverse_mass = answers.iter().fold(rigid, |most, answer| most.max(answer / LEVERAGE));
         (inverse_mass > 0.0).then(|| Self {
             feature,
+            starts,
             weights,
             answers,
             normal,
@@ -73,11 +82,11 @@ impl Constraint {
         })
     }
 
-    /// Lets the nodes come closer to the tool's surface by `gap` within the substep, and no further; where they are
-    /// inside, not deeper.
-    pub fn allow_gap(&mut self, gap: f32, substep: f32) {
+    /// Lets the nodes come closer to the tool's surface by `gap` within `duration` seconds, and no further; where they
+    /// are inside, not deeper.
+    pub fn allow_gap(&mut self, gap: f32, duration: f32) {
         self.depth = -gap;
-        self.least_speed = self.surface_velocity.dot(self.normal) - gap.max(0.0) / substep;
+        self.least_speed = self.surface_velocity.dot(self.normal) - gap.max(0.0) / duration;
     }
 
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.

@@ -11,12 +11,14 @@ use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::path::{Motion, Solid, ToolPath};
 use super::sweep::{Corners, Segment};
-use crate::body::{Bounds, Mobility, Vectors};
+use crate::body::{Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
-use crate::memory;
 
-/// Contacts that are solved together at most; what is beyond is solved once each.
-const TOGETHER: usize = 1 << 16;
+/// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
+const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
+
+/// A substep is cut into at most so many slices.
+const SLICES: u32 = 512;
 
 /// Sweeps over the contacts of a substep at most.
 const SWEEPS: u32 = 64;
@@ -44,6 +46,8 @@ pub(crate) struct Contacts {
     loads: Vec<Load>,
     /// The box of all velocities that contacts gave in this substep.
     given: Bounds,
+    /// Whether the step that was begun last became current.
+    committed: bool,
 }
 
 /// One substep of a body near tools.
@@ -66,6 +70,18 @@ pub(crate) struct Meeting<'a> {
     pub positions: &'a Vectors,
     pub velocities: &'a mut Vectors,
     pub next_positions: &'a mut Vectors,
+    pub pins: &'a mut Pins,
+}
+
+/// A part of a substep in which no tool moves further against the body than its radius. Springs act once in a substep,
+/// contact in each slice: a tip that goes far takes along what it meets, however far that is.
+#[derive(Clone, Copy, Debug)]
+struct Slice {
+    /// Seconds from its start to the end of the substep.
+    remains: f32,
+    /// s
+    duration: f32,
+    first: bool,
 }
 
 impl Contacts {
@@ -74,10 +90,11 @@ impl Contacts {
         let features = Features::new(node_count, surface)?;
         let mut contacts = Self {
             candidates: Candidates::new(&features)?,
-            constraints: memory::reserved(features.count().min(TOGETHER))?,
+            constraints: Vec::new(),
             features,
             loads: Vec::new(),
             given: Bounds::EMPTY,
+            committed: true,
         };
         contacts.reserve(tools)?;
         Ok(contacts)
@@ -86,6 +103,10 @@ impl Contacts {
     /// Makes room for `tools` tools.
     pub fn reserve(&mut self, tools: usize) -> Result<()> {
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
+        let together = self.features.count().saturating_mul(tools);
+        let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
+        self.constraints
+            .try_reserve_exact(together.saturating_sub(self.constraints.len()))?;
         self.candidates.reserve(tools)
     }
 
@@ -93,9 +114,16 @@ impl Contacts {
     pub fn begin(&mut self, tools: &[ToolPath], origin: DVec3) {
         self.loads.clear();
         self.loads.resize(tools.len(), Load::default());
-        if !self.candidates.covers(tools, origin) {
+        // A step that is begun again goes back to where its nodes were.
+        if !self.committed || !self.candidates.covers(tools, origin) {
             self.candidates.invalidate();
         }
+        self.committed = false;
+    }
+
+    /// The step that was begun last is current now.
+    pub fn commit(&mut self) {
+        self.committed = true;
     }
 
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
@@ -126,16 +154,28 @@ impl Contacts {
         if self.candidates.near().is_empty() {
             return;
         }
-        self.constraints.clear();
-        for place in 0..meeting.tools.len() {
-            let tool = &meeting.tools[place];
-            let motion = tool.motion(meeting.start.min(1.0), meeting.end.min(1.0), meeting.dt, meeting.origin);
-            for candidate in 0..self.candidates.near().len() {
-                let feature = self.features.get(self.candidates.near()[candidate]);
-                self.touch(&mut meeting, place, &motion, feature);
+        let slices = if meeting.drifts { slices(&meeting) } else { 1 };
+        for index in 0..slices {
+            let part = |index: u32| f64::from(index) / f64::from(slices);
+            let slice = Slice {
+                remains: meeting.substep * (1.0 - part(index)) as f32,
+                duration: meeting.substep / slices as f32,
+                first: index == 0,
+            };
+            let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
+            let (start, end) = (fraction(part(index)), fraction(part(index + 1)));
+            self.constraints.clear();
+            for place in 0..meeting.tools.len() {
+                let motion = meeting.tools[place].motion(start, end, meeting.dt, meeting.origin);
+                for candidate in 0..self.candidates.near().len() {
+                    let feature = self.features.get(self.candidates.near()[candidate]);
+                    self.touch(&mut meeting, &slice, place, &motion, feature);
+                }
             }
+            self.solve(&mut meeting, &slice);
         }
-        self.solve(&mut meeting);
+        let fastest = self.given.min.abs().max(self.given.max.abs()).length();
+        self.candidates.spend(meeting.substep * fastest);
     }
 
     fn find_candidates(&mut self, meeting: &Meeting) {
@@ -161,30 +201,30 @@ impl Contacts {
     }
 
     /// Adds the contacts of one feature with one tool.
-    fn touch(&mut self, meeting: &mut Meeting, tool: usize, motion: &Motion, feature: Feature) {
+    fn touch(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, motion: &Motion, feature: Feature) {
         match motion.from {
             Solid::HalfSpace { point, .. } => {
                 if feature.nodes().len() == 1 {
-                    let found = meet_plane(meeting, motion, feature, point);
-                    self.add(meeting, tool, found);
+                    let found = meet_plane(meeting, slice, motion, feature, point);
+                    self.add(meeting, slice, tool, found);
                 }
             }
             Solid::Rounded { .. } => {
-                let segment = motion.segment(meeting.substep, meeting.drifts);
+                let segment = motion.segment(slice.duration, meeting.drifts);
                 if feature.nodes().len() == 3 && !segment.is_point() {
                     for end in 0..2 {
-                        let found = meet_rounded(meeting, motion, feature, &segment.end(end));
-                        self.add(meeting, tool, found);
+                        let found = meet_rounded(meeting, slice, motion, feature, &segment.end(end));
+                        self.add(meeting, slice, tool, found);
                     }
                 } else {
-                    let found = meet_rounded(meeting, motion, feature, &segment);
-                    self.add(meeting, tool, found);
+                    let found = meet_rounded(meeting, slice, motion, feature, &segment);
+                    self.add(meeting, slice, tool, found);
                 }
             }
         }
     }
 
-    fn add(&mut self, meeting: &mut Meeting, tool: usize, found: Option<Constraint>) {
+    fn add(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, found: Option<Constraint>) {
         let Some(mut constraint) = found else {
             return;
         };
@@ -193,11 +233,11 @@ impl Contacts {
             self.constraints.push(constraint);
         } else {
             constraint.solve(meeting.velocities);
-            self.settle(meeting, &constraint);
+            self.settle(meeting, slice, &constraint);
         }
     }
 
-    fn solve(&mut self, meeting: &mut Meeting) {
+    fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
         let mut first = 0.0_f32;
         for sweep in 0..SWEEPS {
             let mut largest = 0.0_f32;
@@ -213,9 +253,9 @@ impl Contacts {
         }
         for index in 0..self.constraints.len() {
             let constraint = self.constraints[index];
-            self.settle(meeting, &constraint);
+            self.settle(meeting, slice, &constraint);
         }
-        if meeting.drifts {
+        if meeting.drifts && slice.first {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
                     constraint.push_out(meeting.next_positions, PUSHED_OUT);
@@ -225,26 +265,54 @@ impl Contacts {
     }
 
     /// Adds what a contact gave to its tool's load, and moves its nodes.
-    fn settle(&mut self, meeting: &mut Meeting, constraint: &Constraint) {
+    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint) {
         let load = &mut self.loads[constraint.tool];
         let received = -constraint.given().as_dvec3();
         load.impulse += received;
         load.angular_impulse += constraint.arm.as_dvec3().cross(received);
-        for &node in constraint.feature.nodes() {
-            let node = node as usize;
-            let velocity = meeting.velocities.get(node);
+        let corners = constraint.starts.iter().zip(constraint.weights);
+        for (&node, (&start, weight)) in constraint.feature.nodes().iter().zip(corners) {
+            if let Some(pin) = meeting.pins.get_mut(node) {
+                pin.force_sum += received * f64::from(weight / meeting.substep);
+                continue;
+            }
+            let velocity = meeting.velocities.get(node as usize);
             self.given = self.given.with(velocity);
-            if meeting.drifts && meeting.mobility.inverse_masses[node] > 0.0 {
-                let position = meeting.positions.get(node) + velocity * meeting.substep;
-                meeting.next_positions.set(node, position);
+            if meeting.drifts {
+                meeting
+                    .next_positions
+                    .set(node as usize, start + velocity * slice.remains);
             }
         }
     }
 }
 
+/// How many slices a substep needs.
+fn slices(meeting: &Meeting) -> u32 {
+    let mut slices = 1.0_f32;
+    for tool in meeting.tools {
+        if let Some(sweep) = tool.sweep(meeting.origin) {
+            let speed = tool.speed(meeting.dt) + meeting.fastest;
+            slices = slices.max((speed * meeting.substep / sweep.radius).ceil());
+        }
+    }
+    (slices as u32).clamp(1, SLICES)
+}
+
+impl Meeting<'_> {
+    /// Where a node is when the slice begins.
+    fn position(&self, slice: &Slice, node: usize) -> Vec3 {
+        if slice.first {
+            self.positions.get(node)
+        } else {
+            self.next_positions.get(node) - self.velocities.get(node) * slice.remains
+        }
+    }
+}
+
 impl Motion {
-    /// The segment within a rounded tool over the substep; with the last half kick of a step as if it went on.
-    fn segment(&self, substep: f32, drifts: bool) -> Segment {
+    /// The segment within a rounded tool over `duration` seconds; with the last half kick of a step as if it went on.
+    fn segment(&self, duration: f32, drifts: bool) -> Segment {
         let (
             Solid::Rounded { a, b, radius },
             Solid::Rounded {
@@ -261,7 +329,7 @@ impl Motion {
         let steps = if drifts {
             [last_a - a, last_b - b]
         } else {
-            [a, b].map(|end| self.velocity_at(end) * substep)
+            [a, b].map(|end| self.velocity_at(end) * duration)
         };
         Segment {
             ends: [a, b],
@@ -276,39 +344,46 @@ impl Motion {
     }
 }
 
-/// The contact of a node with a plane over the substep.
-fn meet_plane(meeting: &Meeting, motion: &Motion, feature: Feature, point: Vec3) -> Option<Constraint> {
+/// The contact of a node with a plane over the slice.
+fn meet_plane(meeting: &Meeting, slice: &Slice, motion: &Motion, feature: Feature, point: Vec3) -> Option<Constraint> {
     let (Solid::HalfSpace { normal: first, .. }, Solid::HalfSpace { normal, .. }) = (motion.from, motion.to) else {
         return None;
     };
     let node = feature.nodes()[0] as usize;
-    let position = meeting.positions.get(node);
+    let position = meeting.position(slice, node);
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
-    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * meeting.substep;
-    let margin = surface_velocity.length() * meeting.substep;
+    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * slice.duration;
+    let margin = surface_velocity.length() * slice.duration;
     if !(gap <= closing.max(0.0) + margin) {
         return None;
     }
-    let mut constraint = Constraint::new(feature, [1.0, 0.0, 0.0], normal, &meeting.mobility)?;
+    let starts = [position, Vec3::ZERO, Vec3::ZERO];
+    let mut constraint = Constraint::new(feature, starts, [1.0, 0.0, 0.0], normal, &meeting.mobility)?;
     constraint.surface_velocity = surface_velocity;
     constraint.arm = foot - motion.centre;
     constraint.friction = motion.friction;
-    constraint.allow_gap(gap, meeting.substep);
+    constraint.allow_gap(gap, slice.duration);
     Some(constraint)
 }
 
-/// The contact of a feature with a rounded tool over the substep.
-fn meet_rounded(meeting: &Meeting, motion: &Motion, feature: Feature, segment: &Segment) -> Option<Constraint> {
+/// The contact of a feature with a rounded tool over the slice.
+fn meet_rounded(
+    meeting: &Meeting,
+    slice: &Slice,
+    motion: &Motion,
+    feature: Feature,
+    segment: &Segment,
+) -> Option<Constraint> {
     let mut corners = Corners {
         points: [Vec3::ZERO; 3],
         steps: [Vec3::ZERO; 3],
         count: feature.nodes().len(),
     };
     for (corner, &node) in feature.nodes().iter().enumerate() {
-        corners.points[corner] = meeting.positions.get(node as usize);
-        corners.steps[corner] = meeting.velocities.get(node as usize) * meeting.substep;
+        corners.points[corner] = meeting.position(slice, node as usize);
+        corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
     }
     let separation = corners.approach(segment, segment.travel())?;
     if !separation.inside {
@@ -322,17 +397,14 @@ fn meet_rounded(meeting: &Meeting, motion: &Motion, feature: Feature, segment: &
         .try_normalize()
         .or_else(|| step.try_normalize())
         .unwrap_or(Vec3::Y);
-    let mut constraint = Constraint::new(feature, separation.weights, normal, &meeting.mobility)?;
-    let matter: Vec3 = corners
-        .points
-        .iter()
-        .zip(separation.weights)
-        .map(|(point, weight)| *point * weight)
-        .sum();
+    let weights = separation.weights;
+    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility)?;
+    let points = corners.points.iter().zip(weights);
+    let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
     let surface = normal * segment.radius;
-    constraint.surface_velocity = step / meeting.substep + motion.spin.cross(surface);
+    constraint.surface_velocity = step / slice.duration + motion.spin.cross(surface);
     constraint.arm = start + step * if meeting.drifts { 1.0 } else { 0.0 } + surface - motion.centre;
     constraint.friction = motion.friction;
-    constraint.allow_gap((matter - start).dot(normal) - segment.radius, meeting.substep);
+    constraint.allow_gap((matter - start).dot(normal) - segment.radius, slice.duration);
     Some(constraint)
 }

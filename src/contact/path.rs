@@ -63,31 +63,26 @@ impl ToolPath {
         }
     }
 
-    fn pose_at(&self, fraction: f64) -> Pose {
-        if fraction <= 0.0 {
-            return self.start;
-        }
-        if fraction >= 1.0 {
-            return self.end;
-        }
-        let position = self
-            .start
-            .position
-            .as_dvec3()
-            .lerp(self.end.position.as_dvec3(), fraction)
-            .as_vec3();
-        let orientation = if self.turn == Vec3::ZERO {
+    /// Its position after `fraction` of the step, in the coordinates of a body that begin at `origin`.
+    fn centre_at(&self, fraction: f64, origin: DVec3) -> Vec3 {
+        let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
+        (start.lerp(end, fraction) - origin).as_vec3()
+    }
+
+    fn orientation_at(&self, fraction: f64) -> Quat {
+        if self.turn == Vec3::ZERO || fraction <= 0.0 {
             self.start.orientation
+        } else if fraction >= 1.0 {
+            self.end.orientation
         } else {
             Quat::from_scaled_axis(self.turn * fraction as f32) * self.start.orientation
-        };
-        Pose { position, orientation }
+        }
     }
 
     /// Where it is after `fraction` of the step, in the coordinates of a body that begin at `origin`.
     pub(super) fn solid_at(&self, fraction: f64, origin: DVec3) -> Solid {
-        let pose = self.pose_at(fraction);
-        let centre = (pose.position.as_dvec3() - origin).as_vec3();
+        let centre = self.centre_at(fraction, origin);
+        let up = self.orientation_at(fraction) * Vec3::Y;
         match self.shape {
             Shape::Sphere { radius } => Solid::Rounded {
                 a: centre,
@@ -95,7 +90,7 @@ impl ToolPath {
                 radius,
             },
             Shape::Capsule { radius, half_length } => {
-                let axis = pose.orientation * Vec3::Y * half_length;
+                let axis = up * half_length;
                 Solid::Rounded {
                     a: centre - axis,
                     b: centre + axis,
@@ -104,19 +99,18 @@ impl ToolPath {
             }
             Shape::Plane => Solid::HalfSpace {
                 point: centre,
-                normal: pose.orientation * Vec3::Y,
+                normal: up,
             },
         }
     }
 
     /// Its motion between two fractions of a step of `dt` seconds.
     pub(super) fn motion(&self, start: f64, end: f64, dt: f32, origin: DVec3) -> Motion {
-        let centre = (self.pose_at(end).position.as_dvec3() - origin).as_vec3();
         Motion {
             friction: self.friction,
             from: self.solid_at(start, origin),
             to: self.solid_at(end, origin),
-            centre,
+            centre: self.centre_at(end, origin),
             velocity: ((self.end.position.as_dvec3() - self.start.position.as_dvec3()) / f64::from(dt)).as_vec3(),
             spin: self.turn / dt,
         }
@@ -129,8 +123,7 @@ impl ToolPath {
             Shape::Capsule { radius, half_length } => (radius, half_length),
             Shape::Plane => return None,
         };
-        let centre = |pose: Pose| (pose.position.as_dvec3() - origin).as_vec3();
-        let bounds = Bounds::of([centre(self.start), centre(self.end)].into_iter());
+        let bounds = Bounds::of([0.0, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
         Some(Sweep {
             bounds: bounds.extended(radius + half_length),
             travel: self.start.position.distance(self.end.position) + self.turn.length() * half_length,

@@ -14,9 +14,6 @@ const RESERVE: f32 = 0.8;
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 4;
 
-/// Substeps taken, at most, so that a fast tool moves less than its radius in each.
-const SUBSTEPS_FOR_TOOLS: u32 = 64;
-
 /// What is asked of a step.
 pub(crate) struct StepRequest<'a> {
     /// Seconds, above 0.
@@ -60,33 +57,35 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
         ..body.carry
     };
     if request.substeps > 0 {
-        return match verlet::run(body, request, request.substeps, start) {
+        return match verlet::run(body, request, request.substeps, 0, start) {
             Ok(carry) => finish(body, request.substeps, carry, 0.0),
-            Err(TooLong { stable_substep }) => Outcome::Unstable { stable_substep },
+            Err(too_long) => Outcome::Unstable {
+                stable_substep: too_long.stable_substep,
+            },
         };
     }
-    let least = body.contacts.as_ref().map_or(1, |_| substeps_for_tools(body, request));
-    match run_stably(body, request, least, start) {
-        Err(TooLong { stable_substep }) => Outcome::Unstable { stable_substep },
+    match run_stably(body, request, start) {
+        Err(too_long) => Outcome::Unstable {
+            stable_substep: too_long.stable_substep,
+        },
         Ok((substeps, carry)) if request.tolerance == 0.0 => finish(body, substeps, carry, 0.0),
         Ok((substeps, carry)) => run_to_tolerance(body, request, substeps, start, carry),
     }
 }
 
-/// Takes the step with as many substeps as stability needs, at least `least`: how many, and what they carry on.
-fn run_stably(body: &mut Body, request: &StepRequest, least: u32, start: Carry) -> Result<(u32, Carry), TooLong> {
+/// Takes the step with as many substeps as stability needs: how many, and what they carry on.
+fn run_stably(body: &mut Body, request: &StepRequest, start: Carry) -> Result<(u32, Carry), TooLong> {
     let mut stable_substep = start.stability.limit.unwrap_or(f32::INFINITY);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
             stable_substep = substep_stable_anywhere(&body.springs, &body.inverse_masses);
         }
         let needed = (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil();
-        let needed = needed.max(f64::from(least));
         if needed > f64::from(request.max_substeps) {
             break;
         }
-        let substeps = needed as u32;
-        match verlet::run(body, request, substeps, start) {
+        let substeps = needed.max(1.0) as u32;
+        match verlet::run(body, request, substeps, middle(substeps), start) {
             Ok(carry) => return Ok((substeps, carry)),
             Err(found) => stable_substep = stable_substep.min(found.stable_substep),
         }
@@ -94,51 +93,59 @@ fn run_stably(body: &mut Body, request: &StepRequest, least: u32, start: Carry) 
     Err(TooLong { stable_substep })
 }
 
-/// Doubles the substeps until that changes no position by more than the tolerance; the finer result stands.
+/// The substep after which a step is looked at on its way: far from simple fractions of the step, where steps that have
+/// lost the phase of an oscillation may agree.
+fn middle(substeps: u32) -> u32 {
+    (f64::from(substeps) * 0.618).ceil() as u32
+}
+
+/// Doubles the substeps until that changes nothing by more than the tolerance; the finer result stands.
 ///
 /// The difference bounds the error of the finer step whatever the order at which the step converges, from 1 on: contact
 /// is of order 1, and modes that the step does not resolve are of no order at all.
 fn run_to_tolerance(body: &mut Body, request: &StepRequest, substeps: u32, start: Carry, coarse: Carry) -> Outcome {
     let mut substeps = substeps;
+    let mut middle = middle(substeps);
     let mut carry = coarse;
+    compare(body, request, &carry);
     loop {
-        body.keep_coarse_positions();
+        let stable_substep = carry.stability.limit.unwrap_or(f32::INFINITY);
         substeps = substeps.saturating_mul(2);
+        middle = middle.saturating_mul(2);
         if substeps > request.max_substeps {
-            let stable_substep = carry.stability.limit.unwrap_or(f32::INFINITY);
             return Outcome::Unstable { stable_substep };
         }
-        match verlet::run(body, request, substeps, start) {
+        match verlet::run(body, request, substeps, middle, start) {
             Ok(finer) => carry = finer,
-            Err(TooLong { stable_substep }) => return Outcome::Unstable { stable_substep },
+            Err(too_long) => {
+                return Outcome::Unstable {
+                    stable_substep: too_long.stable_substep,
+                };
+            }
         }
-        let error = body.difference_from_coarse();
+        let error = compare(body, request, &carry);
         if error <= request.tolerance || error.is_infinite() {
             return finish(body, substeps, carry, error);
         }
     }
 }
 
+/// How far the step just taken lies from the one before it, m.
+fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
+    let (positions, velocities) = body.state.newest();
+    // 1 over the highest frequency.
+    let time = (0.5 * carry.stability.limit.unwrap_or(f32::INFINITY)).min(request.dt);
+    body.coarse
+        .as_mut()
+        .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))
+}
+
 fn finish(body: &Body, substeps: u32, carry: Carry, error: f32) -> Outcome {
     let (positions, velocities) = body.state.newest();
-    let finite = |vectors: &Vectors| vectors.largest_length_squared().is_finite();
+    let finite = |vectors: &Vectors| vectors.largest_length().is_finite();
     if finite(positions) && finite(velocities) {
         Outcome::Done { substeps, carry, error }
     } else {
         Outcome::NotFinite
     }
-}
-
-/// So many substeps that no tool near the body moves further than its radius in one.
-fn substeps_for_tools(body: &Body, request: &StepRequest) -> u32 {
-    let bounds = body.bounds();
-    let mut substeps = 1.0_f32;
-    for tool in request.tools {
-        if let Some(sweep) = tool.sweep(body.origin)
-            && sweep.bounds.overlaps(&bounds)
-        {
-            substeps = substeps.max((sweep.travel / sweep.radius).ceil());
-        }
-    }
-    (substeps as u32).clamp(1, SUBSTEPS_FOR_TOOLS.min(request.max_substeps))
 }

@@ -24,7 +24,10 @@ impl Kick<'_> {
         let acceleration = self.acceleration(node, force);
         match self.damping {
             None => velocity + (acceleration * (0.5 * self.substep) + self.fall),
-            Some(damping) => velocity * damping.decay[node] + (acceleration + self.gravity) * damping.gain[node],
+            Some(damping) => {
+                let (loss, gain) = (damping.loss[node], damping.gain[node]);
+                velocity + ((acceleration + self.gravity) * gain - velocity * loss)
+            }
         }
     }
 
@@ -34,8 +37,10 @@ impl Kick<'_> {
         match self.damping {
             None => velocity + (acceleration * self.substep + self.fall),
             Some(damping) => {
-                let (decay, gain) = (damping.decay[node], damping.gain[node]);
-                velocity * (decay * decay) + (acceleration + self.gravity) * (gain * (1.0 + decay))
+                let (loss, gain) = (damping.loss[node], damping.gain[node]);
+                // Two half kicks in one: the second loses from what the first left.
+                let both = 2.0 - loss;
+                velocity + ((acceleration + self.gravity) * (gain * both) - velocity * (loss * both))
             }
         }
     }

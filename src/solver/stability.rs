@@ -12,8 +12,8 @@ use glam::Vec3;
 use crate::body::Vectors;
 use crate::springs::{Packed, separation};
 
-/// How far neighbours may move against each other, as a fraction of the mean rest length, before the limit is
-/// estimated again. It then changes by less than what a chosen substep keeps in reserve.
+/// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over
+/// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
 /// What is known about the longest stable substep of a body.
@@ -22,66 +22,111 @@ pub(crate) struct Stability {
     /// The longest stable substep at the positions of the last estimate, s; `None`: not estimated since the body's
     /// springs, masses or pins changed.
     pub limit: Option<f32>,
-    /// How far neighbours can have moved against each other since then, m.
-    pub travel: f32,
+    /// How far neighbours may still move against each other before the estimate is stale, m.
+    pub reach: f32,
 }
 
 impl Stability {
     pub const UNKNOWN: Self = Self {
         limit: None,
-        travel: 0.0,
+        reach: 0.0,
     };
 
-    /// What holds at these positions.
-    pub fn estimate(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
-        Self {
-            limit: Some(longest_stable_substep(springs, inverse_masses, positions)),
-            travel: 0.0,
-        }
+    /// Whether the estimate still holds after neighbours have moved against each other by up to `travel` more.
+    pub fn holds_after(&mut self, travel: f32) -> bool {
+        self.reach -= travel;
+        self.reach >= 0.0
     }
 
-    /// Whether the estimate still holds in a body whose springs are `rest_length` long on average.
-    pub fn holds(&self, rest_length: f32) -> bool {
-        self.limit.is_some() && self.travel <= TRAVEL_BEFORE_ESTIMATE * rest_length
+    /// The longest stable substep at these positions, and how long that is true.
+    pub fn estimate(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
+        let mut stiffest = 0.0_f32;
+        let mut most_damped = 0.0_f32;
+        let mut reach = f32::INFINITY;
+        for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
+            if inverse_mass == 0.0 {
+                continue;
+            }
+            let sums = Sums::of(node, inverse_mass, springs, inverse_masses, positions);
+            let across = sums.across;
+            stiffest = stiffest.max(sums.along.largest_eigenvalue_beyond(stiffest - across) + across);
+            most_damped = sums.damping.largest_eigenvalue_beyond(most_damped);
+            // Nothing that moves can make a node matter whose springs are too weak even together.
+            if sums.stiffness_anywhere > stiffest || sums.damping_anywhere > most_damped {
+                reach = reach.min(sums.shortest);
+            }
+        }
+        Self {
+            limit: Some(limit(stiffest, most_damped)),
+            reach: TRAVEL_BEFORE_ESTIMATE * reach,
+        }
     }
 }
 
-/// The longest stable substep at these positions, s; infinity where there is no limit.
-fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> f32 {
-    let mut stiffest = 0.0_f32;
-    let mut most_damped = 0.0_f32;
-    for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
-        if inverse_mass == 0.0 {
-            continue;
-        }
-        let position = positions.lanes(node);
-        let mut along = Symmetric::default();
-        let mut across = 0.0_f32;
-        let mut damping = Symmetric::default();
-        for link in springs.links(node) {
-            let neighbour = link.neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
-            let inverse_mass = inverse_mass + inverse_masses[neighbour];
-            let axial = link.stiffness * inverse_mass;
-            let transverse = if length > link.rest_length {
-                axial * (1.0 - link.rest_length / length)
-            } else {
-                0.0
-            };
-            along.add_outer(direction.into(), axial - transverse);
-            across += transverse;
-            if link.damping > 0.0 {
-                damping.add_outer(direction.into(), link.damping * inverse_mass);
-            }
-        }
-        stiffest = stiffest.max(along.largest_eigenvalue_beyond(stiffest - across) + across);
-        most_damped = damping.largest_eigenvalue_beyond(most_damped);
-    }
+/// The longest stable substep for squared frequencies up to `stiffest` and rates of damping up to `most_damped`, s;
+/// infinity where there is no limit.
+fn limit(stiffest: f32, most_damped: f32) -> f32 {
     let damping = 0.5 * most_damped;
     2.0 / ((stiffest + damping * damping).sqrt() + damping)
 }
 
-/// The same whatever the positions, s: every spring's matrix is at most its stiffness times the unit matrix.
+/// The springs of one node, added up.
+struct Sums {
+    /// The directed part of the matrices of stiffness, 1/s².
+    along: Symmetric,
+    /// The part that is the same in all directions, 1/s².
+    across: f32,
+    /// The matrices of damping, 1/s.
+    damping: Symmetric,
+    /// What stiffness and damping can be at most, wherever the nodes are.
+    stiffness_anywhere: f32,
+    damping_anywhere: f32,
+    /// The shortest length over which one of the matrices changes, m.
+    shortest: f32,
+}
+
+impl Sums {
+    fn of(node: usize, inverse_mass: f32, springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
+        let position = positions.lanes(node);
+        let mut sums = Self {
+            along: Symmetric::default(),
+            across: 0.0,
+            damping: Symmetric::default(),
+            stiffness_anywhere: 0.0,
+            damping_anywhere: 0.0,
+            shortest: f32::INFINITY,
+        };
+        for link in springs.links(node) {
+            let neighbour = link.neighbour as usize;
+            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
+            let direction = Vec3::from(direction);
+            let inverse_mass = inverse_mass + inverse_masses[neighbour];
+            let stiffness = link.stiffness * inverse_mass;
+            sums.stiffness_anywhere += stiffness;
+            // Stretched to twice its rest length a spring is half as stiff across as along, and so on: only the rest
+            // has a direction.
+            let directed = if length > link.rest_length {
+                link.rest_length / length
+            } else {
+                1.0
+            };
+            sums.along.add_outer(direction, stiffness * directed);
+            sums.across += stiffness * (1.0 - directed);
+            if directed > 0.0 {
+                sums.shortest = sums.shortest.min(length / directed);
+            }
+            if link.damping > 0.0 {
+                let damping = link.damping * inverse_mass;
+                sums.damping_anywhere += damping;
+                sums.damping.add_outer(direction, damping);
+                sums.shortest = sums.shortest.min(length);
+            }
+        }
+        sums
+    }
+}
+
+/// The longest substep that is stable whatever the positions, s: every spring's matrix is at most its stiffness times the unit matrix.
 pub(crate) fn substep_stable_anywhere(springs: &Packed, inverse_masses: &[f32]) -> f32 {
     let mut stiffest = 0.0_f32;
     let mut most_damped = 0.0_f32;
@@ -98,8 +143,7 @@ pub(crate) fn substep_stable_anywhere(springs: &Packed, inverse_masses: &[f32]) 
         stiffest = stiffest.max(stiffness);
         most_damped = most_damped.max(damping);
     }
-    let damping = 0.5 * most_damped;
-    2.0 / ((stiffest + damping * damping).sqrt() + damping)
+    limit(stiffest, most_damped)
 }
 
 /// A symmetric 3x3 matrix.

@@ -16,12 +16,19 @@ use crate::contact::Meeting;
 /// The substep asked for is longer than what is stable, or the motion made it so on the way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TooLong {
-    /// s
+    /// So long may it be, s.
     pub stable_substep: f32,
 }
 
-/// Takes the step with exactly `substeps` substeps: what it carries on to the next.
-pub(super) fn run(body: &mut Body, request: &StepRequest, substeps: u32, start: Carry) -> Result<Carry, TooLong> {
+/// Takes the step with exactly `substeps` substeps: what it carries on to the next. After `middle` of them a world with a
+/// tolerance looks at it.
+pub(super) fn run(
+    body: &mut Body,
+    request: &StepRequest,
+    substeps: u32,
+    middle: u32,
+    start: Carry,
+) -> Result<Carry, TooLong> {
     let mut carry = start;
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
     let check = |stability: &Stability| match stability.limit {
@@ -47,9 +54,13 @@ pub(super) fn run(body: &mut Body, request: &StepRequest, substeps: u32, start: 
             break;
         }
         body.state.advance();
+        if index + 1 == middle
+            && let Some(coarse) = &mut body.coarse
+        {
+            coarse.pass_middle(body.state.newest().0);
+        }
         let Bounds { min, max } = carry.gravity.velocities;
-        carry.stability.travel += substep * (max - min).length();
-        if !carry.stability.holds(body.mean_rest_length) {
+        if !carry.stability.holds_after(substep * (max - min).length()) {
             let positions = body.state.newest().0;
             carry.stability = Stability::estimate(&body.springs, &body.inverse_masses, positions);
             check(&carry.stability)?;
@@ -222,6 +233,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         positions: state.positions,
         velocities: state.velocities,
         next_positions: state.next_positions,
+        pins: &mut body.pins,
     });
     contacts.velocities(velocities)
 }

@@ -166,16 +166,15 @@ impl Packed {
         Ok(())
     }
 
-    /// Removes the spring between `a` and `b`: its rest length; refused where there is none.
-    pub fn remove(&mut self, a: u32, b: u32) -> Result<f32> {
+    /// Removes the spring between `a` and `b`; refused where there is none.
+    pub fn remove(&mut self, a: u32, b: u32) -> Result<()> {
         let (Some(at_a), Some(at_b)) = (self.place_of(a, b), self.place_of(b, a)) else {
             return Err(Error::invalid(format!("nodes {a} and {b} have no spring")));
         };
-        let rest_length = self.rest_lengths[at_a];
         self.remove_link(a, at_a);
         self.remove_link(b, at_b);
         self.spring_count -= 1;
-        Ok(rest_length)
+        Ok(())
     }
 
     fn place_of(&self, node: u32, neighbour: u32) -> Option<usize> {
