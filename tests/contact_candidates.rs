@@ -71,7 +71,7 @@ fn when_the_list_is_made_changes_no_bit() {
 fn a_tool_inside_a_body_is_found_however_far_it_pushes() {
     // Deep inside: what is pushed out of one tool may come into another that it was far from.
     let run = |more: bool| {
-        let mut world = world_of(Vec3::ZERO, 6);
+        let mut world = world_of(Vec3::ZERO, 40);
         let mesh = sinew::mesh::Mesh::block([0.1, 0.1, 0.1], [6, 6, 6]).expect("a block");
         let block = Tissue::VISCOUS.put(&mut world, &mesh);
         for (place, radius) in [(Vec3::ZERO, 0.045), (Vec3::new(0.066, 0.01, 0.0), 0.012)] {
@@ -150,7 +150,7 @@ fn a_step_that_could_not_be_taken_leaves_no_trace() {
             ..Default::default()
         })
         .expect("a world");
-        let cloth = Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 10), Vec3::Y * 0.01));
+        Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 10), Vec3::Y * 0.01));
         let ball = tool(&mut world, Shape::Sphere { radius: 0.02 }, 0.3, Vec3::Y * -0.02, Quat::IDENTITY);
         let mut seen = Vec::new();
         for step in 0..60 {

