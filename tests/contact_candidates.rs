@@ -39,7 +39,13 @@ fn wander(more: u32) -> Vec<Vec<[u32; 3]>> {
     let mut world = world_of(DOWN, 8);
     let cloth = Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 12), Vec3::Y * 0.003));
     tool(&mut world, Shape::Plane, 0.3, Vec3::ZERO, Quat::IDENTITY);
-    let ball = tool(&mut world, Shape::Sphere { radius: 0.01 }, 0.3, Vec3::Y * 0.05, Quat::IDENTITY);
+    let ball = tool(
+        &mut world,
+        Shape::Sphere { radius: 0.01 },
+        0.3,
+        Vec3::Y * 0.05,
+        Quat::IDENTITY,
+    );
     let far: Vec<_> = (0..more)
         .map(|place| sphere(&mut world, 0.01, Vec3::new(30.0 + place as f32, 40.0, 0.0)))
         .collect();
@@ -47,12 +53,18 @@ fn wander(more: u32) -> Vec<Vec<[u32; 3]>> {
     let mut seen = Vec::new();
     for step in 0..150 {
         // In and out of the cloth and the plane, created inside at times.
-        let place = Vec3::new(random.between(-0.1, 0.1), random.between(0.0, 0.04), random.between(-0.1, 0.1));
+        let place = Vec3::new(
+            random.between(-0.1, 0.1),
+            random.between(0.0, 0.04),
+            random.between(-0.1, 0.1),
+        );
         world.set_pose(ball, place, None).expect("a pose");
         for &tool in &far {
             // Leaves its zone every step: the list is made anew every time.
             let place = world.pose(tool).expect("a tool").position;
-            world.set_pose(tool, place + Vec3::X * if step % 2 == 0 { 1.0 } else { -1.0 }, None).expect("a pose");
+            world
+                .set_pose(tool, place + Vec3::X * if step % 2 == 0 { 1.0 } else { -1.0 }, None)
+                .expect("a pose");
         }
         world.step(0.01).expect("a step");
         seen.push(bits(&world, cloth));
@@ -81,7 +93,9 @@ fn a_tool_inside_a_body_is_found_however_far_it_pushes() {
         let mut seen = Vec::new();
         for step in 0..60 {
             if let Some(far) = far {
-                world.set_pose(far, Vec3::X * (40.0 + (step % 2) as f32), None).expect("a pose");
+                world
+                    .set_pose(far, Vec3::X * (40.0 + (step % 2) as f32), None)
+                    .expect("a pose");
             }
             world.step(0.01).expect("a step");
             seen.push(bits(&world, block));
@@ -99,7 +113,11 @@ fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps() {
     let mut random = Random::new(6);
     let mut met = 0;
     for shot in 0..60 {
-        let start = Vec3::new(random.between(-0.05, 0.05), random.between(0.02, 0.15), random.between(-0.004, 0.004));
+        let start = Vec3::new(
+            random.between(-0.05, 0.05),
+            random.between(0.02, 0.15),
+            random.between(-0.004, 0.004),
+        );
         let velocity = Vec3::new(random.between(-3.0, 3.0), -10.0, random.between(-0.3, 0.3));
         let run = |substeps: u32, tolerance: f32| {
             let mut world = World::new(WorldDefinition {
@@ -123,7 +141,11 @@ fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps() {
                     ..Default::default()
                 })
                 .expect("a body");
-            world.body_mut(node).expect("a body").set_velocities(&[velocity]).expect("velocities");
+            world
+                .body_mut(node)
+                .expect("a body")
+                .set_velocities(&[velocity])
+                .expect("velocities");
             let report = world.step(1.0 / 30.0);
             let force = world.wrench(needle).expect("a tool").0;
             (report, bits(&world, node), force)
@@ -135,7 +157,11 @@ fn a_step_to_a_tolerance_is_the_step_of_so_many_substeps() {
         };
         met += u32::from(force != Vec3::ZERO);
         let (_, exactly, same) = run(report.substeps, 0.0);
-        assert_eq!(moved, exactly, "shot {shot}, {} substeps: {force}, {same}", report.substeps);
+        assert_eq!(
+            moved, exactly,
+            "shot {shot}, {} substeps: {force}, {same}",
+            report.substeps
+        );
     }
     assert!(met > 5, "only {met} shots met the needle");
 }
@@ -151,7 +177,13 @@ fn a_step_that_could_not_be_taken_leaves_no_trace() {
         })
         .expect("a world");
         Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 10), Vec3::Y * 0.01));
-        let ball = tool(&mut world, Shape::Sphere { radius: 0.02 }, 0.3, Vec3::Y * -0.02, Quat::IDENTITY);
+        let ball = tool(
+            &mut world,
+            Shape::Sphere { radius: 0.02 },
+            0.3,
+            Vec3::Y * -0.02,
+            Quat::IDENTITY,
+        );
         let mut seen = Vec::new();
         for step in 0..60 {
             let place = Vec3::new(0.002 * step as f32, -0.02 + 0.0005 * step as f32, 0.0);

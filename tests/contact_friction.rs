@@ -19,7 +19,11 @@ fn the_cone_is_never_left() {
         let cloth = Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 8), Vec3::Y * 0.002));
         let mut slipped = false;
         for step in 0..200 {
-            let aside = Vec3::new(random.between(-0.01, 0.01), random.between(-0.002, 0.002), random.between(-0.01, 0.01));
+            let aside = Vec3::new(
+                random.between(-0.01, 0.01),
+                random.between(-0.002, 0.002),
+                random.between(-0.01, 0.01),
+            );
             let pose = world.pose(plane).expect("a tool");
             world.set_pose(plane, pose.position + aside, None).expect("a pose");
             world.step(0.01).expect("a step");
@@ -28,10 +32,16 @@ fn the_cone_is_never_left() {
             let dragged = DVec3::new(force.x, 0.0, force.z).length();
             let limit = f64::from(friction) * pressed;
             assert!(pressed >= 0.0, "step {step}: it pulls, {force}");
-            assert!(dragged <= limit * (1.0 + 1e-5), "friction {friction}, step {step}: {dragged} N above {limit}");
+            assert!(
+                dragged <= limit * (1.0 + 1e-5),
+                "friction {friction}, step {step}: {dragged} N above {limit}"
+            );
             slipped |= dragged > 0.999 * limit && limit > 0.0;
         }
-        assert!(slipped || friction > 0.9, "friction {friction}: the limit was never reached");
+        assert!(
+            slipped || friction > 0.9,
+            "friction {friction}: the limit was never reached"
+        );
         assert!(all_finite(body(&world, cloth)));
     }
 }
@@ -70,7 +80,10 @@ fn a_moving_ball_drags_the_cloth_by_friction_alone() {
     let part = followed.dot(way.as_dvec3()) / way.as_dvec3().length_squared();
     assert!((0.5..1.02).contains(&part), "{followed} of {way}");
     let (stayed, _, _) = dragged(0.0, way, Vec3::ZERO);
-    assert!(stayed.length() < 0.1 * followed.length(), "{stayed} without friction, {followed} with it");
+    assert!(
+        stayed.length() < 0.1 * followed.length(),
+        "{stayed} without friction, {followed} with it"
+    );
 }
 
 /// What a ball feels that was pressed into a cloth held at its rim and spins there.
@@ -79,7 +92,13 @@ fn spun(friction: f32) -> (DVec3, DVec3) {
     let cloth = Tissue::CALM.put(&mut world, &square(0.2, 12));
     pin_all(&mut world, cloth, &rim(12));
     let start = Vec3::new(0.004, 0.021, 0.003);
-    let ball = tool(&mut world, Shape::Sphere { radius: 0.02 }, friction, start, Quat::IDENTITY);
+    let ball = tool(
+        &mut world,
+        Shape::Sphere { radius: 0.02 },
+        friction,
+        start,
+        Quat::IDENTITY,
+    );
     let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
     for step in 1..=300_u16 {
         let place = start - Vec3::Y * 0.03 * (f32::from(step) / 100.0).min(1.0);
@@ -105,7 +124,10 @@ fn a_spinning_ball_drags_sideways() {
     // All of it slips, so that friction acts at its limit: at most mu times what presses, on an arm of the radius. What
     // presses adds up to more than the upward force, by less than half here, because it points to the middle.
     let least = 0.02 * f64::from(friction) * force.y;
-    assert!((0.8..1.5).contains(&(-torque.z / least)), "torque {torque}, at least about {least}");
+    assert!(
+        (0.8..1.5).contains(&(-torque.z / least)),
+        "torque {torque}, at least about {least}"
+    );
     let (_, smooth) = spun(0.0);
     assert!(smooth.length() < 1e-4 * least, "{smooth}");
 }

@@ -64,7 +64,13 @@ fn errors(visit: &Visit, dt: f32, substeps: u32) -> (f64, f64, f64) {
     let node_mass = tissue.node_mass(&mesh);
     let mass = f64::from(node_mass) * mesh.positions.len() as f64;
     let mut world = world_of(GRAVITY, substeps);
-    let tip = tool(&mut world, visit.shape, visit.friction, visit.start.position, visit.start.orientation);
+    let tip = tool(
+        &mut world,
+        visit.shape,
+        visit.friction,
+        visit.start.position,
+        visit.start.orientation,
+    );
     let block = tissue.put(&mut world, &mesh);
     // Into the tool, and tumbling.
     let toward = if visit.shape == Shape::Plane { -0.3 } else { 0.6 };
@@ -73,7 +79,11 @@ fn errors(visit: &Visit, dt: f32, substeps: u32) -> (f64, f64, f64) {
         .iter()
         .map(|position| Vec3::Y * toward + Vec3::new(1.0, 2.0, -1.0).cross(*position))
         .collect();
-    world.body_mut(block).expect("a body").set_velocities(&thrown).expect("velocities");
+    world
+        .body_mut(block)
+        .expect("a body")
+        .set_velocities(&thrown)
+        .expect("velocities");
     let (mut linear, mut angular, mut given) = (0.0_f64, 0.0_f64, 0.0_f64);
     for step in 1..=(0.2 / dt) as u32 {
         let seconds = dt * step as f32;
@@ -109,7 +119,10 @@ fn the_momentum_a_tool_gives_is_the_momentum_that_arrives() {
             let (linear, _, given) = errors(visit, dt, substeps);
             // The roundings of a sum over the body's momentum in f32 beside 1e-5 of what was given.
             let rounding = 3e-7 * 0.2 / given;
-            assert!(linear < 1e-5 + rounding, "visit {index}, dt {dt}: {linear} of {given} N s");
+            assert!(
+                linear < 1e-5 + rounding,
+                "visit {index}, dt {dt}: {linear} of {given} N s"
+            );
         }
     }
 }
@@ -136,7 +149,9 @@ fn a_smooth_ball_feels_no_torque() {
         let mut most = 0.0_f32;
         for step in 0..(0.3 / dt) as u32 {
             let aside = Vec3::new(0.02, -0.0205, 0.05 * step as f32 * dt);
-            world.set_pose(ball, aside, Some(Quat::from_rotation_x(step as f32))).expect("a pose");
+            world
+                .set_pose(ball, aside, Some(Quat::from_rotation_x(step as f32)))
+                .expect("a pose");
             world.step(dt).expect("a step");
             let (force, torque) = world.wrench(ball).expect("a tool");
             most = most.max(force.length());

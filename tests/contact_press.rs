@@ -52,7 +52,10 @@ fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Ve
     let carried = pin_forces(&world, cloth, &pins) + weight;
     let off = force.as_dvec3().distance(carried);
     assert!(carried.y > 0.02, "{case}: nothing to be measured, {carried}");
-    assert!(off < 0.02 * carried.length(), "{case}: {force} on the tool, {carried} carried");
+    assert!(
+        off < 0.02 * carried.length(),
+        "{case}: {force} on the tool, {carried} carried"
+    );
     let pose = world.pose(tip).expect("a tool").position.as_dvec3();
     let middle = centre(body(&world, cloth));
     let moment = pin_moments(&world, cloth, &pins, pose) + (middle - pose).cross(weight);
@@ -64,7 +67,10 @@ fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Ve
     // A ball without friction feels no torque about its middle.
     if let Shape::Sphere { .. } = shape {
         let off = f64::from(torque.length());
-        assert!(off < 1e-4 * carried.length() * f64::from(radius), "{case}: torque {torque}");
+        assert!(
+            off < 1e-4 * carried.length() * f64::from(radius),
+            "{case}: torque {torque}"
+        );
     }
     // It leaves, and feels nothing at all.
     world.set_pose(tip, start + Vec3::Y * 0.2, None).expect("a pose");
@@ -100,7 +106,15 @@ fn spheres_smaller_than_the_mesh_do_not_slip_through() {
     for dt in [0.002, 1.0 / 60.0, 1.0 / 30.0] {
         for place in places {
             for radius in [0.002, 0.006] {
-                press(dt, 10, Shape::Sphere { radius }, radius, Quat::IDENTITY, place * spacing, 0.03);
+                press(
+                    dt,
+                    10,
+                    Shape::Sphere { radius },
+                    radius,
+                    Quat::IDENTITY,
+                    place * spacing,
+                    0.03,
+                );
             }
         }
     }
@@ -108,7 +122,12 @@ fn spheres_smaller_than_the_mesh_do_not_slip_through() {
 
 #[test]
 fn capsules_lie_in_the_cloth() {
-    for (dt, cells, angle) in [(0.001, 16, 0.0), (1.0 / 60.0, 16, 0.5), (1.0 / 60.0, 9, 1.1), (1.0 / 30.0, 20, 0.3)] {
+    for (dt, cells, angle) in [
+        (0.001, 16, 0.0),
+        (1.0 / 60.0, 16, 0.5),
+        (1.0 / 60.0, 9, 1.1),
+        (1.0 / 30.0, 20, 0.3),
+    ] {
         for (radius, half_length) in [(0.01, 0.04), (0.004, 0.05)] {
             let lying = Quat::from_rotation_y(angle) * Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
             let shape = Shape::Capsule { radius, half_length };
@@ -138,12 +157,17 @@ fn what_a_pinned_node_takes_from_a_tool_its_pin_takes() {
     let ball = sphere(&mut world, 0.01, Vec3::new(0.03, 0.011, 0.004));
     for step in 1..=600 {
         let down = 0.011 - 0.02 * (step as f32 / 200.0).min(1.0);
-        world.set_pose(ball, Vec3::new(0.03, down, 0.004), None).expect("a pose");
+        world
+            .set_pose(ball, Vec3::new(0.03, down, 0.004), None)
+            .expect("a pose");
         world.step(0.005).expect("a step");
     }
     let force = world.wrench(ball).expect("a tool").0.as_dvec3();
     let carried = pin_forces(&world, cloth, &pins);
     assert!(kinetic(&world, cloth) < 1e-10);
     assert!(force.length() > 0.01, "nothing to be measured: {force}");
-    assert!(force.distance(carried) < 0.02 * force.length(), "{force} on the tool, {carried} carried");
+    assert!(
+        force.distance(carried) < 0.02 * force.length(),
+        "{force} on the tool, {carried} carried"
+    );
 }

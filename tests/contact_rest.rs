@@ -5,7 +5,7 @@ mod tissue;
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Shape, Values, WorldDefinition, World};
+use sinew::{BodyDefinition, Shape, Values, World, WorldDefinition};
 use tissue::*;
 
 const GRAVITY: f32 = 9.81;
@@ -24,9 +24,12 @@ fn mean_force(world: &mut World, tool: sinew::ToolId, dt: f32, count: u32) -> DV
 #[test]
 fn a_plane_carries_the_weight_of_a_cloth() {
     for dt in [0.001, 1.0 / 60.0, 1.0 / 30.0] {
-        for drag in [0.0, 2.0, 20.0, 100.0] {
-            for friction in [0.0, 0.5] {
-                let tissue = Tissue { drag, ..Tissue::VISCOUS };
+        for (drag, friction) in [(0.0, 0.0), (2.0, 0.5), (20.0, 0.0), (100.0, 0.5)] {
+            {
+                let tissue = Tissue {
+                    drag,
+                    ..Tissue::VISCOUS
+                };
                 let mut world = world(DOWN);
                 let plane = tool(&mut world, Shape::Plane, friction, Vec3::ZERO, Quat::IDENTITY);
                 let cloth = tissue.put(&mut world, &moved(square(0.2, 10), Vec3::Y * 0.001));
@@ -68,7 +71,13 @@ fn a_plane_carries_the_weight_of_a_block() {
     };
     for (dt, friction) in [(0.002, 0.0), (1.0 / 60.0, 0.4), (1.0 / 30.0, 1.0)] {
         let mut world = world(DOWN);
-        let plane = tool(&mut world, Shape::Plane, friction, Vec3::new(0.3, 0.0, 0.0), Quat::IDENTITY);
+        let plane = tool(
+            &mut world,
+            Shape::Plane,
+            friction,
+            Vec3::new(0.3, 0.0, 0.0),
+            Quat::IDENTITY,
+        );
         let mesh = Mesh::block([0.08, 0.04, 0.08], [8, 4, 8]).expect("a block");
         let block = tissue.put(&mut world, &moved(mesh, Vec3::Y * 0.025));
         for _ in 0..(3.0 / dt) as u32 {
@@ -128,14 +137,23 @@ fn friction_below_the_slope_lets_it_slide() {
             let acceleration = f64::from(GRAVITY * (angle.sin() - friction * angle.cos()));
             let expected = 0.5 * acceleration * seconds * seconds;
             let case = format!("dt {dt}, angle {angle}, friction {friction}");
-            assert!((slid.length() / expected - 1.0).abs() < 0.01, "{case}: slid {slid}, {expected} m");
+            assert!(
+                (slid.length() / expected - 1.0).abs() < 0.01,
+                "{case}: slid {slid}, {expected} m"
+            );
             let normal = lean.as_dquat() * DVec3::Y;
             assert!(slid.dot(normal).abs() < 1e-5, "{case}: left the plane, {slid}");
             let press = -force.dot(normal);
             let pressed = f64::from(Tissue::VISCOUS.mass * GRAVITY * angle.cos());
-            assert!((press / pressed - 1.0).abs() < 0.01, "{case}: pressed by {press}, {pressed} N");
+            assert!(
+                (press / pressed - 1.0).abs() < 0.01,
+                "{case}: pressed by {press}, {pressed} N"
+            );
             let drag = (force + normal * press).length();
-            assert!((drag - f64::from(friction) * press).abs() < 0.01 * pressed, "{case}: dragged by {drag} N");
+            assert!(
+                (drag - f64::from(friction) * press).abs() < 0.01 * pressed,
+                "{case}: dragged by {drag} N"
+            );
         }
     }
 }
@@ -145,7 +163,14 @@ fn single_nodes_rest_in_grooves_and_corners() {
     // Two planes at right angles for a groove, three for a corner: each carries its share of a node without a surface.
     for (count, directions) in [
         (2, [Vec3::new(1.0, 1.0, 0.0), Vec3::new(-1.0, 1.0, 0.0), Vec3::ZERO]),
-        (3, [Vec3::new(1.0, 1.0, 1.0), Vec3::new(-2.0, 1.0, 1.0), Vec3::new(1.0, 1.0, -2.0)]),
+        (
+            3,
+            [
+                Vec3::new(1.0, 1.0, 1.0),
+                Vec3::new(-2.0, 1.0, 1.0),
+                Vec3::new(1.0, 1.0, -2.0),
+            ],
+        ),
     ] {
         let mut world = world(DOWN);
         let planes: Vec<_> = directions[..count]
@@ -171,8 +196,15 @@ fn single_nodes_rest_in_grooves_and_corners() {
         }
         let force: Vec3 = planes.iter().map(|&plane| world.wrench(plane).expect("a tool").0).sum();
         let weight = 0.01 * GRAVITY;
-        assert!((force + Vec3::Y * weight).length() < 0.01 * weight, "{count} planes: {force}");
-        assert!(kinetic(&world, node) < 1e-9, "{count} planes: {}", kinetic(&world, node));
+        assert!(
+            (force + Vec3::Y * weight).length() < 0.01 * weight,
+            "{count} planes: {force}"
+        );
+        assert!(
+            kinetic(&world, node) < 1e-9,
+            "{count} planes: {}",
+            kinetic(&world, node)
+        );
     }
 }
 
@@ -195,15 +227,24 @@ fn a_thrown_body_stops_at_a_plane() {
             let mesh = moved(square(0.2, 6), Vec3::Y * 1.0);
             let cloth = soft.put(&mut world, &mesh);
             let fast = vec![Vec3::new(20.0, -100.0, 5.0); mesh.positions.len()];
-            world.body_mut(cloth).expect("a body").set_velocities(&fast).expect("velocities");
+            world
+                .body_mut(cloth)
+                .expect("a body")
+                .set_velocities(&fast)
+                .expect("velocities");
             for step in 0..(0.1 / dt) as u32 {
                 if step < 3 {
                     let pose = world.pose(plane).expect("a tool");
-                    world.set_pose(plane, pose.position + Vec3::Y * towards, None).expect("a pose");
+                    world
+                        .set_pose(plane, pose.position + Vec3::Y * towards, None)
+                        .expect("a pose");
                 }
                 world.step(dt).expect("a step");
                 let deepest = penetration_of(&world, cloth, Shape::Plane, plane);
-                assert!(deepest < 1e-5, "{substeps} substeps, dt {dt}, step {step}: {deepest} m deep");
+                assert!(
+                    deepest < 1e-5,
+                    "{substeps} substeps, dt {dt}, step {step}: {deepest} m deep"
+                );
             }
         }
     }

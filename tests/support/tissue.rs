@@ -30,7 +30,11 @@ impl Random {
 
     /// Each coordinate between -1 and 1.
     pub fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
+        Vec3::new(
+            self.between(-1.0, 1.0),
+            self.between(-1.0, 1.0),
+            self.between(-1.0, 1.0),
+        )
     }
 
     pub fn direction(&mut self) -> Vec3 {
@@ -155,7 +159,11 @@ pub fn moved(mut mesh: Mesh, by: Vec3) -> Mesh {
 pub fn rim(cells: u32) -> Vec<u32> {
     let row = cells + 1;
     (0..row * row)
-        .filter(|node| [node % row, node / row].iter().any(|&place| place == 0 || place == cells))
+        .filter(|node| {
+            [node % row, node / row]
+                .iter()
+                .any(|&place| place == 0 || place == cells)
+        })
         .collect()
 }
 
@@ -221,7 +229,10 @@ pub fn centre(body: &Body) -> DVec3 {
 }
 
 pub fn all_finite(body: &Body) -> bool {
-    body.positions().iter().chain(body.velocities()).all(|vector| vector.is_finite())
+    body.positions()
+        .iter()
+        .chain(body.velocities())
+        .all(|vector| vector.is_finite())
 }
 
 /// The distance of a point from the segment from `a` to `b`.
@@ -317,7 +328,10 @@ pub fn penetration(body: &Body, shape: Shape, pose: Pose) -> f64 {
             return -lowest;
         }
     };
-    let nodes = body.positions().iter().map(|node| point_to_segment(node.as_dvec3(), p, q));
+    let nodes = body
+        .positions()
+        .iter()
+        .map(|node| point_to_segment(node.as_dvec3(), p, q));
     let faces = body.surface().iter().map(|&triangle| {
         let triangle = corners(body, triangle);
         if p == q {
@@ -345,7 +359,11 @@ pub fn winding(body: &Body, first: &Mesh, point: DVec3) -> f64 {
         let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
         2.0 * a.dot(b.cross(c)).atan2(below)
     };
-    let now: f64 = body.surface().iter().map(|&triangle| solid_angle(corners(body, triangle))).sum();
+    let now: f64 = body
+        .surface()
+        .iter()
+        .map(|&triangle| solid_angle(corners(body, triangle)))
+        .sum();
     let before: f64 = first
         .triangles
         .iter()
