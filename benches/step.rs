@@ -1,5 +1,170 @@
-//! Placeholder.
-use criterion::{Criterion, criterion_group, criterion_main};
-fn step(_: &mut Criterion) {}
-criterion_group!(benches, step);
+//! The time of a VERLET step, as springs per second: a step here is one substep, and visits each spring once.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Pose, Shape, ToolDefinition, Values, World, WorldDefinition};
+
+/// Short enough for every body here.
+const SUBSTEP: f32 = 1e-4;
+
+/// A sheet of `side` x `side` nodes with springs to all 8 neighbours.
+fn grid(side: u32) -> (Vec<Vec3>, Vec<[u32; 2]>) {
+    let spacing = 1.0 / side as f32;
+    let mut positions = Vec::new();
+    let mut springs = Vec::new();
+    for row in 0..side {
+        for column in 0..side {
+            let node = row * side + column;
+            positions.push(Vec3::new(column as f32 * spacing, 0.0, row as f32 * spacing));
+            let (right, below) = (column + 1 < side, row + 1 < side);
+            if right {
+                springs.push([node, node + 1]);
+            }
+            if below {
+                springs.push([node, node + side]);
+            }
+            if right && below {
+                springs.push([node, node + side + 1]);
+                springs.push([node + 1, node + side]);
+            }
+        }
+    }
+    (positions, springs)
+}
+
+/// A body of these springs, pinned at its first node.
+fn definition<'a>(positions: &'a [Vec3], springs: &'a [[u32; 2]]) -> BodyDefinition<'a> {
+    BodyDefinition {
+        positions,
+        springs: Some(springs),
+        masses: Values::Uniform(1e-4),
+        stiffnesses: Values::Uniform(10.0),
+        ..BodyDefinition::default()
+    }
+}
+
+fn world() -> World {
+    let definition = WorldDefinition {
+        substeps: 1,
+        ..WorldDefinition::default()
+    };
+    World::new(definition).expect("a valid definition")
+}
+
+/// Steps a world with this body, and nothing else.
+fn measure(
+    group: &mut criterion::BenchmarkGroup<'_, criterion::measurement::WallTime>,
+    name: BenchmarkId,
+    body: &BodyDefinition,
+) {
+    let mut world = world();
+    let id = world.create_body(body).expect("a valid body");
+    world.body_mut(id).and_then(|body| body.pin(0)).expect("a node");
+    let springs = world.body(id).expect("a live body").storage_report().spring_count;
+    group.throughput(Throughput::Elements(springs as u64));
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| world.step(black_box(SUBSTEP)).expect("a stable step"));
+    });
+}
+
+/// How the size of a body, and its kind, decide.
+fn sizes(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("verlet");
+    group.sample_size(20);
+    for side in [32, 100, 316, 1000] {
+        let (positions, springs) = grid(side);
+        let nodes = side * side;
+        measure(
+            &mut group,
+            BenchmarkId::new("grid", nodes),
+            &definition(&positions, &springs),
+        );
+    }
+    let organ = Mesh::organ(0.25, 0.006).expect("an organ");
+    let springs = organ.edges().expect("its edges");
+    let nodes = organ.positions.len();
+    measure(
+        &mut group,
+        BenchmarkId::new("organ", nodes),
+        &definition(&organ.positions, &springs),
+    );
+    group.finish();
+}
+
+/// What a feature costs a body that asks for it; the first line is a body that asks for none.
+fn features(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("features");
+    group.sample_size(20);
+    let (positions, springs) = grid(100);
+    let plain = definition(&positions, &springs);
+    measure(&mut group, BenchmarkId::new("none", 10_000), &plain);
+    let node_damping = BodyDefinition {
+        node_dampings: Values::Uniform(1e-4),
+        ..plain
+    };
+    measure(&mut group, BenchmarkId::new("node damping", 10_000), &node_damping);
+    let spring_damping = BodyDefinition {
+        spring_dampings: Values::Uniform(1e-3),
+        ..plain
+    };
+    measure(&mut group, BenchmarkId::new("spring damping", 10_000), &spring_damping);
+    group.finish();
+}
+
+/// What a tool costs: far away, near, and pressed into a cloth.
+fn tools(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("tools");
+    group.sample_size(20);
+    let mesh = Mesh::cloth([1.0, 1.0], [99, 99]).expect("a cloth");
+    let masses: Vec<f32> = mesh
+        .positions
+        .iter()
+        .map(|position| {
+            if position.x.abs().max(position.z.abs()) > 0.499 {
+                0.0
+            } else {
+                1e-4
+            }
+        })
+        .collect();
+    for (name, height) in [
+        ("none", None),
+        ("far away", Some(10.0)),
+        ("near", Some(0.055)),
+        ("pressed in", Some(0.02)),
+    ] {
+        let mut world = world();
+        let body = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Each(&masses),
+            stiffnesses: Values::Uniform(10.0),
+            node_dampings: Values::Uniform(1e-3),
+            ..BodyDefinition::default()
+        };
+        let id = world.create_body(&body).expect("a valid body");
+        world.set_gravity(Vec3::ZERO).expect("a finite vector");
+        if let Some(height) = height {
+            let tool = ToolDefinition {
+                pose: Pose {
+                    position: Vec3::new(0.0, height, 0.0),
+                    ..Pose::IDENTITY
+                },
+                ..ToolDefinition::new(Shape::Sphere { radius: 0.05 })
+            };
+            world.create_tool(&tool).expect("a valid tool");
+        }
+        let springs = world.body(id).expect("a live body").storage_report().spring_count;
+        group.throughput(Throughput::Elements(springs as u64));
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| world.step(black_box(SUBSTEP)).expect("a stable step"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sizes, features, tools);
 criterion_main!(benches);

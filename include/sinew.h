@@ -24,6 +24,26 @@
 #include <stdint.h>
 
 /**
+ * The first number of the version that this header is of.
+ */
+#define SINEW_VERSION_MAJOR 0
+
+/**
+ * The second.
+ */
+#define SINEW_VERSION_MINOR 1
+
+/**
+ * The third.
+ */
+#define SINEW_VERSION_PATCH 0
+
+/**
+ * All three: major << 16 | minor << 8 | patch.
+ */
+#define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)
+
+/**
  * The default: laid out for the processor.
  */
 #define SINEW_STORAGE_PACKED 0
@@ -57,61 +77,6 @@
  * The accurate reference: converged implicit steps, slow.
  */
 #define SINEW_SOLVER_NEWTON 2
-
-/**
- * By the file's name: .obj .stl .vtk .msh .node .ele.
- */
-#define SINEW_MESH_FORMAT_AUTO 0
-
-/**
- * Wavefront OBJ.
- */
-#define SINEW_MESH_FORMAT_OBJ 1
-
-/**
- * STL, binary or ASCII.
- */
-#define SINEW_MESH_FORMAT_STL 2
-
-/**
- * VTK legacy: unstructured grids and polygonal data, ASCII or binary.
- */
-#define SINEW_MESH_FORMAT_VTK 3
-
-/**
- * Gmsh, versions 1, 2 and 4.1, ASCII.
- */
-#define SINEW_MESH_FORMAT_GMSH 4
-
-/**
- * TetGen: .node and .ele side by side, whichever is named.
- */
-#define SINEW_MESH_FORMAT_TETGEN 5
-
-/**
- * In node_of_vertex: the vertex was dropped.
- */
-#define SINEW_NO_NODE 4294967295
-
-/**
- * The first number of the version that this header is of.
- */
-#define SINEW_VERSION_MAJOR 0
-
-/**
- * The second.
- */
-#define SINEW_VERSION_MINOR 1
-
-/**
- * The third.
- */
-#define SINEW_VERSION_PATCH 0
-
-/**
- * All three: major << 16 | minor << 8 | patch.
- */
-#define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)
 
 /**
  * A ball about the origin.
@@ -149,6 +114,41 @@
 #define SINEW_DETECTION_DISTANCE_FIELD 2
 
 /**
+ * By the file's name: .obj .stl .vtk .msh .node .ele.
+ */
+#define SINEW_MESH_FORMAT_AUTO 0
+
+/**
+ * Wavefront OBJ.
+ */
+#define SINEW_MESH_FORMAT_OBJ 1
+
+/**
+ * STL, binary or ASCII.
+ */
+#define SINEW_MESH_FORMAT_STL 2
+
+/**
+ * VTK legacy: unstructured grids and polygonal data, ASCII or binary.
+ */
+#define SINEW_MESH_FORMAT_VTK 3
+
+/**
+ * Gmsh, versions 1, 2 and 4.1, ASCII.
+ */
+#define SINEW_MESH_FORMAT_GMSH 4
+
+/**
+ * TetGen: .node and .ele side by side, whichever is named.
+ */
+#define SINEW_MESH_FORMAT_TETGEN 5
+
+/**
+ * In node_of_vertex: the vertex was dropped.
+ */
+#define SINEW_NO_NODE UINT32_MAX
+
+/**
  * A mesh: positions, triangles and tetrahedra. It belongs to the caller, never changes, and may be read by any number of
  * threads at once.
  */
@@ -166,6 +166,66 @@ typedef struct sinew_world sinew_world;
  * The answer of every function that can fail: one of the `SINEW_STATUS_...`.
  */
 typedef int32_t sinew_status;
+
+/**
+ * How a world steps. Filled by sinew_world_def_init.
+ */
+typedef struct sinew_world_def {
+  /**
+   * Set by sinew_world_def_init.
+   */
+  size_t struct_size;
+  /**
+   * m/s^2; default 0 -9.81 0.
+   */
+  float gravity[3];
+  /**
+   * 1, the default: the caller's thread alone; 0: one per core.
+   */
+  uint32_t thread_count;
+  /**
+   * 0, the default: as many as stability needs; n: exactly n per step.
+   */
+  uint32_t substeps;
+  /**
+   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE.
+   */
+  uint32_t max_substeps;
+  /**
+   * m; 0, the default: off; above 0, with substeps 0: a step's own position error stays below it.
+   */
+  float tolerance;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_world_def;
+
+/**
+ * What a step did; filled on SINEW_STATUS_OK and SINEW_STATUS_UNSTABLE.
+ */
+typedef struct sinew_step_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * The most that any body took.
+   */
+  uint32_t substeps;
+  /**
+   * s: the longest explicit substep that is stable now, over all bodies; infinity: no limit.
+   */
+  float stable_substep;
+  /**
+   * Bodies that would have become non-finite: put back as they were, the others stepped.
+   */
+  uint32_t bodies_restored;
+  /**
+   * m: how far a position of this step may be off; 0 where tolerance is off.
+   */
+  float error_estimate;
+} sinew_step_report;
 
 /**
  * What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
@@ -349,6 +409,82 @@ typedef struct sinew_storage_report {
 } sinew_storage_report;
 
 /**
+ * What a tool is. Filled by sinew_tool_def_init; used only during sinew_tool_create.
+ */
+typedef struct sinew_tool_def {
+  /**
+   * Set by sinew_tool_def_init.
+   */
+  size_t struct_size;
+  /**
+   * SINEW_SHAPE_...: sphere about the origin, capsule along y, plane y = 0 with free space above.
+   */
+  uint32_t shape;
+  /**
+   * m, above 0: sphere, capsule; no default.
+   */
+  float radius;
+  /**
+   * m: capsule, between the centre and a cap's centre.
+   */
+  float half_length;
+  /**
+   * 0.
+   */
+  uint32_t reserved0;
+  /**
+   * Mesh: 3 node_count floats, closed, triangles outward.
+   */
+  const float *positions;
+  /**
+   * Nodes of the mesh.
+   */
+  size_t node_count;
+  /**
+   * 3 triangle_count node indices.
+   */
+  const uint32_t *triangles;
+  /**
+   * Triangles of the mesh.
+   */
+  size_t triangle_count;
+  /**
+   * SINEW_DETECTION_...
+   */
+  uint32_t detection;
+  /**
+   * Coulomb coefficient; default 0.
+   */
+  float friction;
+  /**
+   * Where it is at first, m; default 0 0 0.
+   */
+  float position[3];
+  /**
+   * x y z w; default 0 0 0 1; normalised, zero is refused.
+   */
+  float orientation[4];
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_tool_def;
+
+/**
+ * A tool: a plain value, all zero is "none".
+ */
+typedef struct sinew_tool_id {
+  /**
+   * Which place, from 1.
+   */
+  uint32_t index1;
+  /**
+   * Which of the tools that lived there.
+   */
+  uint32_t generation;
+} sinew_tool_id;
+
+/**
  * What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
  */
 typedef struct sinew_mesh_view {
@@ -469,142 +605,6 @@ typedef struct sinew_picture_def {
 } sinew_picture_def;
 
 /**
- * What a tool is. Filled by sinew_tool_def_init; used only during sinew_tool_create.
- */
-typedef struct sinew_tool_def {
-  /**
-   * Set by sinew_tool_def_init.
-   */
-  size_t struct_size;
-  /**
-   * SINEW_SHAPE_...: sphere about the origin, capsule along y, plane y = 0 with free space above.
-   */
-  uint32_t shape;
-  /**
-   * m, above 0: sphere, capsule; no default.
-   */
-  float radius;
-  /**
-   * m: capsule, between the centre and a cap's centre.
-   */
-  float half_length;
-  /**
-   * 0.
-   */
-  uint32_t reserved0;
-  /**
-   * Mesh: 3 node_count floats, closed, triangles outward.
-   */
-  const float *positions;
-  /**
-   * Nodes of the mesh.
-   */
-  size_t node_count;
-  /**
-   * 3 triangle_count node indices.
-   */
-  const uint32_t *triangles;
-  /**
-   * Triangles of the mesh.
-   */
-  size_t triangle_count;
-  /**
-   * SINEW_DETECTION_...
-   */
-  uint32_t detection;
-  /**
-   * Coulomb coefficient; default 0.
-   */
-  float friction;
-  /**
-   * Where it is at first, m; default 0 0 0.
-   */
-  float position[3];
-  /**
-   * x y z w; default 0 0 0 1; normalised, zero is refused.
-   */
-  float orientation[4];
-  /**
-   * 0.
-   */
-  uint32_t reserved;
-} sinew_tool_def;
-
-/**
- * A tool: a plain value, all zero is "none".
- */
-typedef struct sinew_tool_id {
-  /**
-   * Which place, from 1.
-   */
-  uint32_t index1;
-  /**
-   * Which of the tools that lived there.
-   */
-  uint32_t generation;
-} sinew_tool_id;
-
-/**
- * How a world steps. Filled by sinew_world_def_init.
- */
-typedef struct sinew_world_def {
-  /**
-   * Set by sinew_world_def_init.
-   */
-  size_t struct_size;
-  /**
-   * m/s^2; default 0 -9.81 0.
-   */
-  float gravity[3];
-  /**
-   * 1, the default: the caller's thread alone; 0: one per core.
-   */
-  uint32_t thread_count;
-  /**
-   * 0, the default: as many as stability needs; n: exactly n per step.
-   */
-  uint32_t substeps;
-  /**
-   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE.
-   */
-  uint32_t max_substeps;
-  /**
-   * m; 0, the default: off; above 0, with substeps 0: a step's own position error stays below it.
-   */
-  float tolerance;
-  /**
-   * 0.
-   */
-  uint32_t reserved;
-} sinew_world_def;
-
-/**
- * What a step did; filled on SINEW_STATUS_OK and SINEW_STATUS_UNSTABLE.
- */
-typedef struct sinew_step_report {
-  /**
-   * Set by the caller.
-   */
-  size_t struct_size;
-  /**
-   * The most that any body took.
-   */
-  uint32_t substeps;
-  /**
-   * s: the longest explicit substep that is stable now, over all bodies; infinity: no limit.
-   */
-  float stable_substep;
-  /**
-   * Bodies that would have become non-finite: put back as they were, the others stepped.
-   */
-  uint32_t bodies_restored;
-  /**
-   * m: how far a position of this step may be off; 0 where tolerance is off.
-   */
-  float error_estimate;
-} sinew_step_report;
-
-/**
  * Done.
  */
 #define SINEW_STATUS_OK 0
@@ -652,6 +652,91 @@ typedef struct sinew_step_report {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * The version of the library that is linked: major << 16 | minor << 8 | patch; compare with SINEW_VERSION.
+ */
+uint32_t sinew_version(void);
+
+/**
+ * The name of a status, such as "SINEW_STATUS_OK"; never NULL, valid for ever.
+ */
+const char *sinew_status_name(sinew_status status);
+
+/**
+ * Writes the message of this thread's last failed call to `buffer`, cut where `capacity` bytes do not hold it, and ended
+ * by NUL. `buffer` may be NULL where `capacity` is 0.
+ *
+ * Returns the bytes that the whole message needs, NUL included; 1, an empty message, where no call has failed.
+ *
+ * # Safety
+ * `buffer` must be writable for `capacity` bytes.
+ */
+size_t sinew_last_error(char *buffer,
+                        size_t capacity);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_world_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_world_def_init(struct sinew_world_def *def, size_t struct_size);
+
+/**
+ * Creates an empty world, which the caller destroys with sinew_world_destroy.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread_count other than 1),
+ * SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_world_create(const struct sinew_world_def *def, struct sinew_world **out);
+
+/**
+ * Destroys a world with all that is in it. NULL: nothing.
+ *
+ * # Safety
+ * `world` is NULL or a world that is not destroyed and that nobody uses any more.
+ */
+void sinew_world_destroy(struct sinew_world *world);
+
+/**
+ * Steps everything in the world by `dt` seconds, above 0. `report` may be NULL. Views of positions and velocities end.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT; SINEW_STATUS_UNSTABLE, where the step needs more substeps than max_substeps, or
+ * than the world's fixed substeps: nothing has moved, pending forces and poses stay pending.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_world_step(struct sinew_world *world,
+                              float dt,
+                              struct sinew_step_report *report);
+
+/**
+ * Gives everything this acceleration, 3 floats, m/s^2, from the next step on.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `gravity` is NULL or 3 floats.
+ */
+sinew_status sinew_world_set_gravity(struct sinew_world *world, const float *gravity);
+
+/**
+ * Writes a hash over everything that the next step depends on; to be compared within one version of the library.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_world_get_state_hash(const struct sinew_world *world,
+                                        uint64_t *out);
 
 /**
  * Fills `def` with the defaults. `struct_size` is sizeof(sinew_body_def).
@@ -870,6 +955,68 @@ sinew_status sinew_body_get_storage_report(const struct sinew_world *world,
                                            struct sinew_storage_report *out);
 
 /**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_tool_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_tool_def_init(struct sinew_tool_def *def, size_t struct_size);
+
+/**
+ * Creates a tool; copies what `def` points to.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (SINEW_SHAPE_MESH, detection other than EXACT),
+ * SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
+ * the lengths that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_tool_create(struct sinew_world *world,
+                               const struct sinew_tool_def *def,
+                               struct sinew_tool_id *out);
+
+/**
+ * Destroys a tool.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_tool_destroy(struct sinew_world *world, struct sinew_tool_id tool);
+
+/**
+ * Moves a tool to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be
+ * NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the orientation is zero), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
+ */
+sinew_status sinew_tool_set_pose(struct sinew_world *world,
+                                 struct sinew_tool_id tool,
+                                 const float *position,
+                                 const float *orientation);
+
+/**
+ * Writes the force, 3 floats, N, and the torque about its position, 3 floats, N m, on a tool: world axes, mean over the
+ * last step.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `force` and `torque` are NULL or writable for 3 floats.
+ */
+sinew_status sinew_tool_get_wrench(const struct sinew_world *world,
+                                   struct sinew_tool_id tool,
+                                   float *force,
+                                   float *torque);
+
+/**
  * Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements
  * and points that nothing uses are dropped, tetrahedra that are inside out are turned; the view counts it all. `path` is
  * UTF-8, `format` a SINEW_MESH_FORMAT_..., `scale` what one unit of the file is in m, above 0. The caller destroys the mesh
@@ -969,154 +1116,6 @@ sinew_status sinew_picture_def_init(struct sinew_picture_def *def, size_t struct
 sinew_status sinew_world_save_picture(const struct sinew_world *world,
                                       const struct sinew_picture_def *def,
                                       const char *path);
-
-/**
- * The version of the library that is linked: major << 16 | minor << 8 | patch; compare with SINEW_VERSION.
- */
-uint32_t sinew_version(void);
-
-/**
- * The name of a status, such as "SINEW_STATUS_OK"; never NULL, valid for ever.
- */
-const char *sinew_status_name(sinew_status status);
-
-/**
- * Writes the message of this thread's last failed call to `buffer`, cut where `capacity` bytes do not hold it, and ended
- * by NUL. `buffer` may be NULL where `capacity` is 0.
- *
- * Returns the bytes that the whole message needs, NUL included; 1, an empty message, where no call has failed.
- *
- * # Safety
- * `buffer` must be writable for `capacity` bytes.
- */
-size_t sinew_last_error(char *buffer,
-                        size_t capacity);
-
-/**
- * Fills `def` with the defaults. `struct_size` is sizeof(sinew_tool_def).
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT.
- *
- * # Safety
- * `def` is NULL or writable for `struct_size` bytes.
- */
-sinew_status sinew_tool_def_init(struct sinew_tool_def *def, size_t struct_size);
-
-/**
- * Creates a tool; copies what `def` points to.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (SINEW_SHAPE_MESH, detection other than EXACT),
- * SINEW_STATUS_OUT_OF_MEMORY.
- *
- * # Safety
- * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
- * the lengths that it states; `out` is NULL or writable.
- */
-sinew_status sinew_tool_create(struct sinew_world *world,
-                               const struct sinew_tool_def *def,
-                               struct sinew_tool_id *out);
-
-/**
- * Destroys a tool.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
- *
- * # Safety
- * `world` is NULL or a world nobody else uses.
- */
-sinew_status sinew_tool_destroy(struct sinew_world *world, struct sinew_tool_id tool);
-
-/**
- * Moves a tool to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be
- * NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the orientation is zero), SINEW_STATUS_STALE_ID.
- *
- * # Safety
- * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
- */
-sinew_status sinew_tool_set_pose(struct sinew_world *world,
-                                 struct sinew_tool_id tool,
-                                 const float *position,
-                                 const float *orientation);
-
-/**
- * Writes the force, 3 floats, N, and the torque about its position, 3 floats, N m, on a tool: world axes, mean over the
- * last step.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
- *
- * # Safety
- * `world` is NULL or a world nobody changes; `force` and `torque` are NULL or writable for 3 floats.
- */
-sinew_status sinew_tool_get_wrench(const struct sinew_world *world,
-                                   struct sinew_tool_id tool,
-                                   float *force,
-                                   float *torque);
-
-/**
- * Fills `def` with the defaults. `struct_size` is sizeof(sinew_world_def).
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT.
- *
- * # Safety
- * `def` is NULL or writable for `struct_size` bytes.
- */
-sinew_status sinew_world_def_init(struct sinew_world_def *def, size_t struct_size);
-
-/**
- * Creates an empty world, which the caller destroys with sinew_world_destroy. `def` may be NULL: the defaults.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread_count other than 1),
- * SINEW_STATUS_OUT_OF_MEMORY.
- *
- * # Safety
- * `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
- */
-sinew_status sinew_world_create(const struct sinew_world_def *def,
-                                struct sinew_world **out);
-
-/**
- * Destroys a world with all that is in it. NULL: nothing.
- *
- * # Safety
- * `world` is NULL or a world that is not destroyed and that nobody uses any more.
- */
-void sinew_world_destroy(struct sinew_world *world);
-
-/**
- * Steps everything in the world by `dt` seconds, above 0. `report` may be NULL. Views of positions and velocities end.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT; SINEW_STATUS_UNSTABLE, where the step needs more substeps than max_substeps, or
- * than the world's fixed substeps: nothing has moved, pending forces and poses stay pending.
- *
- * # Safety
- * `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
- */
-sinew_status sinew_world_step(struct sinew_world *world,
-                              float dt,
-                              struct sinew_step_report *report);
-
-/**
- * Gives everything this acceleration, 3 floats, m/s^2, from the next step on.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT.
- *
- * # Safety
- * `world` is NULL or a world nobody else uses; `gravity` is NULL or 3 floats.
- */
-sinew_status sinew_world_set_gravity(struct sinew_world *world, const float *gravity);
-
-/**
- * Writes a hash over everything that the next step depends on; to be compared within one version of the library.
- *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT.
- *
- * # Safety
- * `world` is NULL or a world nobody changes; `out` is NULL or writable.
- */
-sinew_status sinew_world_get_state_hash(const struct sinew_world *world,
-                                        uint64_t *out);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -22,3 +22,10 @@ pub(crate) fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
     copy.extend_from_slice(values);
     Ok(copy)
 }
+
+/// Appends `value`, growing the vector fallibly.
+pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
+    values.try_reserve(1)?;
+    values.push(value);
+    Ok(())
+}

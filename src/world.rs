@@ -303,18 +303,14 @@ impl World {
         };
         for (outcome, (_, body)) in self.outcomes.iter().zip(self.bodies.iter()) {
             let stable_substep = match *outcome {
-                Outcome::Done {
-                    substeps,
-                    stability,
-                    error,
-                } => {
+                Outcome::Done { substeps, carry, error } => {
                     report.substeps = report.substeps.max(substeps);
                     report.error_estimate = report.error_estimate.max(error);
-                    stability.limit
+                    carry.stability.limit
                 }
                 Outcome::NotFinite => {
                     report.bodies_restored += 1;
-                    body.stability.limit
+                    body.carry.stability.limit
                 }
                 Outcome::Unstable { stable_substep } => Some(stable_substep),
             };
@@ -326,9 +322,7 @@ impl World {
     fn commit_bodies(&mut self) {
         for (outcome, (_, body)) in self.outcomes.iter().zip(self.bodies.iter_mut()) {
             match *outcome {
-                Outcome::Done {
-                    substeps, stability, ..
-                } => body.commit(substeps, stability),
+                Outcome::Done { substeps, carry, .. } => body.commit(substeps, carry),
                 Outcome::NotFinite | Outcome::Unstable { .. } => body.clear_pending(),
             }
         }

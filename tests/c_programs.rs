@@ -7,7 +7,7 @@ mod support;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use support::{Library, installed, root, skip, succeed};
+use support::{Library, failure, installed, root, skip, succeed};
 
 const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 
@@ -65,18 +65,19 @@ impl Compiler {
     }
 
     /// Compiles a program and links it; where it ends up.
-    fn build(&self, source: &Path, link: Link, options: &[&str]) -> PathBuf {
-        let stem = source.file_stem().expect("a file").to_string_lossy();
-        let kind = options
-            .first()
-            .map_or("", |option| option.trim_start_matches("-fsanitize="));
-        let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{stem}-{}-{link:?}{kind}", self.name));
+    fn build(&self, source: &Path, build: &Build) -> PathBuf {
+        let program = Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join(build.name)
+            .join(self.name)
+            .join(source.strip_prefix(root()).expect("a source of the crate"))
+            .with_extension("");
+        std::fs::create_dir_all(program.parent().expect("a folder")).expect("the target directory can be written");
         let mut command = Command::new(self.name);
         command
             .arg(format!("-std={}", self.standard()))
             .args(WARNINGS)
             .args(["-O1", "-g", "-pthread"])
-            .args(options)
+            .args(build.options)
             .arg(format!("-DEXPECTED_VERSION={}", version()))
             .arg("-I")
             .arg(root().join("include"))
@@ -85,7 +86,7 @@ impl Compiler {
             .args(["-x", "none", "-o"])
             .arg(&program);
         let library = Library::get();
-        match link {
+        match build.link {
             Link::Shared => command
                 .arg(library.shared())
                 .arg(format!("-Wl,-rpath,{}", library.folder.display())),
@@ -96,11 +97,41 @@ impl Compiler {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
 enum Link {
     Shared,
     Static,
 }
+
+/// One way of building the programs, in a folder of its own: the tests run side by side.
+struct Build {
+    name: &'static str,
+    link: Link,
+    options: &'static [&'static str],
+}
+
+const SHARED: Build = Build {
+    name: "shared",
+    link: Link::Shared,
+    options: &[],
+};
+
+const STATIC: Build = Build {
+    name: "static",
+    link: Link::Static,
+    options: &[],
+};
+
+const SANITIZED: Build = Build {
+    name: "sanitized",
+    link: Link::Shared,
+    options: &["-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
+};
+
+const CHECKED: Build = Build {
+    name: "valgrind",
+    link: Link::Shared,
+    options: &[],
+};
 
 /// The version of the crate as `sinew_version` gives it.
 fn version() -> u32 {
@@ -123,41 +154,45 @@ fn sources(folder: &str) -> Vec<PathBuf> {
     sources
 }
 
-/// A program that finds its library by its own path alone: cargo puts older builds on the loader's.
-fn run(command: &mut Command) {
-    succeed(
-        command
-            .env_remove("LD_LIBRARY_PATH")
-            .current_dir(env!("CARGO_TARGET_TMPDIR")),
-    );
+/// Runs all of these programs and tells of every one that fails. Each finds its library by its own path alone: cargo puts
+/// older builds on the loader's.
+fn run_all(programs: impl Iterator<Item = Command>) {
+    let failures: Vec<String> = programs
+        .filter_map(|mut program| {
+            program
+                .env_remove("LD_LIBRARY_PATH")
+                .current_dir(env!("CARGO_TARGET_TMPDIR"));
+            failure(&mut program)
+        })
+        .collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-fn every_program_runs(link: Link) {
+fn every_program_runs(build: &Build) {
     let programs = sources("tests/c");
     assert!(!programs.is_empty(), "there are programs in tests/c");
-    for compiler in Compiler::installed() {
-        for source in &programs {
-            run(&mut Command::new(compiler.build(source, link, &[])));
-        }
-    }
+    run_all(Compiler::installed().flat_map(|compiler| {
+        let built = programs.iter().map(move |source| compiler.build(source, build));
+        built.map(Command::new)
+    }));
 }
 
 #[test]
 fn programs_run_with_the_shared_library() {
-    every_program_runs(Link::Shared);
+    every_program_runs(&SHARED);
 }
 
 #[test]
 fn programs_run_with_the_static_library() {
-    every_program_runs(Link::Static);
+    every_program_runs(&STATIC);
 }
 
 #[test]
 fn the_examples_compile_as_c_and_as_cxx() {
     for compiler in Compiler::installed() {
         for source in sources("c_examples") {
-            compiler.build(&source, Link::Shared, &[]);
-            compiler.build(&source, Link::Static, &[]);
+            compiler.build(&source, &SHARED);
+            compiler.build(&source, &STATIC);
         }
     }
 }
@@ -183,12 +218,12 @@ fn the_header_stands_alone_in_every_standard() {
 }
 
 /// Whether the compiler's address and undefined-behaviour sanitizers are there and work.
-fn sanitizers_work(compiler: &Compiler, options: &[&str]) -> bool {
+fn sanitizers_work(compiler: &Compiler) -> bool {
     let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nothing.c");
     let program = source.with_extension("out");
     std::fs::write(&source, "int main(void) { return 0; }\n").expect("a file can be written");
     let built = Command::new(compiler.name)
-        .args(options)
+        .args(SANITIZED.options)
         .arg(&source)
         .arg("-o")
         .arg(&program)
@@ -201,13 +236,11 @@ fn sanitizers_work(compiler: &Compiler, options: &[&str]) -> bool {
 
 #[test]
 fn sanitizers_find_nothing() {
-    let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
-    let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler, &options)) else {
+    let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler)) else {
         return skip("the sanitizers, which no compiler here has");
     };
-    for source in sources("tests/c") {
-        run(&mut Command::new(compiler.build(&source, Link::Shared, &options)));
-    }
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| Command::new(compiler.build(&source, &SANITIZED))));
 }
 
 #[test]
@@ -218,10 +251,12 @@ fn valgrind_finds_nothing() {
     let Some(compiler) = Compiler::installed().next() else {
         return;
     };
-    for source in sources("tests/c") {
-        let program = compiler.build(&source, Link::Shared, &["-gdwarf-4"]);
-        run(Command::new("valgrind")
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| {
+        let mut valgrind = Command::new("valgrind");
+        valgrind
             .args(["--quiet", "--leak-check=full", "--error-exitcode=9"])
-            .arg(program));
-    }
+            .arg(compiler.build(&source, &CHECKED));
+        valgrind
+    }));
 }

@@ -267,7 +267,7 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
         up: Vec3::Y,
         field_of_view: 0.7,
     };
-    let (width, height) = (640, 480);
+    let (width, height) = (1600, 1200);
     let mut scene = Scene::default();
     let empty = scene.draw(&camera, width, height).expect("a picture");
     scene.shapes.push((Shape::Sphere { centre, radius }, Look::INSTRUMENT));
@@ -281,16 +281,15 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
     let major = focal * (r2 * (d2 - r2)).sqrt() / (z2 - r2);
     let minor = focal * (r2 / (z2 - r2)).sqrt();
     let area = std::f64::consts::PI * major * minor;
-    // A pixel at the outline is touched by half of its area on average.
-    let outline = std::f64::consts::PI * (major + minor);
-    let expected = area + 0.35 * outline;
-    let error = (changed as f64 - expected).abs() / area;
-    assert!(error < 0.01, "{changed} {expected} {area}");
+    // A pixel at the outline counts even if a quarter of it is covered: at this size 0.3 % too much.
+    let error = (changed as f64 - area).abs() / area;
+    assert!(error < 0.01, "{changed} {area}");
 }
 
 #[test]
 fn a_fitted_camera_has_all_points_and_no_more() {
     let mut random = Random(21);
+    let mut close = 0;
     for round in 0..200 {
         let stretch = random.point(1.0).abs() + Vec3::splat(0.05);
         let shift = random.point(5.0);
@@ -311,17 +310,23 @@ fn a_fitted_camera_has_all_points_and_no_more() {
         )
         .expect("a camera");
         let view = camera.view(width, height).expect("a view");
-        let (mut x, mut y) = (0.0_f64, 0.0_f64);
+        let (mut x, mut y, mut nearest) = (0.0_f64, 0.0_f64, f64::INFINITY);
         for &point in &points {
             let pixel = view.project(point).expect("in front of the camera");
             x = x.max((pixel.x / f64::from(width) * 2.0 - 1.0).abs());
             y = y.max((pixel.y / f64::from(height) * 2.0 - 1.0).abs());
+            nearest = nearest.min(pixel.depth);
         }
         assert!(x < 0.945 && y < 0.945, "{x} {y}");
-        assert!(x.max(y) > 0.935, "{x} {y}");
+        if x.max(y) < 0.935 {
+            // Only where the camera is as close as it may be: 2 % of at most 2 sqrt(3) times the stretch.
+            assert!(nearest < 0.07 * f64::from(stretch.max_element()), "{nearest} {x} {y}");
+            close += 1;
+        }
         let towards = (camera.eye - camera.target).normalize();
         assert!(towards.dot(direction.normalize()) > 0.999);
     }
+    assert!(close < 20, "{close}");
 }
 
 #[test]
@@ -405,6 +410,10 @@ fn broken_triangles_neither_draw_nor_hang() {
         scene.shapes.push((plane, Look::GROUND));
     }
     assert_eq!(scene.draw(&camera, 40, 30), Ok(empty));
+    for (width, height) in [(16_384, 1), (1, 16_384), (1, 1)] {
+        let image = scene.draw(&camera, width, height).expect("a picture");
+        assert_eq!(image.pixels.len(), (width * height) as usize);
+    }
 }
 
 #[test]

@@ -58,25 +58,6 @@ fn the_exported_symbols_are_the_headers_functions() {
 }
 
 #[test]
-fn the_static_library_defines_the_same_functions() {
-    if !installed("nm") {
-        return skip("the static library's symbols: nm is not installed");
-    }
-    let output = succeed(
-        Command::new("nm")
-            .args(["--defined-only", "--extern-only", "--format=posix"])
-            .arg(Library::get().archive()),
-    );
-    let defined: BTreeSet<String> = String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| name.starts_with("sinew_"))
-        .map(str::to_owned)
-        .collect();
-    assert_eq!(defined, declared());
-}
-
-#[test]
 fn the_shared_library_is_called_by_its_version() {
     if !installed("readelf") {
         return skip("the soname: readelf is not installed");

@@ -53,3 +53,32 @@ impl NodeDamping {
         self.substep = substep;
     }
 }
+
+/// How nodes answer an impulse within a kick.
+#[derive(Clone, Copy)]
+pub(crate) struct Mobility<'a> {
+    pub inverse_masses: &'a [f32],
+    pub damping: Option<&'a NodeDamping>,
+    /// The substep of the kick, s.
+    pub substep: f32,
+    /// Whether the kick is half of one.
+    pub half: bool,
+}
+
+impl Mobility<'_> {
+    /// The change of velocity for an impulse, 1/kg; 0 for a pinned node. The force that gives the impulse acts over the
+    /// whole kick, so that damping takes of it what it takes of any force.
+    #[inline]
+    pub fn of(&self, node: usize) -> f32 {
+        let inverse_mass = self.inverse_masses[node];
+        let Some(NodeDamping { decay, gain, .. }) = self.damping else {
+            return inverse_mass;
+        };
+        let duration = if self.half {
+            gain[node] * 2.0
+        } else {
+            gain[node] * (1.0 + decay[node])
+        };
+        inverse_mass * (duration / self.substep)
+    }
+}

@@ -3,9 +3,9 @@
 use glam::Vec3;
 
 use super::definition::{Spring, distance, expect_count, finite_vector, finite_vectors, not_negative};
-use super::{Body, Vectors};
+use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
-use crate::solver::Stability;
+use crate::solver::{GravityKicks, Stability};
 
 impl Body {
     /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node.
@@ -68,6 +68,7 @@ impl Body {
                 self.set_velocity(node, velocity);
             }
         }
+        self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
         Ok(())
     }
 
@@ -81,7 +82,7 @@ impl Body {
             self.pins.insert(node)?;
             self.inverse_masses[node as usize] = 0.0;
             self.set_velocity(node as usize, Vec3::ZERO);
-            self.stability = Stability::UNKNOWN;
+            self.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
     }
@@ -100,7 +101,7 @@ impl Body {
         }
         if self.pins.remove(node) {
             self.inverse_masses[node as usize] = 1.0 / mass;
-            self.stability = Stability::UNKNOWN;
+            self.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
     }
@@ -171,7 +172,7 @@ impl Body {
     fn springs_changed(&mut self) {
         self.count_rest_lengths();
         self.forces_current = false;
-        self.stability = Stability::UNKNOWN;
+        self.carry.stability = Stability::UNKNOWN;
     }
 
     fn set_velocity(&mut self, node: usize, velocity: Vec3) {

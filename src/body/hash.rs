@@ -18,8 +18,8 @@ impl Body {
             vectors.extend(&self.applied);
         }
         for vectors in vectors {
-            for component in vectors.components() {
-                hasher.write_floats(component);
+            for vector in vectors.iter() {
+                hasher.write_floats(&vector.to_array());
             }
         }
         hasher.write_floats(&self.masses);
@@ -39,6 +39,10 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
-        hasher.write_floats(&[self.stability.limit.unwrap_or(-1.0), self.stability.travel]);
+        let stability = &self.carry.stability;
+        hasher.write_floats(&[stability.limit.unwrap_or(-1.0), stability.travel]);
+        for bits in self.carry.gravity.bits() {
+            hasher.write_u64(bits);
+        }
     }
 }

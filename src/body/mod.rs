@@ -11,7 +11,7 @@ mod vectors;
 
 use glam::{DVec3, Vec3};
 
-pub(crate) use damping::NodeDamping;
+pub(crate) use damping::{Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
@@ -21,7 +21,7 @@ use crate::contact::Contacts;
 use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
-use crate::solver::Stability;
+use crate::solver::{Carry, GravityKicks, Stability};
 use crate::springs::Packed;
 use origin::shift_towards;
 use pins::Pins;
@@ -48,7 +48,7 @@ pub struct Body {
     /// Forces from outside for the next step, N; kept from the first force on.
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
-    pub(crate) stability: Stability,
+    pub(crate) carry: Carry,
     /// The mean rest length of all springs, m; infinite where there are none.
     pub(crate) mean_rest_length: f32,
     rest_length_sum: f64,
@@ -114,7 +114,13 @@ impl Body {
             origin: DVec3::ZERO,
             applied: None,
             contacts: None,
-            stability: Stability::UNKNOWN,
+            carry: Carry {
+                stability: Stability::UNKNOWN,
+                gravity: GravityKicks::new(Bounds {
+                    min: Vec3::ZERO,
+                    max: Vec3::ZERO,
+                }),
+            },
             mean_rest_length: f32::INFINITY,
             rest_length_sum,
             forces_current: false,
@@ -202,7 +208,7 @@ impl Body {
         }
         self.published_positions.copy_from_slice(positions);
         self.forces_current = false;
-        self.stability = Stability::UNKNOWN;
+        self.carry.stability = Stability::UNKNOWN;
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
         }
@@ -252,9 +258,9 @@ impl Body {
     }
 
     /// Makes the step in progress, of `substeps` substeps, the current state.
-    pub(crate) fn commit(&mut self, substeps: u32, stability: Stability) {
+    pub(crate) fn commit(&mut self, substeps: u32, carry: Carry) {
         self.state.commit();
-        self.stability = stability;
+        self.carry = carry;
         self.forces_current = true;
         for pin in self.pins.iter_mut() {
             pin.force = (pin.force_sum / f64::from(substeps)).as_vec3();

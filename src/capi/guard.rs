@@ -101,7 +101,8 @@ fn caught(call: impl FnOnce() -> Result<()>) -> Result<()> {
 mod tests {
     use super::super::status::{SINEW_STATUS_INTERNAL, SINEW_STATUS_INVALID_ARGUMENT};
     use super::super::world::{
-        sinew_world_create, sinew_world_destroy, sinew_world_get_state_hash, sinew_world_set_gravity, sinew_world_step,
+        sinew_world_create, sinew_world_def_init, sinew_world_destroy, sinew_world_get_state_hash,
+        sinew_world_set_gravity, sinew_world_step,
     };
     use super::*;
 
@@ -110,7 +111,9 @@ mod tests {
         let mut world = std::ptr::null_mut();
         // SAFETY: pointers to live variables throughout, and a world used before its end alone.
         unsafe {
-            assert_eq!(sinew_world_create(std::ptr::null(), &mut world), SINEW_STATUS_OK);
+            let mut def = std::mem::zeroed();
+            assert_eq!(sinew_world_def_init(&mut def, size_of_val(&def)), SINEW_STATUS_OK);
+            assert_eq!(sinew_world_create(&def, &mut world), SINEW_STATUS_OK);
             let status = with_world_mut(world, |_| panic!("on purpose"));
             assert_eq!(status, SINEW_STATUS_INTERNAL);
             assert_eq!(
@@ -123,7 +126,7 @@ mod tests {
             assert_eq!(hash, 7);
             sinew_world_destroy(world);
 
-            assert_eq!(sinew_world_create(std::ptr::null(), &mut world), SINEW_STATUS_OK);
+            assert_eq!(sinew_world_create(&def, &mut world), SINEW_STATUS_OK);
             let status = with_world(world, |_| panic!("on purpose, while others look too"));
             assert_eq!(status, SINEW_STATUS_INTERNAL);
             assert_eq!(

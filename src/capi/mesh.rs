@@ -30,7 +30,7 @@ pub const SINEW_MESH_FORMAT_GMSH: u32 = 4;
 pub const SINEW_MESH_FORMAT_TETGEN: u32 = 5;
 
 /// In node_of_vertex: the vertex was dropped.
-pub const SINEW_NO_NODE: u32 = 0xFFFF_FFFF;
+pub const SINEW_NO_NODE: u32 = u32::MAX;
 
 /// What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
 #[repr(C)]

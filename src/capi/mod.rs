@@ -5,11 +5,19 @@
 #![allow(unsafe_code)]
 #![allow(non_camel_case_types)]
 
-pub mod body;
-mod guard;
 mod memory;
-pub mod mesh;
-pub mod picture;
+
+// The order of the header.
 pub mod status;
-pub mod tool;
+
+mod guard;
+
 pub mod world;
+
+pub mod body;
+
+pub mod tool;
+
+pub mod mesh;
+
+pub mod picture;

@@ -108,7 +108,7 @@ pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_world_def::defaults()) })
 }
 
-/// Creates an empty world, which the caller destroys with sinew_world_destroy. `def` may be NULL: the defaults.
+/// Creates an empty world, which the caller destroys with sinew_world_destroy.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread_count other than 1),
 /// SINEW_STATUS_OUT_OF_MEMORY.
@@ -120,13 +120,8 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
     guard(|| {
         // SAFETY: the same contract.
         let out = unsafe { memory::output("out", out) }?;
-        let defaults = sinew_world_def::defaults();
-        let def = if def.is_null() {
-            defaults
-        } else {
-            // SAFETY: the same contract.
-            unsafe { memory::definition("def", def, defaults) }?
-        };
+        // SAFETY: the same contract.
+        let def = unsafe { memory::definition("def", def, sinew_world_def::defaults()) }?;
         let world = World::new(def.definition()?)?;
         *out = Box::into_raw(Box::new(sinew_world::new(world)));
         Ok(())

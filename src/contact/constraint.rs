@@ -3,7 +3,11 @@
 use glam::Vec3;
 
 use super::features::Feature;
-use crate::body::Vectors;
+use crate::body::{Mobility, Vectors};
+
+/// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
+/// need more, and cannot be had: where nothing gives way, the tool goes in.
+const LEVERAGE: f32 = 4.0;
 
 /// A contact over one substep.
 ///
@@ -14,6 +18,8 @@ pub(super) struct Constraint {
     pub feature: Feature,
     /// Weights of the feature's nodes, 1 in sum.
     pub weights: [f32; 3],
+    /// How much each node's velocity changes for an impulse at the contact, 1/kg.
+    answers: [f32; 3],
     /// Away from the tool, of unit length.
     pub normal: Vec3,
     least_speed: f32,
@@ -28,6 +34,8 @@ pub(super) struct Constraint {
     pub tool: usize,
     /// The mass that an impulse at the contact moves, kg.
     effective_mass: f32,
+    /// How far the contact gives way, 0 to 1: 0 but near pinned nodes, where it would fling away the free ones.
+    give: f32,
     /// What it has given so far, N s, at least 0.
     impulse: f32,
     /// What friction has given so far, N s.
@@ -36,16 +44,21 @@ pub(super) struct Constraint {
 
 impl Constraint {
     /// A contact that has given nothing yet; `None` where all of its nodes are pinned.
-    pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, inverse_masses: &[f32]) -> Option<Self> {
-        let inverse_mass: f32 = feature
-            .nodes()
+    pub fn new(feature: Feature, weights: [f32; 3], normal: Vec3, mobility: &Mobility) -> Option<Self> {
+        let mut answers = [0.0; 3];
+        for (answer, (&node, weight)) in answers.iter_mut().zip(feature.nodes().iter().zip(weights)) {
+            *answer = mobility.of(node as usize) * weight;
+        }
+        let rigid: f32 = answers
             .iter()
             .zip(weights)
-            .map(|(&node, weight)| inverse_masses[node as usize] * weight * weight)
+            .map(|(answer, weight)| answer * weight)
             .sum();
+        let inverse_mass = answers.iter().fold(rigid, |most, answer| most.max(answer / LEVERAGE));
         (inverse_mass > 0.0).then(|| Self {
             feature,
             weights,
+            answers,
             normal,
             least_speed: 0.0,
             surface_velocity: Vec3::ZERO,
@@ -54,6 +67,7 @@ impl Constraint {
             friction: 0.0,
             tool: 0,
             effective_mass: 1.0 / inverse_mass,
+            give: 1.0 - rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
         })
@@ -67,12 +81,15 @@ impl Constraint {
     }
 
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
-    pub fn solve(&mut self, velocities: &mut Vectors, inverse_masses: &[f32]) -> f32 {
+    pub fn solve(&mut self, velocities: &mut Vectors) -> f32 {
         let velocity = self.velocity(velocities);
         let missing = self.least_speed - velocity.dot(self.normal);
-        let impulse = (self.impulse + missing * self.effective_mass).max(0.0);
+        let impulse = (self.impulse * (1.0 - self.give) + missing * self.effective_mass).max(0.0);
         let change = impulse - self.impulse;
         self.impulse = impulse;
+        if change == 0.0 && self.friction == 0.0 {
+            return 0.0;
+        }
         let mut given = self.normal * change;
         if self.friction > 0.0 {
             let slip = (velocity - self.surface_velocity).reject_from_normalized(self.normal);
@@ -81,9 +98,9 @@ impl Constraint {
             given += friction - self.friction_impulse;
             self.friction_impulse = friction;
         }
-        for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
+        for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
             let node = node as usize;
-            let velocity = velocities.get(node) + given * (weight * inverse_masses[node]);
+            let velocity = velocities.get(node) + given * answer;
             velocities.set(node, velocity);
         }
         given.length() / self.effective_mass
@@ -95,11 +112,11 @@ impl Constraint {
     }
 
     /// Moves the nodes out of the tool by `part` of how deep they were, without giving them speed.
-    pub fn push_out(&self, positions: &mut Vectors, inverse_masses: &[f32], part: f32) {
+    pub fn push_out(&self, positions: &mut Vectors, part: f32) {
         let push = self.normal * (self.depth * part * self.effective_mass);
-        for (&node, weight) in self.feature.nodes().iter().zip(self.weights) {
+        for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
             let node = node as usize;
-            let position = positions.get(node) + push * (weight * inverse_masses[node]);
+            let position = positions.get(node) + push * answer;
             positions.set(node, position);
         }
     }

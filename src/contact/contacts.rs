@@ -11,7 +11,7 @@ use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::path::{Motion, Solid, ToolPath};
 use super::sweep::{Corners, Segment};
-use crate::body::{Bounds, Vectors};
+use crate::body::{Bounds, Mobility, Vectors};
 use crate::error::Result;
 use crate::memory;
 
@@ -62,7 +62,7 @@ pub(crate) struct Meeting<'a> {
     pub drifts: bool,
     /// No node is faster, m/s.
     pub fastest: f32,
-    pub inverse_masses: &'a [f32],
+    pub mobility: Mobility<'a>,
     pub positions: &'a Vectors,
     pub velocities: &'a mut Vectors,
     pub next_positions: &'a mut Vectors,
@@ -192,7 +192,7 @@ impl Contacts {
         if self.constraints.len() < self.constraints.capacity() {
             self.constraints.push(constraint);
         } else {
-            constraint.solve(meeting.velocities, meeting.inverse_masses);
+            constraint.solve(meeting.velocities);
             self.settle(meeting, &constraint);
         }
     }
@@ -202,7 +202,7 @@ impl Contacts {
         for sweep in 0..SWEEPS {
             let mut largest = 0.0_f32;
             for constraint in &mut self.constraints {
-                largest = largest.max(constraint.solve(meeting.velocities, meeting.inverse_masses));
+                largest = largest.max(constraint.solve(meeting.velocities));
             }
             if sweep == 0 {
                 first = largest;
@@ -218,7 +218,7 @@ impl Contacts {
         if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
-                    constraint.push_out(meeting.next_positions, meeting.inverse_masses, PUSHED_OUT);
+                    constraint.push_out(meeting.next_positions, PUSHED_OUT);
                 }
             }
         }
@@ -234,7 +234,7 @@ impl Contacts {
             let node = node as usize;
             let velocity = meeting.velocities.get(node);
             self.given = self.given.with(velocity);
-            if meeting.drifts && meeting.inverse_masses[node] > 0.0 {
+            if meeting.drifts && meeting.mobility.inverse_masses[node] > 0.0 {
                 let position = meeting.positions.get(node) + velocity * meeting.substep;
                 meeting.next_positions.set(node, position);
             }
@@ -291,7 +291,7 @@ fn meet_plane(meeting: &Meeting, motion: &Motion, feature: Feature, point: Vec3)
     if !(gap <= closing.max(0.0) + margin) {
         return None;
     }
-    let mut constraint = Constraint::new(feature, [1.0, 0.0, 0.0], normal, meeting.inverse_masses)?;
+    let mut constraint = Constraint::new(feature, [1.0, 0.0, 0.0], normal, &meeting.mobility)?;
     constraint.surface_velocity = surface_velocity;
     constraint.arm = foot - motion.centre;
     constraint.friction = motion.friction;
@@ -322,7 +322,7 @@ fn meet_rounded(meeting: &Meeting, motion: &Motion, feature: Feature, segment: &
         .try_normalize()
         .or_else(|| step.try_normalize())
         .unwrap_or(Vec3::Y);
-    let mut constraint = Constraint::new(feature, separation.weights, normal, meeting.inverse_masses)?;
+    let mut constraint = Constraint::new(feature, separation.weights, normal, &meeting.mobility)?;
     let matter: Vec3 = corners
         .points
         .iter()

@@ -131,16 +131,11 @@ impl Tool {
         }
         not_negative("friction", definition.friction)?;
         let pose = definition.pose.checked()?;
-        match definition.detection {
-            Detection::Exact => {}
-            Detection::ImageSpace => {
-                return Err(Error::Unsupported(
-                    "detection is ImageSpace: this version offers Exact alone".into(),
-                ));
-            }
-            Detection::DistanceField => {
-                return Err(Error::invalid("detection is DistanceField: that is for meshes alone"));
-            }
+        if definition.detection != Detection::Exact {
+            return Err(Error::Unsupported(format!(
+                "detection is {:?}: this version offers Exact alone",
+                definition.detection
+            )));
         }
         Ok(Self {
             shape: definition.shape,

@@ -11,6 +11,7 @@ mod topology;
 
 use glam::{DVec3, Vec3};
 
+use crate::memory;
 use crate::{Error, Result};
 
 pub use file::{MeshFormat, load};
@@ -60,8 +61,7 @@ impl Mesh {
         if !self.tetrahedra.is_empty() {
             return boundary(&self.tetrahedra);
         }
-        let mut surface = Vec::new();
-        surface.try_reserve_exact(self.triangles.len())?;
+        let mut surface = memory::reserved(self.triangles.len())?;
         surface.extend_from_slice(&self.triangles);
         Ok(surface)
     }
@@ -102,21 +102,4 @@ fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: 
         }
     }
     Ok(())
-}
-
-/// `push` that fails instead of aborting when memory runs out.
-fn try_push<T>(list: &mut Vec<T>, item: T) -> Result<()> {
-    if list.len() == list.capacity() {
-        list.try_reserve(1)?;
-    }
-    list.push(item);
-    Ok(())
-}
-
-/// `count` copies of `value`, reserved fallibly.
-fn try_filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>> {
-    let mut list = Vec::new();
-    list.try_reserve_exact(count)?;
-    list.resize(count, value);
-    Ok(list)
 }

@@ -3,13 +3,14 @@
 use glam::Vec3;
 
 use super::tidy::NO_NODE;
-use super::{Mesh, boundary, try_push};
+use super::{Mesh, boundary};
+use crate::memory;
 use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
 /// face are cut in opposite ways, so that the diagonals meet.
-const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
-const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 4, 2], [3, 1, 2, 7], [5, 1, 7, 4], [6, 2, 4, 7]];
+const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 6, 5], [1, 0, 5, 3], [2, 0, 3, 6], [4, 0, 6, 5], [7, 3, 5, 6]];
+const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4]];
 
 impl Mesh {
     /// A rectangle in the plane y = 0 about the origin, facing up (+y): `size` along x and z in metres, above 0, in
@@ -72,7 +73,7 @@ impl Mesh {
                             let corner = corner as u32;
                             first + (corner & 1) + (corner >> 1 & 1) * row + (corner >> 2) * layer
                         });
-                        try_push(&mut mesh.tetrahedra, tetrahedron)?;
+                        memory::push(&mut mesh.tetrahedra, tetrahedron)?;
                     }
                 }
             }
@@ -115,8 +116,7 @@ fn axis(name: &str, size: f32, cells: u32) -> Result<Vec<f32>> {
     if cells > 1 << 25 {
         return Err(coincide());
     }
-    let mut places = Vec::new();
-    places.try_reserve_exact(cells as usize + 1)?;
+    let mut places = memory::reserved(cells as usize + 1)?;
     places.extend((0..=cells).map(|i| {
         let share = f64::from(i) / f64::from(cells) - 0.5;
         (share * f64::from(size)) as f32

@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::topology::{boundary, sorted};
-use super::{Mesh, tetrahedron_volume, try_filled, try_push};
+use super::{Mesh, tetrahedron_volume};
 use crate::Result;
+use crate::memory;
 
 /// In [`LoadedMesh::node_of_vertex`]: the vertex was dropped.
 pub const NO_NODE: u32 = u32::MAX;
@@ -69,8 +70,7 @@ impl LoadedMesh {
     /// Errors: [`Error::InvalidArgument`](crate::Error::InvalidArgument) where [`Mesh::check`] gives it, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn unchanged(mesh: Mesh) -> Result<Self> {
         mesh.check()?;
-        let mut node_of_vertex = Vec::new();
-        node_of_vertex.try_reserve_exact(mesh.positions.len())?;
+        let mut node_of_vertex = memory::reserved(mesh.positions.len())?;
         node_of_vertex.extend(0..mesh.positions.len() as u32);
         Ok(LoadedMesh {
             mesh,
@@ -118,7 +118,7 @@ impl RawMesh {
     pub fn add_polygon(&mut self, corners: &[u32]) -> Result<()> {
         if let [first, rest @ ..] = corners {
             for pair in rest.windows(2) {
-                try_push(&mut self.triangles, [*first, pair[0], pair[1]])?;
+                memory::push(&mut self.triangles, [*first, pair[0], pair[1]])?;
             }
         }
         Ok(())
@@ -139,7 +139,7 @@ impl RawMesh {
         // What only dropped elements used is used no longer.
         let used = self.used()?;
         let mut mesh = Mesh::default();
-        let mut node_of_vertex = try_filled(NO_NODE, self.vertices.len())?;
+        let mut node_of_vertex = memory::filled(NO_NODE, self.vertices.len())?;
         for (vertex, &position) in self.vertices.iter().enumerate() {
             let first = first_of_vertex[vertex] as usize;
             if !used[first] {
@@ -149,7 +149,7 @@ impl RawMesh {
                 report.welded_vertices += 1;
             } else {
                 node_of_vertex[vertex] = mesh.positions.len() as u32;
-                try_push(&mut mesh.positions, position.as_vec3())?;
+                memory::push(&mut mesh.positions, position.as_vec3())?;
             }
         }
         rename(&mut self.triangles, &node_of_vertex);
@@ -165,7 +165,7 @@ impl RawMesh {
 
     /// For each vertex, whether an element uses it.
     fn used(&self) -> Result<Vec<bool>> {
-        let mut used = try_filled(false, self.vertices.len())?;
+        let mut used = memory::filled(false, self.vertices.len())?;
         let in_triangles = self.triangles.iter().flatten();
         for &vertex in in_triangles.chain(self.tetrahedra.iter().flatten()) {
             used[vertex as usize] = true;
@@ -239,11 +239,10 @@ fn rename<const N: usize>(elements: &mut Vec<[u32; N]>, names: &[u32]) -> usize 
 
 /// Keeps the first of all elements with the same key, in their order; returns how many were dropped.
 fn keep_first<const N: usize>(elements: &mut Vec<[u32; N]>, key: impl Fn(&[u32; N]) -> [u32; N]) -> Result<usize> {
-    let mut order = Vec::new();
-    order.try_reserve_exact(elements.len())?;
+    let mut order = memory::reserved(elements.len())?;
     order.extend(elements.iter().enumerate().map(|(i, e)| (key(e), i)));
     order.sort_unstable();
-    let mut keep = try_filled(true, elements.len())?;
+    let mut keep = memory::filled(true, elements.len())?;
     for pair in order.windows(2) {
         keep[pair[1].1] = pair[0].0 != pair[1].0;
     }
@@ -258,8 +257,7 @@ fn keep_first<const N: usize>(elements: &mut Vec<[u32; N]>, key: impl Fn(&[u32; 
 /// Every vertex is compared with the firsts of the cells of a grid that its ball reaches. Firsts lie apart, so a cell
 /// holds few of them and the time is linear.
 fn weld(vertices: &[DVec3], used: &[bool]) -> Result<Vec<u32>> {
-    let mut first_of_vertex = Vec::new();
-    first_of_vertex.try_reserve_exact(vertices.len())?;
+    let mut first_of_vertex = memory::reserved(vertices.len())?;
     first_of_vertex.extend(0..vertices.len() as u32);
 
     let in_use = || vertices.iter().zip(used).filter(|(_, used)| **used);
@@ -278,7 +276,7 @@ fn weld(vertices: &[DVec3], used: &[bool]) -> Result<Vec<u32>> {
 
     // The cell's latest first, and for each first the one before it in its cell.
     let mut latest: HashMap<u64, u32> = HashMap::new();
-    let mut before = try_filled(NO_NODE, vertices.len())?;
+    let mut before = memory::filled(NO_NODE, vertices.len())?;
     for (vertex, &position) in vertices.iter().enumerate().filter(|(i, _)| used[*i]) {
         let [x0, y0, z0] = cell_of(position - reach);
         let [x1, y1, z1] = cell_of(position + reach);

@@ -1,6 +1,7 @@
 //! Edges and surfaces, found by sorting: near-linear, and the same result on every run.
 
 use crate::Result;
+use crate::memory;
 
 /// The corners of a tetrahedron's faces; outward if its volume is positive.
 const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
@@ -10,8 +11,7 @@ const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
 pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 2]>> {
-    let mut packed = Vec::new();
-    packed.try_reserve_exact(triangles.len() * 3 + tetrahedra.len() * 6)?;
+    let mut packed = memory::reserved(triangles.len() * 3 + tetrahedra.len() * 6)?;
     for &[a, b, c] in triangles {
         packed.extend([pack(a, b), pack(b, c), pack(c, a)]);
     }
@@ -22,8 +22,7 @@ pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32
     packed.sort_unstable();
     packed.dedup();
 
-    let mut edges = Vec::new();
-    edges.try_reserve_exact(packed.len())?;
+    let mut edges = memory::reserved(packed.len())?;
     let unpacked = packed.iter().map(|&edge| [(edge >> 32) as u32, edge as u32]);
     edges.extend(unpacked.filter(|[a, b]| a != b));
     Ok(edges)
@@ -34,8 +33,7 @@ pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
 pub fn boundary(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
-    let mut faces = Vec::new();
-    faces.try_reserve_exact(tetrahedra.len() * 4)?;
+    let mut faces = memory::reserved(tetrahedra.len() * 4)?;
     for (i, tetrahedron) in tetrahedra.iter().enumerate() {
         for (k, corners) in FACES.iter().enumerate() {
             faces.push((sorted(corners.map(|corner| tetrahedron[corner])), i * 4 + k));
@@ -46,13 +44,12 @@ pub fn boundary(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
     let mut once = Vec::new();
     for same in faces.chunk_by(|a, b| a.0 == b.0) {
         if let [(_, face)] = same {
-            super::try_push(&mut once, *face)?;
+            memory::push(&mut once, *face)?;
         }
     }
     once.sort_unstable();
 
-    let mut surface = Vec::new();
-    surface.try_reserve_exact(once.len())?;
+    let mut surface = memory::reserved(once.len())?;
     surface.extend(
         once.iter()
             .map(|face| FACES[face % 4].map(|corner| tetrahedra[face / 4][corner])),

@@ -7,6 +7,9 @@ use glam::{DVec3, Vec3};
 /// How much of the half width or height a fitted view leaves free on each side.
 const MARGIN: f64 = 0.06;
 
+/// How far a fitted camera stays from the nearest point, as a share of the points' size.
+const NEAREST: f64 = 0.02;
+
 /// The near plane, as a share of the distance from the eye to the target.
 const NEAR: f64 = 1e-3;
 
@@ -26,8 +29,9 @@ pub struct Camera {
 impl Camera {
     /// The nearest camera in this direction that has all `points` in the frame, 6 % away from its edges.
     ///
-    /// `direction` points from the scene towards the camera, `aspect` is width over height. The fit is exact: at least
-    /// one pair of opposite edges is touched. Points that are not finite are passed over. A single point is seen from
+    /// `direction` points from the scene towards the camera, `aspect` is width over height. The fit is exact: points
+    /// touch one pair of opposite margins, unless that would bring the camera closer to the nearest point than 2 % of the
+    /// size of them all, as of a row of points along the view. Points that are not finite are passed over. A single point is seen from
     /// 1 m away; without points that is the origin. A direction of zero or `up` along it is replaced.
     ///
     /// # Errors
@@ -73,7 +77,7 @@ impl Camera {
             sides = [0.0; 4];
         }
         let size = (bounds.1 - bounds.0).length();
-        let smallest = if size > 0.0 { 0.002 * size } else { 1.0 };
+        let smallest = if size > 0.0 { NEAREST * size } else { 1.0 };
         let along = ((sides[0] + sides[1]) / (2.0 * tangent_x))
             .max((sides[2] + sides[3]) / (2.0 * tangent_y))
             .max(bounds.1.z + smallest);

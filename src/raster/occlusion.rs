@@ -4,6 +4,7 @@ use super::fragment::Window;
 use super::geometry::{Geometry, Kind};
 use super::view::View;
 use crate::Result;
+use crate::memory;
 use glam::Vec3;
 
 /// Places looked at around each pixel, on a spiral.
@@ -172,8 +173,7 @@ fn open_sky(spiral: &[[f32; 2]; TAPS], normal: Vec3, reach: f32, way: impl Fn(f3
 }
 
 fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>> {
-    let mut buffer = Vec::new();
-    buffer.try_reserve_exact(count)?;
+    let mut buffer = memory::reserved(count)?;
     buffer.resize(count, value);
     Ok(buffer)
 }

@@ -45,13 +45,13 @@ impl Look {
         gloss: 0.9,
         two_sided: false,
         mesh_edges: 0.0,
-        show_through: 0.6,
+        show_through: 0.8,
     };
 
     /// A plane to stand on.
     pub const GROUND: Look = Look {
         colour: [0.85, 0.86, 0.88],
-        gloss: 0.05,
+        gloss: 0.0,
         two_sided: false,
         mesh_edges: 0.0,
         show_through: 0.0,

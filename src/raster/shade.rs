@@ -51,7 +51,7 @@ impl Lights {
     pub fn shade(&self, look: &Look, colour: Vec3, place: &Place) -> Vec3 {
         let inside = !place.front && !look.two_sided;
         let lit = place.lit * (0.6 + 0.4 * place.open);
-        let albedo = if inside { colour * 0.35 } else { colour };
+        let albedo = if inside { colour * 0.6 } else { colour };
         let normal = place.normal;
         // Where some colour is scattered inside, it also leaves past the edge of the shadow.
         let wrap = albedo * 0.35;
@@ -69,27 +69,31 @@ impl Lights {
         let gloss = if inside { 0.3 * look.gloss } else { look.gloss };
         let wet = gloss * gloss;
         let rim = RIM * (wet * (1.0 - facing).powi(4) * height * place.open);
-        let broad = self.highlight(place, 0.62 - 0.2 * gloss) * 0.6 * gloss;
-        let sharp = self.highlight(place, 0.40 - 0.22 * gloss) * 0.9 * wet;
-        body * (1.0 - 0.1 * wet) + rim + KEY * ((broad + sharp) * place.lit)
+        let highlight = if gloss > 0.0 {
+            0.6 * gloss * self.highlight(place, 0.62 - 0.2 * gloss)
+                + 0.9 * wet * self.highlight(place, 0.40 - 0.22 * gloss)
+        } else {
+            0.0
+        };
+        body * (1.0 - 0.1 * wet) + rim + KEY * (highlight * place.lit)
     }
 
     /// The reflection of the key light (Walter et al., "Microfacet models for refraction", 2007: GGX), with the masking
     /// of Kelemen and Szirmay-Kalos (2001).
     fn highlight(&self, place: &Place, roughness: f32) -> f32 {
         let toward_light = place.normal.dot(self.key);
-        if toward_light <= 0.0 {
+        if toward_light <= 0.0 || place.lit == 0.0 {
             return 0.0;
         }
         let half = (self.key + place.to_eye).normalize_or_zero();
         let squared = roughness.powi(4);
         let cosine = place.normal.dot(half).max(0.0);
         let spread = cosine * cosine * (squared - 1.0) + 1.0;
-        let distribution = squared / (std::f32::consts::PI * spread * spread);
-        let fresnel = 0.04 + 0.96 * (1.0 - self.key.dot(half).max(0.0)).powi(5);
-        let masking = 1.0 / (4.0 * self.key.dot(half).powi(2).max(0.05));
+        let along = self.key.dot(half).max(0.0);
+        let fresnel = 0.04 + 0.96 * (1.0 - along).powi(5);
+        let masking = 4.0 * (along * along).max(0.05);
         // Distant lights have no size; without a limit a smooth surface would show a burnt-out dot.
-        (distribution * fresnel * masking * toward_light * std::f32::consts::PI).min(4.0)
+        (squared * fresnel * toward_light / (spread * spread * masking)).min(4.0)
     }
 }
 

@@ -5,23 +5,21 @@ use super::geometry::{Geometry, Kind};
 use super::scene::bounds;
 use super::view::View;
 use crate::Result;
+use crate::memory;
 use glam::Vec3;
 
 /// Texels along each side.
 const SIZE: u32 = 1024;
 /// Texels across the filter, which softens the edges of shadows.
 const TAPS: usize = 8;
-/// Texels along each side of a tile; a filter covers at most four tiles.
-const TILE: usize = 8;
-const TILES: usize = SIZE as usize / TILE;
+/// Columns and rows of the filter that are looked at first.
+const PROBES: [usize; 3] = [0, 4, 7];
 
 /// A shadow map (Williams, "Casting curved shadows on curved surfaces", 1978), softened
 /// by percentage-closer filtering (Reeves et al., "Rendering antialiased shadows with depth maps", 1987).
 pub(crate) struct ShadowMap {
     view: View,
     depths: Vec<f32>,
-    /// The least and the greatest depth of each tile: most places are outside of all penumbras.
-    tiles: Vec<(f32, f32)>,
     texel: f32,
 }
 
@@ -53,8 +51,7 @@ impl ShadowMap {
             SIZE,
         );
         let count = SIZE as usize * SIZE as usize;
-        let mut depths = Vec::new();
-        depths.try_reserve_exact(count)?;
+        let mut depths = memory::reserved(count)?;
         depths.resize(count, f32::INFINITY);
         let window = Window::new(SIZE, SIZE);
         for triangle in solid() {
@@ -67,7 +64,6 @@ impl ShadowMap {
         }
         Ok(ShadowMap {
             view,
-            tiles: tiles(&depths)?,
             depths,
             texel: 2.0 * half_width / SIZE as f32,
         })
@@ -87,20 +83,15 @@ impl ShadowMap {
         }
         let first = |value: f32| value as usize + 1 - TAPS / 2;
         let (left, top) = (first(x), first(y));
-        let [mut least, mut greatest] = [f32::INFINITY, f32::NEG_INFINITY];
-        for row in [top / TILE, (top + TAPS - 1) / TILE] {
-            for column in [left / TILE, (left + TAPS - 1) / TILE] {
-                if let Some(tile) = self.tiles.get(row * TILES + column) {
-                    least = least.min(tile.0);
-                    greatest = greatest.max(tile.1);
-                }
-            }
-        }
-        if depth <= least {
-            return 1.0;
-        }
-        if depth > greatest {
-            return 0.0;
+        let in_light = |column: usize, row: usize| {
+            let texel = self.depths.get((top + row) * SIZE as usize + left + column);
+            texel.is_none_or(|&texel| texel >= depth)
+        };
+        // Nearly everywhere the whole filter agrees.
+        let probes = PROBES.map(|row| PROBES.map(|column| in_light(column, row)));
+        let count = probes.as_flattened().iter().filter(|&&lit| lit).count();
+        if count == 0 || count == PROBES.len() * PROBES.len() {
+            return if count == 0 { 0.0 } else { 1.0 };
         }
         let (across, down) = (weights(x.fract()), weights(y.fract()));
         let mut light = 0.0;
@@ -113,22 +104,6 @@ impl ShadowMap {
         }
         light
     }
-}
-
-/// The least and the greatest depth of each tile.
-fn tiles(depths: &[f32]) -> Result<Vec<(f32, f32)>> {
-    let mut tiles = Vec::new();
-    tiles.try_reserve_exact(TILES * TILES)?;
-    tiles.resize(TILES * TILES, (f32::INFINITY, f32::NEG_INFINITY));
-    for (y, row) in depths.chunks_exact(SIZE as usize).enumerate() {
-        for (x, texels) in row.chunks_exact(TILE).enumerate() {
-            let tile = &mut tiles[y / TILE * TILES + x];
-            for &depth in texels {
-                *tile = (tile.0.min(depth), tile.1.max(depth));
-            }
-        }
-    }
-    Ok(tiles)
 }
 
 /// Weights of the texels around a place, `t` past the middle of the inner left one: a smooth bump, (1 - d^2)^2 in the

@@ -1,8 +1,11 @@
 //! How bodies move: the solvers and what they share.
 
+mod attempt;
+mod gravity;
 mod kick;
 mod stability;
 mod verlet;
 
+pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
+pub(crate) use gravity::GravityKicks;
 pub(crate) use stability::Stability;
-pub(crate) use verlet::{Outcome, StepRequest, attempt};

@@ -32,6 +32,14 @@ impl Stability {
         travel: 0.0,
     };
 
+    /// What holds at these positions.
+    pub fn estimate(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
+        Self {
+            limit: Some(longest_stable_substep(springs, inverse_masses, positions)),
+            travel: 0.0,
+        }
+    }
+
     /// Whether the estimate still holds in a body whose springs are `rest_length` long on average.
     pub fn holds(&self, rest_length: f32) -> bool {
         self.limit.is_some() && self.travel <= TRAVEL_BEFORE_ESTIMATE * rest_length
@@ -39,20 +47,20 @@ impl Stability {
 }
 
 /// The longest stable substep at these positions, s; infinity where there is no limit.
-pub(crate) fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> f32 {
+fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> f32 {
     let mut stiffest = 0.0_f32;
     let mut most_damped = 0.0_f32;
     for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
         if inverse_mass == 0.0 {
             continue;
         }
-        let position = positions.get(node);
+        let position = positions.lanes(node);
         let mut along = Symmetric::default();
         let mut across = 0.0_f32;
         let mut damping = Symmetric::default();
         for link in springs.links(node) {
             let neighbour = link.neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
+            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
             let inverse_mass = inverse_mass + inverse_masses[neighbour];
             let axial = link.stiffness * inverse_mass;
             let transverse = if length > link.rest_length {
@@ -60,10 +68,10 @@ pub(crate) fn longest_stable_substep(springs: &Packed, inverse_masses: &[f32], p
             } else {
                 0.0
             };
-            along.add_outer(direction, axial - transverse);
+            along.add_outer(direction.into(), axial - transverse);
             across += transverse;
             if link.damping > 0.0 {
-                damping.add_outer(direction, link.damping * inverse_mass);
+                damping.add_outer(direction.into(), link.damping * inverse_mass);
             }
         }
         stiffest = stiffest.max(along.largest_eigenvalue_beyond(stiffest - across) + across);

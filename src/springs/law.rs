@@ -1,6 +1,6 @@
-//! The force of a linear spring with damping along it (Halic et al., section 3), as one of its two nodes feels it.
+//! Where a spring points, and how long it is.
 
-use glam::Vec3;
+use glam::Vec3A;
 
 /// Springs shorter than this, in metres, have no direction of their own.
 const SHORTEST: f32 = 1e-15;
@@ -10,14 +10,14 @@ const SHORTEST: f32 = 1e-15;
 /// Where both are at the same place the spring points along x, from the node with the lower number to the other: each
 /// end sees the opposite of what the other sees, so that momentum is kept there too.
 #[inline(always)]
-pub(crate) fn separation(node: usize, neighbour: usize, offset: Vec3) -> (f32, Vec3) {
+pub(crate) fn separation(node: usize, neighbour: usize, offset: Vec3A) -> (f32, Vec3A) {
     let length_squared = offset.length_squared();
     if length_squared > SHORTEST * SHORTEST {
         let length = length_squared.sqrt();
-        (length, offset / length)
+        (length, offset * (1.0 / length))
     } else if node < neighbour {
-        (0.0, Vec3::X)
+        (0.0, Vec3A::X)
     } else {
-        (0.0, Vec3::NEG_X)
+        (0.0, Vec3A::NEG_X)
     }
 }

@@ -4,7 +4,7 @@
 //! but that node, and the sum is the same in whatever order nodes are visited. A row that is full moves to the end of
 //! the arrays with twice the room; once more than half of the places are abandoned, the rows are packed again.
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use super::law::separation;
 use crate::body::{Spring, Vectors};
@@ -114,31 +114,36 @@ impl Packed {
 
     /// The force of all springs on `node`, in newtons.
     #[inline(always)]
-    pub fn force(&self, node: usize, positions: &Vectors) -> Vec3 {
-        let position = positions.get(node);
+    pub fn force(&self, node: usize, positions: &Vectors) -> Vec3A {
+        let position = positions.lanes(node);
         let links = self.rows[node].links();
         let neighbours = &self.neighbours[links.clone()];
         let stiffnesses = &self.stiffnesses[links.clone()];
         let rest_lengths = &self.rest_lengths[links];
-        let mut force = Vec3::ZERO;
+        let mut force = Vec3A::ZERO;
         for ((&neighbour, &stiffness), &rest_length) in neighbours.iter().zip(stiffnesses).zip(rest_lengths) {
             let neighbour = neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
+            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
             force += direction * (stiffness * (length - rest_length));
         }
         force
     }
 
-    /// The force of all springs and of the damping along them on `node`, in newtons.
+    /// The force of all springs and of the damping along them on `node`, in newtons; for springs with damping alone.
     #[inline(always)]
-    pub fn damped_force(&self, node: usize, positions: &Vectors, velocities: &Vectors) -> Vec3 {
-        let (position, velocity) = (positions.get(node), velocities.get(node));
-        let mut force = Vec3::ZERO;
-        for link in self.links(node) {
-            let neighbour = link.neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
-            let rate = direction.dot(velocities.get(neighbour) - velocity);
-            force += direction * (link.stiffness * (length - link.rest_length) + link.damping * rate);
+    pub fn damped_force(&self, node: usize, positions: &Vectors, velocities: &Vectors) -> Vec3A {
+        let (position, velocity) = (positions.lanes(node), velocities.lanes(node));
+        let links = self.rows[node].links();
+        let springs = self.stiffnesses[links.clone()]
+            .iter()
+            .zip(&self.rest_lengths[links.clone()])
+            .zip(&self.dampings[links.clone()]);
+        let mut force = Vec3A::ZERO;
+        for (&neighbour, ((&stiffness, &rest_length), &damping)) in self.neighbours[links].iter().zip(springs) {
+            let neighbour = neighbour as usize;
+            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
+            let rate = direction.dot(velocities.lanes(neighbour) - velocity);
+            force += direction * (stiffness * (length - rest_length) + damping * rate);
         }
         force
     }

@@ -17,6 +17,7 @@ static void a_message_is_copied_as_far_as_it_fits(void)
     CHECK(whole[needed] == '#');
 
     CHECK(sinew_last_error(NULL, 0) == needed);
+    CHECK(sinew_last_error(NULL, 10) == needed);
     memset(part, '#', sizeof part);
     CHECK(sinew_last_error(part, 0) == needed);
     CHECK(part[0] == '#');

@@ -258,7 +258,7 @@ static void worlds_share_nothing(void)
 {
     const float pull[3] = {0, 1e-3f, 0};
     sinew_world *one = a_world(-9.81f), *two = a_world(-9.81f);
-    const sinew_body_id a = a_cloth(one), b = a_cloth(two);
+    const sinew_body_id a = a_cloth(one, SOFT), b = a_cloth(two, SOFT);
     const uint64_t start = hash_of(two);
     CHECK(hash_of(one) == start);
     MUST(sinew_body_apply_force(one, a, 7, pull));

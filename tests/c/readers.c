@@ -59,7 +59,7 @@ int main(void)
     struct findings alone;
     pthread_t threads[THREADS];
     int i, started = 0;
-    the_cloth = a_cloth(world);
+    the_cloth = a_cloth(world, SOFT);
     MUST(sinew_body_pin(world, the_cloth, 0));
     MUST(sinew_tool_def_init(&def, sizeof def));
     def.shape = SINEW_SHAPE_SPHERE;

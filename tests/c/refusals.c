@@ -172,7 +172,7 @@ static void body_definitions(void)
 
     BODY(INVALID, "positions", def.positions = NULL);
     BODY(INVALID, "node_count", def.node_count = 0);
-    BODY(INVALID, "node_count", def.node_count = SIZE_MAX);
+    BODY(INVALID, "positions", def.node_count = SIZE_MAX);
     BODY_FLOATS(positions, 12, NOT_FINITE);
     BODY_FLOATS(rest_positions, 12, NOT_FINITE);
     BODY_FLOATS(masses, 4, OR_NEGATIVE);
@@ -202,9 +202,9 @@ static void bodies_springs_and_elements(void)
         PLAIN_BODY(INVALID, "spring_damping", def.spring_damping = bad[i]);
     }
 
-    BODY(INVALID, "spring_count", def.spring_count = SIZE_MAX);
-    BODY(INVALID, "triangle_count", def.triangle_count = SIZE_MAX);
-    BODY(INVALID, "tetrahedron_count", def.tetrahedron_count = SIZE_MAX);
+    BODY(INVALID, "springs", def.spring_count = SIZE_MAX);
+    BODY(INVALID, "triangles", def.triangle_count = SIZE_MAX);
+    BODY(INVALID, "tetrahedra", def.tetrahedron_count = SIZE_MAX);
     PLAIN_BODY(INVALID, "springs", def.spring_count = 5);
     PLAIN_BODY(INVALID, "triangles", def.triangles = NULL);
     PLAIN_BODY(INVALID, "tetrahedra", def.tetrahedra = NULL);
@@ -240,7 +240,7 @@ static void forces(void)
     REFUSES_NO_BODY(sinew_body_apply_forces(world, body, nodes, three, 3));
     REFUSED(INVALID, "nodes", sinew_body_apply_forces(the.world, the.body, NULL, three, 3));
     REFUSED(INVALID, "forces", sinew_body_apply_forces(the.world, the.body, nodes, NULL, 3));
-    REFUSED(INVALID, "count", sinew_body_apply_forces(the.world, the.body, nodes, three, SIZE_MAX));
+    REFUSED(INVALID, "nodes", sinew_body_apply_forces(the.world, the.body, nodes, three, SIZE_MAX));
     REFUSES_NO_NODE("nodes", sinew_body_apply_forces(the.world, the.body, renumbered(nodes, 3, 2, node), three, 3));
     for (i = 0; i < NOT_FINITE; i++) {
         REFUSED(INVALID, "forces", sinew_body_apply_forces(the.world, the.body, nodes, spoiled(three, 9, 0, bad[i]), 3));
@@ -263,8 +263,8 @@ static void positions_and_velocities(void)
     REFUSED(INVALID, "positions", sinew_body_set_positions(the.world, the.body, NULL, 9));
     REFUSED(INVALID, "velocities", sinew_body_set_velocities(the.world, the.body, NULL, 9));
     for (i = 0; i < 4; i++) {
-        REFUSED(INVALID, "node_count", sinew_body_set_positions(the.world, the.body, nine, counts[i]));
-        REFUSED(INVALID, "node_count", sinew_body_set_velocities(the.world, the.body, nine, counts[i]));
+        REFUSED(INVALID, "positions", sinew_body_set_positions(the.world, the.body, nine, counts[i]));
+        REFUSED(INVALID, "velocities", sinew_body_set_velocities(the.world, the.body, nine, counts[i]));
     }
     for (i = 0; i < NOT_FINITE; i++) {
         REFUSED(INVALID, "positions", sinew_body_set_positions(the.world, the.body, spoiled(nine, 27, 0, bad[i]), 9));

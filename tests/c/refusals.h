@@ -143,20 +143,28 @@ static const char *const bad_id_names[BAD_IDS] = {
     "all bits set", "a generation that was not yet",
 };
 
-/* Every size that the struct never had. The call may use `size`; `result` is the output whose struct_size it is. */
-#define REFUSES_SIZES(type, oldest, set, call)                                 \
+/* Sizes that no header ever gave the struct; the call may use `size`. A definition is known to the byte, a result struct
+ * may be a newer header's, of which the library fills what it knows: so only too small a one is refused. */
+#define REFUSES_EACH(sizes, count, set, call)                                  \
     do {                                                                       \
-        const size_t sizes_[] = {0, 1, sizeof(size_t), (oldest) - 4, (oldest) - 1, sizeof(type) + 1, sizeof(type) + 8, SIZE_MAX}; \
         size_t i_;                                                             \
-        for (i_ = 0; i_ < sizeof sizes_ / sizeof sizes_[0]; i_++) {            \
-            const size_t size = sizes_[i_];                                    \
+        for (i_ = 0; i_ < (count); i_++) {                                     \
+            const size_t size = (sizes)[i_];                                   \
             set;                                                               \
             REFUSED_WITH(INVALID, "struct_size", call, "a size it never had"); \
         }                                                                      \
     } while (0)
+#define REFUSES_SIZES(type, oldest, set, call)                                 \
+    do {                                                                       \
+        const size_t sizes_[] = {0, 1, sizeof(size_t), (oldest) - 4, (oldest) - 1, sizeof(type) + 1, sizeof(type) + 8, SIZE_MAX}; \
+        REFUSES_EACH(sizes_, sizeof sizes_ / sizeof sizes_[0], set, call);     \
+    } while (0)
+/* `result` is the output whose struct_size it is. */
 #define REFUSES_RESULT_SIZES(type, oldest, result, call)                       \
     do {                                                                       \
-        REFUSES_SIZES(type, oldest, out.result.struct_size = untouched.result.struct_size = size, call); \
+        const size_t sizes_[] = {0, 1, sizeof(size_t), (oldest) - 4, (oldest) - 1}; \
+        REFUSES_EACH(sizes_, sizeof sizes_ / sizeof sizes_[0],                 \
+                     out.result.struct_size = untouched.result.struct_size = size, call); \
         out.result.struct_size = untouched.result.struct_size = sizeof(type);  \
     } while (0)
 

@@ -32,8 +32,10 @@ static inline sinew_body_id loose_nodes(sinew_world *world, size_t node_count)
 
 enum { SIDE = 9, CLOTH_NODES = SIDE * SIDE };
 
+enum { SOFT = 50, STIFF = 500 }; /* N/m; hanging by its rim, the stiff cloth sags by a few millimetres */
+
 /* A cloth in the plane y = 0 about the origin, 0.08 m wide, 1 g a node, springs from its triangles, facing up. */
-static inline sinew_body_id a_cloth(sinew_world *world)
+static inline sinew_body_id a_cloth(sinew_world *world, float stiffness)
 {
     float positions[3 * CLOTH_NODES];
     uint32_t triangles[6 * (SIDE - 1) * (SIDE - 1)];
@@ -55,7 +57,7 @@ static inline sinew_body_id a_cloth(sinew_world *world)
     def.node_count = CLOTH_NODES;
     def.node_mass = 1e-3f;
     def.node_damping = 0.02f;
-    def.stiffness = 50.0f;
+    def.stiffness = stiffness;
     def.triangles = triangles;
     def.triangle_count = (size_t)(next - triangles) / 3;
     MUST(sinew_body_create(world, &def, &body));

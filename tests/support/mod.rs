@@ -1,6 +1,10 @@
-//! What the tests of the C interface share: the library as it is delivered, and how programs beside cargo are run.
+//! What the tests share: the library as it is delivered, how programs beside cargo are run, bodies and their motion in
+//! `f64`.
 
 #![allow(dead_code, reason = "every test takes a part of it")]
+
+pub mod bodies;
+pub mod reference;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -22,17 +26,26 @@ pub fn installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
+/// What a command says that does not succeed.
+pub fn failure(command: &mut Command) -> Option<String> {
+    match command.output() {
+        Ok(output) if output.status.success() => None,
+        Ok(output) => Some(format!(
+            "{command:?}: {}\n{}{}",
+            output.status,
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        )),
+        Err(error) => Some(format!("{command:?}: {error}")),
+    }
+}
+
 /// A command that must succeed; its output.
 pub fn succeed(command: &mut Command) -> Output {
-    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
-    assert!(
-        output.status.success(),
-        "{command:?}: {}\n{}{}",
-        output.status,
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr)
-    );
-    output
+    match command.output() {
+        Ok(output) if output.status.success() => output,
+        _ => panic!("{}", failure(command).unwrap_or_default()),
+    }
 }
 
 /// The release build of the library.

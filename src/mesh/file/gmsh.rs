@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::scanner::{Scanner, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::mesh::try_push;
+use crate::memory;
 
 /// The layouts of the nodes and elements.
 #[derive(Clone, Copy, PartialEq)]
@@ -111,7 +111,7 @@ fn read_nodes(scanner: &mut Scanner, version: Version, raw: &mut RawMesh) -> Res
         for _ in 0..scanner.count("nodes", 8)? {
             let tag = scanner.integer("node number")?;
             add(scanner, &mut nodes, tag)?;
-            try_push(&mut raw.vertices, scanner.point()?)?;
+            memory::push(&mut raw.vertices, scanner.point()?)?;
         }
         return Ok(nodes);
     }
@@ -134,7 +134,7 @@ fn read_nodes(scanner: &mut Scanner, version: Version, raw: &mut RawMesh) -> Res
             add(scanner, &mut nodes, tag)?;
         }
         for _ in 0..count {
-            try_push(&mut raw.vertices, scanner.point()?)?;
+            memory::push(&mut raw.vertices, scanner.point()?)?;
             for _ in 0..parameters {
                 scanner.number("parametric coordinate")?;
             }
@@ -202,9 +202,9 @@ fn read_element(scanner: &mut Scanner, kind: u64, nodes: &HashMap<u64, u32>, raw
     }
     let [a, b, c, d, ..] = corners;
     match kind {
-        TRIANGLE | TRIANGLE_OF_6 => try_push(&mut raw.triangles, [a, b, c]),
+        TRIANGLE | TRIANGLE_OF_6 => memory::push(&mut raw.triangles, [a, b, c]),
         QUAD | QUAD_OF_8 | QUAD_OF_9 => raw.add_polygon(&[a, b, c, d]),
-        TETRAHEDRON | TETRAHEDRON_OF_10 => try_push(&mut raw.tetrahedra, [a, b, c, d]),
+        TETRAHEDRON | TETRAHEDRON_OF_10 => memory::push(&mut raw.tetrahedra, [a, b, c, d]),
         _ => {
             raw.ignored_cells += 1;
             Ok(())

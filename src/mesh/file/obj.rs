@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::scanner::{Scanner, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::mesh::try_push;
+use crate::memory;
 
 /// Statements that say nothing about points, triangles, lines: looks, groups, smooth surfaces.
 const IGNORED: [&str; 34] = [
@@ -66,7 +66,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
                         .filter(|number: &f64| number.is_finite())
                         .ok_or_else(|| fail(format!("{} is no finite number", shown(word))))?;
                 }
-                try_push(&mut raw.vertices, DVec3::from(vertex))?;
+                memory::push(&mut raw.vertices, DVec3::from(vertex))?;
                 check_vertex_count(scanner, raw.vertices.len())?;
             }
             [b"v", ..] => return Err(fail("a vertex needs x, y and z".into())),
@@ -76,7 +76,7 @@ pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
                     let corner = corner(word, raw.vertices.len())
                         .ok_or_else(|| fail(format!("{} names no vertex", shown(word))))?;
                     largest = largest.max(Some((corner, place)));
-                    try_push(&mut corners, corner)?;
+                    memory::push(&mut corners, corner)?;
                 }
                 raw.add_polygon(&corners)?;
             }
@@ -108,7 +108,7 @@ fn next_statement<'a>(scanner: &mut Scanner<'a>, words: &mut Vec<&'a [u8]>) -> R
         let text = continued.unwrap_or(text);
         for word in text.split(u8::is_ascii_whitespace) {
             if !word.is_empty() {
-                try_push(words, word)?;
+                memory::push(words, word)?;
             }
         }
         if continued.is_none() || scanner.remaining() == 0 {

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::scanner::{Scanner, is};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::mesh::try_push;
+use crate::memory;
 
 const HEADER: usize = 80;
 /// A normal, three corners and two bytes of attributes.
@@ -81,7 +81,7 @@ fn read_ascii(scanner: &mut Scanner) -> Result<RawMesh> {
             for _ in 0..3 {
                 scanner.expect("vertex")?;
                 let corner: DVec3 = scanner.point()?;
-                try_push(&mut raw.vertices, corner)?;
+                memory::push(&mut raw.vertices, corner)?;
             }
             scanner.expect("endloop")?;
             scanner.expect("endfacet")?;
@@ -95,5 +95,5 @@ fn read_ascii(scanner: &mut Scanner) -> Result<RawMesh> {
 fn add_triangle(scanner: &Scanner, raw: &mut RawMesh) -> Result<()> {
     check_vertex_count(scanner, raw.vertices.len())?;
     let next = raw.vertices.len() as u32;
-    try_push(&mut raw.triangles, [next - 3, next - 2, next - 1])
+    memory::push(&mut raw.triangles, [next - 3, next - 2, next - 1])
 }

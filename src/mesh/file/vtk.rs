@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::scanner::{Scanner, is, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::mesh::try_push;
+use crate::memory;
 
 pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     let header = scanner.line();
@@ -106,7 +106,9 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
             raw.ignored_cells += 1;
             Ok(())
         }
-        (TRIANGLE, &[a, b, c]) | (QUADRATIC_TRIANGLE, &[a, b, c, _, _, _]) => try_push(&mut raw.triangles, [a, b, c]),
+        (TRIANGLE, &[a, b, c]) | (QUADRATIC_TRIANGLE, &[a, b, c, _, _, _]) => {
+            memory::push(&mut raw.triangles, [a, b, c])
+        }
         (QUAD, &[a, b, c, d]) | (QUADRATIC_QUAD, &[a, b, c, d, _, _, _, _]) => raw.add_polygon(&[a, b, c, d]),
         (PIXEL, &[a, b, c, d]) => raw.add_polygon(&[a, b, d, c]),
         (POLYGON, &[_, _, _, ..]) => raw.add_polygon(corners),
@@ -115,12 +117,12 @@ fn add_cell(raw: &mut RawMesh, scanner: &Scanner, kind: u64, corners: &[u32]) ->
                 let &[a, b, c] = corners else { continue };
                 // Every other triangle of a strip runs backwards.
                 let triangle = if i % 2 == 0 { [a, b, c] } else { [b, a, c] };
-                try_push(&mut raw.triangles, triangle)?;
+                memory::push(&mut raw.triangles, triangle)?;
             }
             Ok(())
         }
         (TETRAHEDRON, &[a, b, c, d]) | (QUADRATIC_TETRAHEDRON, &[a, b, c, d, _, _, _, _, _, _]) => {
-            try_push(&mut raw.tetrahedra, [a, b, c, d])
+            memory::push(&mut raw.tetrahedra, [a, b, c, d])
         }
         _ => Err(scanner.fail(format!(
             "a cell of type {kind} with {} points: only points, lines, triangles, polygons and tetrahedra can be read",
@@ -211,7 +213,7 @@ impl Cells {
     fn add_point(&mut self, scanner: &mut Scanner, data_type: DataType, vertex_count: usize) -> Result<()> {
         let point = integer(scanner, data_type)?;
         let point = scanner.vertex(point, 0, vertex_count)?;
-        try_push(&mut self.points, point)
+        memory::push(&mut self.points, point)
     }
 }
 
@@ -220,8 +222,7 @@ fn read_points(scanner: &mut Scanner) -> Result<Vec<DVec3>> {
     check_vertex_count(scanner, count)?;
     let data_type = DataType::read(scanner)?;
     begin_data(scanner)?;
-    let mut points = Vec::new();
-    points.try_reserve_exact(count)?;
+    let mut points = memory::reserved(count)?;
     for _ in 0..count {
         let mut point = [0.0; 3];
         for coordinate in &mut point {
@@ -235,8 +236,7 @@ fn read_points(scanner: &mut Scanner) -> Result<Vec<DVec3>> {
 fn read_kinds(scanner: &mut Scanner) -> Result<Vec<u64>> {
     let count = scanner.count("cell types", 2)?;
     begin_data(scanner)?;
-    let mut kinds = Vec::new();
-    kinds.try_reserve_exact(count)?;
+    let mut kinds = memory::reserved(count)?;
     for _ in 0..count {
         kinds.push(integer(scanner, DataType::I32)?);
     }
