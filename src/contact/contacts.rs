@@ -20,6 +20,9 @@ const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
 /// A substep is cut into at most so many slices.
 const SLICES: u32 = 512;
 
+/// How far a tool and the body may move against each other in a slice, as a part of the tool's radius.
+const SLICE_TRAVEL: f32 = 0.5;
+
 /// Sweeps over the contacts of a substep at most.
 const SWEEPS: u32 = 64;
 
@@ -73,7 +76,7 @@ pub(crate) struct Meeting<'a> {
     pub pins: &'a mut Pins,
 }
 
-/// A part of a substep in which no tool moves further against the body than its radius. Springs act once in a substep,
+/// A part of a substep in which no tool moves further against the body than half its radius. Springs act once in a substep,
 /// contact in each slice: a tip that goes far takes along what it meets, however far that is.
 #[derive(Clone, Copy, Debug)]
 struct Slice {
@@ -287,13 +290,20 @@ impl Contacts {
     }
 }
 
-/// How many slices a substep needs.
+/// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
 fn slices(meeting: &Meeting) -> u32 {
     let mut slices = 1.0_f32;
     for tool in meeting.tools {
-        if let Some(sweep) = tool.sweep(meeting.origin) {
-            let speed = tool.speed(meeting.dt) + meeting.fastest;
-            slices = slices.max((speed * meeting.substep / sweep.radius).ceil());
+        let Some(sweep) = tool.sweep(meeting.origin) else {
+            continue;
+        };
+        let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
+        let wanted = (travel / (sweep.radius * SLICE_TRAVEL)).ceil();
+        if wanted > slices {
+            let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
+            if reached.overlaps(&sweep.bounds) {
+                slices = wanted;
+            }
         }
     }
     (slices as u32).clamp(1, SLICES)
