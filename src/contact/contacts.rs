@@ -29,7 +29,7 @@ const SWEEPS: u32 = 64;
 /// The sweeps end when the last changed velocities by less than this part of what the first did.
 const CONVERGED: f32 = 1e-4;
 
-/// The part of a depth that is taken back in one substep, where something began inside a tool.
+/// The part of a depth that is taken back in one slice, where something began inside a tool.
 const PUSHED_OUT: f32 = 0.2;
 
 /// What a tool received from a body in the step in progress, N s and N m s.
@@ -258,7 +258,7 @@ impl Contacts {
             let constraint = self.constraints[index];
             self.settle(meeting, slice, &constraint);
         }
-        if meeting.drifts && slice.first {
+        if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
                     constraint.push_out(meeting.next_positions, PUSHED_OUT);
