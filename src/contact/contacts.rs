@@ -24,10 +24,10 @@ const SLICES: u32 = 512;
 const SLICE_TRAVEL: f32 = 0.5;
 
 /// Sweeps over the contacts of a substep at most.
-const SWEEPS: u32 = 64;
+const SWEEPS: u32 = 128;
 
 /// The sweeps end when the last changed velocities by less than this part of what the first did.
-const CONVERGED: f32 = 1e-4;
+const CONVERGED: f32 = 1e-5;
 
 /// The part of a depth that is taken back in one slice, where something began inside a tool.
 const PUSHED_OUT: f32 = 0.2;
