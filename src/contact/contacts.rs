@@ -23,8 +23,10 @@ const SLICES: u32 = 512;
 /// How far a tool and the body may move against each other in a slice, as a part of the tool's radius.
 const SLICE_TRAVEL: f32 = 0.5;
 
-/// Sweeps over the contacts of a substep at most.
+/// Sweeps over the contacts of a substep at most: where nothing is fast, so that tissue comes to rest; and in each of
+/// several slices, where what is left is found again in the next.
 const SWEEPS: u32 = 128;
+const SWEEPS_OF_A_SLICE: u32 = 16;
 
 /// The sweeps end when the last changed velocities by less than this part of what the first did.
 const CONVERGED: f32 = 1e-5;
@@ -85,6 +87,7 @@ struct Slice {
     /// s
     duration: f32,
     first: bool,
+    sweeps: u32,
 }
 
 impl Contacts {
@@ -164,6 +167,7 @@ impl Contacts {
                 remains: meeting.substep * (1.0 - part(index)) as f32,
                 duration: meeting.substep / slices as f32,
                 first: index == 0,
+                sweeps: if slices == 1 { SWEEPS } else { SWEEPS_OF_A_SLICE },
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
             let (start, end) = (fraction(part(index)), fraction(part(index + 1)));
@@ -242,7 +246,7 @@ impl Contacts {
 
     fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
         let mut first = 0.0_f32;
-        for sweep in 0..SWEEPS {
+        for sweep in 0..slice.sweeps {
             let mut largest = 0.0_f32;
             for constraint in &mut self.constraints {
                 largest = largest.max(constraint.solve(meeting.velocities));
