@@ -48,6 +48,11 @@ impl std::fmt::Display for Error {
             | Error::Io(message)
             | Error::Internal(message) => f.write_str(message),
             Error::OutOfMemory => f.write_str("out of memory"),
+            Error::Unstable { report, allowed } if report.error_estimate > 0.0 => write!(
+                f,
+                "the step could not be taken in the {allowed} substeps allowed: the tolerance needs more, {} m is off",
+                report.error_estimate
+            ),
             Error::Unstable { report, allowed } => write!(
                 f,
                 "the step could not be taken in the {allowed} substeps allowed: the longest stable one is {} s",

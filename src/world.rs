@@ -118,7 +118,7 @@ impl World {
     /// does not offer its storage or solver. [`Error::OutOfMemory`].
     pub fn create_body(&mut self, definition: &BodyDefinition) -> Result<BodyId> {
         let needs = Needs {
-            tolerance: self.definition.tolerance > 0.0,
+            tolerance: self.definition.tolerance > 0.0 && self.definition.substeps == 0,
             tools: self.tools.iter().count(),
         };
         let body = Body::new(definition, needs)?;
@@ -164,10 +164,15 @@ impl World {
         let tool = Tool::new(definition)?;
         let count = self.tools.iter().count() + 1;
         self.paths.try_reserve(count)?;
-        for (_, body) in self.bodies.iter_mut() {
-            body.make_contacts(count)?;
+        let made = self
+            .bodies
+            .iter_mut()
+            .try_for_each(|(_, body)| body.make_contacts(count));
+        let id = made.and_then(|()| self.tools.insert(tool));
+        if id.is_err() && count == 1 {
+            self.drop_contacts();
         }
-        Ok(ToolId(self.tools.insert(tool)?))
+        Ok(ToolId(id?))
     }
 
     /// Removes a tool.
@@ -177,11 +182,16 @@ impl World {
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
         self.tools.remove(tool.0)?;
         if self.tools.iter().next().is_none() {
-            for (_, body) in self.bodies.iter_mut() {
-                body.contacts = None;
-            }
+            self.drop_contacts();
         }
         Ok(())
+    }
+
+    /// A world without tools keeps nothing for them.
+    fn drop_contacts(&mut self) {
+        for (_, body) in self.bodies.iter_mut() {
+            body.contacts = None;
+        }
     }
 
     /// Moves a tool to `position`, in metres, over the next step, and turns it to `orientation`, `None`: it stays as it
@@ -312,7 +322,10 @@ impl World {
                     report.bodies_restored += 1;
                     body.carry.stability.limit
                 }
-                Outcome::Unstable { stable_substep } => Some(stable_substep),
+                Outcome::Unstable { stable_substep, error } => {
+                    report.error_estimate = report.error_estimate.max(error);
+                    Some(stable_substep)
+                }
             };
             report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
         }
@@ -339,8 +352,9 @@ impl World {
                     torque += contacts.loads()[index].angular_impulse / dt;
                 }
             }
-            tool.force = force.as_vec3();
-            tool.torque = torque.as_vec3();
+            // Finite, whatever the step's length.
+            tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+            tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             if let Some(target) = tool.target.take() {
                 tool.pose = target;
             }

@@ -270,7 +270,7 @@ fn random_tools_that_jump_about() {
             .collect();
         let before = bodies.map(|id| total_energy(&world, id));
         let mut given = 0.0_f64;
-        for step in 0..200 {
+        for step in 0..60 {
             let dt = [0.004, 1.0 / 60.0, 1.0 / 30.0][random.below(3)];
             let poses: Vec<Pose> = tools
                 .iter()

@@ -50,7 +50,7 @@ fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Ve
     // At rest the tool, the rim and the weight hold each other.
     let (force, torque) = world.wrench(tip).expect("a tool");
     let mass = f64::from(TISSUE.node_mass(&mesh));
-    let weight = DVec3::from(DOWN.as_dvec3()) * mass * mesh.positions.len() as f64;
+    let weight = DOWN.as_dvec3() * mass * mesh.positions.len() as f64;
     let carried = pin_forces(&world, cloth, &pins) + weight;
     let off = force.as_dvec3().distance(carried);
     assert!(carried.y > 0.02, "{case}: nothing to be measured, {carried}");
@@ -85,7 +85,7 @@ fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Ve
 #[test]
 fn spheres_feel_what_the_rim_carries() {
     for dt in [0.001, 1.0 / 60.0, 1.0 / 30.0] {
-        for cells in [8, 20, 31] {
+        for cells in [8, 20] {
             let radius = 0.02;
             let aside = Vec3::new(0.013, 0.0, 0.021);
             press(dt, cells, Shape::Sphere { radius }, radius, Quat::IDENTITY, aside, 0.05);

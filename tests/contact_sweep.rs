@@ -69,11 +69,11 @@ fn put_through(
     Ok(())
 }
 
-fn put_through_everywhere(substeps: impl Fn(f32, u32) -> u32, shape: Shape, turned: Quat, reach: f32) {
+fn put_through_everywhere(sizes: &[u32], substeps: impl Fn(f32, u32) -> u32, shape: Shape, turned: Quat, reach: f32) {
     let mut failures = Vec::new();
     let mut tried = 0;
     let mut random = Random::new(5);
-    for cells in [8, 16] {
+    for &cells in sizes {
         let spacing = SIZE / cells as f32;
         for dt in [0.002, 1.0 / 60.0, 1.0 / 30.0] {
             for aim in AIMS {
@@ -109,14 +109,26 @@ fn put_through_everywhere(substeps: impl Fn(f32, u32) -> u32, shape: Shape, turn
 
 #[test]
 fn a_tip_carries_the_cloth_with_it() {
-    put_through_everywhere(|_, _| 0, Shape::Sphere { radius: RADIUS }, Quat::IDENTITY, 0.0);
+    put_through_everywhere(
+        &[8, 16],
+        |_, _| 0,
+        Shape::Sphere { radius: RADIUS },
+        Quat::IDENTITY,
+        0.0,
+    );
 }
 
 #[test]
 fn a_tip_carries_the_cloth_with_it_in_few_substeps() {
     // No more than the springs need.
     let substeps = |dt: f32, cells: u32| (dt * cells as f32 / 0.0064).ceil() as u32;
-    put_through_everywhere(substeps, Shape::Sphere { radius: RADIUS }, Quat::IDENTITY, 0.0);
+    put_through_everywhere(
+        &[8, 16],
+        substeps,
+        Shape::Sphere { radius: RADIUS },
+        Quat::IDENTITY,
+        0.0,
+    );
 }
 
 #[test]
@@ -125,9 +137,9 @@ fn an_instrument_carries_the_cloth_with_it() {
         radius: RADIUS,
         half_length: 0.03,
     };
-    put_through_everywhere(|_, _| 0, shape, Quat::IDENTITY, 0.03);
+    put_through_everywhere(&[8], |_, _| 0, shape, Quat::IDENTITY, 0.03);
     let lying = Quat::from_rotation_y(0.4) * Quat::from_rotation_z(1.5);
-    put_through_everywhere(|_, _| 0, shape, lying, 0.003);
+    put_through_everywhere(&[8], |_, _| 0, shape, lying, 0.003);
 }
 
 #[test]

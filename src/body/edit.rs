@@ -37,6 +37,9 @@ impl Body {
         };
         for (&node, &force) in nodes.iter().zip(forces) {
             let node = node as usize;
+            if self.inverse_masses[node] == 0.0 {
+                continue;
+            }
             // Sums of finite forces stay finite.
             let sum = (applied.get(node) + force).clamp(Vec3::MIN, Vec3::MAX);
             applied.set(node, sum);

@@ -14,6 +14,7 @@ impl Body {
         if self.springs.damped() && self.forces_current {
             vectors.push(self.state.forces());
         }
+        hasher.write_u64(u64::from(self.forces_applied));
         if self.forces_applied {
             vectors.extend(&self.applied);
         }
@@ -27,6 +28,11 @@ impl Body {
         if let Some(damping) = &self.damping {
             hasher.write_floats(damping.rates());
         }
+        hasher.write_u64(self.surface.len() as u64);
+        for &[a, b, c] in &self.surface {
+            hasher.write_u64(u64::from(a) << 32 | u64::from(b));
+            hasher.write_u64(u64::from(c));
+        }
         for node in 0..self.node_count() {
             for link in self.springs.links(node) {
                 hasher.write_u64(u64::from(link.neighbour));
@@ -34,7 +40,7 @@ impl Body {
             }
         }
         for pin in self.pins.iter() {
-            hasher.write_u64(u64::from(pin.node));
+            hasher.write_u64(u64::from(pin.node) << 1 | u64::from(pin.target.is_some()));
             if let Some(target) = pin.target {
                 hasher.write_floats(&target.to_array());
             }

@@ -63,13 +63,36 @@ impl Vectors {
 
 /// The root of the largest of `squares`; infinite where one is not finite.
 fn largest(squares: impl Iterator<Item = f32>) -> f32 {
-    let largest = squares.fold(
-        0.0_f32,
-        |largest, square| if square <= largest { largest } else { square },
-    );
+    // A NaN, once met, stays.
+    let larger = |largest: f32, square: f32| {
+        if largest.is_nan() || square <= largest {
+            largest
+        } else {
+            square
+        }
+    };
+    let largest = squares.fold(0.0, larger);
     if largest.is_finite() {
         largest.sqrt()
     } else {
         f32::INFINITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_is_seen_wherever_it_is() {
+        for spoilt in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for node in 0..3 {
+                let mut vectors = Vectors::zeros(3).expect("memory");
+                vectors.set(1, Vec3::ONE);
+                assert_eq!(vectors.largest_length(), 3.0_f32.sqrt());
+                vectors.set(node, Vec3::new(0.0, spoilt, 0.0));
+                assert_eq!(vectors.largest_length(), f32::INFINITY, "{spoilt} at node {node}");
+            }
+        }
     }
 }

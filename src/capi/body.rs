@@ -439,7 +439,9 @@ pub unsafe extern "C" fn sinew_body_set_positions(
     // SAFETY: the same contract.
     unsafe {
         with_body_mut(world, body, |body| {
-            body.set_positions(memory::array("positions", positions.cast(), node_count)?)
+            let own = body.positions().as_ptr_range();
+            let positions = memory::array_apart("positions", positions.cast(), node_count, own)?;
+            body.set_positions(&positions)
         })
     }
 }
@@ -460,7 +462,9 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
     // SAFETY: the same contract.
     unsafe {
         with_body_mut(world, body, |body| {
-            body.set_velocities(memory::array("velocities", velocities.cast(), node_count)?)
+            let own = body.velocities().as_ptr_range();
+            let velocities = memory::array_apart("velocities", velocities.cast(), node_count, own)?;
+            body.set_velocities(&velocities)
         })
     }
 }

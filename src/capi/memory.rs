@@ -1,11 +1,14 @@
 //! What crosses the border as a pointer: checked, and turned into references and slices.
 
+use std::borrow::Cow;
 use std::ffi::CStr;
+use std::ops::Range;
 
 use glam::Vec3;
 use libc::c_char;
 
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// A struct that begins with `struct_size`, so that it can grow.
 ///
@@ -24,7 +27,8 @@ pub(super) unsafe trait Versioned: Copy {
 /// # Safety
 /// `pointer` is NULL or points to a valid `T` that nobody changes meanwhile.
 pub(super) unsafe fn reference<'a, T>(name: &str, pointer: *const T) -> Result<&'a T> {
-    // SAFETY: the caller vouches for a valid T where the pointer is not NULL.
+    aligned(name, pointer)?;
+    // SAFETY: aligned; the caller vouches for a valid T where the pointer is not NULL.
     unsafe { pointer.as_ref() }.ok_or_else(|| null(name))
 }
 
@@ -33,7 +37,8 @@ pub(super) unsafe fn reference<'a, T>(name: &str, pointer: *const T) -> Result<&
 /// # Safety
 /// `pointer` is NULL or points to a valid `T` that nobody else uses meanwhile.
 pub(super) unsafe fn output<'a, T>(name: &str, pointer: *mut T) -> Result<&'a mut T> {
-    // SAFETY: the caller vouches for a valid T where the pointer is not NULL.
+    aligned(name, pointer)?;
+    // SAFETY: aligned; the caller vouches for a valid T where the pointer is not NULL.
     unsafe { pointer.as_mut() }.ok_or_else(|| null(name))
 }
 
@@ -50,6 +55,25 @@ pub(super) unsafe fn array<'a, T>(name: &str, pointer: *const T, count: usize) -
     }
     // SAFETY: not NULL, aligned, of a size that exists; the caller vouches for its content.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// The array, copied where it lies in `own`: a view of ours that the caller hands back, and that the call writes to.
+///
+/// # Safety
+/// As [`array`].
+pub(super) unsafe fn array_apart<'a, T: Copy>(
+    name: &str,
+    pointer: *const T,
+    count: usize,
+    own: Range<*const T>,
+) -> Result<Cow<'a, [T]>> {
+    // SAFETY: the same contract.
+    let values = unsafe { array(name, pointer, count) }?;
+    let given = values.as_ptr_range();
+    if given.start < own.end && own.start < given.end {
+        return memory::copied(values).map(Cow::Owned);
+    }
+    Ok(Cow::Borrowed(values))
 }
 
 /// An array that may be left out altogether.
@@ -172,6 +196,13 @@ fn known_size<T: Versioned>(size: usize) -> Result<()> {
         T::NAME,
         T::SIZES
     )))
+}
+
+fn aligned<T>(name: &str, pointer: *const T) -> Result<()> {
+    if pointer.is_aligned() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is not aligned")))
 }
 
 fn null(name: &str) -> Error {

@@ -44,7 +44,8 @@ thread_local! {
 /// Keeps `error` as this thread's last failure: its status.
 pub(super) fn fail(error: Error) -> sinew_status {
     let status = status_of(&error);
-    LAST_ERROR.with_borrow_mut(|last| *last = Some(error));
+    // Nothing where the thread is at its end.
+    let _ = LAST_ERROR.try_with(|last| last.replace(Some(error)));
     status
 }
 
@@ -94,7 +95,8 @@ pub extern "C" fn sinew_status_name(status: sinew_status) -> *const c_char {
 /// `buffer` must be writable for `capacity` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_last_error(buffer: *mut c_char, capacity: usize) -> usize {
-    let message = LAST_ERROR.with_borrow(|last| last.as_ref().map(Error::to_string).unwrap_or_default());
+    let message = LAST_ERROR.try_with(|last| last.borrow().as_ref().map(Error::to_string));
+    let message = message.ok().flatten().unwrap_or_default();
     if !buffer.is_null() && capacity > 0 {
         let mut written = message.len().min(capacity - 1);
         while !message.is_char_boundary(written) {

@@ -239,11 +239,12 @@ pub unsafe extern "C" fn sinew_tool_get_wrench(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let force_out = memory::output("force", force.cast::<[f32; 3]>())?;
-            let torque_out = memory::output("torque", torque.cast::<[f32; 3]>())?;
-            let (force, torque) = world.wrench(tool.id())?;
-            *force_out = force.to_array();
-            *torque_out = torque.to_array();
+            let (of_force, of_torque) = world.wrench(tool.id())?;
+            // Both are looked at before either is written.
+            memory::output("force", force.cast::<[f32; 3]>())?;
+            memory::output("torque", torque.cast::<[f32; 3]>())?;
+            *memory::output("force", force.cast())? = of_force.to_array();
+            *memory::output("torque", torque.cast())? = of_torque.to_array();
             Ok(())
         })
     }

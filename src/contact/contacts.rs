@@ -47,6 +47,8 @@ pub(crate) struct Contacts {
     features: Features,
     candidates: Candidates,
     constraints: Vec<Constraint>,
+    /// How many of them are solved together.
+    together: usize,
     /// By the place of a tool among those of the step.
     loads: Vec<Load>,
     /// The box of all velocities that contacts gave in this substep.
@@ -97,6 +99,7 @@ impl Contacts {
         let mut contacts = Self {
             candidates: Candidates::new(&features)?,
             constraints: Vec::new(),
+            together: 0,
             features,
             loads: Vec::new(),
             given: Bounds::EMPTY,
@@ -113,6 +116,7 @@ impl Contacts {
         let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
         self.constraints
             .try_reserve_exact(together.saturating_sub(self.constraints.len()))?;
+        self.together = together;
         self.candidates.reserve(tools)
     }
 
@@ -144,15 +148,15 @@ impl Contacts {
 
     /// The box of all velocities, given that of those before the contacts.
     pub fn velocities(&self, before: Bounds) -> Bounds {
-        before.with(self.given.min).with(self.given.max)
+        Bounds {
+            min: before.min.min(self.given.min),
+            max: before.max.max(self.given.max),
+        }
     }
 
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.
     pub fn resolve(&mut self, mut meeting: Meeting) {
-        self.given = Bounds {
-            min: Vec3::ZERO,
-            max: Vec3::ZERO,
-        };
+        self.given = Bounds::EMPTY;
         if meeting.tools.is_empty() {
             return;
         }
@@ -181,8 +185,10 @@ impl Contacts {
             }
             self.solve(&mut meeting, &slice);
         }
-        let fastest = self.given.min.abs().max(self.given.max.abs()).length();
-        self.candidates.spend(meeting.substep * fastest);
+        if self.given != Bounds::EMPTY {
+            let fastest = self.given.min.abs().max(self.given.max.abs()).length();
+            self.candidates.spend(meeting.substep * fastest);
+        }
     }
 
     fn find_candidates(&mut self, meeting: &Meeting) {
@@ -236,7 +242,7 @@ impl Contacts {
             return;
         };
         constraint.tool = tool;
-        if self.constraints.len() < self.constraints.capacity() {
+        if self.constraints.len() < self.together {
             self.constraints.push(constraint);
         } else {
             constraint.solve(meeting.velocities);

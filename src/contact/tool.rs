@@ -158,6 +158,7 @@ impl Tool {
         };
         hasher.write_floats(&shape);
         hasher.write_floats(&[self.friction]);
+        hasher.write_u64(u64::from(self.target.is_some()));
         for pose in [Some(self.pose), self.target].into_iter().flatten() {
             hasher.write_floats(&pose.position.to_array());
             hasher.write_floats(&pose.orientation.to_array());

@@ -1,12 +1,12 @@
 //! How many substeps a step takes, and what becomes of a step that cannot be taken.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::gravity::GravityKicks;
 use super::stability::{Stability, substep_stable_anywhere};
 use super::verlet::{self, TooLong};
 use crate::body::{Body, Vectors};
-use crate::contact::ToolPath;
+use crate::contact::{Contacts, ToolPath};
 
 /// The part of the longest stable substep that is used.
 const RESERVE: f32 = 0.8;
@@ -42,7 +42,12 @@ pub(crate) enum Outcome {
     /// The step would have ended in infinity or NaN.
     NotFinite,
     /// More substeps would be needed than are allowed.
-    Unstable { stable_substep: f32 },
+    Unstable {
+        /// s
+        stable_substep: f32,
+        /// What was reached where a tolerance needs more, m; 0 where it is stability that does.
+        error: f32,
+    },
 }
 
 /// Takes a step of `body` without making it current.
@@ -61,12 +66,14 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
             Ok(carry) => finish(body, request.substeps, carry, 0.0),
             Err(too_long) => Outcome::Unstable {
                 stable_substep: too_long.stable_substep,
+                error: 0.0,
             },
         };
     }
     match run_stably(body, request, start) {
         Err(too_long) => Outcome::Unstable {
             stable_substep: too_long.stable_substep,
+            error: 0.0,
         },
         Ok((substeps, carry)) if request.tolerance == 0.0 => finish(body, substeps, carry, 0.0),
         Ok((substeps, carry)) => run_to_tolerance(body, request, substeps, start, carry),
@@ -107,24 +114,22 @@ fn run_to_tolerance(body: &mut Body, request: &StepRequest, substeps: u32, start
     let mut substeps = substeps;
     let mut middle = middle(substeps);
     let mut carry = coarse;
+    let mut error = 0.0;
     compare(body, request, &carry);
     loop {
         let stable_substep = carry.stability.limit.unwrap_or(f32::INFINITY);
         substeps = substeps.saturating_mul(2);
         middle = middle.saturating_mul(2);
-        if substeps > request.max_substeps {
-            return Outcome::Unstable { stable_substep };
+        if substeps > request.max_substeps || substeps == u32::MAX {
+            return Outcome::Unstable { stable_substep, error };
         }
-        match verlet::run(body, request, substeps, middle, start) {
-            Ok(finer) => carry = finer,
-            Err(too_long) => {
-                return Outcome::Unstable {
-                    stable_substep: too_long.stable_substep,
-                };
-            }
-        }
-        let error = compare(body, request, &carry);
-        if error <= request.tolerance || error.is_infinite() {
+        // What was not stable after all may be so with twice the substeps.
+        let Ok(finer) = verlet::run(body, request, substeps, middle, start) else {
+            continue;
+        };
+        carry = finer;
+        error = compare(body, request, &carry);
+        if error <= request.tolerance || !is_finite(body) {
             return finish(body, substeps, carry, error);
         }
     }
@@ -141,11 +146,28 @@ fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
 }
 
 fn finish(body: &Body, substeps: u32, carry: Carry, error: f32) -> Outcome {
-    let (positions, velocities) = body.state.newest();
-    let finite = |vectors: &Vectors| vectors.largest_length().is_finite();
-    if finite(positions) && finite(velocities) {
+    if is_finite(body) {
         Outcome::Done { substeps, carry, error }
     } else {
         Outcome::NotFinite
     }
+}
+
+/// Whether everything that the step in progress gives is finite.
+fn is_finite(body: &Body) -> bool {
+    let (positions, velocities) = body.state.newest();
+    let finite = |vectors: &Vectors| vectors.largest_length().is_finite();
+    finite(positions)
+        && finite(velocities)
+        && body.pins.iter().all(|pin| fits(pin.force_sum))
+        && body
+            .contacts
+            .iter()
+            .flat_map(Contacts::loads)
+            .all(|load| fits(load.impulse) && fits(load.angular_impulse))
+}
+
+/// Whether a sum over the step is finite, and far enough from the end of `f32` to be told to the caller.
+fn fits(sum: DVec3) -> bool {
+    sum.abs().max_element() < f64::from(f32::MAX) * 1e-3
 }

@@ -35,7 +35,8 @@ impl GravityKicks {
             whole_units(wanted.z, fastest.z),
         )
         .as_vec3();
-        self.residual = wanted - given.as_dvec3();
+        let left = wanted - given.as_dvec3();
+        self.residual = if left.is_finite() { left } else { DVec3::ZERO };
         given
     }
 

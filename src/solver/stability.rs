@@ -51,6 +51,10 @@ impl Stability {
             let across = sums.across;
             stiffest = stiffest.max(sums.along.largest_eigenvalue_beyond(stiffest - across) + across);
             most_damped = sums.damping.largest_eigenvalue_beyond(most_damped);
+            // Springs beyond the range of `f32` allow no substep at all.
+            if !(sums.stiffness_anywhere.is_finite() && sums.damping_anywhere.is_finite()) {
+                stiffest = f32::INFINITY;
+            }
             // Nothing that moves can make a node matter whose springs are too weak even together.
             if sums.stiffness_anywhere > stiffest || sums.damping_anywhere > most_damped {
                 reach = reach.min(sums.shortest);

@@ -1,0 +1,88 @@
+//! Numbers at the end of `f32`, and things that must not matter.
+
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Error, Pose, Shape, ToolDefinition, Values, World, WorldDefinition};
+
+fn world() -> World {
+    World::new(WorldDefinition::default()).expect("a world")
+}
+
+#[test]
+fn springs_beyond_the_range_allow_no_step() {
+    let positions = [Vec3::ZERO, Vec3::X * 5.0, Vec3::Y];
+    for stiffness in [1e36, 3e38] {
+        let mut world = world();
+        let definition = BodyDefinition {
+            positions: &positions,
+            springs: Some(&[[0, 1]]),
+            rest_lengths: Some(&[1.0]),
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(stiffness),
+            ..BodyDefinition::default()
+        };
+        let body = world.create_body(&definition).expect("a body");
+        let hash = world.state_hash();
+        assert!(matches!(world.step(0.01), Err(Error::Unstable { .. })));
+        assert_eq!(world.state_hash(), hash);
+        assert_eq!(world.body(body).expect("a body").positions(), &positions);
+    }
+}
+
+#[test]
+fn a_tool_far_away_changes_no_bit_of_a_moving_cloth() {
+    let mesh = Mesh::cloth([0.2, 0.2], [9, 9]).expect("a cloth");
+    let moved = |with_tool: bool| {
+        let mut world = world();
+        let definition = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(200.0),
+            ..BodyDefinition::default()
+        };
+        let cloth = world.create_body(&definition).expect("a cloth");
+        if with_tool {
+            let pose = Pose {
+                position: Vec3::X * 1000.0,
+                ..Pose::IDENTITY
+            };
+            let ball = ToolDefinition {
+                pose,
+                ..ToolDefinition::new(Shape::Sphere { radius: 0.1 })
+            };
+            world.create_tool(&ball).expect("a ball");
+        }
+        let velocities: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|p| Vec3::new(1.0, 8.0 * p.x, 5.0 * p.z))
+            .collect();
+        let body = world.body_mut(cloth).expect("a cloth");
+        body.set_velocities(&velocities).expect("velocities");
+        body.pin(0).expect("a node");
+        for _ in 0..60 {
+            world.step(1.0 / 60.0).expect("a step");
+        }
+        world.body(cloth).expect("a cloth").positions().to_vec()
+    };
+    assert_eq!(moved(true), moved(false));
+}
+
+#[test]
+fn a_force_on_a_pinned_node_is_nothing_even_when_it_is_let_go() {
+    let mut world = world();
+    let definition = BodyDefinition {
+        positions: &[Vec3::ZERO],
+        masses: Values::Uniform(1e-3),
+        ..BodyDefinition::default()
+    };
+    let id = world.create_body(&definition).expect("a body");
+    world.set_gravity(Vec3::ZERO).expect("gravity");
+    let body = world.body_mut(id).expect("a body");
+    body.pin(0).expect("a node");
+    body.apply_force(0, Vec3::X).expect("a force");
+    body.unpin(0).expect("a node");
+    world.step(0.01).expect("a step");
+    assert_eq!(world.body(id).expect("a body").positions(), &[Vec3::ZERO]);
+}
