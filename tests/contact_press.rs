@@ -3,7 +3,7 @@
 #[path = "support/tissue.rs"]
 mod tissue;
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{Quat, Vec3};
 use sinew::Shape;
 use tissue::*;
 

@@ -1,0 +1,113 @@
+//! A step allocates nothing, taken or refused.
+#![allow(unsafe_code)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use glam::{Quat, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Error, Pose, Shape, ToolDefinition, Values, World, WorldDefinition};
+
+/// Counts what this thread asks for.
+struct Counting;
+
+thread_local! {
+    static ASKED: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    // Nothing where the thread is at its end.
+    let _ = ASKED.try_with(|asked| asked.set(asked.get() + 1));
+}
+
+// SAFETY: every call goes to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the same contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: the same contract.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count();
+        // SAFETY: the same contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn asked(call: impl FnOnce()) -> u64 {
+    let before = ASKED.get();
+    call();
+    ASKED.get() - before
+}
+
+#[test]
+fn the_count_counts() {
+    assert!(asked(|| drop(vec![1_u8; 100])) >= 2);
+}
+
+#[test]
+fn a_step_allocates_nothing() {
+    let mesh = Mesh::cloth([0.2, 0.2], [12, 12]).expect("a cloth");
+    for tolerance in [0.0, 1e-4] {
+        let definition = WorldDefinition {
+            tolerance,
+            ..WorldDefinition::default()
+        };
+        let mut world = World::new(definition).expect("a world");
+        let cloth = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(2e-4),
+            stiffnesses: Values::Uniform(50.0),
+            node_dampings: Values::Uniform(1e-3),
+            spring_dampings: Values::Uniform(1e-3),
+            ..BodyDefinition::default()
+        };
+        let cloth = world.create_body(&cloth).expect("a body");
+        world.body_mut(cloth).and_then(|body| body.pin(0)).expect("a node");
+        let capsule = Shape::Capsule {
+            radius: 0.01,
+            half_length: 0.03,
+        };
+        let mut tools = Vec::new();
+        for (shape, height) in [
+            (capsule, 0.02),
+            (Shape::Plane, -0.03),
+            (Shape::Sphere { radius: 0.02 }, 0.03),
+        ] {
+            let definition = ToolDefinition {
+                friction: 0.4,
+                pose: Pose {
+                    position: Vec3::Y * height,
+                    ..Pose::IDENTITY
+                },
+                ..ToolDefinition::new(shape)
+            };
+            tools.push(world.create_tool(&definition).expect("a tool"));
+        }
+        let body = world.body_mut(cloth).expect("a body");
+        body.apply_force(5, Vec3::Y * 0.01).expect("a force");
+        for step in 0..40 {
+            let turned = Quat::from_rotation_x(0.05 * step as f32);
+            let place = Vec3::Y * (0.02 - 0.0005 * step as f32);
+            world.set_pose(tools[0], place, Some(turned)).expect("a pose");
+            assert_eq!(
+                asked(|| drop(world.step(0.004))),
+                0,
+                "tolerance {tolerance}, step {step}"
+            );
+        }
+        let refused = asked(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));
+        assert_eq!(refused, 0);
+    }
+}
