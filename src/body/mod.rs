@@ -215,11 +215,8 @@ impl Body {
         }
         let (positions, velocities, forces) = self.state.forces_mut();
         for node in 0..positions.len() {
-            let force = if self.springs.damped() {
-                self.springs.damped_force(node, positions, velocities)
-            } else {
-                self.springs.force(node, positions)
-            };
+            let velocities = self.springs.damped().then_some(velocities);
+            let force = self.springs.force_at(node, positions, velocities);
             forces.set(node, force);
         }
     }

@@ -146,10 +146,8 @@ fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec
             predicted.set(pin.node as usize, state.velocities.lanes(pin.node as usize));
         }
     }
-    let force_on = |node: usize| match &body.predicted_velocities {
-        None => springs.force(node, state.positions),
-        Some(predicted) => springs.damped_force(node, state.positions, predicted),
-    };
+    let predicted = body.predicted_velocities.as_ref();
+    let force_on = |node: usize| springs.force_at(node, state.positions, predicted);
     if part.ends {
         for node in nodes {
             let force = force_on(node);
@@ -190,11 +188,8 @@ fn hold_pins(body: &mut Body, request: &StepRequest, part: &Part) {
         } else if part.ends {
             (state.forces.get(node), 0.5)
         } else {
-            let force = match &body.predicted_velocities {
-                None => Vec3::from(body.springs.force(node, state.positions)),
-                Some(predicted) => body.springs.damped_force(node, state.positions, predicted).into(),
-            };
-            (force, 1.0)
+            let predicted = body.predicted_velocities.as_ref();
+            (body.springs.force_at(node, state.positions, predicted).into(), 1.0)
         };
         let weight_of_node = request.gravity * body.masses[node];
         pin.force_sum -= (force + weight_of_node).as_dvec3() * weight;

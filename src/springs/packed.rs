@@ -148,16 +148,20 @@ impl Packed {
         force
     }
 
-    /// Adds a spring; refused where the pair has one already.
+    /// [`Packed::damped_force`] where velocities are given, else [`Packed::force`].
+    #[inline(always)]
+    pub fn force_at(&self, node: usize, positions: &Vectors, velocities: Option<&Vectors>) -> Vec3A {
+        match velocities {
+            None => self.force(node, positions),
+            Some(velocities) => self.damped_force(node, positions, velocities),
+        }
+    }
+
+    /// Adds a spring; refused where the pair has one already. Its damping counts only in a body whose springs have some.
     pub fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
         if self.place_of(a, b).is_some() {
             return Err(Error::invalid(format!("nodes {a} and {b} have a spring already")));
-        }
-        if spring.damping != 0.0 && !self.damped {
-            let places = self.neighbours.len();
-            self.dampings = memory::filled(0.0, places)?;
-            self.damped = true;
         }
         self.make_room(a)?;
         self.make_room(b)?;
