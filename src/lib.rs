@@ -19,4 +19,5 @@ pub use contact::{Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{Energy, StorageReport};
 pub use error::{Error, Result};
 pub use picture::PictureDefinition;
+pub use springs::Kernel;
 pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};

@@ -8,6 +8,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
 use crate::solver::{Outcome, StepRequest, attempt};
+use crate::springs::{ChosenKernel, Kernel};
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +23,8 @@ pub struct WorldDefinition {
     pub max_substeps: u32,
     /// Metres; 0: off; above 0, with `substeps` 0: a step's own position error stays below it.
     pub tolerance: f32,
+    /// The instructions that springs and nodes are worked on with.
+    pub kernel: Kernel,
 }
 
 impl Default for WorldDefinition {
@@ -33,6 +36,7 @@ impl Default for WorldDefinition {
             substeps: 0,
             max_substeps: 1000,
             tolerance: 0.0,
+            kernel: Kernel::Best,
         }
     }
 }
@@ -62,6 +66,7 @@ pub struct ToolId(pub(crate) SlotId);
 #[derive(Debug)]
 pub struct World {
     definition: WorldDefinition,
+    kernel: ChosenKernel,
     bodies: Slots<Body>,
     tools: Slots<Tool>,
     /// The ways of the tools in the step in progress.
@@ -88,6 +93,7 @@ impl World {
             )));
         }
         Ok(Self {
+            kernel: definition.kernel.choose()?,
             definition,
             bodies: Slots::new("body"),
             tools: Slots::new("tool"),
@@ -120,6 +126,7 @@ impl World {
         let needs = Needs {
             tolerance: self.definition.tolerance > 0.0 && self.definition.substeps == 0,
             tools: self.tools.iter().count(),
+            kernel: self.kernel,
         };
         let body = Body::new(definition, needs)?;
         self.outcomes.try_reserve(self.bodies.places() + 1)?;

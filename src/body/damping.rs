@@ -54,6 +54,22 @@ impl NodeDamping {
     }
 }
 
+/// The inverse masses of nodes that are free to move, 1/kg.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum InverseMasses<'a> {
+    /// The same for all; for a pinned node too, which something else holds.
+    Uniform(f32),
+    /// 0 where a node is pinned.
+    Each(&'a [f32]),
+}
+
+impl<'a> InverseMasses<'a> {
+    /// `uniform` where there is such a one, else `each`.
+    pub fn of(uniform: Option<f32>, each: &'a [f32]) -> Self {
+        uniform.map_or(Self::Each(each), Self::Uniform)
+    }
+}
+
 /// How nodes answer an impulse within a kick.
 #[derive(Clone, Copy)]
 pub(crate) struct Mobility<'a> {

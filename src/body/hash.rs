@@ -34,10 +34,10 @@ impl Body {
             hasher.write_u64(u64::from(c));
         }
         for node in 0..self.node_count() {
-            for link in self.springs.links(node) {
+            self.springs.visit(node, &mut |link| {
                 hasher.write_u64(u64::from(link.neighbour));
                 hasher.write_floats(&[link.stiffness, link.rest_length, link.damping]);
-            }
+            });
         }
         for pin in self.pins.iter() {
             hasher.write_u64(u64::from(pin.node) << 1 | u64::from(pin.target.is_some()));

@@ -13,7 +13,7 @@ mod vectors;
 use glam::{DVec3, Vec3};
 
 pub(crate) use coarse::CoarseStep;
-pub(crate) use damping::{Mobility, NodeDamping};
+pub(crate) use damping::{InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
@@ -24,9 +24,9 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability};
-use crate::springs::Packed;
+use crate::springs::{ChosenKernel, Packed, Springs, TileForces, tile_count, tile_nodes};
 use origin::shift_towards;
-pub(crate) use pins::Pins;
+pub(crate) use pins::{Pin, Pins};
 use state::State;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
@@ -34,11 +34,14 @@ use state::State;
 /// Coordinates and indices are the caller's throughout.
 #[derive(Debug)]
 pub struct Body {
-    pub(crate) springs: Packed,
+    pub(crate) springs: Box<dyn Springs>,
+    pub(crate) kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
     pub(crate) masses: Vec<f32>,
     /// 1/kg, 0 for nodes that are pinned.
     pub(crate) inverse_masses: Vec<f32>,
+    /// That of every node that is not pinned, where they all have the same.
+    pub(crate) uniform_inverse_mass: Option<f32>,
     pub(crate) damping: Option<NodeDamping>,
     pub(crate) pins: Pins,
     pub(crate) surface: Vec<[u32; 3]>,
@@ -67,6 +70,7 @@ pub(crate) struct Needs {
     pub tolerance: bool,
     /// 0: no contacts.
     pub tools: usize,
+    pub kernel: ChosenKernel,
 }
 
 impl Body {
@@ -101,7 +105,12 @@ impl Body {
         let mut body = Self {
             predicted_velocities: packed.damped().then(|| Vectors::zeros(node_count)).transpose()?,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
-            springs: packed,
+            springs: Box::new(packed),
+            kernel: needs.kernel,
+            uniform_inverse_mass: match definition.masses {
+                Values::Uniform(mass) => Some(1.0 / mass),
+                Values::Each(_) => None,
+            },
             masses,
             inverse_masses,
             damping,
@@ -157,9 +166,12 @@ impl Body {
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn spring_pairs(&self) -> Result<Vec<[u32; 2]>> {
         let mut pairs = memory::reserved(self.springs.spring_count())?;
-        for node in 0..self.node_count() {
-            let upwards = self.springs.links(node).filter(|link| link.neighbour as usize > node);
-            pairs.extend(upwards.map(|link| [node as u32, link.neighbour]));
+        for node in 0..self.node_count() as u32 {
+            self.springs.visit(node as usize, &mut |link| {
+                if link.neighbour > node {
+                    pairs.push([node, link.neighbour]);
+                }
+            });
         }
         Ok(pairs)
     }
@@ -214,10 +226,14 @@ impl Body {
             return;
         }
         let (positions, velocities, forces) = self.state.forces_mut();
-        for node in 0..positions.len() {
-            let velocities = self.springs.damped().then_some(velocities);
-            let force = self.springs.force_at(node, positions, velocities);
-            forces.set(node, force);
+        let velocities = self.springs.damped().then_some(velocities);
+        for tile in 0..tile_count(positions.len()) {
+            let mut sums = TileForces::ZERO;
+            self.springs.forces(tile, positions, velocities, &mut sums);
+            let nodes = tile_nodes(tile, positions.len());
+            for (forces, sums) in forces.axes_mut().into_iter().zip(&sums.axes) {
+                forces[nodes.clone()].copy_from_slice(&sums[..nodes.len()]);
+            }
         }
     }
 

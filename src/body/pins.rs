@@ -1,5 +1,7 @@
 //! Nodes that are held: where they are led, and the force it takes.
 
+use std::ops::Range;
+
 use glam::{DVec3, Vec3};
 
 use crate::error::Result;
@@ -32,6 +34,13 @@ impl Pins {
 
     pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Pin> {
         self.pins.iter_mut()
+    }
+
+    /// The pins of these nodes.
+    pub fn within_mut(&mut self, nodes: &Range<usize>) -> &mut [Pin] {
+        let first = self.pins.partition_point(|pin| (pin.node as usize) < nodes.start);
+        let count = self.pins[first..].partition_point(|pin| (pin.node as usize) < nodes.end);
+        &mut self.pins[first..first + count]
     }
 
     pub fn get(&self, node: u32) -> Option<&Pin> {

@@ -116,6 +116,12 @@ impl State {
         (&self.positions[self.latest], &self.velocities[1 - self.settled])
     }
 
+    /// Whether those, and their squares, are finite.
+    pub fn newest_is_finite(&self) -> bool {
+        let (positions, velocities) = self.newest();
+        positions.largest_length().is_finite() && velocities.largest_length().is_finite()
+    }
+
     /// Makes the step in progress the current state.
     pub fn commit(&mut self) {
         self.current = self.latest;

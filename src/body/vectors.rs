@@ -1,63 +1,141 @@
-//! Vectors of all nodes, sixteen bytes each, so that a kernel fetches a neighbour's in one load.
+//! Vectors of all nodes as structure of arrays, laid out for kernels that take sixteen nodes at a time.
 
-use glam::{Vec3, Vec3A};
+use std::ops::Range;
+
+use glam::Vec3;
 
 use crate::error::Result;
 use crate::memory;
 
+/// How many numbers there are to spare on either side: a kernel that takes the neighbours of sixteen nodes in one load may
+/// read so far beyond the ends.
+pub(crate) const MARGIN: usize = 16;
+
+/// Numbers in a cache line.
+const LINE: usize = 16;
+
+/// One number per node, aligned to a cache line, with zeros on both sides that may be read.
+#[derive(Debug)]
+struct Floats {
+    values: Vec<f32>,
+    first: usize,
+    count: usize,
+}
+
+impl Floats {
+    /// `count` zeros, `skew` cache lines further into the memory taken than they had to be.
+    fn zeros(count: usize, skew: usize) -> Result<Self> {
+        let padded = count.next_multiple_of(LINE);
+        let values = memory::filled(0.0_f32, LINE * (skew + 1) + padded + 2 * MARGIN)?;
+        // What cannot be aligned is not, and only slower.
+        let aligned = values.as_ptr().align_offset(LINE * size_of::<f32>()).min(LINE);
+        Ok(Self {
+            values,
+            first: aligned + LINE * skew + MARGIN,
+            count,
+        })
+    }
+
+    fn places(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+}
+
 /// One vector per node.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Vectors(Vec<Vec3A>);
+#[derive(Debug)]
+pub(crate) struct Vectors {
+    axes: [Floats; 3],
+}
 
 impl Vectors {
     /// `count` zero vectors.
     pub fn zeros(count: usize) -> Result<Self> {
-        Ok(Self(memory::filled(Vec3A::ZERO, count)?))
+        // Arrays that begin at the same place of a memory page get in each other's way: a load waits for the store before
+        // it where their addresses agree in the last twelve bits.
+        let axis = |skew| Floats::zeros(count, skew);
+        Ok(Self {
+            axes: [axis(0)?, axis(21)?, axis(42)?],
+        })
     }
 
     #[inline(always)]
     pub fn get(&self, node: usize) -> Vec3 {
-        self.0[node].into()
-    }
-
-    /// The vector as the processor holds it.
-    #[inline(always)]
-    pub fn lanes(&self, node: usize) -> Vec3A {
-        self.0[node]
+        Vec3::from(self.axes().map(|axis| axis[node]))
     }
 
     #[inline(always)]
-    pub fn set(&mut self, node: usize, value: impl Into<Vec3A>) {
-        self.0[node] = value.into();
+    pub fn set(&mut self, node: usize, value: Vec3) {
+        let [x, y, z] = self.axes_mut();
+        (x[node], y[node], z[node]) = value.into();
     }
 
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.axes[0].count
+    }
+
+    /// The coordinates along each axis.
+    #[inline(always)]
+    pub fn axes(&self) -> [&[f32]; 3] {
+        self.axes.each_ref().map(|axis| &axis.values[axis.places()])
+    }
+
+    #[inline(always)]
+    pub fn axes_mut(&mut self) -> [&mut [f32]; 3] {
+        self.axes.each_mut().map(|axis| {
+            let places = axis.places();
+            &mut axis.values[places]
+        })
+    }
+
+    /// The coordinates of some nodes along each axis.
+    #[inline(always)]
+    pub fn slices(&self, nodes: Range<usize>) -> [&[f32]; 3] {
+        self.axes().map(|axis| &axis[nodes.clone()])
+    }
+
+    #[inline(always)]
+    pub fn slices_mut(&mut self, nodes: Range<usize>) -> [&mut [f32]; 3] {
+        self.axes_mut().map(|axis| &mut axis[nodes.clone()])
+    }
+
+    /// The coordinates along each axis with [`MARGIN`] readable numbers before the first and at least as many after the
+    /// last, rounded up to whole blocks of sixteen.
+    #[inline(always)]
+    pub fn with_margins(&self) -> [&[f32]; 3] {
+        self.axes.each_ref().map(|axis| {
+            let after = axis.count.next_multiple_of(LINE) + MARGIN;
+            &axis.values[axis.first - MARGIN..axis.first + after]
+        })
     }
 
     /// All of them, in order.
     pub fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
-        self.0.iter().map(|&vector| vector.into())
+        let [x, y, z] = self.axes();
+        x.iter().zip(y).zip(z).map(|((&x, &y), &z)| Vec3::new(x, y, z))
     }
 
     /// Copies all of `other`, which has as many.
     pub fn copy_from(&mut self, other: &Self) {
-        self.0.copy_from_slice(&other.0);
+        for (to, from) in self.axes_mut().into_iter().zip(other.axes()) {
+            to.copy_from_slice(from);
+        }
     }
 
     /// Sets every vector to zero.
     pub fn clear(&mut self) {
-        self.0.fill(Vec3A::ZERO);
+        for axis in self.axes_mut() {
+            axis.fill(0.0);
+        }
     }
 
     /// The length of the longest of them; infinite where one is not finite.
     pub fn largest_length(&self) -> f32 {
-        largest(self.0.iter().map(|vector| vector.length_squared()))
+        largest(self.iter().map(|vector| vector.length_squared()))
     }
 
     /// The longest way between a vector and that of `other` at its place; infinite where one is not finite.
     pub fn largest_distance(&self, other: &Self) -> f32 {
-        largest(self.0.iter().zip(&other.0).map(|(a, b)| a.distance_squared(*b)))
+        largest(self.iter().zip(other.iter()).map(|(a, b)| a.distance_squared(b)))
     }
 }
 
@@ -92,6 +170,23 @@ mod tests {
                 assert_eq!(vectors.largest_length(), 3.0_f32.sqrt());
                 vectors.set(node, Vec3::new(0.0, spoilt, 0.0));
                 assert_eq!(vectors.largest_length(), f32::INFINITY, "{spoilt} at node {node}");
+            }
+        }
+    }
+
+    #[test]
+    fn kernels_may_read_beyond_both_ends() {
+        for count in [1, 15, 16, 17, 1000] {
+            let mut vectors = Vectors::zeros(count).expect("memory");
+            for node in 0..count {
+                vectors.set(node, Vec3::splat(1.0 + node as f32));
+            }
+            for (axis, padded) in vectors.axes().into_iter().zip(vectors.with_margins()) {
+                assert!(axis.as_ptr().addr().is_multiple_of(64));
+                assert_eq!(&padded[MARGIN..MARGIN + count], axis);
+                assert!(padded.len() >= MARGIN + count.next_multiple_of(16) + MARGIN);
+                let spare = padded[..MARGIN].iter().chain(&padded[MARGIN + count..]);
+                assert!(spare.into_iter().all(|&number| number == 0.0));
             }
         }
     }

@@ -80,6 +80,7 @@ impl sinew_world_def {
             substeps: self.substeps,
             max_substeps: self.max_substeps,
             tolerance: self.tolerance,
+            ..WorldDefinition::default()
         })
     }
 }

@@ -27,7 +27,7 @@ impl Energy {
                 energy.kinetic += 0.5 * mass * velocities.get(node).as_dvec3().length_squared();
             }
             energy.gravitational -= mass * gravity.dot(position + body.origin);
-            for link in body.springs.links(node) {
+            body.springs.visit(node, &mut |link| {
                 let neighbour = link.neighbour as usize;
                 // Each spring is met at both of its nodes.
                 if neighbour > node {
@@ -35,7 +35,7 @@ impl Energy {
                     let stretch = length - f64::from(link.rest_length);
                     energy.elastic += 0.5 * f64::from(link.stiffness) * stretch * stretch;
                 }
-            }
+            });
         }
         energy
     }

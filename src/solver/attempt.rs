@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::gravity::GravityKicks;
 use super::stability::{Stability, substep_stable_anywhere};
-use super::verlet::{self, TooLong};
-use crate::body::{Body, Vectors};
+use super::verlet::{self, Taken, TooLong};
+use crate::body::Body;
 use crate::contact::{Contacts, ToolPath};
 
 /// The part of the longest stable substep that is used.
@@ -55,7 +55,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
     body.refresh_forces();
     let stability = match body.carry.stability.limit {
         Some(_) => body.carry.stability,
-        None => Stability::estimate(&body.springs, &body.inverse_masses, body.state.positions()),
+        None => Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions()),
     };
     let start = Carry {
         stability,
@@ -63,7 +63,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
     };
     if request.substeps > 0 {
         return match verlet::run(body, request, request.substeps, 0, start) {
-            Ok(carry) => finish(body, request.substeps, carry, 0.0),
+            Ok(taken) => finish(body, request.substeps, taken, 0.0),
             Err(too_long) => Outcome::Unstable {
                 stable_substep: too_long.stable_substep,
                 error: 0.0,
@@ -75,17 +75,17 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
             stable_substep: too_long.stable_substep,
             error: 0.0,
         },
-        Ok((substeps, carry)) if request.tolerance == 0.0 => finish(body, substeps, carry, 0.0),
-        Ok((substeps, carry)) => run_to_tolerance(body, request, substeps, start, carry),
+        Ok((substeps, taken)) if request.tolerance == 0.0 => finish(body, substeps, taken, 0.0),
+        Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry),
     }
 }
 
-/// Takes the step with as many substeps as stability needs: how many, and what they carry on.
-fn run_stably(body: &mut Body, request: &StepRequest, start: Carry) -> Result<(u32, Carry), TooLong> {
+/// Takes the step with as many substeps as stability needs: how many, and what came of them.
+fn run_stably(body: &mut Body, request: &StepRequest, start: Carry) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = start.stability.limit.unwrap_or(f32::INFINITY);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
-            stable_substep = substep_stable_anywhere(&body.springs, &body.inverse_masses);
+            stable_substep = substep_stable_anywhere(&*body.springs, &body.inverse_masses);
         }
         let needed = (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil();
         if needed > f64::from(request.max_substeps) {
@@ -93,7 +93,7 @@ fn run_stably(body: &mut Body, request: &StepRequest, start: Carry) -> Result<(u
         }
         let substeps = needed.max(1.0) as u32;
         match verlet::run(body, request, substeps, middle(substeps), start) {
-            Ok(carry) => return Ok((substeps, carry)),
+            Ok(taken) => return Ok((substeps, taken)),
             Err(found) => stable_substep = stable_substep.min(found.stable_substep),
         }
     }
@@ -127,10 +127,10 @@ fn run_to_tolerance(body: &mut Body, request: &StepRequest, substeps: u32, start
         let Ok(finer) = verlet::run(body, request, substeps, middle, start) else {
             continue;
         };
-        carry = finer;
+        carry = finer.carry;
         error = compare(body, request, &carry);
-        if error <= request.tolerance || !is_finite(body) {
-            return finish(body, substeps, carry, error);
+        if error <= request.tolerance || !finer.finite {
+            return finish(body, substeps, finer, error);
         }
     }
 }
@@ -145,21 +145,21 @@ fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
         .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))
 }
 
-fn finish(body: &Body, substeps: u32, carry: Carry, error: f32) -> Outcome {
-    if is_finite(body) {
-        Outcome::Done { substeps, carry, error }
+fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Outcome {
+    if taken.finite && sums_fit(body) {
+        Outcome::Done {
+            substeps,
+            carry: taken.carry,
+            error,
+        }
     } else {
         Outcome::NotFinite
     }
 }
 
-/// Whether everything that the step in progress gives is finite.
-fn is_finite(body: &Body) -> bool {
-    let (positions, velocities) = body.state.newest();
-    let finite = |vectors: &Vectors| vectors.largest_length().is_finite();
-    finite(positions)
-        && finite(velocities)
-        && body.pins.iter().all(|pin| fits(pin.force_sum))
+/// Whether what is told of pins and tools is finite.
+fn sums_fit(body: &Body) -> bool {
+    body.pins.iter().all(|pin| fits(pin.force_sum))
         && body
             .contacts
             .iter()

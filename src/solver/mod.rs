@@ -4,6 +4,7 @@ mod attempt;
 mod gravity;
 mod kick;
 mod stability;
+mod substep;
 mod verlet;
 
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};

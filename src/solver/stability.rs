@@ -10,7 +10,7 @@
 use glam::Vec3;
 
 use crate::body::Vectors;
-use crate::springs::{Packed, separation};
+use crate::springs::{Springs, separation};
 
 /// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over
 /// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
@@ -39,7 +39,7 @@ impl Stability {
     }
 
     /// The longest stable substep at these positions, and how long that is true.
-    pub fn estimate(springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
+    pub fn estimate(springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
         let mut stiffest = 0.0_f32;
         let mut most_damped = 0.0_f32;
         let mut reach = f32::INFINITY;
@@ -90,8 +90,8 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(node: usize, inverse_mass: f32, springs: &Packed, inverse_masses: &[f32], positions: &Vectors) -> Self {
-        let position = positions.lanes(node);
+    fn of(node: usize, inverse_mass: f32, springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
+        let position = positions.get(node);
         let mut sums = Self {
             along: Symmetric::default(),
             across: 0.0,
@@ -100,10 +100,9 @@ impl Sums {
             damping_anywhere: 0.0,
             shortest: f32::INFINITY,
         };
-        for link in springs.links(node) {
+        springs.visit(node, &mut |link| {
             let neighbour = link.neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
-            let direction = Vec3::from(direction);
+            let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
             let inverse_mass = inverse_mass + inverse_masses[neighbour];
             let stiffness = link.stiffness * inverse_mass;
             sums.stiffness_anywhere += stiffness;
@@ -125,13 +124,13 @@ impl Sums {
                 sums.damping.add_outer(direction, damping);
                 sums.shortest = sums.shortest.min(length);
             }
-        }
+        });
         sums
     }
 }
 
 /// The longest substep that is stable whatever the positions, s: every spring's matrix is at most its stiffness times the unit matrix.
-pub(crate) fn substep_stable_anywhere(springs: &Packed, inverse_masses: &[f32]) -> f32 {
+pub(crate) fn substep_stable_anywhere(springs: &dyn Springs, inverse_masses: &[f32]) -> f32 {
     let mut stiffest = 0.0_f32;
     let mut most_damped = 0.0_f32;
     for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
@@ -139,11 +138,11 @@ pub(crate) fn substep_stable_anywhere(springs: &Packed, inverse_masses: &[f32]) 
             continue;
         }
         let (mut stiffness, mut damping) = (0.0_f32, 0.0_f32);
-        for link in springs.links(node) {
+        springs.visit(node, &mut |link| {
             let inverse_mass = inverse_mass + inverse_masses[link.neighbour as usize];
             stiffness += link.stiffness * inverse_mass;
             damping += link.damping * inverse_mass;
-        }
+        });
         stiffest = stiffest.max(stiffness);
         most_damped = most_damped.max(damping);
     }

@@ -5,11 +5,11 @@
 //! the end of a step is the one the next begins with. Damping along springs needs velocities at the time of the
 //! positions: a first visit predicts them, a second uses them (order 2 too; Heun's method).
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::DVec3;
 
 use super::attempt::{Carry, StepRequest};
-use super::kick::Kick;
 use super::stability::Stability;
+use super::substep::{Part, kick_and_drift};
 use crate::body::{Body, Bounds, Mobility};
 use crate::contact::Meeting;
 
@@ -20,16 +20,25 @@ pub(super) struct TooLong {
     pub stable_substep: f32,
 }
 
-/// Takes the step with exactly `substeps` substeps: what it carries on to the next. After `middle` of them a world with a
-/// tolerance looks at it.
+/// A step that was taken, and is not current yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taken {
+    /// What it carries on to the next.
+    pub carry: Carry,
+    /// Whether its positions and velocities are finite.
+    pub finite: bool,
+}
+
+/// Takes the step with exactly `substeps` substeps. After `middle` of them a world with a tolerance looks at it.
 pub(super) fn run(
     body: &mut Body,
     request: &StepRequest,
     substeps: u32,
     middle: u32,
     start: Carry,
-) -> Result<Carry, TooLong> {
+) -> Result<Taken, TooLong> {
     let mut carry = start;
+    let mut finite = true;
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
     let check = |stability: &Stability| match stability.limit {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
@@ -47,10 +56,15 @@ pub(super) fn run(
         };
         let kicked = if part.is_half() { 0.5 * substep } else { substep };
         let fall = carry.gravity.next(request.gravity, kicked);
-        let velocities = kick_and_drift(body, request, &part, fall);
-        hold_pins(body, request, &part);
-        carry.gravity.velocities = meet_tools(body, request, &part, velocities);
+        let survey = kick_and_drift(body, request, &part, fall);
+        carry.gravity.velocities = meet_tools(body, request, &part, survey.velocities);
         if part.ends {
+            // What tools have done was not looked at.
+            finite = if body.contacts.is_some() {
+                body.state.newest_is_finite()
+            } else {
+                survey.finite
+            };
             break;
         }
         body.state.advance();
@@ -62,11 +76,11 @@ pub(super) fn run(
         let Bounds { min, max } = carry.gravity.velocities;
         if !carry.stability.holds_after(substep * (max - min).length()) {
             let positions = body.state.newest().0;
-            carry.stability = Stability::estimate(&body.springs, &body.inverse_masses, positions);
+            carry.stability = Stability::estimate(&*body.springs, &body.inverse_masses, positions);
             check(&carry.stability)?;
         }
     }
-    Ok(carry)
+    Ok(Taken { carry, finite })
 }
 
 /// Starts the step over, from what is current.
@@ -86,120 +100,6 @@ fn begin(body: &mut Body, request: &StepRequest, substep: f32) {
     }
     if let Some(contacts) = &mut body.contacts {
         contacts.begin(request.tools, body.origin);
-    }
-}
-
-/// Which part of a step a substep is.
-struct Part {
-    /// The first kick: half of one, with the forces that the last step ended with.
-    begins: bool,
-    /// The last kick: half of one, without a drift.
-    ends: bool,
-    /// Fractions of the step at which the substep starts and ends.
-    start: f64,
-    end: f64,
-    /// s
-    substep: f32,
-}
-
-impl Part {
-    /// Whether its kick is half of one.
-    fn is_half(&self) -> bool {
-        self.begins || self.ends
-    }
-}
-
-/// Changes the velocities by the forces at the latest positions and moves the nodes by them: the box of all velocities.
-fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec3) -> Bounds {
-    let substep = part.substep;
-    let kick = Kick {
-        substep,
-        gravity: request.gravity.into(),
-        fall: fall.into(),
-        inverse_masses: &body.inverse_masses,
-        applied: body.applied.as_ref(),
-        damping: body.damping.as_ref(),
-    };
-    let state = body.state.substep();
-    let springs = &body.springs;
-    let nodes = 0..kick.inverse_masses.len();
-    let (mut slowest, mut fastest) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-    if part.begins {
-        for node in nodes {
-            let force = state.first_forces.lanes(node);
-            let velocity = kick.half(node, state.first_velocities.lanes(node), force);
-            state.velocities.set(node, velocity);
-            state
-                .next_positions
-                .set(node, state.positions.lanes(node) + velocity * substep);
-            slowest = slowest.min(velocity);
-            fastest = fastest.max(velocity);
-        }
-        return bounds(slowest, fastest);
-    }
-    if let Some(predicted) = &mut body.predicted_velocities {
-        for node in nodes.clone() {
-            let force = springs.damped_force(node, state.positions, state.velocities);
-            predicted.set(node, kick.half(node, state.velocities.lanes(node), force));
-        }
-        for pin in body.pins.iter() {
-            predicted.set(pin.node as usize, state.velocities.lanes(pin.node as usize));
-        }
-    }
-    let predicted = body.predicted_velocities.as_ref();
-    let force_on = |node: usize| springs.force_at(node, state.positions, predicted);
-    if part.ends {
-        for node in nodes {
-            let force = force_on(node);
-            let velocity = kick.half(node, state.velocities.lanes(node), force);
-            state.forces.set(node, force);
-            state.velocities.set(node, velocity);
-            slowest = slowest.min(velocity);
-            fastest = fastest.max(velocity);
-        }
-    } else {
-        for node in nodes {
-            let velocity = kick.full(node, state.velocities.lanes(node), force_on(node));
-            state.velocities.set(node, velocity);
-            state
-                .next_positions
-                .set(node, state.positions.lanes(node) + velocity * substep);
-            slowest = slowest.min(velocity);
-            fastest = fastest.max(velocity);
-        }
-    }
-    bounds(slowest, fastest)
-}
-
-fn bounds(min: Vec3A, max: Vec3A) -> Bounds {
-    Bounds {
-        min: min.into(),
-        max: max.into(),
-    }
-}
-
-/// Puts the pinned nodes where they are led, and adds up what holds them.
-fn hold_pins(body: &mut Body, request: &StepRequest, part: &Part) {
-    let state = body.state.substep();
-    for pin in body.pins.iter_mut() {
-        let node = pin.node as usize;
-        let (force, weight) = if part.begins {
-            (state.first_forces.get(node), 0.5)
-        } else if part.ends {
-            (state.forces.get(node), 0.5)
-        } else {
-            let predicted = body.predicted_velocities.as_ref();
-            (body.springs.force_at(node, state.positions, predicted).into(), 1.0)
-        };
-        let weight_of_node = request.gravity * body.masses[node];
-        pin.force_sum -= (force + weight_of_node).as_dvec3() * weight;
-        let velocity = pin.travel / request.dt;
-        state.velocities.set(node, velocity);
-        if !part.ends {
-            // From the start of the step, so that roundings do not add up.
-            let position = pin.goal - pin.travel * (1.0 - part.end) as f32;
-            state.next_positions.set(node, position);
-        }
     }
 }
 

@@ -4,21 +4,13 @@
 //! but that node, and the sum is the same in whatever order nodes are visited. A row that is full moves to the end of
 //! the arrays with twice the room; once more than half of the places are abandoned, the rows are packed again.
 
-use glam::Vec3A;
+use glam::Vec3;
 
 use super::law::separation;
+use super::{Link, Springs, TileForces, tile_nodes};
 use crate::body::{Spring, Vectors};
 use crate::error::{Error, Result};
 use crate::memory;
-
-/// One end of a spring, as the node at the other end sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Link {
-    pub neighbour: u32,
-    pub stiffness: f32,
-    pub rest_length: f32,
-    pub damping: f32,
-}
 
 /// The places of one node's links.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,108 +69,6 @@ impl Packed {
             packed.push_both(spring);
         }
         Ok(packed)
-    }
-
-    /// Whether any spring has damping.
-    pub fn damped(&self) -> bool {
-        self.damped
-    }
-
-    pub fn spring_count(&self) -> usize {
-        self.spring_count
-    }
-
-    /// Bytes taken by the springs that exist, and bytes held from the allocator.
-    pub fn bytes(&self) -> (usize, usize) {
-        let link = 3 * size_of::<f32>() + if self.damped { size_of::<f32>() } else { 0 };
-        let rows = self.rows.len() * size_of::<Row>();
-        let held = self.rows.capacity() * size_of::<Row>()
-            + (self.neighbours.capacity()
-                + self.stiffnesses.capacity()
-                + self.rest_lengths.capacity()
-                + self.dampings.capacity())
-                * size_of::<f32>();
-        (rows + 2 * self.spring_count * link, held)
-    }
-
-    /// The links of `node`.
-    #[inline]
-    pub fn links(&self, node: usize) -> impl Iterator<Item = Link> + '_ {
-        self.rows[node].links().map(|place| Link {
-            neighbour: self.neighbours[place],
-            stiffness: self.stiffnesses[place],
-            rest_length: self.rest_lengths[place],
-            damping: if self.damped { self.dampings[place] } else { 0.0 },
-        })
-    }
-
-    /// The force of all springs on `node`, in newtons.
-    #[inline(always)]
-    pub fn force(&self, node: usize, positions: &Vectors) -> Vec3A {
-        let position = positions.lanes(node);
-        let links = self.rows[node].links();
-        let neighbours = &self.neighbours[links.clone()];
-        let stiffnesses = &self.stiffnesses[links.clone()];
-        let rest_lengths = &self.rest_lengths[links];
-        let mut force = Vec3A::ZERO;
-        for ((&neighbour, &stiffness), &rest_length) in neighbours.iter().zip(stiffnesses).zip(rest_lengths) {
-            let neighbour = neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
-            force += direction * (stiffness * (length - rest_length));
-        }
-        force
-    }
-
-    /// The force of all springs and of the damping along them on `node`, in newtons; for springs with damping alone.
-    #[inline(always)]
-    pub fn damped_force(&self, node: usize, positions: &Vectors, velocities: &Vectors) -> Vec3A {
-        let (position, velocity) = (positions.lanes(node), velocities.lanes(node));
-        let links = self.rows[node].links();
-        let springs = self.stiffnesses[links.clone()]
-            .iter()
-            .zip(&self.rest_lengths[links.clone()])
-            .zip(&self.dampings[links.clone()]);
-        let mut force = Vec3A::ZERO;
-        for (&neighbour, ((&stiffness, &rest_length), &damping)) in self.neighbours[links].iter().zip(springs) {
-            let neighbour = neighbour as usize;
-            let (length, direction) = separation(node, neighbour, positions.lanes(neighbour) - position);
-            let rate = direction.dot(velocities.lanes(neighbour) - velocity);
-            force += direction * (stiffness * (length - rest_length) + damping * rate);
-        }
-        force
-    }
-
-    /// [`Packed::damped_force`] where velocities are given, else [`Packed::force`].
-    #[inline(always)]
-    pub fn force_at(&self, node: usize, positions: &Vectors, velocities: Option<&Vectors>) -> Vec3A {
-        match velocities {
-            None => self.force(node, positions),
-            Some(velocities) => self.damped_force(node, positions, velocities),
-        }
-    }
-
-    /// Adds a spring; refused where the pair has one already. Its damping counts only in a body whose springs have some.
-    pub fn add(&mut self, spring: &Spring) -> Result<()> {
-        let [a, b] = spring.nodes;
-        if self.place_of(a, b).is_some() {
-            return Err(Error::invalid(format!("nodes {a} and {b} have a spring already")));
-        }
-        self.make_room(a)?;
-        self.make_room(b)?;
-        self.push_both(spring);
-        self.spring_count += 1;
-        Ok(())
-    }
-
-    /// Removes the spring between `a` and `b`; refused where there is none.
-    pub fn remove(&mut self, a: u32, b: u32) -> Result<()> {
-        let (Some(at_a), Some(at_b)) = (self.place_of(a, b), self.place_of(b, a)) else {
-            return Err(Error::invalid(format!("nodes {a} and {b} have no spring")));
-        };
-        self.remove_link(a, at_a);
-        self.remove_link(b, at_b);
-        self.spring_count -= 1;
-        Ok(())
     }
 
     fn place_of(&self, node: u32, neighbour: u32) -> Option<usize> {
@@ -282,6 +172,76 @@ impl Packed {
             first += row.capacity as usize;
         }
         *self = packed;
+        Ok(())
+    }
+}
+
+impl Springs for Packed {
+    fn damped(&self) -> bool {
+        self.damped
+    }
+
+    fn spring_count(&self) -> usize {
+        self.spring_count
+    }
+
+    fn bytes(&self) -> (usize, usize) {
+        let link = 3 * size_of::<f32>() + if self.damped { size_of::<f32>() } else { 0 };
+        let rows = self.rows.len() * size_of::<Row>();
+        let held = self.rows.capacity() * size_of::<Row>()
+            + (self.neighbours.capacity()
+                + self.stiffnesses.capacity()
+                + self.rest_lengths.capacity()
+                + self.dampings.capacity())
+                * size_of::<f32>();
+        (rows + 2 * self.spring_count * link, held)
+    }
+
+    fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
+        for place in self.rows[node].links() {
+            see(Link {
+                neighbour: self.neighbours[place],
+                stiffness: self.stiffnesses[place],
+                rest_length: self.rest_lengths[place],
+                damping: if self.damped { self.dampings[place] } else { 0.0 },
+            });
+        }
+    }
+
+    fn forces(&self, tile: usize, positions: &Vectors, velocities: Option<&Vectors>, forces: &mut TileForces) {
+        for (place, node) in tile_nodes(tile, self.rows.len()).enumerate() {
+            let mut force = Vec3::ZERO;
+            for link in self.rows[node].links() {
+                let neighbour = self.neighbours[link] as usize;
+                let (length, direction) = separation(node, neighbour, positions.get(neighbour) - positions.get(node));
+                let rate = velocities.map_or(0.0, |velocities| {
+                    self.dampings[link] * direction.dot(velocities.get(neighbour) - velocities.get(node))
+                });
+                force += direction * (self.stiffnesses[link] * (length - self.rest_lengths[link]) + rate);
+            }
+            forces.set(place, force);
+        }
+    }
+
+    fn add(&mut self, spring: &Spring) -> Result<()> {
+        let [a, b] = spring.nodes;
+        if self.place_of(a, b).is_some() {
+            return Err(Error::invalid(format!("nodes {a} and {b} have a spring already")));
+        }
+        self.make_room(a)?;
+        self.make_room(b)?;
+        self.push_both(spring);
+        self.spring_count += 1;
+        Ok(())
+    }
+
+    fn remove(&mut self, a: u32, b: u32) -> Result<()> {
+        let (Some(at_a), Some(at_b)) = (self.place_of(a, b), self.place_of(b, a)) else {
+            return Err(Error::invalid(format!("nodes {a} and {b} have no spring")));
+        };
+        self.remove_link(a, at_a);
+        self.remove_link(b, at_b);
+        self.spring_count -= 1;
         Ok(())
     }
 }

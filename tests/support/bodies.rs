@@ -12,6 +12,7 @@ pub const FREE: WorldDefinition = WorldDefinition {
     substeps: 0,
     max_substeps: 1000,
     tolerance: 0.0,
+    kernel: sinew::Kernel::Best,
 };
 
 /// What a body of springs is made of.

@@ -1,0 +1,104 @@
+//! What is compiled once for each kind of processor, and chosen at run time.
+#![allow(unsafe_code)]
+
+use crate::error::{Error, Result};
+
+/// The widest instructions that kernels use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kernel {
+    /// What the processor offers, the widest first.
+    #[default]
+    Best,
+    /// Sixteen lanes of x86-64's AVX-512 (F, BW, DQ, VL).
+    Avx512,
+    /// Eight lanes of x86-64's AVX2, with fused multiply-add.
+    Avx2,
+    /// Four lanes of AArch64's NEON.
+    Neon,
+    /// The same bits on every processor.
+    Portable,
+}
+
+impl Kernel {
+    /// The kernel to be used on this processor.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: the processor does not offer it.
+    pub(crate) fn choose(self) -> Result<ChosenKernel> {
+        let best = [Self::Avx512, Self::Avx2, Self::Neon];
+        let chosen = match self {
+            Self::Best => best
+                .into_iter()
+                .find(|kernel| kernel.is_offered())
+                .unwrap_or(Self::Portable),
+            kernel => kernel,
+        };
+        if chosen.is_offered() {
+            Ok(ChosenKernel(chosen))
+        } else {
+            Err(Error::Unsupported(format!(
+                "kernel is {chosen:?}: this processor does not offer it"
+            )))
+        }
+    }
+
+    fn is_offered(self) -> bool {
+        match self {
+            Self::Best | Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+                    && Self::Avx2.is_offered()
+            }
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            // Part of every processor of its kind.
+            Self::Neon => cfg!(all(target_arch = "aarch64", target_endian = "little")),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx512 | Self::Avx2 => false,
+        }
+    }
+}
+
+/// A kernel whose instructions the processor has: [`Kernel::choose`] alone makes one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ChosenKernel(Kernel);
+
+/// Plain loops that the compiler turns into the instructions of a kernel.
+pub(crate) trait Loops {
+    type Output;
+
+    /// To be marked `#[inline(always)]`: it is compiled as part of its caller, with that one's instructions.
+    fn run(self) -> Self::Output;
+}
+
+impl ChosenKernel {
+    /// Runs `loops` with the kernel's instructions.
+    #[inline]
+    pub(crate) fn run<L: Loops>(self, loops: L) -> L::Output {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: a kernel is chosen only where the processor has its instructions.
+            Kernel::Avx512 => unsafe { run_avx512(loops) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the same.
+            Kernel::Avx2 => unsafe { run_avx2(loops) },
+            _ => loops.run(),
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+fn run_avx512<L: Loops>(loops: L) -> L::Output {
+    loops.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn run_avx2<L: Loops>(loops: L) -> L::Output {
+    loops.run()
+}

@@ -1,0 +1,42 @@
+//! Tiles: ranges of nodes that are worked on together, small enough that what they share stays in the nearest cache.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+/// Nodes of a tile; the last of a body has fewer.
+pub(crate) const TILE: usize = 512;
+
+/// How many tiles `node_count` nodes make.
+pub(crate) fn tile_count(node_count: usize) -> usize {
+    node_count.div_ceil(TILE)
+}
+
+/// The nodes of a tile.
+#[inline(always)]
+pub(crate) fn tile_nodes(tile: usize, node_count: usize) -> Range<usize> {
+    tile * TILE..node_count.min((tile + 1) * TILE)
+}
+
+/// The forces on the nodes of one tile, N.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileForces {
+    pub axes: [[f32; TILE]; 3],
+}
+
+impl TileForces {
+    pub const ZERO: Self = Self { axes: [[0.0; TILE]; 3] };
+
+    #[inline(always)]
+    pub fn get(&self, place: usize) -> Vec3 {
+        Vec3::from(self.axes.map(|axis| axis[place]))
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, place: usize, force: Vec3) {
+        for (axis, value) in self.axes.iter_mut().zip(force.to_array()) {
+            axis[place] = value;
+        }
+    }
+}
