@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::springs::Rounding;
 
 /// One value for all, or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -221,6 +222,18 @@ impl BodyDefinition<'_> {
             )));
         }
         Ok(())
+    }
+
+    /// What rest lengths may differ by, to be one.
+    pub(crate) fn rounding(&self) -> Rounding {
+        let rest = self.rest_positions.unwrap_or(self.positions);
+        let reach = |reach: f32, position: &Vec3| reach.max(position.abs().max_element());
+        Rounding {
+            reach: match self.rest_lengths {
+                Some(_) => 0.0,
+                None => rest.iter().fold(0.0, reach),
+            },
+        }
     }
 
     /// The springs with their rest lengths, from the definition or from the edges of its elements.

@@ -17,7 +17,7 @@ pub(crate) use damping::{InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
-pub(crate) use vectors::Vectors;
+pub(crate) use vectors::{MARGIN, Vectors};
 
 use crate::contact::Contacts;
 use crate::diagnostics::{Energy, StorageReport};
@@ -78,7 +78,7 @@ impl Body {
         definition.check()?;
         let node_count = definition.positions.len();
         let springs = definition.resolved_springs()?;
-        let packed = Packed::new(node_count, &springs)?;
+        let packed = Packed::new(needs.kernel, node_count, &springs, definition.rounding())?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
         let mut inverse_masses = memory::reserved(node_count)?;

@@ -10,8 +10,8 @@ use std::fmt::Debug;
 pub use kernels::Kernel;
 pub(crate) use kernels::{ChosenKernel, Loops};
 pub(crate) use law::separation;
-pub(crate) use packed::Packed;
-pub(crate) use tile::{TileForces, tile_count, tile_nodes};
+pub(crate) use packed::{Packed, Rounding};
+pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
 use crate::body::{Spring, Vectors};
 use crate::error::Result;

@@ -1,6 +1,21 @@
 //! What is compiled once for each kind of processor, and chosen at run time.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod columns;
+mod forces;
+mod lanes;
+#[cfg(all(target_arch = "aarch64", target_endian = "little"))]
+mod neon;
+mod portable;
+mod strays;
+
+pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
+use forces::TileLinks;
+
 use crate::error::{Error, Result};
 
 /// The widest instructions that kernels use.
@@ -89,6 +104,23 @@ impl ChosenKernel {
             _ => loops.run(),
         }
     }
+
+    /// Computes the forces on a tile.
+    fn forces(self, links: TileLinks) {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: a kernel is chosen only where the processor has its instructions.
+            Kernel::Avx512 => unsafe { forces_avx512(links) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the same.
+            Kernel::Avx2 => unsafe { forces_avx2(links) },
+            #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
+            // SAFETY: every processor of this kind has them.
+            Kernel::Neon => unsafe { links.run::<neon::NeonLanes>() },
+            // SAFETY: no special instructions.
+            _ => unsafe { links.run::<portable::PortableLanes>() },
+        }
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -101,4 +133,18 @@ fn run_avx512<L: Loops>(loops: L) -> L::Output {
 #[target_feature(enable = "avx2,fma")]
 fn run_avx2<L: Loops>(loops: L) -> L::Output {
     loops.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+fn forces_avx512(links: TileLinks) {
+    // SAFETY: these are the instructions.
+    unsafe { links.run::<avx512::Avx512Lanes>() }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn forces_avx2(links: TileLinks) {
+    // SAFETY: these are the instructions.
+    unsafe { links.run::<avx2::Avx2Lanes>() }
 }

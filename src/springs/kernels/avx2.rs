@@ -1,0 +1,100 @@
+//! Eight lanes of x86-64's AVX2, with fused multiply-add.
+
+use std::arch::x86_64::*;
+
+use super::lanes::Lanes;
+
+#[derive(Clone, Copy)]
+pub(super) struct Avx2Lanes(__m256);
+
+/// All bits of the lanes whose bit in `mask` is set.
+#[inline(always)]
+unsafe fn spread(mask: u32) -> __m256 {
+    // SAFETY: the caller promises the instructions.
+    unsafe {
+        let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+        let set = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bits);
+        _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, bits))
+    }
+}
+
+// SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
+// here asks for more than the alignment of a number.
+#[allow(clippy::undocumented_unsafe_blocks)]
+impl Lanes for Avx2Lanes {
+    const COUNT: usize = 8;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        Self(unsafe { _mm256_loadu_ps(from) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { _mm256_storeu_ps(to, self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+        unsafe { Self(_mm256_i32gather_ps::<4>(base, _mm256_loadu_si256(indices.cast()))) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
+        unsafe {
+            let indices = _mm256_cvtepu16_epi32(_mm_loadu_si128(indices.cast()));
+            Self(_mm256_i32gather_ps::<4>(base, indices))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn subtract(self, other: Self) -> Self {
+        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply(self, other: Self) -> Self {
+        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm256_fnmadd_ps(self.0, factor.0, summand.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe {
+            let guess = _mm256_rsqrt_ps(self.0);
+            // Twelve bits are known: one step of order 3 (Householder) gives what f32 holds.
+            let error = _mm256_fnmadd_ps(_mm256_mul_ps(self.0, guess), guess, _mm256_set1_ps(1.0));
+            let factor = _mm256_fmadd_ps(error, _mm256_set1_ps(0.375), _mm256_set1_ps(0.5));
+            Self(_mm256_fmadd_ps(_mm256_mul_ps(guess, error), factor, guess))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn where_set(self, mask: u32) -> Self {
+        Self(unsafe { _mm256_and_ps(self.0, spread(mask)) })
+    }
+
+    #[inline(always)]
+    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
+        Self(unsafe { _mm256_blendv_ps(self.0, _mm256_min_ps(other.0, self.0), spread(mask)) })
+    }
+
+    #[inline(always)]
+    unsafe fn any_at_most(self, limit: f32) -> bool {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, _mm256_set1_ps(limit))) != 0 }
+    }
+}

@@ -1,0 +1,89 @@
+//! Sixteen lanes of x86-64's AVX-512.
+
+use std::arch::x86_64::*;
+
+use super::lanes::Lanes;
+
+#[derive(Clone, Copy)]
+pub(super) struct Avx512Lanes(__m512);
+
+// SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
+// here asks for more than the alignment of a number.
+#[allow(clippy::undocumented_unsafe_blocks)]
+impl Lanes for Avx512Lanes {
+    const COUNT: usize = 16;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self(unsafe { _mm512_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        Self(unsafe { _mm512_loadu_ps(from) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { _mm512_storeu_ps(to, self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+        unsafe { Self(_mm512_i32gather_ps::<4>(_mm512_loadu_si512(indices.cast()), base)) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
+        unsafe {
+            let indices = _mm512_cvtepu16_epi32(_mm256_loadu_si256(indices.cast()));
+            Self(_mm512_i32gather_ps::<4>(indices, base))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn subtract(self, other: Self) -> Self {
+        Self(unsafe { _mm512_sub_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply(self, other: Self) -> Self {
+        Self(unsafe { _mm512_mul_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm512_fnmadd_ps(self.0, factor.0, summand.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe {
+            let guess = _mm512_rsqrt14_ps(self.0);
+            // Newton's step, as a correction: what is rounded is small.
+            let error = _mm512_fnmadd_ps(_mm512_mul_ps(self.0, guess), guess, _mm512_set1_ps(1.0));
+            let half = _mm512_mul_ps(guess, _mm512_set1_ps(0.5));
+            Self(_mm512_fmadd_ps(half, error, guess))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn where_set(self, mask: u32) -> Self {
+        Self(unsafe { _mm512_maskz_mov_ps(mask as __mmask16, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
+        Self(unsafe { _mm512_mask_min_ps(self.0, mask as __mmask16, other.0, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn any_at_most(self, limit: f32) -> bool {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, _mm512_set1_ps(limit)) != 0 }
+    }
+}

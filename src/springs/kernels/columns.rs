@@ -1,0 +1,423 @@
+//! The links of a tile in columns: one link each of sixteen nodes that lie side by side.
+//!
+//! A column is a *run* where the neighbours lie side by side too, so that one load fetches them, and a *gather* where they
+//! do not. Its springs share their parameters, or bring their own. What fills no column well, such as most links of a node
+//! that has far more than those around it, is a *stray*: sixteen of those, of any nodes, are worked on at a time.
+//!
+//! Whatever is read without a check at every step is checked here when it is put in.
+
+use std::ops::Range;
+
+use super::strays::Strays;
+use crate::body::MARGIN;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::{Link, TILE};
+
+/// Lanes of a column.
+pub(crate) const LANES: usize = 16;
+
+/// How far ahead a gather with small indices reaches.
+const WINDOW: usize = 1 << 16;
+
+/// Of a column whose springs bring their own parameters.
+const OWN: u16 = u16::MAX;
+
+/// Parameters that many springs of a body share.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Material {
+    /// N/m
+    pub stiffness: f32,
+    /// m
+    pub rest_length: f32,
+    /// N s/m
+    pub damping: f32,
+}
+
+/// Sixteen numbers in a cache line of their own.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Line(pub [f32; LANES]);
+
+impl Line {
+    pub const ZERO: Self = Self([0.0; LANES]);
+}
+
+/// What the springs of a column are like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Parameters {
+    /// All like this entry of the body's table.
+    Shared(u16),
+    /// Each its own; 0 in lanes without a link.
+    Own {
+        stiffnesses: Line,
+        rest_lengths: Line,
+        dampings: Line,
+    },
+}
+
+/// Where the other ends of a column's links are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Neighbours {
+    /// As far from each node as this.
+    Run(i32),
+    /// These; any node in lanes without a link.
+    Gather([u32; LANES]),
+}
+
+/// A column to be put in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Column {
+    pub neighbours: Neighbours,
+    /// Bit i: whether the node in lane i has a link here.
+    pub lanes: u16,
+    pub parameters: Parameters,
+}
+
+/// What the kernel needs to know of any column.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Header {
+    pub lanes: u16,
+    /// Its place in the table of materials; [`OWN`].
+    material: u16,
+}
+
+impl Header {
+    /// Its place in the table of materials, where it is there.
+    #[inline(always)]
+    pub fn material(self) -> Option<usize> {
+        (self.material != OWN).then_some(usize::from(self.material))
+    }
+}
+
+/// A column of neighbours that lie side by side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    pub offset: i32,
+    pub header: Header,
+}
+
+/// Where the columns of sixteen nodes end in each list.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Ends {
+    pub runs: u32,
+    pub near: u32,
+    pub far: u32,
+    pub own: u32,
+}
+
+/// Small indices of a column.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NearIndices(pub [u16; LANES]);
+
+/// Indices of a column.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FarIndices(pub [u32; LANES]);
+
+/// The links of the nodes of one tile.
+#[derive(Debug)]
+pub(crate) struct Columns {
+    /// The tile's first node, and how many it has.
+    pub(super) first: usize,
+    pub(super) count: usize,
+    /// Nodes of the body.
+    pub(super) node_count: usize,
+    /// What small indices count from.
+    pub(super) window: usize,
+    pub(super) blocks: Vec<Ends>,
+    pub(super) runs: Vec<Run>,
+    pub(super) near: Vec<Header>,
+    pub(super) near_indices: Vec<NearIndices>,
+    pub(super) far: Vec<Header>,
+    pub(super) far_indices: Vec<FarIndices>,
+    /// The parameters of columns that bring their own, in the order of the blocks, and in a block runs first, then near and
+    /// far gathers.
+    pub(super) own_rest_lengths: Vec<Line>,
+    /// Empty where all of them are `own_stiffness`.
+    pub(super) own_stiffnesses: Vec<Line>,
+    pub(super) own_stiffness: f32,
+    /// Empty in a body whose springs have no damping.
+    pub(super) own_dampings: Vec<Line>,
+    pub(super) damped: bool,
+    pub(super) strays: Strays,
+}
+
+/// A link's place.
+#[derive(Clone, Copy)]
+enum Found {
+    Run(usize),
+    Near(usize),
+    Far(usize),
+}
+
+impl Columns {
+    /// No links yet of `nodes`, of a body of `node_count`. Springs that bring their own parameters have this stiffness;
+    /// `None`: each its own.
+    pub fn new(nodes: Range<usize>, node_count: usize, own_stiffness: Option<f32>, damped: bool) -> Self {
+        assert!(nodes.start.is_multiple_of(LANES) && nodes.end <= node_count && nodes.len() <= TILE);
+        Self {
+            first: nodes.start,
+            count: nodes.len(),
+            node_count,
+            window: nodes
+                .start
+                .saturating_sub(WINDOW / 2)
+                .min(node_count.saturating_sub(WINDOW)),
+            blocks: Vec::new(),
+            runs: Vec::new(),
+            near: Vec::new(),
+            near_indices: Vec::new(),
+            far: Vec::new(),
+            far_indices: Vec::new(),
+            own_rest_lengths: Vec::new(),
+            own_stiffnesses: Vec::new(),
+            own_stiffness: own_stiffness.unwrap_or(f32::NAN),
+            own_dampings: Vec::new(),
+            damped,
+            strays: Strays::new(nodes.start, node_count, damped),
+        }
+    }
+
+    /// The columns of the next sixteen nodes.
+    pub fn push_block(&mut self, columns: &[Column]) -> Result<()> {
+        let first = self.first + self.blocks.len() * LANES;
+        let nodes = (self.first + self.count).saturating_sub(first).min(LANES);
+        assert!(nodes > 0, "a block beyond the tile's last node");
+        let kinds: [fn(&Self, &Neighbours) -> bool; 3] = [
+            |_, neighbours| matches!(neighbours, Neighbours::Run(_)),
+            Self::is_near,
+            Self::is_far,
+        ];
+        for kind in kinds {
+            for column in columns {
+                if !kind(self, &column.neighbours) {
+                    continue;
+                }
+                assert!(u32::from(column.lanes) < 1 << nodes, "a lane without a node");
+                self.push_column(first, column)?;
+            }
+        }
+        memory::push(
+            &mut self.blocks,
+            Ends {
+                runs: self.runs.len() as u32,
+                near: self.near.len() as u32,
+                far: self.far.len() as u32,
+                own: self.own_rest_lengths.len() as u32,
+            },
+        )
+    }
+
+    /// A column of the sixteen nodes from `first` on.
+    fn push_column(&mut self, first: usize, column: &Column) -> Result<()> {
+        let header = Header {
+            lanes: column.lanes,
+            material: self.push_parameters(&column.parameters)?,
+        };
+        match column.neighbours {
+            Neighbours::Run(offset) => {
+                for lane in set_lanes(column.lanes) {
+                    let neighbour = (first + lane).checked_add_signed(offset as isize);
+                    assert!(neighbour.is_some_and(|neighbour| neighbour < self.node_count));
+                }
+                // Where one lane has a neighbour, those of the others lie within the margins.
+                assert!(column.lanes != 0 && MARGIN >= LANES);
+                memory::push(&mut self.runs, Run { offset, header })
+            }
+            Neighbours::Gather(neighbours) => {
+                assert!(
+                    neighbours
+                        .iter()
+                        .all(|&neighbour| (neighbour as usize) < self.node_count)
+                );
+                if self.is_near(&column.neighbours) {
+                    let indices = neighbours.map(|neighbour| (neighbour as usize - self.window) as u16);
+                    memory::push(&mut self.near, header)?;
+                    memory::push(&mut self.near_indices, NearIndices(indices))
+                } else {
+                    memory::push(&mut self.far, header)?;
+                    memory::push(&mut self.far_indices, FarIndices(neighbours))
+                }
+            }
+        }
+    }
+
+    fn is_near(&self, neighbours: &Neighbours) -> bool {
+        let near = self.window..self.window + WINDOW;
+        matches!(neighbours, Neighbours::Gather(nodes) if nodes.iter().all(|&node| near.contains(&(node as usize))))
+    }
+
+    fn is_far(&self, neighbours: &Neighbours) -> bool {
+        matches!(neighbours, Neighbours::Gather(_)) && !self.is_near(neighbours)
+    }
+
+    fn push_parameters(&mut self, parameters: &Parameters) -> Result<u16> {
+        match parameters {
+            &Parameters::Shared(material) => {
+                assert!(material != OWN);
+                Ok(material)
+            }
+            Parameters::Own {
+                stiffnesses,
+                rest_lengths,
+                dampings,
+            } => {
+                memory::push(&mut self.own_rest_lengths, *rest_lengths)?;
+                if self.own_stiffness.is_nan() {
+                    memory::push(&mut self.own_stiffnesses, *stiffnesses)?;
+                }
+                if self.damped {
+                    memory::push(&mut self.own_dampings, *dampings)?;
+                }
+                Ok(OWN)
+            }
+        }
+    }
+
+    /// Gives back what was reserved too much while columns were put in.
+    pub fn shrink(&mut self) {
+        self.blocks.shrink_to_fit();
+        self.runs.shrink_to_fit();
+        self.near.shrink_to_fit();
+        self.near_indices.shrink_to_fit();
+        self.far.shrink_to_fit();
+        self.far_indices.shrink_to_fit();
+        self.own_rest_lengths.shrink_to_fit();
+        self.own_stiffnesses.shrink_to_fit();
+        self.own_dampings.shrink_to_fit();
+    }
+
+    /// Links beside the columns.
+    pub fn strays(&self) -> &Strays {
+        &self.strays
+    }
+
+    pub fn strays_mut(&mut self) -> &mut Strays {
+        &mut self.strays
+    }
+
+    /// Bytes in use, and bytes held from the allocator.
+    pub fn bytes(&self) -> (usize, usize) {
+        let (strays, strays_held) = self.strays.bytes();
+        let used = size_of_val(&*self.blocks)
+            + size_of_val(&*self.runs)
+            + size_of_val(&*self.near)
+            + size_of_val(&*self.near_indices)
+            + size_of_val(&*self.far)
+            + size_of_val(&*self.far_indices)
+            + size_of_val(&*self.own_rest_lengths)
+            + size_of_val(&*self.own_stiffnesses)
+            + size_of_val(&*self.own_dampings);
+        let held = held(&self.blocks)
+            + held(&self.runs)
+            + held(&self.near)
+            + held(&self.near_indices)
+            + held(&self.far)
+            + held(&self.far_indices)
+            + held(&self.own_rest_lengths)
+            + held(&self.own_stiffnesses)
+            + held(&self.own_dampings);
+        (used + strays, held + strays_held)
+    }
+
+    /// Shows the links of `node`.
+    pub fn visit(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
+        self.visit_columns(node, materials, see);
+        self.strays.visit(node, see);
+    }
+
+    /// Shows the links of `node` that are in columns.
+    pub(super) fn visit_columns(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
+        let lane = (node - self.first) % LANES;
+        self.columns_of(node, &mut |_, own, header, neighbour| {
+            if header.lanes >> lane & 1 == 1 {
+                see(self.link(header, own, lane, neighbour, materials));
+            }
+        });
+    }
+
+    /// Takes out the link from `node` to `neighbour`; whether there was one.
+    pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
+        let lane = (node - self.first) % LANES;
+        let mut place = None;
+        self.columns_of(node, &mut |found, _, header, other| {
+            if header.lanes >> lane & 1 == 1 && other == neighbour {
+                place = Some(found);
+            }
+        });
+        let keep = !(1_u16 << lane);
+        match place {
+            Some(Found::Run(run)) => self.runs[run].header.lanes &= keep,
+            Some(Found::Near(near)) => self.near[near].lanes &= keep,
+            Some(Found::Far(far)) => self.far[far].lanes &= keep,
+            None => return self.strays.remove(node, neighbour),
+        }
+        true
+    }
+
+    /// Shows the columns of the block of `node`: place, place among those with parameters of their own, header, and the
+    /// neighbour in the node's lane.
+    fn columns_of(&self, node: usize, see: &mut dyn FnMut(Found, usize, Header, usize)) {
+        let place = node - self.first;
+        let (block, lane) = (place / LANES, place % LANES);
+        let (start, end) = self.ends(block);
+        let mut own = start.own as usize;
+        let mut see = |found, header: Header, neighbour| {
+            see(found, own, header, neighbour);
+            own += usize::from(header.material == OWN);
+        };
+        for run in start.runs as usize..end.runs as usize {
+            let Run { offset, header } = self.runs[run];
+            // In a lane that is not set this may be no node.
+            see(Found::Run(run), header, node.wrapping_add_signed(offset as isize));
+        }
+        for near in start.near as usize..end.near as usize {
+            let neighbour = self.window + usize::from(self.near_indices[near].0[lane]);
+            see(Found::Near(near), self.near[near], neighbour);
+        }
+        for far in start.far as usize..end.far as usize {
+            see(Found::Far(far), self.far[far], self.far_indices[far].0[lane] as usize);
+        }
+    }
+
+    fn link(&self, header: Header, own: usize, lane: usize, neighbour: usize, materials: &[Material]) -> Link {
+        let material = match header.material() {
+            Some(material) => materials[material],
+            None => Material {
+                stiffness: self
+                    .own_stiffnesses
+                    .get(own)
+                    .map_or(self.own_stiffness, |line| line.0[lane]),
+                rest_length: self.own_rest_lengths[own].0[lane],
+                damping: self.own_dampings.get(own).map_or(0.0, |line| line.0[lane]),
+            },
+        };
+        Link {
+            neighbour: neighbour as u32,
+            stiffness: material.stiffness,
+            rest_length: material.rest_length,
+            damping: material.damping,
+        }
+    }
+
+    /// Where the columns of a block start and end.
+    #[inline(always)]
+    pub(super) fn ends(&self, block: usize) -> (Ends, Ends) {
+        let start = if block == 0 {
+            Ends::default()
+        } else {
+            self.blocks[block - 1]
+        };
+        (start, self.blocks[block])
+    }
+}
+
+fn held<T>(values: &Vec<T>) -> usize {
+    values.capacity() * size_of::<T>()
+}
+
+fn set_lanes(lanes: u16) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |&lane| lanes >> lane & 1 == 1)
+}

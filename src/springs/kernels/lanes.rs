@@ -1,0 +1,48 @@
+//! What the spring kernel asks of a processor: some numbers side by side.
+
+/// A few `f32` side by side, and what the spring kernel does with them.
+///
+/// # Safety
+/// Every function is called only where the processor has the implementation's instructions; functions that take a pointer
+/// also ask for what they say.
+pub(super) trait Lanes: Copy {
+    /// How many; divides 16.
+    const COUNT: usize;
+
+    /// The same number in all.
+    unsafe fn splat(value: f32) -> Self;
+
+    /// `COUNT` numbers from `from`, readable and aligned to 4 bytes.
+    unsafe fn load(from: *const f32) -> Self;
+
+    /// To `COUNT` numbers at `to`, writable and aligned to 4 bytes.
+    unsafe fn store(self, to: *mut f32);
+
+    /// `base[indices[lane]]` for `COUNT` readable indices that are all less than 2^31 and lead to readable numbers.
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self;
+
+    /// The same with small indices.
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self;
+
+    unsafe fn subtract(self, other: Self) -> Self;
+
+    unsafe fn multiply(self, other: Self) -> Self;
+
+    /// `self * factor + summand`
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self;
+
+    /// `summand - self * factor`
+    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self;
+
+    /// 1 over the square root, within 2^-22 of it for normal numbers.
+    unsafe fn inverse_root(self) -> Self;
+
+    /// 0 in the lanes whose bit in `mask` is not set.
+    unsafe fn where_set(self, mask: u32) -> Self;
+
+    /// The lesser of each lane of both; `self` in the lanes whose bit in `mask` is not set.
+    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self;
+
+    /// Whether any lane is at most `limit`.
+    unsafe fn any_at_most(self, limit: f32) -> bool;
+}

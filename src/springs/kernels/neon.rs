@@ -1,0 +1,97 @@
+//! Four lanes of AArch64's NEON.
+
+use std::arch::aarch64::*;
+
+use super::lanes::Lanes;
+
+#[derive(Clone, Copy)]
+pub(super) struct NeonLanes(float32x4_t);
+
+/// All bits of the lanes whose bit in `mask` is set.
+#[inline(always)]
+unsafe fn spread(mask: u32) -> uint32x4_t {
+    const BITS: [u32; 4] = [1, 2, 4, 8];
+    // SAFETY: every processor of this kind has the instructions; four numbers are read.
+    unsafe { vtstq_u32(vdupq_n_u32(mask), vld1q_u32(BITS.as_ptr())) }
+}
+
+// SAFETY of every block: every processor of this kind has the instructions, and the caller promises that what pointers lead
+// to is there; no load or store here asks for more than the alignment of a number.
+#[allow(clippy::undocumented_unsafe_blocks)]
+impl Lanes for NeonLanes {
+    const COUNT: usize = 4;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self(unsafe { vdupq_n_f32(value) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        Self(unsafe { vld1q_f32(from) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { vst1q_f32(to, self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.add(*indices.add(lane) as usize) });
+        Self(unsafe { vld1q_f32(values.as_ptr()) })
+    }
+
+    #[inline(always)]
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
+        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.add(usize::from(*indices.add(lane))) });
+        Self(unsafe { vld1q_f32(values.as_ptr()) })
+    }
+
+    #[inline(always)]
+    unsafe fn subtract(self, other: Self) -> Self {
+        Self(unsafe { vsubq_f32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply(self, other: Self) -> Self {
+        Self(unsafe { vmulq_f32(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { vfmaq_f32(summand.0, self.0, factor.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { vfmsq_f32(summand.0, self.0, factor.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe {
+            let guess = vrsqrteq_f32(self.0);
+            // Eight bits are known, then sixteen, then what f32 holds.
+            let guess = vmulq_f32(guess, vrsqrtsq_f32(vmulq_f32(self.0, guess), guess));
+            let error = vfmsq_f32(vdupq_n_f32(1.0), vmulq_f32(self.0, guess), guess);
+            let half = vmulq_f32(guess, vdupq_n_f32(0.5));
+            Self(vfmaq_f32(guess, half, error))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn where_set(self, mask: u32) -> Self {
+        Self(unsafe { vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(self.0), spread(mask))) })
+    }
+
+    #[inline(always)]
+    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
+        Self(unsafe { vbslq_f32(spread(mask), vminq_f32(other.0, self.0), self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn any_at_most(self, limit: f32) -> bool {
+        unsafe { vmaxvq_u32(vcleq_f32(self.0, vdupq_n_f32(limit))) != 0 }
+    }
+}

@@ -1,0 +1,87 @@
+//! Four lanes in plain Rust, with the same bits on every processor: exact roots and quotients, no fused operations.
+
+use std::array::from_fn;
+
+use super::lanes::Lanes;
+
+#[derive(Clone, Copy)]
+pub(super) struct PortableLanes([f32; 4]);
+
+impl Lanes for PortableLanes {
+    const COUNT: usize = 4;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self([value; 4])
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: the caller's promise.
+        Self(unsafe { from.cast::<[f32; 4]>().read() })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: the caller's promise.
+        unsafe { to.cast::<[f32; 4]>().write(self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+        // SAFETY: the caller's promise.
+        Self(from_fn(|lane| unsafe { *base.add(*indices.add(lane) as usize) }))
+    }
+
+    #[inline(always)]
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
+        // SAFETY: the caller's promise.
+        Self(from_fn(|lane| unsafe { *base.add(usize::from(*indices.add(lane))) }))
+    }
+
+    #[inline(always)]
+    unsafe fn subtract(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] - other.0[lane]))
+    }
+
+    #[inline(always)]
+    unsafe fn multiply(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] * other.0[lane]))
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] * factor.0[lane] + summand.0[lane]))
+    }
+
+    #[inline(always)]
+    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
+        Self(from_fn(|lane| summand.0[lane] - self.0[lane] * factor.0[lane]))
+    }
+
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        Self(self.0.map(|value| 1.0 / value.sqrt()))
+    }
+
+    #[inline(always)]
+    unsafe fn where_set(self, mask: u32) -> Self {
+        Self(from_fn(|lane| if mask >> lane & 1 == 1 { self.0[lane] } else { 0.0 }))
+    }
+
+    #[inline(always)]
+    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
+        Self(from_fn(|lane| {
+            if mask >> lane & 1 == 1 && other.0[lane] < self.0[lane] {
+                other.0[lane]
+            } else {
+                self.0[lane]
+            }
+        }))
+    }
+
+    #[inline(always)]
+    unsafe fn any_at_most(self, limit: f32) -> bool {
+        self.0.into_iter().any(|value| value <= limit)
+    }
+}

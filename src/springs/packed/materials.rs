@@ -1,0 +1,124 @@
+//! The few kinds of spring that most of a body's springs are.
+
+use crate::body::Spring;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::kernels::Material;
+
+/// How many springs are looked at to find the kinds.
+const SAMPLE: usize = 4096;
+
+/// The share of the sample that a kind needs: with fewer springs of each, an entry in a table is no gain.
+const SHARE: usize = 50;
+
+/// Rest lengths that come from positions are merged where they differ by no more than this part of themselves, however
+/// coarse the positions.
+const LARGEST_MERGER: f32 = 1e-3;
+
+/// What rest lengths may differ by, to be one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rounding {
+    /// The largest coordinate that they were computed from, m; 0 where they were given.
+    pub reach: f32,
+}
+
+impl Rounding {
+    /// The width within which rest lengths of about this length are one, m.
+    fn width(self, length: f32) -> f32 {
+        // Each end is rounded by up to half a unit in the last place along each axis, and so are the length and its ends'
+        // difference.
+        let rounded = 4.0 * f32::EPSILON * self.reach;
+        (4.0 * f32::EPSILON * length).max(rounded.min(LARGEST_MERGER * length))
+    }
+}
+
+/// A kind, and the rest lengths that are its own.
+#[derive(Clone, Copy, Debug)]
+struct Kind {
+    material: Material,
+    shortest: f32,
+    longest: f32,
+}
+
+/// The kinds of spring in a body.
+#[derive(Debug, Default)]
+pub(super) struct Kinds {
+    kinds: Vec<Kind>,
+}
+
+impl Kinds {
+    /// The kinds that are common among `springs`.
+    pub fn of(springs: &[Spring], rounding: Rounding) -> Result<Self> {
+        let mut sample: Vec<&Spring> = memory::reserved(SAMPLE.min(springs.len()))?;
+        let count = SAMPLE.min(springs.len());
+        sample.extend((0..count).map(|index| &springs[index * springs.len() / count]));
+        let order = |a: &&Spring, b: &&Spring| {
+            a.stiffness
+                .total_cmp(&b.stiffness)
+                .then(a.damping.total_cmp(&b.damping))
+                .then(a.rest_length.total_cmp(&b.rest_length))
+        };
+        sample.sort_unstable_by(order);
+        let mut found = Self {
+            kinds: memory::reserved(SHARE)?,
+        };
+        let mut rest = &*sample;
+        while let Some(first) = rest.first() {
+            let width = rounding.width(first.rest_length);
+            let same = |spring: &&Spring| {
+                spring.stiffness == first.stiffness
+                    && spring.damping == first.damping
+                    && spring.rest_length - first.rest_length <= width
+            };
+            let count = rest.iter().take_while(|spring| same(spring)).count();
+            if count * SHARE >= sample.len() {
+                let (shortest, longest) = (first.rest_length, rest[count - 1].rest_length);
+                let middle = 0.5 * (shortest + longest);
+                // The sample may have missed the shortest and the longest.
+                found.kinds.push(Kind {
+                    material: Material {
+                        stiffness: first.stiffness,
+                        rest_length: middle,
+                        damping: first.damping,
+                    },
+                    shortest: middle - 0.5 * width,
+                    longest: middle + 0.5 * width,
+                });
+            }
+            rest = &rest[count..];
+        }
+        Ok(found)
+    }
+
+    /// The table that a spring's kind is a place in.
+    pub fn materials(&self) -> Result<Vec<Material>> {
+        let mut materials = memory::reserved(self.kinds.len())?;
+        materials.extend(self.kinds.iter().map(|kind| kind.material));
+        Ok(materials)
+    }
+
+    /// Bytes held from the allocator.
+    pub fn bytes(&self) -> usize {
+        self.kinds.capacity() * size_of::<Kind>()
+    }
+
+    /// The place of the kind that a spring is of by its definition; `None`: it is one of its own.
+    #[inline]
+    pub fn find(&self, spring: &Spring) -> Option<u16> {
+        self.place(|kind| {
+            kind.material.stiffness == spring.stiffness
+                && kind.material.damping == spring.damping
+                && (kind.shortest..=kind.longest).contains(&spring.rest_length)
+        })
+    }
+
+    /// The place of the kind that has just these parameters.
+    #[inline]
+    pub fn find_exactly(&self, material: &Material) -> Option<u16> {
+        self.place(|kind| kind.material == *material)
+    }
+
+    fn place(&self, is: impl FnMut(&Kind) -> bool) -> Option<u16> {
+        self.kinds.iter().position(is).map(|place| place as u16)
+    }
+}

@@ -1,0 +1,250 @@
+//! PACKED: springs laid out for the processor.
+//!
+//! Each spring is kept at both of its nodes, so that the force on a node is a sum over its own links, nothing is written
+//! but that node, and tiles can be worked on in any order. The links of a tile are packed into columns, which sixteen nodes
+//! side by side share. A spring that is removed leaves a lane empty; one that is added goes beside the columns. A tile
+//! is packed again when it has many of either.
+
+mod materials;
+mod pack;
+
+use materials::Kinds;
+pub(crate) use materials::Rounding;
+use pack::{Loose, NO_KIND, pack};
+
+use super::kernels::{ChosenKernel, Columns, Material};
+use super::{Link, Springs, TILE, TileForces, tile_count, tile_nodes};
+use crate::body::{Spring, Vectors};
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// How many links may be added to a tile before it is packed again.
+const ADDED: usize = 256;
+
+/// A tile's links, and how much they have changed since they were packed.
+#[derive(Debug)]
+struct Tile {
+    columns: Columns,
+    /// Links when it was packed.
+    links: usize,
+    /// Those that were strays then.
+    strays: usize,
+    removed: usize,
+}
+
+impl Tile {
+    fn new(columns: Columns, links: usize) -> Self {
+        Self {
+            links,
+            strays: columns.strays().len(),
+            removed: 0,
+            columns,
+        }
+    }
+
+    /// Whether so much has changed since it was packed that it pays to pack it again.
+    fn is_worn(&self) -> bool {
+        self.columns.strays().len() > self.strays + self.strays / 2 + ADDED || self.removed > self.links / 2 + ADDED
+    }
+}
+
+impl From<&Spring> for Material {
+    fn from(spring: &Spring) -> Self {
+        Self {
+            stiffness: spring.stiffness,
+            rest_length: spring.rest_length,
+            damping: spring.damping,
+        }
+    }
+}
+
+/// Springs in columns.
+#[derive(Debug)]
+pub(crate) struct Packed {
+    kernel: ChosenKernel,
+    node_count: usize,
+    spring_count: usize,
+    damped: bool,
+    kinds: Kinds,
+    materials: Vec<Material>,
+    tiles: Vec<Tile>,
+}
+
+impl Packed {
+    /// Packs `springs` of `node_count` nodes.
+    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], rounding: Rounding) -> Result<Self> {
+        let kinds = Kinds::of(springs, rounding)?;
+        let mut packed = Self {
+            kernel,
+            node_count,
+            spring_count: springs.len(),
+            damped: springs.iter().any(|spring| spring.damping != 0.0),
+            materials: kinds.materials()?,
+            kinds,
+            tiles: memory::reserved(tile_count(node_count))?,
+        };
+        // The ends of springs in the order of their nodes: a counting sort.
+        let mut firsts = memory::filled(0_usize, node_count + 1)?;
+        for spring in springs {
+            for node in spring.nodes {
+                firsts[node as usize + 1] += 1;
+            }
+        }
+        for node in 0..node_count {
+            firsts[node + 1] += firsts[node];
+        }
+        let mut ends = memory::filled((0_u32, 0_u32), 2 * springs.len())?;
+        for (index, &Spring { nodes: [a, b], .. }) in springs.iter().enumerate() {
+            for (node, neighbour) in [(a, b), (b, a)] {
+                let place = &mut firsts[node as usize];
+                ends[*place] = (neighbour, index as u32);
+                *place += 1;
+            }
+        }
+        // By now each entry is where the node's ends end.
+        let mut links = Vec::new();
+        for tile in 0..tile_count(node_count) {
+            let nodes = tile_nodes(tile, node_count);
+            links.clear();
+            let start = |node: usize| if node == 0 { 0 } else { firsts[node - 1] };
+            links.try_reserve(firsts[nodes.end - 1] - start(nodes.start))?;
+            for node in nodes.clone() {
+                for &(neighbour, index) in &ends[start(node)..firsts[node]] {
+                    let spring = &springs[index as usize];
+                    let kind = packed.kinds.find(spring);
+                    links.push(Loose {
+                        node: node as u32,
+                        neighbour,
+                        kind: kind.unwrap_or(NO_KIND),
+                        own: kind.map_or(spring.into(), |kind| packed.materials[usize::from(kind)]),
+                    });
+                }
+            }
+            let count = links.len();
+            let columns = pack(nodes, node_count, packed.damped, &mut links)?;
+            packed.tiles.push(Tile::new(columns, count));
+        }
+        Ok(packed)
+    }
+
+    fn tile(&self, node: u32) -> &Tile {
+        &self.tiles[node as usize / TILE]
+    }
+
+    fn tile_mut(&mut self, node: u32) -> &mut Tile {
+        &mut self.tiles[node as usize / TILE]
+    }
+
+    fn has(&self, a: u32, b: u32) -> bool {
+        let mut found = false;
+        self.visit(a as usize, &mut |link| found |= link.neighbour == b);
+        found
+    }
+
+    /// Packs the tile of `node` again where that pays; where there is no memory for it, it stays as it is.
+    fn mend(&mut self, node: u32) {
+        if self.tile(node).is_worn()
+            && let Ok(tile) = self.repacked(node as usize / TILE)
+        {
+            *self.tile_mut(node) = tile;
+        }
+    }
+
+    fn repacked(&self, tile: usize) -> Result<Tile> {
+        let nodes = tile_nodes(tile, self.node_count);
+        let mut links = Vec::new();
+        for node in nodes.clone() {
+            let mut room = Ok(());
+            self.visit(node, &mut |link| {
+                let own = Material {
+                    stiffness: link.stiffness,
+                    rest_length: link.rest_length,
+                    damping: link.damping,
+                };
+                if room.is_ok() {
+                    let loose = Loose {
+                        node: node as u32,
+                        neighbour: link.neighbour,
+                        kind: self.kinds.find_exactly(&own).unwrap_or(NO_KIND),
+                        own,
+                    };
+                    room = memory::push(&mut links, loose);
+                }
+            });
+            room?;
+        }
+        let count = links.len();
+        let columns = pack(nodes, self.node_count, self.damped, &mut links)?;
+        Ok(Tile::new(columns, count))
+    }
+}
+
+impl Springs for Packed {
+    fn damped(&self) -> bool {
+        self.damped
+    }
+
+    fn spring_count(&self) -> usize {
+        self.spring_count
+    }
+
+    fn bytes(&self) -> (usize, usize) {
+        let tables = size_of_val(&*self.materials);
+        let mut used = size_of_val(&*self.tiles) + tables;
+        let mut held = self.tiles.capacity() * size_of::<Tile>() + tables + self.kinds.bytes();
+        for tile in &self.tiles {
+            let (tile_used, tile_held) = tile.columns.bytes();
+            used += tile_used;
+            held += tile_held;
+        }
+        (used, held)
+    }
+
+    fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
+        self.tile(node as u32).columns.visit(node, &self.materials, see);
+    }
+
+    fn forces(&self, tile: usize, positions: &Vectors, velocities: Option<&Vectors>, forces: &mut TileForces) {
+        let columns = &self.tiles[tile].columns;
+        columns.forces(self.kernel, &self.materials, positions, velocities, forces);
+    }
+
+    fn add(&mut self, spring: &Spring) -> Result<()> {
+        let [a, b] = spring.nodes;
+        if self.has(a, b) {
+            return Err(Error::invalid(format!("nodes {a} and {b} have a spring already")));
+        }
+        for node in [a, b] {
+            // Both ends may be in one tile.
+            self.tile_mut(node).columns.strays_mut().reserve(2)?;
+        }
+        for (node, neighbour) in [(a, b), (b, a)] {
+            let link = Link {
+                neighbour,
+                stiffness: spring.stiffness,
+                rest_length: spring.rest_length,
+                damping: if self.damped { spring.damping } else { 0.0 },
+            };
+            self.tile_mut(node).columns.strays_mut().insert(node as usize, &link);
+        }
+        self.spring_count += 1;
+        self.mend(a);
+        self.mend(b);
+        Ok(())
+    }
+
+    fn remove(&mut self, a: u32, b: u32) -> Result<()> {
+        if !self.has(a, b) {
+            return Err(Error::invalid(format!("nodes {a} and {b} have no spring")));
+        }
+        for (node, neighbour) in [(a, b), (b, a)] {
+            let tile = self.tile_mut(node);
+            tile.columns.remove(node as usize, neighbour as usize);
+            tile.removed += 1;
+        }
+        self.spring_count -= 1;
+        self.mend(a);
+        self.mend(b);
+        Ok(())
+    }
+}
