@@ -68,18 +68,13 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
-        Self(unsafe { _mm256_fnmadd_ps(self.0, factor.0, summand.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn inverse_root(self) -> Self {
+    unsafe fn roots(self) -> (Self, Self) {
         unsafe {
+            // The guess has twelve bits: too few for a root by one correction, enough for its inverse.
+            let root = _mm256_sqrt_ps(self.0);
             let guess = _mm256_rsqrt_ps(self.0);
-            // Twelve bits are known: one step of order 3 (Householder) gives what f32 holds.
-            let error = _mm256_fnmadd_ps(_mm256_mul_ps(self.0, guess), guess, _mm256_set1_ps(1.0));
-            let factor = _mm256_fmadd_ps(error, _mm256_set1_ps(0.375), _mm256_set1_ps(0.5));
-            Self(_mm256_fmadd_ps(_mm256_mul_ps(guess, error), factor, guess))
+            let error = _mm256_fnmadd_ps(root, guess, _mm256_set1_ps(1.0));
+            (Self(root), Self(_mm256_fmadd_ps(guess, error, guess)))
         }
     }
 

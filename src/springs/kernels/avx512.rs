@@ -57,18 +57,15 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
-        Self(unsafe { _mm512_fnmadd_ps(self.0, factor.0, summand.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn inverse_root(self) -> Self {
+    unsafe fn roots(self) -> (Self, Self) {
         unsafe {
             let guess = _mm512_rsqrt14_ps(self.0);
-            // Newton's step, as a correction: what is rounded is small.
-            let error = _mm512_fnmadd_ps(_mm512_mul_ps(self.0, guess), guess, _mm512_set1_ps(1.0));
-            let half = _mm512_mul_ps(guess, _mm512_set1_ps(0.5));
-            Self(_mm512_fmadd_ps(half, error, guess))
+            // Newton's steps as corrections: what is rounded in them is small.
+            let root = _mm512_mul_ps(self.0, guess);
+            let rest = _mm512_fnmadd_ps(root, root, self.0);
+            let root = _mm512_fmadd_ps(_mm512_mul_ps(guess, _mm512_set1_ps(0.5)), rest, root);
+            let error = _mm512_fnmadd_ps(root, guess, _mm512_set1_ps(1.0));
+            (Self(root), Self(_mm512_fmadd_ps(guess, error, guess)))
         }
     }
 

@@ -1,6 +1,6 @@
 //! The spring forces on the nodes of a tile, as many nodes at a time as the processor has lanes.
 //!
-//! The force of a spring is `k (1 - L0 / L) d` for the way d of length L to its other end. Both ends compute it in the same
+//! The force of a spring is `k (L - L0) / L d` for the way d of length L to its other end. Both ends compute it in the same
 //! way, with opposite signs: no momentum is lost to rounding but where forces are added up.
 
 use glam::Vec3;
@@ -273,12 +273,10 @@ impl<L: Lanes> Sums<L> {
             let way = difference(there.position, here.position);
             let squared = dot(way, way);
             self.least = self.least.lesser_where(lanes, squared);
-            let inverse = squared.inverse_root();
-            let one = L::splat(1.0);
-            let mut factor = spring
-                .rest_length
-                .subtract_from(inverse, one)
-                .multiply(spring.stiffness);
+            let (length, inverse) = squared.roots();
+            // The stretch is exact where it is small: a product with the inverse would not be.
+            let tension = length.subtract(spring.rest_length).multiply(spring.stiffness);
+            let mut factor = tension.multiply(inverse);
             if DAMPED {
                 let rate = dot(way, difference(there.velocity, here.velocity));
                 let rate = rate.multiply(inverse).multiply(inverse);

@@ -31,11 +31,8 @@ pub(super) trait Lanes: Copy {
     /// `self * factor + summand`
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self;
 
-    /// `summand - self * factor`
-    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self;
-
-    /// 1 over the square root, within 2^-22 of it for normal numbers.
-    unsafe fn inverse_root(self) -> Self;
+    /// The square root, within 0.51 units in its last place, and 1 over it, within 2^-22 of it; for normal numbers.
+    unsafe fn roots(self) -> (Self, Self);
 
     /// 0 in the lanes whose bit in `mask` is not set.
     unsafe fn where_set(self, mask: u32) -> Self;

@@ -64,19 +64,10 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
-        Self(unsafe { vfmsq_f32(summand.0, self.0, factor.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn inverse_root(self) -> Self {
+    unsafe fn roots(self) -> (Self, Self) {
         unsafe {
-            let guess = vrsqrteq_f32(self.0);
-            // Eight bits are known, then sixteen, then what f32 holds.
-            let guess = vmulq_f32(guess, vrsqrtsq_f32(vmulq_f32(self.0, guess), guess));
-            let error = vfmsq_f32(vdupq_n_f32(1.0), vmulq_f32(self.0, guess), guess);
-            let half = vmulq_f32(guess, vdupq_n_f32(0.5));
-            Self(vfmaq_f32(guess, half, error))
+            let root = vsqrtq_f32(self.0);
+            (Self(root), Self(vdivq_f32(vdupq_n_f32(1.0), root)))
         }
     }
 

@@ -55,13 +55,9 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn subtract_from(self, factor: Self, summand: Self) -> Self {
-        Self(from_fn(|lane| summand.0[lane] - self.0[lane] * factor.0[lane]))
-    }
-
-    #[inline(always)]
-    unsafe fn inverse_root(self) -> Self {
-        Self(self.0.map(|value| 1.0 / value.sqrt()))
+    unsafe fn roots(self) -> (Self, Self) {
+        let root = self.0.map(f32::sqrt);
+        (Self(root), Self(root.map(|root| 1.0 / root)))
     }
 
     #[inline(always)]
