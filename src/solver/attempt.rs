@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::gravity::GravityKicks;
-use super::stability::{Stability, substep_stable_anywhere};
+use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
 use crate::contact::{Contacts, ToolPath};
@@ -13,6 +13,10 @@ const RESERVE: f32 = 0.8;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 4;
+
+/// A step with more substeps than this looks whether the positions allow longer ones: an estimate takes about as long as
+/// so many.
+const WORTH_ESTIMATING: f32 = 8.0;
 
 /// What is asked of a step.
 pub(crate) struct StepRequest<'a> {
@@ -53,9 +57,15 @@ pub(crate) enum Outcome {
 /// Takes a step of `body` without making it current.
 pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
     body.refresh_forces();
-    let stability = match body.carry.stability.limit {
-        Some(_) => body.carry.stability,
-        None => Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions()),
+    let known = body.carry.stability;
+    let is_worth_estimating = || {
+        let substeps = request.dt / (RESERVE * known.anywhere);
+        request.substeps == 0 && known.is_coarse() && substeps > WORTH_ESTIMATING
+    };
+    let stability = if known.limit.is_none() || is_worth_estimating() {
+        Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions())
+    } else {
+        known
     };
     let start = Carry {
         stability,
@@ -85,7 +95,7 @@ fn run_stably(body: &mut Body, request: &StepRequest, start: Carry) -> Result<(u
     let mut stable_substep = start.stability.limit.unwrap_or(f32::INFINITY);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
-            stable_substep = substep_stable_anywhere(&*body.springs, &body.inverse_masses);
+            stable_substep = start.stability.anywhere;
         }
         let needed = (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil();
         if needed > f64::from(request.max_substeps) {

@@ -24,12 +24,15 @@ pub(crate) struct Stability {
     pub limit: Option<f32>,
     /// How far neighbours may still move against each other before the estimate is stale, m.
     pub reach: f32,
+    /// The longest substep that is stable wherever the nodes are, s; 0 where `limit` is not known.
+    pub anywhere: f32,
 }
 
 impl Stability {
     pub const UNKNOWN: Self = Self {
         limit: None,
         reach: 0.0,
+        anywhere: 0.0,
     };
 
     /// Whether the estimate still holds after neighbours have moved against each other by up to `travel` more.
@@ -38,11 +41,26 @@ impl Stability {
         self.reach >= 0.0
     }
 
+    /// The same, where `substep` is so short that the nodes may be anywhere: an estimate that never gets stale.
+    pub fn for_short(self, substep: f32) -> Option<Self> {
+        (substep <= self.anywhere).then_some(Self {
+            limit: Some(self.anywhere),
+            reach: f32::INFINITY,
+            ..self
+        })
+    }
+
+    /// Whether another estimate may allow longer substeps at the positions as they are now.
+    pub fn is_coarse(&self) -> bool {
+        self.reach == f32::INFINITY && self.limit.is_some_and(f32::is_finite)
+    }
+
     /// The longest stable substep at these positions, and how long that is true.
     pub fn estimate(springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
         let mut stiffest = 0.0_f32;
         let mut most_damped = 0.0_f32;
         let mut reach = f32::INFINITY;
+        let (mut stiffest_anywhere, mut most_damped_anywhere) = (0.0_f32, 0.0_f32);
         for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
             if inverse_mass == 0.0 {
                 continue;
@@ -51,6 +69,8 @@ impl Stability {
             let across = sums.across;
             stiffest = stiffest.max(sums.along.largest_eigenvalue_beyond(stiffest - across) + across);
             most_damped = sums.damping.largest_eigenvalue_beyond(most_damped);
+            stiffest_anywhere = stiffest_anywhere.max(sums.stiffness_anywhere);
+            most_damped_anywhere = most_damped_anywhere.max(sums.damping_anywhere);
             // Springs beyond the range of `f32` allow no substep at all.
             if !(sums.stiffness_anywhere.is_finite() && sums.damping_anywhere.is_finite()) {
                 stiffest = f32::INFINITY;
@@ -63,6 +83,7 @@ impl Stability {
         Self {
             limit: Some(limit(stiffest, most_damped)),
             reach: TRAVEL_BEFORE_ESTIMATE * reach,
+            anywhere: limit(stiffest_anywhere, most_damped_anywhere),
         }
     }
 }
@@ -127,26 +148,6 @@ impl Sums {
         });
         sums
     }
-}
-
-/// The longest substep that is stable whatever the positions, s: every spring's matrix is at most its stiffness times the unit matrix.
-pub(crate) fn substep_stable_anywhere(springs: &dyn Springs, inverse_masses: &[f32]) -> f32 {
-    let mut stiffest = 0.0_f32;
-    let mut most_damped = 0.0_f32;
-    for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
-        if inverse_mass == 0.0 {
-            continue;
-        }
-        let (mut stiffness, mut damping) = (0.0_f32, 0.0_f32);
-        springs.visit(node, &mut |link| {
-            let inverse_mass = inverse_mass + inverse_masses[link.neighbour as usize];
-            stiffness += link.stiffness * inverse_mass;
-            damping += link.damping * inverse_mass;
-        });
-        stiffest = stiffest.max(stiffness);
-        most_damped = most_damped.max(damping);
-    }
-    limit(stiffest, most_damped)
 }
 
 /// A symmetric 3x3 matrix.
