@@ -1,6 +1,7 @@
 //! Eight lanes of x86-64's AVX2, with fused multiply-add.
 
 use std::arch::x86_64::*;
+use std::array::from_fn;
 
 use super::lanes::Lanes;
 
@@ -68,13 +69,14 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn roots(self) -> (Self, Self) {
+    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
         unsafe {
             // The guess has twelve bits: too few for a root by one correction, enough for its inverse.
-            let root = _mm256_sqrt_ps(self.0);
-            let guess = _mm256_rsqrt_ps(self.0);
-            let error = _mm256_fnmadd_ps(root, guess, _mm256_set1_ps(1.0));
-            (Self(root), Self(_mm256_fmadd_ps(guess, error, guess)))
+            let roots = values.map(|value| _mm256_sqrt_ps(value.0));
+            let guesses = values.map(|value| _mm256_rsqrt_ps(value.0));
+            let errors: [__m256; N] = from_fn(|n| _mm256_fnmadd_ps(roots[n], guesses[n], _mm256_set1_ps(1.0)));
+            let inverses = from_fn(|n| Self(_mm256_fmadd_ps(guesses[n], errors[n], guesses[n])));
+            (roots.map(Self), inverses)
         }
     }
 
@@ -84,12 +86,7 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
-        Self(unsafe { _mm256_blendv_ps(self.0, _mm256_min_ps(other.0, self.0), spread(mask)) })
-    }
-
-    #[inline(always)]
-    unsafe fn any_at_most(self, limit: f32) -> bool {
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, _mm256_set1_ps(limit))) != 0 }
+    unsafe fn any_nan(self) -> bool {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_UNORD_Q>(self.0, self.0)) != 0 }
     }
 }

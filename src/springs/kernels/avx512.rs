@@ -1,6 +1,7 @@
 //! Sixteen lanes of x86-64's AVX-512.
 
 use std::arch::x86_64::*;
+use std::array::from_fn;
 
 use super::lanes::Lanes;
 
@@ -57,15 +58,17 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn roots(self) -> (Self, Self) {
+    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
         unsafe {
-            let guess = _mm512_rsqrt14_ps(self.0);
+            let guesses = values.map(|value| _mm512_rsqrt14_ps(value.0));
             // Newton's steps as corrections: what is rounded in them is small.
-            let root = _mm512_mul_ps(self.0, guess);
-            let rest = _mm512_fnmadd_ps(root, root, self.0);
-            let root = _mm512_fmadd_ps(_mm512_mul_ps(guess, _mm512_set1_ps(0.5)), rest, root);
-            let error = _mm512_fnmadd_ps(root, guess, _mm512_set1_ps(1.0));
-            (Self(root), Self(_mm512_fmadd_ps(guess, error, guess)))
+            let roots: [__m512; N] = from_fn(|n| _mm512_mul_ps(values[n].0, guesses[n]));
+            let rests: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], roots[n], values[n].0));
+            let halves = guesses.map(|guess| _mm512_mul_ps(guess, _mm512_set1_ps(0.5)));
+            let roots: [__m512; N] = from_fn(|n| _mm512_fmadd_ps(halves[n], rests[n], roots[n]));
+            let errors: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], guesses[n], _mm512_set1_ps(1.0)));
+            let inverses = from_fn(|n| Self(_mm512_fmadd_ps(guesses[n], errors[n], guesses[n])));
+            (roots.map(Self), inverses)
         }
     }
 
@@ -75,12 +78,7 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
-        Self(unsafe { _mm512_mask_min_ps(self.0, mask as __mmask16, other.0, self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn any_at_most(self, limit: f32) -> bool {
-        unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, _mm512_set1_ps(limit)) != 0 }
+    unsafe fn any_nan(self) -> bool {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_UNORD_Q>(self.0, self.0) != 0 }
     }
 }

@@ -74,33 +74,45 @@ pub(crate) struct Column {
     pub parameters: Parameters,
 }
 
-/// What the kernel needs to know of any column.
+/// A column of neighbours that lie side by side, of springs that share their parameters.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Header {
+pub(super) struct Run {
+    pub offset: i32,
+    pub lanes: u16,
+    /// Its place in the table of materials: what follows is a copy from there.
+    pub material: u16,
+    pub stiffness: f32,
+    pub rest_length: f32,
+}
+
+/// A column of neighbours that lie side by side, of springs that bring their own parameters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OwnRun {
+    pub offset: i32,
+    pub lanes: u16,
+}
+
+/// What there is to know of a gather beside its neighbours.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gather {
     pub lanes: u16,
     /// Its place in the table of materials; [`OWN`].
     material: u16,
 }
 
-impl Header {
-    /// Its place in the table of materials, where it is there.
+impl Gather {
+    /// Its place in the table of materials, where its springs share their parameters.
     #[inline(always)]
     pub fn material(self) -> Option<usize> {
         (self.material != OWN).then_some(usize::from(self.material))
     }
 }
 
-/// A column of neighbours that lie side by side.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
-    pub offset: i32,
-    pub header: Header,
-}
-
 /// Where the columns of sixteen nodes end in each list.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Ends {
     pub runs: u32,
+    pub own_runs: u32,
     pub near: u32,
     pub far: u32,
     pub own: u32,
@@ -128,9 +140,10 @@ pub(crate) struct Columns {
     pub(super) window: usize,
     pub(super) blocks: Vec<Ends>,
     pub(super) runs: Vec<Run>,
-    pub(super) near: Vec<Header>,
+    pub(super) own_runs: Vec<OwnRun>,
+    pub(super) near: Vec<Gather>,
     pub(super) near_indices: Vec<NearIndices>,
-    pub(super) far: Vec<Header>,
+    pub(super) far: Vec<Gather>,
     pub(super) far_indices: Vec<FarIndices>,
     /// The parameters of columns that bring their own, in the order of the blocks, and in a block runs first, then near and
     /// far gathers.
@@ -148,6 +161,7 @@ pub(crate) struct Columns {
 #[derive(Clone, Copy)]
 enum Found {
     Run(usize),
+    OwnRun(usize),
     Near(usize),
     Far(usize),
 }
@@ -167,6 +181,7 @@ impl Columns {
                 .min(node_count.saturating_sub(WINDOW)),
             blocks: Vec::new(),
             runs: Vec::new(),
+            own_runs: Vec::new(),
             near: Vec::new(),
             near_indices: Vec::new(),
             far: Vec::new(),
@@ -180,8 +195,8 @@ impl Columns {
         }
     }
 
-    /// The columns of the next sixteen nodes.
-    pub fn push_block(&mut self, columns: &[Column]) -> Result<()> {
+    /// The columns of the next sixteen nodes; those that are shared are of `materials`.
+    pub fn push_block(&mut self, columns: &[Column], materials: &[Material]) -> Result<()> {
         let first = self.first + self.blocks.len() * LANES;
         let nodes = (self.first + self.count).saturating_sub(first).min(LANES);
         assert!(nodes > 0, "a block beyond the tile's last node");
@@ -192,17 +207,17 @@ impl Columns {
         ];
         for kind in kinds {
             for column in columns {
-                if !kind(self, &column.neighbours) {
-                    continue;
+                if kind(self, &column.neighbours) {
+                    assert!(column.lanes != 0 && u32::from(column.lanes) < 1 << nodes);
+                    self.push_column(first, column, materials)?;
                 }
-                assert!(u32::from(column.lanes) < 1 << nodes, "a lane without a node");
-                self.push_column(first, column)?;
             }
         }
         memory::push(
             &mut self.blocks,
             Ends {
                 runs: self.runs.len() as u32,
+                own_runs: self.own_runs.len() as u32,
                 near: self.near.len() as u32,
                 far: self.far.len() as u32,
                 own: self.own_rest_lengths.len() as u32,
@@ -211,20 +226,31 @@ impl Columns {
     }
 
     /// A column of the sixteen nodes from `first` on.
-    fn push_column(&mut self, first: usize, column: &Column) -> Result<()> {
-        let header = Header {
-            lanes: column.lanes,
-            material: self.push_parameters(&column.parameters)?,
-        };
+    fn push_column(&mut self, first: usize, column: &Column, materials: &[Material]) -> Result<()> {
+        let Column { lanes, .. } = *column;
+        let material = self.push_parameters(&column.parameters)?;
         match column.neighbours {
             Neighbours::Run(offset) => {
-                for lane in set_lanes(column.lanes) {
+                // Where one lane has a neighbour, those of the others lie within the margins.
+                const { assert!(MARGIN >= LANES) };
+                for lane in set_lanes(lanes) {
                     let neighbour = (first + lane).checked_add_signed(offset as isize);
                     assert!(neighbour.is_some_and(|neighbour| neighbour < self.node_count));
                 }
-                // Where one lane has a neighbour, those of the others lie within the margins.
-                assert!(column.lanes != 0 && MARGIN >= LANES);
-                memory::push(&mut self.runs, Run { offset, header })
+                if material == OWN {
+                    return memory::push(&mut self.own_runs, OwnRun { offset, lanes });
+                }
+                let Material {
+                    stiffness, rest_length, ..
+                } = materials[usize::from(material)];
+                let run = Run {
+                    offset,
+                    lanes,
+                    material,
+                    stiffness,
+                    rest_length,
+                };
+                memory::push(&mut self.runs, run)
             }
             Neighbours::Gather(neighbours) => {
                 assert!(
@@ -232,12 +258,13 @@ impl Columns {
                         .iter()
                         .all(|&neighbour| (neighbour as usize) < self.node_count)
                 );
+                let gather = Gather { lanes, material };
                 if self.is_near(&column.neighbours) {
                     let indices = neighbours.map(|neighbour| (neighbour as usize - self.window) as u16);
-                    memory::push(&mut self.near, header)?;
+                    memory::push(&mut self.near, gather)?;
                     memory::push(&mut self.near_indices, NearIndices(indices))
                 } else {
-                    memory::push(&mut self.far, header)?;
+                    memory::push(&mut self.far, gather)?;
                     memory::push(&mut self.far_indices, FarIndices(neighbours))
                 }
             }
@@ -280,6 +307,7 @@ impl Columns {
     pub fn shrink(&mut self) {
         self.blocks.shrink_to_fit();
         self.runs.shrink_to_fit();
+        self.own_runs.shrink_to_fit();
         self.near.shrink_to_fit();
         self.near_indices.shrink_to_fit();
         self.far.shrink_to_fit();
@@ -303,6 +331,7 @@ impl Columns {
         let (strays, strays_held) = self.strays.bytes();
         let used = size_of_val(&*self.blocks)
             + size_of_val(&*self.runs)
+            + size_of_val(&*self.own_runs)
             + size_of_val(&*self.near)
             + size_of_val(&*self.near_indices)
             + size_of_val(&*self.far)
@@ -312,6 +341,7 @@ impl Columns {
             + size_of_val(&*self.own_dampings);
         let held = held(&self.blocks)
             + held(&self.runs)
+            + held(&self.own_runs)
             + held(&self.near)
             + held(&self.near_indices)
             + held(&self.far)
@@ -331,74 +361,87 @@ impl Columns {
     /// Shows the links of `node` that are in columns.
     pub(super) fn visit_columns(&self, node: usize, materials: &[Material], see: &mut dyn FnMut(Link)) {
         let lane = (node - self.first) % LANES;
-        self.columns_of(node, &mut |_, own, header, neighbour| {
-            if header.lanes >> lane & 1 == 1 {
-                see(self.link(header, own, lane, neighbour, materials));
-            }
+        self.columns_of(node, &mut |_, material, own, neighbour| {
+            let material = match material {
+                Some(material) => materials[material],
+                None => self.own_parameters(own, lane),
+            };
+            see(Link {
+                neighbour: neighbour as u32,
+                stiffness: material.stiffness,
+                rest_length: material.rest_length,
+                damping: material.damping,
+            });
         });
     }
 
     /// Takes out the link from `node` to `neighbour`; whether there was one.
     pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
-        let lane = (node - self.first) % LANES;
         let mut place = None;
-        self.columns_of(node, &mut |found, _, header, other| {
-            if header.lanes >> lane & 1 == 1 && other == neighbour {
+        self.columns_of(node, &mut |found, _, _, other| {
+            if other == neighbour {
                 place = Some(found);
             }
         });
-        let keep = !(1_u16 << lane);
-        match place {
-            Some(Found::Run(run)) => self.runs[run].header.lanes &= keep,
-            Some(Found::Near(near)) => self.near[near].lanes &= keep,
-            Some(Found::Far(far)) => self.far[far].lanes &= keep,
+        let lanes = match place {
+            Some(Found::Run(run)) => &mut self.runs[run].lanes,
+            Some(Found::OwnRun(run)) => &mut self.own_runs[run].lanes,
+            Some(Found::Near(near)) => &mut self.near[near].lanes,
+            Some(Found::Far(far)) => &mut self.far[far].lanes,
             None => return self.strays.remove(node, neighbour),
-        }
+        };
+        *lanes &= !(1 << ((node - self.first) % LANES));
         true
     }
 
-    /// Shows the columns of the block of `node`: place, place among those with parameters of their own, header, and the
-    /// neighbour in the node's lane.
-    fn columns_of(&self, node: usize, see: &mut dyn FnMut(Found, usize, Header, usize)) {
+    /// Shows the columns in which `node` has a link: place, place in the table of materials, place among those with parameters
+    /// of their own, and the neighbour.
+    fn columns_of(&self, node: usize, see: &mut dyn FnMut(Found, Option<usize>, usize, usize)) {
         let place = node - self.first;
         let (block, lane) = (place / LANES, place % LANES);
         let (start, end) = self.ends(block);
         let mut own = start.own as usize;
-        let mut see = |found, header: Header, neighbour| {
-            see(found, own, header, neighbour);
-            own += usize::from(header.material == OWN);
+        let mut see = |found, lanes: u16, material: Option<usize>, neighbour| {
+            if lanes >> lane & 1 == 1 {
+                see(found, material, own, neighbour);
+            }
+            own += usize::from(material.is_none());
         };
-        for run in start.runs as usize..end.runs as usize {
-            let Run { offset, header } = self.runs[run];
-            // In a lane that is not set this may be no node.
-            see(Found::Run(run), header, node.wrapping_add_signed(offset as isize));
+        // In a lane that is not set this may be no node.
+        let at = |offset: i32| node.wrapping_add_signed(offset as isize);
+        for index in start.runs as usize..end.runs as usize {
+            let run = &self.runs[index];
+            see(
+                Found::Run(index),
+                run.lanes,
+                Some(usize::from(run.material)),
+                at(run.offset),
+            );
         }
-        for near in start.near as usize..end.near as usize {
-            let neighbour = self.window + usize::from(self.near_indices[near].0[lane]);
-            see(Found::Near(near), self.near[near], neighbour);
+        for index in start.own_runs as usize..end.own_runs as usize {
+            let run = &self.own_runs[index];
+            see(Found::OwnRun(index), run.lanes, None, at(run.offset));
         }
-        for far in start.far as usize..end.far as usize {
-            see(Found::Far(far), self.far[far], self.far_indices[far].0[lane] as usize);
+        for index in start.near as usize..end.near as usize {
+            let gather = self.near[index];
+            let neighbour = self.window + usize::from(self.near_indices[index].0[lane]);
+            see(Found::Near(index), gather.lanes, gather.material(), neighbour);
+        }
+        for index in start.far as usize..end.far as usize {
+            let gather = self.far[index];
+            let neighbour = self.far_indices[index].0[lane] as usize;
+            see(Found::Far(index), gather.lanes, gather.material(), neighbour);
         }
     }
 
-    fn link(&self, header: Header, own: usize, lane: usize, neighbour: usize, materials: &[Material]) -> Link {
-        let material = match header.material() {
-            Some(material) => materials[material],
-            None => Material {
-                stiffness: self
-                    .own_stiffnesses
-                    .get(own)
-                    .map_or(self.own_stiffness, |line| line.0[lane]),
-                rest_length: self.own_rest_lengths[own].0[lane],
-                damping: self.own_dampings.get(own).map_or(0.0, |line| line.0[lane]),
-            },
-        };
-        Link {
-            neighbour: neighbour as u32,
-            stiffness: material.stiffness,
-            rest_length: material.rest_length,
-            damping: material.damping,
+    fn own_parameters(&self, own: usize, lane: usize) -> Material {
+        Material {
+            stiffness: self
+                .own_stiffnesses
+                .get(own)
+                .map_or(self.own_stiffness, |line| line.0[lane]),
+            rest_length: self.own_rest_lengths[own].0[lane],
+            damping: self.own_dampings.get(own).map_or(0.0, |line| line.0[lane]),
         }
     }
 

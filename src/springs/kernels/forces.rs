@@ -3,13 +3,15 @@
 //! The force of a spring is `k (L - L0) / L d` for the way d of length L to its other end. Both ends compute it in the same
 //! way, with opposite signs: no momentum is lost to rounding but where forces are added up.
 
+use std::array::from_fn;
+
 use glam::Vec3;
 
 use super::ChosenKernel;
-use super::columns::{Columns, LANES, Material};
+use super::columns::{Columns, LANES, Material, Run};
 use super::lanes::Lanes;
 use crate::body::{MARGIN, Vectors};
-use crate::springs::law::{SHORTEST, separation};
+use crate::springs::law::separation;
 use crate::springs::{Link, TileForces};
 
 impl Columns {
@@ -42,6 +44,10 @@ impl Columns {
         kernel.forces(TileLinks { tile, careful, forces });
     }
 }
+
+/// Runs that are worked on together: each step of one waits for the step before, and the processor can look only so far
+/// ahead for other work.
+const GROUP: usize = 4;
 
 /// The forces on a tile, for a kernel to compute.
 pub(super) struct TileLinks<'a> {
@@ -77,26 +83,44 @@ impl TileLinks<'_> {
     #[inline(always)]
     unsafe fn sum<L: Lanes, const DAMPED: bool>(self) {
         let Self { tile, careful, forces } = self;
-        for block in 0..tile.columns.blocks.len() {
-            for part in 0..LANES / L::COUNT {
-                // SAFETY: the same contract.
-                unsafe { tile.block::<L, DAMPED>(block, part, &careful, forces) };
+        let columns = tile.columns;
+        let parts = LANES / L::COUNT;
+        // Loop by loop, so that each has few addresses to keep. A grid needs no more than the first.
+        let runs_alone = columns.own_rest_lengths.is_empty() && columns.near.is_empty() && columns.far.is_empty();
+        // SAFETY: the same contract.
+        unsafe {
+            for block in 0..columns.blocks.len() {
+                for part in 0..parts {
+                    let place = block * LANES + part * L::COUNT;
+                    let sums = tile.runs::<L, DAMPED>(block, part);
+                    sums.store(place, forces);
+                    if runs_alone && sums.any_nan() {
+                        careful.nodes(place, L::COUNT, forces);
+                    }
+                }
             }
-        }
-        for batch in 0..tile.columns.strays.batch_count() {
-            // SAFETY: the same contract.
-            unsafe { tile.strays::<L, DAMPED>(batch, &careful, forces) };
+            if !runs_alone {
+                for block in 0..columns.blocks.len() {
+                    for part in 0..parts {
+                        let place = block * LANES + part * L::COUNT;
+                        let sums = tile.others::<L, DAMPED>(block, part, Sums::load(place, forces));
+                        sums.store(place, forces);
+                        if sums.any_nan() {
+                            careful.nodes(place, L::COUNT, forces);
+                        }
+                    }
+                }
+            }
+            for batch in 0..columns.strays.batch_count() {
+                tile.strays::<L, DAMPED>(batch, &careful, forces);
+            }
         }
     }
 }
 
-/// The forces on some nodes side by side.
+/// The forces on some nodes side by side; NaN where a spring's ends coincide.
 #[derive(Clone, Copy)]
-struct Sums<L> {
-    axes: [L; 3],
-    /// The least squared length.
-    least: L,
-}
+struct Sums<L>([L; 3]);
 
 /// Parameters of some springs side by side.
 #[derive(Clone, Copy)]
@@ -113,56 +137,102 @@ struct Ends<L> {
     velocity: [L; 3],
 }
 
+/// A column of springs: what they are like, where they lead, and which lanes have one.
+#[derive(Clone, Copy)]
+struct Links<L> {
+    spring: Spring<L>,
+    there: Ends<L>,
+    lanes: u32,
+}
+
 impl Tile<'_> {
-    /// The links of the nodes of a block, or of a part of it, as wide as `L`.
+    /// The runs of the nodes of a block, or of a part of it, as wide as `L`, whose springs share their parameters.
     #[inline(always)]
-    unsafe fn block<L: Lanes, const DAMPED: bool>(
-        &self,
-        block: usize,
-        part: usize,
-        careful: &Careful,
-        forces: &mut TileForces,
-    ) {
+    unsafe fn runs<L: Lanes, const DAMPED: bool>(&self, block: usize, part: usize) -> Sums<L> {
         let columns = self.columns;
         let lane = part * L::COUNT;
-        let place = block * LANES + lane;
-        let node = columns.first + place;
+        let node = columns.first + block * LANES + lane;
         let (start, end) = columns.ends(block);
-        let mut own = start.own as usize;
         // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
         // set, and within the margins elsewhere.
         unsafe {
             let here = self.ends::<L, DAMPED>(|axis| L::load(axis.add(node)));
-            let mut sums = Sums {
-                axes: [L::splat(0.0); 3],
-                least: L::splat(f32::INFINITY),
+            let mut sums = Sums([L::splat(0.0); 3]);
+            let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
+            let links = |run: &Run| {
+                let damping = if DAMPED {
+                    self.materials[usize::from(run.material)].damping
+                } else {
+                    0.0
+                };
+                Links {
+                    spring: Spring {
+                        stiffness: L::splat(run.stiffness),
+                        rest_length: L::splat(run.rest_length),
+                        damping: L::splat(damping),
+                    },
+                    there: self.beside::<L, DAMPED>(node, run.offset),
+                    lanes: u32::from(run.lanes) >> lane,
+                }
             };
-            for run in columns.runs.get_unchecked(start.runs as usize..end.runs as usize) {
-                let spring = self.spring::<L, DAMPED>(run.header.material(), &mut own, lane);
-                let there = self.ends::<L, DAMPED>(|axis| L::load(axis.offset(node as isize + run.offset as isize)));
-                sums.add::<DAMPED>(here, there, spring, u32::from(run.header.lanes) >> lane);
+            let (groups, rest) = runs.as_chunks::<GROUP>();
+            for group in groups {
+                sums.add::<GROUP, DAMPED>(here, group.each_ref().map(links));
+            }
+            for run in rest {
+                sums.add::<1, DAMPED>(here, [links(run)]);
+            }
+            sums
+        }
+    }
+
+    /// All other columns of the same nodes, added to `sums`.
+    #[inline(always)]
+    unsafe fn others<L: Lanes, const DAMPED: bool>(&self, block: usize, part: usize, mut sums: Sums<L>) -> Sums<L> {
+        let columns = self.columns;
+        let lane = part * L::COUNT;
+        let node = columns.first + block * LANES + lane;
+        let (start, end) = columns.ends(block);
+        let mut own = start.own as usize;
+        // SAFETY: as in `runs`; gathers were checked to lead to nodes of the body.
+        unsafe {
+            let here = self.ends::<L, DAMPED>(|axis| L::load(axis.add(node)));
+            for run in columns
+                .own_runs
+                .get_unchecked(start.own_runs as usize..end.own_runs as usize)
+            {
+                let links = Links {
+                    spring: self.spring::<L, DAMPED>(None, &mut own, lane),
+                    there: self.beside::<L, DAMPED>(node, run.offset),
+                    lanes: u32::from(run.lanes) >> lane,
+                };
+                sums.add::<1, DAMPED>(here, [links]);
             }
             for near in start.near as usize..end.near as usize {
                 let header = columns.near.get_unchecked(near);
                 let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
                 let there = self.ends::<L, DAMPED>(|axis| L::gather_near(axis.add(columns.window), indices));
-                sums.add::<DAMPED>(here, there, spring, u32::from(header.lanes) >> lane);
+                let links = Links {
+                    spring,
+                    there,
+                    lanes: u32::from(header.lanes) >> lane,
+                };
+                sums.add::<1, DAMPED>(here, [links]);
             }
             for far in start.far as usize..end.far as usize {
                 let header = columns.far.get_unchecked(far);
                 let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
                 let there = self.ends::<L, DAMPED>(|axis| L::gather(axis, indices));
-                sums.add::<DAMPED>(here, there, spring, u32::from(header.lanes) >> lane);
+                let links = Links {
+                    spring,
+                    there,
+                    lanes: u32::from(header.lanes) >> lane,
+                };
+                sums.add::<1, DAMPED>(here, [links]);
             }
-            if sums.least.any_at_most(SHORTEST * SHORTEST) {
-                careful.block(node, L::COUNT, forces);
-            } else {
-                for (sum, forces) in sums.axes.into_iter().zip(&mut forces.axes) {
-                    sum.store(forces[place..place + L::COUNT].as_mut_ptr());
-                }
-            }
+            sums
         }
     }
 
@@ -183,13 +253,15 @@ impl Tile<'_> {
                     rest_length: L::load(batch.rest_lengths.0.as_ptr().add(lane)),
                     damping: L::load(batch.dampings.0.as_ptr().add(lane)),
                 };
-                let mut sums = Sums {
-                    axes: [L::splat(0.0); 3],
-                    least: L::splat(f32::INFINITY),
+                let mut sums = Sums([L::splat(0.0); 3]);
+                let links = Links {
+                    spring,
+                    there,
+                    lanes: u32::MAX,
                 };
-                sums.add::<DAMPED>(here, there, spring, u32::MAX);
-                coincide |= sums.least.any_at_most(SHORTEST * SHORTEST);
-                for (sum, found) in sums.axes.into_iter().zip(&mut found) {
+                sums.add::<1, DAMPED>(here, [links]);
+                coincide |= sums.any_nan();
+                for (sum, found) in sums.0.into_iter().zip(&mut found) {
                     sum.store(found.as_mut_ptr().add(lane));
                 }
             }
@@ -223,6 +295,13 @@ impl Tile<'_> {
                 velocity: position,
             },
         }
+    }
+
+    /// The nodes that lie this far from those from `node` on.
+    #[inline(always)]
+    unsafe fn beside<L: Lanes, const DAMPED: bool>(&self, node: usize, offset: i32) -> Ends<L> {
+        // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
+        unsafe { self.ends::<L, DAMPED>(|axis| L::load(axis.offset(node as isize + offset as isize))) }
     }
 
     /// The parameters of a column; `own` counts those that bring their own.
@@ -265,26 +344,54 @@ impl Tile<'_> {
 }
 
 impl<L: Lanes> Sums<L> {
-    /// Adds the forces of springs from `here` to `there` in the lanes that are set.
+    /// The sums of the nodes from `place` on.
     #[inline(always)]
-    unsafe fn add<const DAMPED: bool>(&mut self, here: Ends<L>, there: Ends<L>, spring: Spring<L>, lanes: u32) {
+    unsafe fn load(place: usize, forces: &TileForces) -> Self {
+        // SAFETY: a block's place in a tile.
+        Self(from_fn(|axis| unsafe {
+            L::load(forces.axes[axis][place..place + L::COUNT].as_ptr())
+        }))
+    }
+
+    #[inline(always)]
+    unsafe fn store(&self, place: usize, forces: &mut TileForces) {
+        for (sum, forces) in self.0.into_iter().zip(&mut forces.axes) {
+            // SAFETY: a block's place in a tile.
+            unsafe { sum.store(forces[place..place + L::COUNT].as_mut_ptr()) };
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn any_nan(&self) -> bool {
+        let [x, y, z] = self.0;
+        // SAFETY: the same contract.
+        unsafe { x.any_nan() || y.any_nan() || z.any_nan() }
+    }
+
+    /// Adds the forces of `N` columns of springs from `here` on.
+    #[inline(always)]
+    unsafe fn add<const N: usize, const DAMPED: bool>(&mut self, here: Ends<L>, links: [Links<L>; N]) {
         // SAFETY: the same contract.
         unsafe {
-            let way = difference(there.position, here.position);
-            let squared = dot(way, way);
-            self.least = self.least.lesser_where(lanes, squared);
-            let (length, inverse) = squared.roots();
+            let ways = links.map(|links| difference(links.there.position, here.position));
+            let squares = ways.map(|way| dot(way, way));
+            let (lengths, inverses) = L::roots(squares);
             // The stretch is exact where it is small: a product with the inverse would not be.
-            let tension = length.subtract(spring.rest_length).multiply(spring.stiffness);
-            let mut factor = tension.multiply(inverse);
+            let stretches: [L; N] = from_fn(|n| lengths[n].subtract(links[n].spring.rest_length));
+            let tensions: [L; N] = from_fn(|n| stretches[n].multiply(links[n].spring.stiffness));
+            let mut factors: [L; N] = from_fn(|n| tensions[n].multiply(inverses[n]));
             if DAMPED {
-                let rate = dot(way, difference(there.velocity, here.velocity));
-                let rate = rate.multiply(inverse).multiply(inverse);
-                factor = rate.multiply_add(spring.damping, factor);
+                for n in 0..N {
+                    let rate = dot(ways[n], difference(links[n].there.velocity, here.velocity));
+                    let rate = rate.multiply(inverses[n]).multiply(inverses[n]);
+                    factors[n] = rate.multiply_add(links[n].spring.damping, factors[n]);
+                }
             }
-            let factor = factor.where_set(lanes);
-            for (sum, way) in self.axes.iter_mut().zip(way) {
-                *sum = way.multiply_add(factor, *sum);
+            for n in 0..N {
+                let factor = factors[n].where_set(links[n].lanes);
+                for (sum, way) in self.0.iter_mut().zip(ways[n]) {
+                    *sum = way.multiply_add(factor, *sum);
+                }
             }
         }
     }
@@ -311,15 +418,16 @@ struct Careful<'a> {
 }
 
 impl Careful<'_> {
-    /// The columns of `count` nodes from `first` on.
+    /// The columns of `count` nodes from `place` on.
     #[cold]
-    fn block(&self, first: usize, count: usize, forces: &mut TileForces) {
-        let end = (first + count).min(self.columns.first + self.columns.count);
-        for node in first..end {
+    #[inline(never)]
+    fn nodes(&self, place: usize, count: usize, forces: &mut TileForces) {
+        for place in place..(place + count).min(self.columns.count) {
+            let node = self.columns.first + place;
             let mut force = Vec3::ZERO;
             self.columns
                 .visit_columns(node, self.materials, &mut |link| force += self.link(node, &link));
-            forces.set(node - self.columns.first, force);
+            forces.set(place, force);
         }
     }
 

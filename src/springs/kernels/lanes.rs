@@ -31,15 +31,12 @@ pub(super) trait Lanes: Copy {
     /// `self * factor + summand`
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self;
 
-    /// The square root, within 0.51 units in its last place, and 1 over it, within 2^-22 of it; for normal numbers.
-    unsafe fn roots(self) -> (Self, Self);
+    /// The square root of each, within 0.51 units in its last place, and 1 over it, within 2^-22 of it; for normal numbers.
+    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]);
 
     /// 0 in the lanes whose bit in `mask` is not set.
     unsafe fn where_set(self, mask: u32) -> Self;
 
-    /// The lesser of each lane of both; `self` in the lanes whose bit in `mask` is not set.
-    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self;
-
-    /// Whether any lane is at most `limit`.
-    unsafe fn any_at_most(self, limit: f32) -> bool;
+    /// Whether any lane is NaN.
+    unsafe fn any_nan(self) -> bool;
 }

@@ -64,10 +64,11 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn roots(self) -> (Self, Self) {
+    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
         unsafe {
-            let root = vsqrtq_f32(self.0);
-            (Self(root), Self(vdivq_f32(vdupq_n_f32(1.0), root)))
+            let roots = values.map(|value| vsqrtq_f32(value.0));
+            let inverses = roots.map(|root| Self(vdivq_f32(vdupq_n_f32(1.0), root)));
+            (roots.map(Self), inverses)
         }
     }
 
@@ -77,12 +78,7 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
-        Self(unsafe { vbslq_f32(spread(mask), vminq_f32(other.0, self.0), self.0) })
-    }
-
-    #[inline(always)]
-    unsafe fn any_at_most(self, limit: f32) -> bool {
-        unsafe { vmaxvq_u32(vcleq_f32(self.0, vdupq_n_f32(limit))) != 0 }
+    unsafe fn any_nan(self) -> bool {
+        unsafe { vminvq_u32(vceqq_f32(self.0, self.0)) == 0 }
     }
 }

@@ -55,9 +55,9 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn roots(self) -> (Self, Self) {
-        let root = self.0.map(f32::sqrt);
-        (Self(root), Self(root.map(|root| 1.0 / root)))
+    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
+        let roots = values.map(|value| value.0.map(f32::sqrt));
+        (roots.map(Self), roots.map(|root| Self(root.map(|root| 1.0 / root))))
     }
 
     #[inline(always)]
@@ -66,18 +66,7 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn lesser_where(self, mask: u32, other: Self) -> Self {
-        Self(from_fn(|lane| {
-            if mask >> lane & 1 == 1 && other.0[lane] < self.0[lane] {
-                other.0[lane]
-            } else {
-                self.0[lane]
-            }
-        }))
-    }
-
-    #[inline(always)]
-    unsafe fn any_at_most(self, limit: f32) -> bool {
-        self.0.into_iter().any(|value| value <= limit)
+    unsafe fn any_nan(self) -> bool {
+        self.0.into_iter().any(f32::is_nan)
     }
 }

@@ -121,7 +121,7 @@ impl Packed {
                 }
             }
             let count = links.len();
-            let columns = pack(nodes, node_count, packed.damped, &mut links)?;
+            let columns = pack(nodes, node_count, packed.damped, &packed.materials, &mut links)?;
             packed.tiles.push(Tile::new(columns, count));
         }
         Ok(packed)
@@ -174,7 +174,7 @@ impl Packed {
             room?;
         }
         let count = links.len();
-        let columns = pack(nodes, self.node_count, self.damped, &mut links)?;
+        let columns = pack(nodes, self.node_count, self.damped, &self.materials, &mut links)?;
         Ok(Tile::new(columns, count))
     }
 }

@@ -34,7 +34,13 @@ impl Loose {
 }
 
 /// Packs the links of `nodes`, in the order of their nodes. The order of `links` is lost.
-pub(super) fn pack(nodes: Range<usize>, node_count: usize, damped: bool, links: &mut [Loose]) -> Result<Columns> {
+pub(super) fn pack(
+    nodes: Range<usize>,
+    node_count: usize,
+    damped: bool,
+    materials: &[Material],
+    links: &mut [Loose],
+) -> Result<Columns> {
     let stiffness = links.first().map_or(0.0, |link| link.own.stiffness);
     let uniform = links.iter().all(|link| link.own.stiffness == stiffness);
     let mut columns = Columns::new(nodes.clone(), node_count, uniform.then_some(stiffness), damped);
@@ -49,7 +55,7 @@ pub(super) fn pack(nodes: Range<usize>, node_count: usize, damped: bool, links: 
         let count = rest.partition_point(|link| (link.node as usize) < first + LANES);
         let (block, after) = rest.split_at_mut(count);
         let strays = packer.block(first, block)?;
-        columns.push_block(&packer.columns)?;
+        columns.push_block(&packer.columns, materials)?;
         columns.strays_mut().reserve(strays)?;
         for loose in &mut block[..strays] {
             let link = Link {
