@@ -24,7 +24,7 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability};
-use crate::springs::{ChosenKernel, Packed, Springs, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Motion, Packed, Springs, TileForces, tile_count, tile_nodes};
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
 use state::State;
@@ -226,10 +226,10 @@ impl Body {
             return;
         }
         let (positions, velocities, forces) = self.state.forces_mut();
-        let velocities = self.springs.damped().then_some(velocities);
+        let motion = Motion::at(positions, self.springs.damped().then_some(velocities));
         for tile in 0..tile_count(positions.len()) {
             let mut sums = TileForces::ZERO;
-            self.springs.forces(tile, positions, velocities, &mut sums);
+            self.springs.forces(tile, &motion, &mut sums);
             let nodes = tile_nodes(tile, positions.len());
             for (forces, sums) in forces.axes_mut().into_iter().zip(&sums.axes) {
                 forces[nodes.clone()].copy_from_slice(&sums[..nodes.len()]);

@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use crate::body::{Bounds, InverseMasses, NodeDamping, Vectors};
-use crate::springs::{Loops, TileForces};
+use crate::springs::{ChosenKernel, Loops, TileForces};
 
 /// One kick of a body.
 #[derive(Clone, Copy)]
@@ -30,7 +30,7 @@ pub(super) struct Kick<'a> {
 pub(super) struct TileKick<'a, 'b> {
     pub kick: &'b Kick<'a>,
     pub nodes: Range<usize>,
-    /// The spring forces on these nodes; lost.
+    /// The spring forces on these nodes; others are added to them.
     pub forces: &'b mut TileForces,
     pub velocities: [&'b mut [f32]; 3],
     pub drift: Option<Drift<'b>>,
@@ -51,54 +51,104 @@ impl Loops for TileKick<'_, '_> {
             kick,
             nodes,
             forces,
-            mut velocities,
+            velocities,
             drift,
         } = self;
-        let (gravity, fall) = (kick.gravity.to_array(), kick.fall.to_array());
-        for (axis, velocities) in velocities.iter_mut().enumerate() {
-            let forces = &mut forces.axes[axis][..nodes.len()];
-            if let Some(applied) = kick.applied {
-                for (force, applied) in forces.iter_mut().zip(&applied.axes()[axis][nodes.clone()]) {
+        if let Some(applied) = kick.applied {
+            for (forces, applied) in forces.axes.iter_mut().zip(applied.slices(nodes.clone())) {
+                for (force, applied) in forces.iter_mut().zip(applied) {
                     *force += applied;
                 }
             }
-            match kick.inverse_masses {
-                InverseMasses::Uniform(inverse_mass) => {
-                    for force in forces.iter_mut() {
-                        *force *= inverse_mass;
-                    }
-                }
-                InverseMasses::Each(inverse_masses) => {
-                    for (force, inverse_mass) in forces.iter_mut().zip(&inverse_masses[nodes.clone()]) {
-                        *force *= inverse_mass;
-                    }
-                }
+        }
+        let mut drift = drift.map(|drift| (drift.positions, drift.next_positions));
+        for (axis, velocities) in velocities.into_iter().enumerate() {
+            let axis = Axis {
+                kick,
+                nodes: nodes.clone(),
+                forces: &forces.axes[axis][..nodes.len()],
+                gravity: kick.gravity[axis],
+                fall: kick.fall[axis],
+                velocities,
+                drift: drift
+                    .as_mut()
+                    .map(|(positions, next_positions)| (positions[axis], &mut *next_positions[axis])),
+            };
+            axis.run();
+        }
+    }
+}
+
+/// The kick along one axis.
+struct Axis<'a> {
+    kick: &'a Kick<'a>,
+    nodes: Range<usize>,
+    forces: &'a [f32],
+    gravity: f32,
+    fall: f32,
+    velocities: &'a mut [f32],
+    /// Positions, and where the drift leaves them.
+    drift: Option<(&'a [f32], &'a mut [f32])>,
+}
+
+impl Axis<'_> {
+    /// Chooses among loops that do no more than they must.
+    #[inline(always)]
+    fn run(self) {
+        let kick = self.kick;
+        let duration = if kick.half { 0.5 * kick.substep } else { kick.substep };
+        let (gravity, fall) = (self.gravity, self.fall);
+        match (kick.damping, kick.inverse_masses) {
+            (None, InverseMasses::Uniform(inverse_mass)) => {
+                self.each(|_, force, velocity| velocity + (force * inverse_mass * duration + fall));
             }
-            let accelerations = &*forces;
-            match kick.damping {
-                None => {
-                    let duration = if kick.half { 0.5 * kick.substep } else { kick.substep };
-                    for (velocity, acceleration) in velocities.iter_mut().zip(accelerations) {
-                        *velocity += acceleration * duration + fall[axis];
+            (None, InverseMasses::Each(inverse_masses)) => {
+                let inverse_masses = &inverse_masses[self.nodes.clone()];
+                self.each(|place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall));
+            }
+            (Some(damping), inverse_masses) => {
+                let loss = &damping.loss[self.nodes.clone()];
+                let gain = &damping.gain[self.nodes.clone()];
+                let nodes = self.nodes.clone();
+                let half = kick.half;
+                let damped = move |place: usize, acceleration: f32, velocity: f32| {
+                    // Two half kicks in one: the second loses from what the first left.
+                    let both = if half { 1.0 } else { 2.0 - loss[place] };
+                    velocity + ((acceleration + gravity) * (gain[place] * both) - velocity * (loss[place] * both))
+                };
+                match inverse_masses {
+                    InverseMasses::Uniform(inverse_mass) => {
+                        self.each(|place, force, velocity| damped(place, force * inverse_mass, velocity));
                     }
-                }
-                Some(damping) => {
-                    let factors = damping.loss[nodes.clone()].iter().zip(&damping.gain[nodes.clone()]);
-                    let moved = velocities.iter_mut().zip(accelerations);
-                    for ((velocity, acceleration), (&loss, &gain)) in moved.zip(factors) {
-                        // Two half kicks in one: the second loses from what the first left.
-                        let both = if kick.half { 1.0 } else { 2.0 - loss };
-                        *velocity += (acceleration + gravity[axis]) * (gain * both) - *velocity * (loss * both);
+                    InverseMasses::Each(inverse_masses) => {
+                        let inverse_masses = &inverse_masses[nodes];
+                        self.each(|place, force, velocity| damped(place, force * inverse_masses[place], velocity));
                     }
                 }
             }
         }
-        let Some(drift) = drift else { return };
-        let places = drift.positions.into_iter().zip(drift.next_positions);
-        for (velocities, (positions, next_positions)) in velocities.iter().zip(places) {
-            let moved = positions.iter().zip(next_positions).zip(velocities.iter());
-            for ((position, next_position), velocity) in moved {
-                *next_position = position + velocity * kick.substep;
+    }
+
+    /// Gives each node the velocity that `kicked` makes of its place in the tile, its force and its velocity, and lets it
+    /// drift.
+    #[inline(always)]
+    fn each(self, kicked: impl Fn(usize, f32, f32) -> f32) {
+        let count = self.nodes.len();
+        let (forces, velocities) = (&self.forces[..count], &mut self.velocities[..count]);
+        match self.drift {
+            None => {
+                for place in 0..count {
+                    velocities[place] = kicked(place, forces[place], velocities[place]);
+                }
+            }
+            Some((positions, next_positions)) => {
+                let substep = self.kick.substep;
+                let (positions, next_positions) = (&positions[..count], &mut next_positions[..count]);
+                for place in 0..count {
+                    let velocity = kicked(place, forces[place], velocities[place]);
+                    velocities[place] = velocity;
+                    next_positions[place] = positions[place] + velocity * substep;
+                }
             }
         }
     }
@@ -131,63 +181,28 @@ impl Survey {
     }
 }
 
-/// Looks at the velocities of a tile.
-pub(super) struct Look<'a> {
-    pub velocities: [&'a [f32]; 3],
-    /// Looked at as well, if only for being finite.
-    pub positions: Option<[&'a [f32]; 3]>,
+/// Looks at the velocities of a tile, and at positions as well if only for being finite.
+pub(super) fn look(kernel: ChosenKernel, velocities: [&[f32]; 3], positions: Option<[&[f32]; 3]>) -> Survey {
+    let ranges = kernel.ranges(velocities);
+    Survey {
+        velocities: Bounds {
+            min: ranges.map(|range| range.least).into(),
+            max: ranges.map(|range| range.greatest).into(),
+        },
+        finite: positions.is_none_or(|positions| kernel.run(AreFinite([velocities, positions]))),
+    }
 }
 
-impl Loops for Look<'_> {
-    type Output = Survey;
+/// Whether the squares of vectors are finite.
+struct AreFinite<'a>([[&'a [f32]; 3]; 2]);
+
+impl Loops for AreFinite<'_> {
+    type Output = bool;
 
     #[inline(always)]
-    fn run(self) -> Survey {
-        let [mut min, mut max] = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        for (axis, velocities) in self.velocities.into_iter().enumerate() {
-            (min[axis], max[axis]) = range(velocities);
-        }
-        let finite = match self.positions {
-            None => true,
-            Some(positions) => squares_are_finite(self.velocities) && squares_are_finite(positions),
-        };
-        Survey {
-            velocities: Bounds {
-                min: min.into(),
-                max: max.into(),
-            },
-            finite,
-        }
+    fn run(self) -> bool {
+        self.0.into_iter().all(squares_are_finite)
     }
-}
-
-/// The least and the greatest of `values`, taken in sixteen lanes side by side.
-#[inline(always)]
-fn range(values: &[f32]) -> (f32, f32) {
-    let (mut least, mut greatest) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
-    let (blocks, rest) = values.as_chunks::<16>();
-    for block in blocks {
-        for lane in 0..16 {
-            least[lane] = lesser(least[lane], block[lane]);
-            greatest[lane] = greater(greatest[lane], block[lane]);
-        }
-    }
-    for (lane, &value) in rest.iter().enumerate() {
-        least[lane] = lesser(least[lane], value);
-        greatest[lane] = greater(greatest[lane], value);
-    }
-    let fold = |values: [f32; 16], choose: fn(f32, f32) -> f32| values.into_iter().reduce(choose).unwrap_or(0.0);
-    (fold(least, lesser), fold(greatest, greater))
-}
-
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if b < a { b } else { a }
-}
-
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
 }
 
 /// Whether the square of every vector's length is finite.

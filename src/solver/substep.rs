@@ -5,9 +5,9 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::attempt::StepRequest;
-use super::kick::{Drift, Kick, Look, Survey, TileKick};
+use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, InverseMasses, Pin, Vectors};
-use crate::springs::{ChosenKernel, Springs, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 
 /// Which part of a step a substep is.
 pub(super) struct Part {
@@ -97,8 +97,8 @@ struct Prediction<'a> {
 impl Prediction<'_> {
     fn take(&self, tile: usize, nodes: Range<usize>, mut predicted: [&mut [f32]; 3], pins: &[Pin]) {
         let mut forces = TileForces::ZERO;
-        self.springs
-            .forces(tile, self.positions, Some(self.velocities), &mut forces);
+        let motion = Motion::at(self.positions, Some(self.velocities));
+        self.springs.forces(tile, &motion, &mut forces);
         let velocities = self.velocities.slices(nodes.clone());
         copy(&mut predicted, velocities);
         let first = nodes.start;
@@ -149,8 +149,14 @@ impl Pass<'_> {
             }
             copy(&mut written.velocities, self.first_velocities.slices(nodes.clone()));
         } else {
-            self.springs
-                .forces(tile, self.positions, self.predicted_velocities, &mut forces);
+            let [vx, vy, vz] = written.velocities.each_ref().map(|axis| &**axis);
+            let [x, y, z] = written.next_positions.each_ref().map(|axis| &**axis);
+            let motion = Motion {
+                positions: self.positions,
+                velocities: self.predicted_velocities,
+                soon: [vx, vy, vz, x, y, z],
+            };
+            self.springs.forces(tile, &motion, &mut forces);
         }
         if self.part.ends {
             copy(
@@ -170,10 +176,12 @@ impl Pass<'_> {
             }),
         });
         self.lead_pins(&nodes, written);
-        self.kernel.run(Look {
-            velocities: written.velocities.each_ref().map(|axis| &**axis),
-            positions: self.part.ends.then(|| self.positions.slices(nodes)),
-        })
+        let positions = self.part.ends.then(|| self.positions.slices(nodes));
+        look(
+            self.kernel,
+            written.velocities.each_ref().map(|axis| &**axis),
+            positions,
+        )
     }
 
     /// Adds up what holds the pinned nodes.

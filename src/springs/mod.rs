@@ -28,6 +28,27 @@ pub(crate) struct Link {
     pub damping: f32,
 }
 
+/// What spring forces depend on, and what is wanted next.
+#[derive(Clone, Copy)]
+pub(crate) struct Motion<'a> {
+    pub positions: &'a Vectors,
+    /// Given where springs are damped.
+    pub velocities: Option<&'a Vectors>,
+    /// What the nodes of the tile need after the forces, to be fetched from memory meanwhile.
+    pub soon: [&'a [f32]; 6],
+}
+
+impl<'a> Motion<'a> {
+    /// Nothing is wanted next.
+    pub fn at(positions: &'a Vectors, velocities: Option<&'a Vectors>) -> Self {
+        Self {
+            positions,
+            velocities,
+            soon: [&[]; 6],
+        }
+    }
+}
+
 /// How the springs of a body are kept. Every solver and every change of topology goes through this.
 pub(crate) trait Springs: Debug + Send + Sync {
     /// Whether springs may have damping: fixed when the body is made.
@@ -41,9 +62,8 @@ pub(crate) trait Springs: Debug + Send + Sync {
     /// Shows the links of `node`, each once.
     fn visit(&self, node: usize, see: &mut dyn FnMut(Link));
 
-    /// Writes the spring forces on the nodes of `tile`, in newtons; with velocities, given where springs are damped, also
-    /// the damping along them.
-    fn forces(&self, tile: usize, positions: &Vectors, velocities: Option<&Vectors>, forces: &mut TileForces);
+    /// Writes the spring forces on the nodes of `tile`, in newtons; with velocities also the damping along springs.
+    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces);
 
     /// Adds a spring between two nodes of the body; refused where the pair has one already. Its damping counts only where
     /// springs are damped. Changes nothing where it fails.

@@ -10,36 +10,36 @@ use glam::Vec3;
 use super::ChosenKernel;
 use super::columns::{Columns, LANES, Material, Run};
 use super::lanes::Lanes;
+use super::prefetch::prefetch;
 use crate::body::{MARGIN, Vectors};
 use crate::springs::law::separation;
-use crate::springs::{Link, TileForces};
+use crate::springs::{Link, Motion, TileForces};
 
 impl Columns {
-    /// Writes the forces on the nodes of the tile, N; with velocities, given where springs are damped, also the damping
-    /// along them.
-    pub fn forces(
-        &self,
-        kernel: ChosenKernel,
-        materials: &[Material],
-        positions: &Vectors,
-        velocities: Option<&Vectors>,
-        forces: &mut TileForces,
-    ) {
+    /// Writes the forces on the nodes of the tile, N.
+    pub fn forces(&self, kernel: ChosenKernel, materials: &[Material], motion: &Motion, forces: &mut TileForces) {
+        let &Motion {
+            positions,
+            velocities,
+            soon,
+        } = motion;
+        let velocities = velocities.filter(|_| self.damped);
         // What the kernel reads without a check was checked against this.
         assert_eq!(positions.len(), self.node_count);
         assert!(velocities.is_none_or(|velocities| velocities.len() == self.node_count));
-        let place = |vectors: &'_ Vectors| vectors.with_margins().map(|axis| axis[MARGIN..].as_ptr());
+        let place = |vectors: &Vectors| vectors.with_margins().map(|axis| axis[MARGIN..].as_ptr());
         let tile = Tile {
             columns: self,
             materials,
             positions: place(positions),
-            velocities: velocities.filter(|_| self.damped).map(place),
+            velocities: velocities.map(place),
+            soon,
         };
         let careful = Careful {
             columns: self,
             materials,
             positions,
-            velocities: velocities.filter(|_| self.damped),
+            velocities,
         };
         kernel.forces(TileLinks { tile, careful, forces });
     }
@@ -63,6 +63,7 @@ struct Tile<'a> {
     /// The first node's coordinates, with [`MARGIN`] numbers before them and as many after the last block.
     positions: [*const f32; 3],
     velocities: Option<[*const f32; 3]>,
+    soon: [&'a [f32]; 6],
 }
 
 impl TileLinks<'_> {
@@ -90,6 +91,9 @@ impl TileLinks<'_> {
         // SAFETY: the same contract.
         unsafe {
             for block in 0..columns.blocks.len() {
+                for wanted in tile.soon {
+                    prefetch(wanted, block * LANES);
+                }
                 for part in 0..parts {
                     let place = block * LANES + part * L::COUNT;
                     let sums = tile.runs::<L, DAMPED>(block, part);

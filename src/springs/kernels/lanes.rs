@@ -37,6 +37,12 @@ pub(super) trait Lanes: Copy {
     /// 0 in the lanes whose bit in `mask` is not set.
     unsafe fn where_set(self, mask: u32) -> Self;
 
+    /// The lesser of each lane of both; that of `self` where `other` has no number.
+    unsafe fn lesser(self, other: Self) -> Self;
+
+    /// The greater of each lane of both; that of `self` where `other` has no number.
+    unsafe fn greater(self, other: Self) -> Self;
+
     /// Whether any lane is NaN.
     unsafe fn any_nan(self) -> bool;
 }

@@ -11,10 +11,13 @@ mod lanes;
 #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
 mod neon;
 mod portable;
+mod prefetch;
+mod range;
 mod strays;
 
 pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
 use forces::TileLinks;
+pub(crate) use range::Range;
 
 use crate::error::{Error, Result};
 
@@ -105,6 +108,23 @@ impl ChosenKernel {
         }
     }
 
+    /// The ranges of some numbers along each axis.
+    pub(crate) fn ranges(self, axes: [&[f32]; 3]) -> [Range; 3] {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: a kernel is chosen only where the processor has its instructions.
+            Kernel::Avx512 => unsafe { ranges_avx512(axes) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the same.
+            Kernel::Avx2 => unsafe { ranges_avx2(axes) },
+            #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
+            // SAFETY: every processor of this kind has them.
+            Kernel::Neon => axes.map(|axis| unsafe { range::range::<neon::NeonLanes>(axis) }),
+            // SAFETY: no special instructions.
+            _ => axes.map(|axis| unsafe { range::range::<portable::PortableLanes>(axis) }),
+        }
+    }
+
     /// Computes the forces on a tile.
     fn forces(self, links: TileLinks) {
         match self.0 {
@@ -147,4 +167,18 @@ fn forces_avx512(links: TileLinks) {
 fn forces_avx2(links: TileLinks) {
     // SAFETY: these are the instructions.
     unsafe { links.run::<avx2::Avx2Lanes>() }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+fn ranges_avx512(axes: [&[f32]; 3]) -> [Range; 3] {
+    // SAFETY: these are the instructions.
+    axes.map(|axis| unsafe { range::range::<avx512::Avx512Lanes>(axis) })
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn ranges_avx2(axes: [&[f32]; 3]) -> [Range; 3] {
+    // SAFETY: these are the instructions.
+    axes.map(|axis| unsafe { range::range::<avx2::Avx2Lanes>(axis) })
 }

@@ -78,6 +78,16 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
+    unsafe fn lesser(self, other: Self) -> Self {
+        Self(unsafe { vminnmq_f32(other.0, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn greater(self, other: Self) -> Self {
+        Self(unsafe { vmaxnmq_f32(other.0, self.0) })
+    }
+
+    #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         unsafe { vminvq_u32(vceqq_f32(self.0, self.0)) == 0 }
     }

@@ -66,6 +66,30 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    unsafe fn lesser(self, other: Self) -> Self {
+        let lesser = |lane: usize| {
+            if other.0[lane] < self.0[lane] {
+                other.0[lane]
+            } else {
+                self.0[lane]
+            }
+        };
+        Self(from_fn(lesser))
+    }
+
+    #[inline(always)]
+    unsafe fn greater(self, other: Self) -> Self {
+        let greater = |lane: usize| {
+            if other.0[lane] > self.0[lane] {
+                other.0[lane]
+            } else {
+                self.0[lane]
+            }
+        };
+        Self(from_fn(greater))
+    }
+
+    #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         self.0.into_iter().any(f32::is_nan)
     }

@@ -13,8 +13,8 @@ pub(crate) use materials::Rounding;
 use pack::{Loose, NO_KIND, pack};
 
 use super::kernels::{ChosenKernel, Columns, Material};
-use super::{Link, Springs, TILE, TileForces, tile_count, tile_nodes};
-use crate::body::{Spring, Vectors};
+use super::{Link, Motion, Springs, TILE, TileForces, tile_count, tile_nodes};
+use crate::body::Spring;
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -204,9 +204,10 @@ impl Springs for Packed {
         self.tile(node as u32).columns.visit(node, &self.materials, see);
     }
 
-    fn forces(&self, tile: usize, positions: &Vectors, velocities: Option<&Vectors>, forces: &mut TileForces) {
-        let columns = &self.tiles[tile].columns;
-        columns.forces(self.kernel, &self.materials, positions, velocities, forces);
+    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        self.tiles[tile]
+            .columns
+            .forces(self.kernel, &self.materials, motion, forces);
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {
