@@ -227,11 +227,11 @@ impl Body {
         }
         let (positions, velocities, forces) = self.state.forces_mut();
         let motion = Motion::at(positions, self.springs.damped().then_some(velocities));
+        let mut sums = TileForces::ZERO;
         for tile in 0..tile_count(positions.len()) {
-            let mut sums = TileForces::ZERO;
             self.springs.forces(tile, &motion, &mut sums);
             let nodes = tile_nodes(tile, positions.len());
-            for (forces, sums) in forces.axes_mut().into_iter().zip(&sums.axes) {
+            for (forces, sums) in forces.axes_mut().into_iter().zip(sums.axes()) {
                 forces[nodes.clone()].copy_from_slice(&sums[..nodes.len()]);
             }
         }

@@ -55,7 +55,7 @@ impl Loops for TileKick<'_, '_> {
             drift,
         } = self;
         if let Some(applied) = kick.applied {
-            for (forces, applied) in forces.axes.iter_mut().zip(applied.slices(nodes.clone())) {
+            for (forces, applied) in forces.axes_mut().into_iter().zip(applied.slices(nodes.clone())) {
                 for (force, applied) in forces.iter_mut().zip(applied) {
                     *force += applied;
                 }
@@ -66,7 +66,7 @@ impl Loops for TileKick<'_, '_> {
             let axis = Axis {
                 kick,
                 nodes: nodes.clone(),
-                forces: &forces.axes[axis][..nodes.len()],
+                forces: &forces.axes()[axis][..nodes.len()],
                 gravity: kick.gravity[axis],
                 fall: kick.fall[axis],
                 velocities,

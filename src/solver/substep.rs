@@ -44,6 +44,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         applied: body.applied.as_ref(),
         damping: body.damping.as_ref(),
     };
+    let mut forces = TileForces::ZERO;
     let tiles = (0..tile_count(node_count)).map(|tile| (tile, tile_nodes(tile, node_count)));
     if !part.begins
         && let Some(predicted) = &mut body.predicted_velocities
@@ -57,7 +58,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         };
         for (tile, nodes) in tiles.clone() {
             let pins = body.pins.within_mut(&nodes);
-            prediction.take(tile, nodes.clone(), predicted.slices_mut(nodes), pins);
+            prediction.take(tile, nodes.clone(), predicted.slices_mut(nodes), pins, &mut forces);
         }
     }
     let pass = Pass {
@@ -80,7 +81,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             forces: state.forces.slices_mut(nodes.clone()),
             pins: body.pins.within_mut(&nodes),
         };
-        survey = survey.and(pass.take(tile, nodes, &mut written));
+        survey = survey.and(pass.take(tile, nodes, &mut written, &mut forces));
     }
     survey
 }
@@ -95,17 +96,23 @@ struct Prediction<'a> {
 }
 
 impl Prediction<'_> {
-    fn take(&self, tile: usize, nodes: Range<usize>, mut predicted: [&mut [f32]; 3], pins: &[Pin]) {
-        let mut forces = TileForces::ZERO;
+    fn take(
+        &self,
+        tile: usize,
+        nodes: Range<usize>,
+        mut predicted: [&mut [f32]; 3],
+        pins: &[Pin],
+        forces: &mut TileForces,
+    ) {
         let motion = Motion::at(self.positions, Some(self.velocities));
-        self.springs.forces(tile, &motion, &mut forces);
+        self.springs.forces(tile, &motion, forces);
         let velocities = self.velocities.slices(nodes.clone());
         copy(&mut predicted, velocities);
         let first = nodes.start;
         self.kernel.run(TileKick {
             kick: &self.kick,
             nodes,
-            forces: &mut forces,
+            forces,
             velocities: predicted.each_mut().map(|axis| &mut **axis),
             drift: None,
         });
@@ -141,10 +148,13 @@ struct Written<'a> {
 }
 
 impl Pass<'_> {
-    fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written) -> Survey {
-        let mut forces = TileForces::ZERO;
+    fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written, forces: &mut TileForces) -> Survey {
         if self.part.begins {
-            for (forces, first) in forces.axes.iter_mut().zip(self.first_forces.slices(nodes.clone())) {
+            for (forces, first) in forces
+                .axes_mut()
+                .into_iter()
+                .zip(self.first_forces.slices(nodes.clone()))
+            {
                 forces[..nodes.len()].copy_from_slice(first);
             }
             copy(&mut written.velocities, self.first_velocities.slices(nodes.clone()));
@@ -156,19 +166,16 @@ impl Pass<'_> {
                 velocities: self.predicted_velocities,
                 soon: [vx, vy, vz, x, y, z],
             };
-            self.springs.forces(tile, &motion, &mut forces);
+            self.springs.forces(tile, &motion, forces);
         }
         if self.part.ends {
-            copy(
-                &mut written.forces,
-                forces.axes.each_ref().map(|axis| &axis[..nodes.len()]),
-            );
+            copy(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
         }
-        self.feel_pins(&nodes, &forces, written.pins);
+        self.feel_pins(&nodes, forces, written.pins);
         self.kernel.run(TileKick {
             kick: &self.kick,
             nodes: nodes.clone(),
-            forces: &mut forces,
+            forces,
             velocities: written.velocities.each_mut().map(|axis| &mut **axis),
             drift: (!self.part.ends).then(|| Drift {
                 positions: self.positions.slices(nodes.clone()),

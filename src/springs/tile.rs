@@ -20,13 +20,23 @@ pub(crate) fn tile_nodes(tile: usize, node_count: usize) -> Range<usize> {
 
 /// The forces on the nodes of one tile, N.
 #[repr(C, align(64))]
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct TileForces {
-    pub axes: [[f32; TILE]; 3],
+    axes: [[f32; TILE]; 3],
 }
 
 impl TileForces {
     pub const ZERO: Self = Self { axes: [[0.0; TILE]; 3] };
+
+    #[inline(always)]
+    pub fn axes(&self) -> [&[f32]; 3] {
+        self.axes.each_ref().map(|axis| &axis[..])
+    }
+
+    #[inline(always)]
+    pub fn axes_mut(&mut self) -> [&mut [f32]; 3] {
+        self.axes.each_mut().map(|axis| &mut axis[..])
+    }
 
     #[inline(always)]
     pub fn get(&self, place: usize) -> Vec3 {

@@ -8,7 +8,7 @@ use std::array::from_fn;
 use glam::Vec3;
 
 use super::ChosenKernel;
-use super::columns::{Columns, LANES, Material, Run};
+use super::columns::{Columns, Ends, LANES, Material, Run};
 use super::lanes::Lanes;
 use super::prefetch::prefetch;
 use crate::body::{MARGIN, Vectors};
@@ -33,7 +33,7 @@ impl Columns {
             materials,
             positions: place(positions),
             velocities: velocities.map(place),
-            soon,
+            soon: soon.map(|wanted| wanted.as_ptr()),
         };
         let careful = Careful {
             columns: self,
@@ -63,7 +63,8 @@ struct Tile<'a> {
     /// The first node's coordinates, with [`MARGIN`] numbers before them and as many after the last block.
     positions: [*const f32; 3],
     velocities: Option<[*const f32; 3]>,
-    soon: [&'a [f32]; 6],
+    /// What is wanted next, block by block.
+    soon: [*const f32; 6],
 }
 
 impl TileLinks<'_> {
@@ -88,31 +89,36 @@ impl TileLinks<'_> {
         let parts = LANES / L::COUNT;
         // Loop by loop, so that each has few addresses to keep. A grid needs no more than the first.
         let runs_alone = columns.own_rest_lengths.is_empty() && columns.near.is_empty() && columns.far.is_empty();
-        // SAFETY: the same contract.
+        let mut axes = forces.axes_mut().map(|axis| axis.as_mut_ptr());
+        // SAFETY: the same contract; a tile has no more blocks than forces have room for.
         unsafe {
-            for block in 0..columns.blocks.len() {
+            let mut start = Ends::default();
+            for (block, &end) in columns.blocks.iter().enumerate() {
                 for wanted in tile.soon {
-                    prefetch(wanted, block * LANES);
+                    prefetch(wanted.wrapping_add(block * LANES));
                 }
                 for part in 0..parts {
                     let place = block * LANES + part * L::COUNT;
-                    let sums = tile.runs::<L, DAMPED>(block, part);
-                    sums.store(place, forces);
+                    let sums = tile.runs::<L, DAMPED>(start, end, place);
+                    sums.store(axes, place);
                     if runs_alone && sums.any_nan() {
-                        careful.nodes(place, L::COUNT, forces);
+                        axes = careful.nodes(place, L::COUNT, forces);
                     }
                 }
+                start = end;
             }
             if !runs_alone {
-                for block in 0..columns.blocks.len() {
+                start = Ends::default();
+                for (block, &end) in columns.blocks.iter().enumerate() {
                     for part in 0..parts {
                         let place = block * LANES + part * L::COUNT;
-                        let sums = tile.others::<L, DAMPED>(block, part, Sums::load(place, forces));
-                        sums.store(place, forces);
+                        let sums = tile.others::<L, DAMPED>(start, end, place, Sums::load(axes, place));
+                        sums.store(axes, place);
                         if sums.any_nan() {
-                            careful.nodes(place, L::COUNT, forces);
+                            axes = careful.nodes(place, L::COUNT, forces);
                         }
                     }
+                    start = end;
                 }
             }
             for batch in 0..columns.strays.batch_count() {
@@ -136,7 +142,7 @@ struct Spring<L> {
 
 /// Where some nodes are, and how fast, side by side.
 #[derive(Clone, Copy)]
-struct Ends<L> {
+struct Place<L> {
     position: [L; 3],
     velocity: [L; 3],
 }
@@ -145,22 +151,20 @@ struct Ends<L> {
 #[derive(Clone, Copy)]
 struct Links<L> {
     spring: Spring<L>,
-    there: Ends<L>,
+    there: Place<L>,
     lanes: u32,
 }
 
 impl Tile<'_> {
     /// The runs of the nodes of a block, or of a part of it, as wide as `L`, whose springs share their parameters.
     #[inline(always)]
-    unsafe fn runs<L: Lanes, const DAMPED: bool>(&self, block: usize, part: usize) -> Sums<L> {
+    unsafe fn runs<L: Lanes, const DAMPED: bool>(&self, start: Ends, end: Ends, place: usize) -> Sums<L> {
         let columns = self.columns;
-        let lane = part * L::COUNT;
-        let node = columns.first + block * LANES + lane;
-        let (start, end) = columns.ends(block);
+        let (node, lane) = (columns.first + place, place % LANES);
         // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
         // set, and within the margins elsewhere.
         unsafe {
-            let here = self.ends::<L, DAMPED>(|axis| L::load(axis.add(node)));
+            let here = self.places::<L, DAMPED>(|axis| L::load(axis.add(node)));
             let mut sums = Sums([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
             let links = |run: &Run| {
@@ -192,15 +196,19 @@ impl Tile<'_> {
 
     /// All other columns of the same nodes, added to `sums`.
     #[inline(always)]
-    unsafe fn others<L: Lanes, const DAMPED: bool>(&self, block: usize, part: usize, mut sums: Sums<L>) -> Sums<L> {
+    unsafe fn others<L: Lanes, const DAMPED: bool>(
+        &self,
+        start: Ends,
+        end: Ends,
+        place: usize,
+        mut sums: Sums<L>,
+    ) -> Sums<L> {
         let columns = self.columns;
-        let lane = part * L::COUNT;
-        let node = columns.first + block * LANES + lane;
-        let (start, end) = columns.ends(block);
+        let (node, lane) = (columns.first + place, place % LANES);
         let mut own = start.own as usize;
         // SAFETY: as in `runs`; gathers were checked to lead to nodes of the body.
         unsafe {
-            let here = self.ends::<L, DAMPED>(|axis| L::load(axis.add(node)));
+            let here = self.places::<L, DAMPED>(|axis| L::load(axis.add(node)));
             for run in columns
                 .own_runs
                 .get_unchecked(start.own_runs as usize..end.own_runs as usize)
@@ -216,7 +224,7 @@ impl Tile<'_> {
                 let header = columns.near.get_unchecked(near);
                 let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.ends::<L, DAMPED>(|axis| L::gather_near(axis.add(columns.window), indices));
+                let there = self.places::<L, DAMPED>(|axis| L::gather_near(axis.add(columns.window), indices));
                 let links = Links {
                     spring,
                     there,
@@ -228,7 +236,7 @@ impl Tile<'_> {
                 let header = columns.far.get_unchecked(far);
                 let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.ends::<L, DAMPED>(|axis| L::gather(axis, indices));
+                let there = self.places::<L, DAMPED>(|axis| L::gather(axis, indices));
                 let links = Links {
                     spring,
                     there,
@@ -250,8 +258,8 @@ impl Tile<'_> {
             let lane = part * L::COUNT;
             // SAFETY: strays were checked to lead to nodes of the body.
             unsafe {
-                let here = self.ends::<L, DAMPED>(|axis| L::gather(axis, batch.nodes.as_ptr().add(lane)));
-                let there = self.ends::<L, DAMPED>(|axis| L::gather(axis, batch.neighbours.as_ptr().add(lane)));
+                let here = self.places::<L, DAMPED>(|axis| L::gather(axis, batch.nodes.as_ptr().add(lane)));
+                let there = self.places::<L, DAMPED>(|axis| L::gather(axis, batch.neighbours.as_ptr().add(lane)));
                 let spring = Spring {
                     stiffness: L::load(batch.stiffnesses.0.as_ptr().add(lane)),
                     rest_length: L::load(batch.rest_lengths.0.as_ptr().add(lane)),
@@ -287,14 +295,14 @@ impl Tile<'_> {
     }
 
     #[inline(always)]
-    unsafe fn ends<L: Lanes, const DAMPED: bool>(&self, fetch: impl Fn(*const f32) -> L) -> Ends<L> {
+    unsafe fn places<L: Lanes, const DAMPED: bool>(&self, fetch: impl Fn(*const f32) -> L) -> Place<L> {
         let position = self.positions.map(&fetch);
         match self.velocities {
-            Some(velocities) if DAMPED => Ends {
+            Some(velocities) if DAMPED => Place {
                 position,
                 velocity: velocities.map(&fetch),
             },
-            _ => Ends {
+            _ => Place {
                 position,
                 velocity: position,
             },
@@ -303,9 +311,9 @@ impl Tile<'_> {
 
     /// The nodes that lie this far from those from `node` on.
     #[inline(always)]
-    unsafe fn beside<L: Lanes, const DAMPED: bool>(&self, node: usize, offset: i32) -> Ends<L> {
+    unsafe fn beside<L: Lanes, const DAMPED: bool>(&self, node: usize, offset: i32) -> Place<L> {
         // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
-        unsafe { self.ends::<L, DAMPED>(|axis| L::load(axis.offset(node as isize + offset as isize))) }
+        unsafe { self.places::<L, DAMPED>(|axis| L::load(axis.offset(node as isize + offset as isize))) }
     }
 
     /// The parameters of a column; `own` counts those that bring their own.
@@ -348,20 +356,18 @@ impl Tile<'_> {
 }
 
 impl<L: Lanes> Sums<L> {
-    /// The sums of the nodes from `place` on.
+    /// From and to three lists that have these lanes.
     #[inline(always)]
-    unsafe fn load(place: usize, forces: &TileForces) -> Self {
-        // SAFETY: a block's place in a tile.
-        Self(from_fn(|axis| unsafe {
-            L::load(forces.axes[axis][place..place + L::COUNT].as_ptr())
-        }))
+    unsafe fn load(axes: [*mut f32; 3], place: usize) -> Self {
+        // SAFETY: the caller's promise.
+        Self(axes.map(|axis| unsafe { L::load(axis.add(place)) }))
     }
 
     #[inline(always)]
-    unsafe fn store(&self, place: usize, forces: &mut TileForces) {
-        for (sum, forces) in self.0.into_iter().zip(&mut forces.axes) {
-            // SAFETY: a block's place in a tile.
-            unsafe { sum.store(forces[place..place + L::COUNT].as_mut_ptr()) };
+    unsafe fn store(&self, axes: [*mut f32; 3], place: usize) {
+        for (sum, axis) in self.0.into_iter().zip(axes) {
+            // SAFETY: the caller's promise.
+            unsafe { sum.store(axis.add(place)) };
         }
     }
 
@@ -374,7 +380,7 @@ impl<L: Lanes> Sums<L> {
 
     /// Adds the forces of `N` columns of springs from `here` on.
     #[inline(always)]
-    unsafe fn add<const N: usize, const DAMPED: bool>(&mut self, here: Ends<L>, links: [Links<L>; N]) {
+    unsafe fn add<const N: usize, const DAMPED: bool>(&mut self, here: Place<L>, links: [Links<L>; N]) {
         // SAFETY: the same contract.
         unsafe {
             let ways = links.map(|links| difference(links.there.position, here.position));
@@ -422,10 +428,10 @@ struct Careful<'a> {
 }
 
 impl Careful<'_> {
-    /// The columns of `count` nodes from `place` on.
+    /// The columns of `count` nodes from `place` on: where the forces are kept.
     #[cold]
     #[inline(never)]
-    fn nodes(&self, place: usize, count: usize, forces: &mut TileForces) {
+    fn nodes(&self, place: usize, count: usize, forces: &mut TileForces) -> [*mut f32; 3] {
         for place in place..(place + count).min(self.columns.count) {
             let node = self.columns.first + place;
             let mut force = Vec3::ZERO;
@@ -433,6 +439,7 @@ impl Careful<'_> {
                 .visit_columns(node, self.materials, &mut |link| force += self.link(node, &link));
             forces.set(place, force);
         }
+        forces.axes_mut().map(|axis| axis.as_mut_ptr())
     }
 
     /// The force of one spring.

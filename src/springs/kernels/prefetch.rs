@@ -1,14 +1,14 @@
 //! Fetching from memory what is needed soon.
 
-/// Begins to fetch the cache line of `values[index]`; nothing where there is no such value, or the processor cannot.
+/// Begins to fetch the cache line at `place`, if there is one; nothing where the processor cannot.
 #[inline(always)]
-pub(crate) fn prefetch<T>(values: &[T], index: usize) {
+pub(crate) fn prefetch<T>(place: *const T) {
     #[cfg(target_arch = "x86_64")]
-    if let Some(value) = values.get(index) {
+    {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: part of every processor of this kind; it reads nothing that can be seen.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(value).cast()) };
+        // SAFETY: part of every processor of this kind; it reads nothing that can be seen, and faults nowhere.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (values, index);
+    let _ = place;
 }
