@@ -25,8 +25,8 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability, Survey};
-use crate::springs::{ChosenKernel, Motion, Packed, Springs, TILE, TileForces, tile_count, tile_nodes};
-use crate::threads::{Team, Tiles};
+use crate::springs::{ChosenKernel, Loops, Motion, Packed, Springs, TILE, TileForces, tile_count, tile_nodes};
+use crate::threads::{Each, Team, Tiles};
 use order::NodeOrder;
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
@@ -51,6 +51,8 @@ pub struct Body {
     pub(crate) pins: Pins,
     /// What a substep found in each tile.
     pub(crate) surveys: Vec<Survey>,
+    /// The box about the nodes of each tile when they were last published, in its own coordinates.
+    boxes: Vec<Bounds>,
     surface: Vec<[u32; 3]>,
     pub(crate) state: State,
     /// Where the coordinates of the state begin.
@@ -132,6 +134,7 @@ impl Body {
             damping,
             pins,
             surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
+            boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
             state: State::new(node_count)?,
             origin: DVec3::ZERO,
@@ -211,11 +214,6 @@ impl Body {
         }
     }
 
-    /// The box about all nodes, in its own coordinates.
-    pub(crate) fn bounds(&self) -> Bounds {
-        Bounds::of(self.state.positions().iter())
-    }
-
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
         match &mut self.contacts {
             Some(contacts) => contacts.reserve(tools)?,
@@ -290,28 +288,37 @@ impl Body {
     }
 
     fn publish(&mut self, team: &Team) {
-        let (origin, order) = (self.origin, &self.order);
+        let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
         let (positions, velocities) = (self.state.positions(), self.state.velocities());
+        let count = positions.len();
         let published = (
             Tiles::new(&mut self.published_positions, TILE),
             Tiles::new(&mut self.published_velocities, TILE),
+            Each::new(&mut self.boxes),
         );
-        let count = positions.len();
         team.pass(
             tile_count(count),
             published,
-            |tile, (published_positions, published_velocities)| {
+            |tile, (to_positions, to_velocities, bounds)| {
                 let nodes = tile_nodes(tile, count);
-                let placed = |local: Vec3| (local.as_dvec3() + origin).as_vec3();
+                *bounds = kernel.ranges(positions.slices(nodes.clone())).into();
                 if order.is_callers() {
-                    let positions = positions.of(nodes.clone()).map(placed);
-                    fill(published_positions, positions);
-                    fill(published_velocities, velocities.of(nodes));
+                    kernel.run(Publish {
+                        from: positions.slices(nodes.clone()),
+                        origin,
+                        to: to_positions,
+                    });
+                    kernel.run(Publish {
+                        from: velocities.slices(nodes),
+                        origin: DVec3::ZERO,
+                        to: to_velocities,
+                    });
                 } else {
                     let own = |node: usize| order.own(node as u32) as usize;
-                    let positions = nodes.clone().map(|node| placed(positions.get(own(node))));
-                    fill(published_positions, positions);
-                    fill(published_velocities, nodes.map(|node| velocities.get(own(node))));
+                    for (node, (position, velocity)) in nodes.zip(to_positions.iter_mut().zip(to_velocities)) {
+                        *position = (positions.get(own(node)).as_dvec3() + origin).as_vec3();
+                        *velocity = velocities.get(own(node));
+                    }
                 }
             },
         );
@@ -319,7 +326,8 @@ impl Body {
 
     /// Moves the origin of its coordinates after it.
     fn follow(&mut self) {
-        let shift = shift_towards(self.bounds());
+        let bounds = self.boxes.iter().fold(Bounds::EMPTY, Bounds::and);
+        let shift = shift_towards(bounds);
         if shift == DVec3::ZERO {
             return;
         }
@@ -334,9 +342,23 @@ impl Body {
     }
 }
 
-/// Writes one value after the other.
-fn fill(places: &mut [Vec3], values: impl Iterator<Item = Vec3>) {
-    for (place, value) in places.iter_mut().zip(values) {
-        *place = value;
+/// Writes vectors side by side, in the world's coordinates.
+struct Publish<'a> {
+    from: [&'a [f32]; 3],
+    origin: DVec3,
+    to: &'a mut [Vec3],
+}
+
+impl Loops for Publish<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [x, y, z] = self.from;
+        let origin = self.origin;
+        for (((to, &x), &y), &z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
+            let placed = |local: f32, origin: f64| (f64::from(local) + origin) as f32;
+            *to = Vec3::new(placed(x, origin.x), placed(y, origin.y), placed(z, origin.z));
+        }
     }
 }

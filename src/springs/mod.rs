@@ -8,7 +8,7 @@ mod tile;
 use std::fmt::Debug;
 
 pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, Loops};
+pub(crate) use kernels::{ChosenKernel, Loops, Range};
 pub(crate) use law::separation;
 pub(crate) use packed::{Packed, Rounding};
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
