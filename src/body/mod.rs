@@ -24,7 +24,7 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability};
-use crate::springs::{ChosenKernel, Motion, Packed, Springs, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Motion, Springs, TileForces, store, tile_count, tile_nodes};
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
 use state::State;
@@ -77,8 +77,7 @@ impl Body {
     pub(crate) fn new(definition: &BodyDefinition, needs: Needs) -> Result<Self> {
         definition.check()?;
         let node_count = definition.positions.len();
-        let springs = definition.resolved_springs()?;
-        let packed = Packed::new(needs.kernel, node_count, &springs, definition.rounding())?;
+        let springs = store(needs.kernel, definition)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
         let mut inverse_masses = memory::reserved(node_count)?;
@@ -103,9 +102,9 @@ impl Body {
             memory::copied(definition.triangles)?
         };
         let mut body = Self {
-            predicted_velocities: packed.damped().then(|| Vectors::zeros(node_count)).transpose()?,
+            predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
-            springs: Box::new(packed),
+            springs,
             kernel: needs.kernel,
             uniform_inverse_mass: match definition.masses {
                 Values::Uniform(mass) => Some(1.0 / mass),
