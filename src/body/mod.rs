@@ -25,7 +25,7 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability, Survey};
-use crate::springs::{ChosenKernel, Loops, Motion, Packed, Springs, TILE, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Loops, Motion, Springs, TILE, TileForces, store, tile_count, tile_nodes};
 use crate::threads::{Each, Team, Tiles};
 use order::NodeOrder;
 use origin::shift_towards;
@@ -94,7 +94,7 @@ impl Body {
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
-        let packed = Packed::new(needs.kernel, node_count, &springs, definition.rounding())?;
+        let springs = store(needs.kernel, definition, &springs)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
         let mut inverse_masses = memory::reserved(node_count)?;
@@ -121,9 +121,9 @@ impl Body {
         };
         let mut body = Self {
             order,
-            predicted_velocities: packed.damped().then(|| Vectors::zeros(node_count)).transpose()?,
+            predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
-            springs: Box::new(packed),
+            springs,
             kernel: needs.kernel,
             uniform_inverse_mass: match definition.masses {
                 Values::Uniform(mass) => Some(1.0 / mass),

@@ -1,0 +1,244 @@
+//! DYNAMIC_BULK: a chain of arrays per node (Halic et al., section 4).
+//!
+//! Where a node's arrays are full another is added, and nothing is copied; one that becomes empty is given back. The
+//! first array of each node is named in a table, those beyond it in a linked list.
+
+use super::batch::Batch;
+use super::chain::{Chain, Element, Unlinked, unlinked};
+use super::ends::Ends;
+use super::kept::KeptLink;
+use super::kernels::{ChosenKernel, prefetch};
+use super::{Link, Loops, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use crate::body::Spring;
+use crate::error::Result;
+use crate::memory;
+
+/// How many nodes ahead arrays are fetched from memory.
+const AHEAD: usize = 16;
+
+/// An array of places, as long as the storage's; not allocated while it is empty.
+type Bulk<L> = Vec<L>;
+
+/// The arrays of one node.
+#[derive(Debug)]
+struct Bulks<L> {
+    first: Bulk<L>,
+    more: Chain<Bulk<L>>,
+}
+
+/// Where a node's next link goes, with memory for it.
+enum Room<L> {
+    Free,
+    First(Bulk<L>),
+    More(Unlinked<Bulk<L>>),
+}
+
+impl<L: KeptLink> Bulks<L> {
+    const EMPTY: Self = Self {
+        first: Vec::new(),
+        more: Chain::EMPTY,
+    };
+
+    #[inline(always)]
+    fn links(&self) -> impl Iterator<Item = Link> {
+        let more = self.more.iter().flat_map(|bulk| bulk.iter());
+        self.first.iter().chain(more).map(L::link)
+    }
+
+    fn has(&self, neighbour: u32) -> bool {
+        self.links().any(|link| link.neighbour == neighbour)
+    }
+
+    /// An array with a free place.
+    fn free(&mut self) -> Option<&mut Bulk<L>> {
+        if self.first.len() < self.first.capacity() {
+            return Some(&mut self.first);
+        }
+        self.more.find_mut(|bulk| bulk.len() < bulk.capacity())
+    }
+
+    /// Finds room for a link, in a new array of `places` where none is free.
+    fn room(&mut self, places: usize) -> Result<Room<L>> {
+        if self.free().is_some() {
+            return Ok(Room::Free);
+        }
+        let bulk = memory::reserved(places)?;
+        if self.first.capacity() == 0 {
+            Ok(Room::First(bulk))
+        } else {
+            Ok(Room::More(unlinked(bulk)?))
+        }
+    }
+
+    fn insert(&mut self, link: L, room: Room<L>) {
+        match room {
+            Room::Free => {}
+            Room::First(bulk) => self.first = bulk,
+            Room::More(bulk) => self.more.put(bulk),
+        }
+        if let Some(bulk) = self.free() {
+            bulk.push(link);
+        }
+    }
+
+    /// Takes out the link to a neighbour; whether there was one.
+    fn remove(&mut self, neighbour: u32) -> bool {
+        let place = |bulk: &Bulk<L>| bulk.iter().position(|link| link.neighbour() == neighbour);
+        if let Some(index) = place(&self.first) {
+            self.first.swap_remove(index);
+            if self.first.is_empty() {
+                self.first = Vec::new();
+            }
+            return true;
+        }
+        let Some(bulk) = self.more.find_mut(|bulk| place(bulk).is_some()) else {
+            return false;
+        };
+        if let Some(index) = place(bulk) {
+            bulk.swap_remove(index);
+        }
+        if bulk.is_empty() {
+            self.more.remove(Vec::is_empty);
+        }
+        true
+    }
+}
+
+/// Springs in chains of arrays.
+#[derive(Debug)]
+pub(super) struct DynamicBulk<L> {
+    kernel: ChosenKernel,
+    spring_count: usize,
+    springs_per_node: usize,
+    nodes: Vec<Bulks<L>>,
+}
+
+impl<L: KeptLink> DynamicBulk<L> {
+    /// Arrays of `springs_per_node` places; 0: chosen from the springs.
+    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+        let ends = Ends::of(node_count, springs)?;
+        let springs_per_node = match springs_per_node {
+            0 => (2 * springs.len()).div_ceil(node_count).clamp(1, LARGEST_CHOICE),
+            chosen => chosen,
+        };
+        let mut nodes = memory::reserved(node_count)?;
+        for node in 0..node_count {
+            let mut bulks = Bulks::EMPTY;
+            for link in ends.links(node) {
+                let room = bulks.room(springs_per_node)?;
+                bulks.insert(L::of(&link), room);
+            }
+            nodes.push(bulks);
+        }
+        Ok(Self {
+            kernel,
+            spring_count: springs.len(),
+            springs_per_node,
+            nodes,
+        })
+    }
+
+    #[inline(always)]
+    fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        let nodes = tile_nodes(tile, self.nodes.len());
+        let mut batch = Batch::<DAMPED>::new(motion, nodes.start, nodes.len(), forces);
+        for node in nodes {
+            if let Some(ahead) = self.nodes.get(node + AHEAD) {
+                let array = ahead.first.as_ptr().cast::<u8>();
+                for line in (0..size_of_val(&*ahead.first).min(FETCHED)).step_by(64) {
+                    prefetch(array.wrapping_add(line));
+                }
+                if let Some(more) = ahead.more.first() {
+                    prefetch(more);
+                }
+            }
+            batch.add(node, self.nodes[node].links());
+        }
+        batch.finish();
+    }
+}
+
+/// The most places that are chosen for an array.
+const LARGEST_CHOICE: usize = 32;
+
+/// How much of an array is fetched ahead, bytes; the processor sees by itself how a longer one goes on.
+const FETCHED: usize = 512;
+
+struct TileLoop<'a, 'b, L> {
+    storage: &'b DynamicBulk<L>,
+    tile: usize,
+    motion: &'b Motion<'a>,
+    forces: &'b mut TileForces,
+}
+
+impl<L: KeptLink> Loops for TileLoop<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        if L::DAMPED && self.motion.velocities.is_some() {
+            self.storage.tile_forces::<true>(self.tile, self.motion, self.forces);
+        } else {
+            self.storage.tile_forces::<false>(self.tile, self.motion, self.forces);
+        }
+    }
+}
+
+impl<L: KeptLink> Springs for DynamicBulk<L> {
+    fn damped(&self) -> bool {
+        L::DAMPED
+    }
+
+    fn spring_count(&self) -> usize {
+        self.spring_count
+    }
+
+    fn bytes(&self) -> (usize, usize) {
+        let mut held = self.nodes.capacity() * size_of::<Bulks<L>>();
+        for bulks in &self.nodes {
+            held += bulks.first.capacity() * size_of::<L>();
+            for bulk in bulks.more.iter() {
+                held += size_of::<Element<Bulk<L>>>() + bulk.capacity() * size_of::<L>();
+            }
+        }
+        (2 * self.spring_count * size_of::<L>(), held)
+    }
+
+    fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
+        self.nodes[node].links().for_each(see);
+    }
+
+    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        self.kernel.run(TileLoop {
+            storage: self,
+            tile,
+            motion,
+            forces,
+        });
+    }
+
+    fn add(&mut self, spring: &Spring) -> Result<()> {
+        let [a, b] = spring.nodes;
+        if self.nodes[a as usize].has(b) {
+            return Err(already_joined(a, b));
+        }
+        let room_a = self.nodes[a as usize].room(self.springs_per_node)?;
+        let room_b = self.nodes[b as usize].room(self.springs_per_node)?;
+        let [link_a, link_b] = Link::ends(spring);
+        self.nodes[a as usize].insert(L::of(&link_a), room_a);
+        self.nodes[b as usize].insert(L::of(&link_b), room_b);
+        self.spring_count += 1;
+        Ok(())
+    }
+
+    fn remove(&mut self, a: u32, b: u32) -> Result<()> {
+        for (node, neighbour) in [(a, b), (b, a)] {
+            // Both ends have it, or none.
+            if !self.nodes[node as usize].remove(neighbour) {
+                return Err(not_joined(a, b));
+            }
+        }
+        self.spring_count -= 1;
+        Ok(())
+    }
+}
