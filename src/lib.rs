@@ -12,6 +12,7 @@ pub mod raster;
 mod slots;
 mod solver;
 mod springs;
+mod threads;
 mod world;
 
 pub use body::{Body, BodyDefinition, Solver, Storage, Values};
@@ -20,4 +21,5 @@ pub use diagnostics::{Energy, StorageReport};
 pub use error::{Error, Result};
 pub use picture::PictureDefinition;
 pub use springs::Kernel;
+pub use threads::{JobSystem, RunTasks, Task};
 pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};

@@ -23,8 +23,9 @@ use crate::contact::Contacts;
 use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
-use crate::solver::{Carry, GravityKicks, Stability};
-use crate::springs::{ChosenKernel, Motion, Packed, Springs, TileForces, tile_count, tile_nodes};
+use crate::solver::{Carry, GravityKicks, Stability, Survey};
+use crate::springs::{ChosenKernel, Motion, Packed, Springs, TILE, TileForces, tile_count, tile_nodes};
+use crate::threads::{Team, Tiles};
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
 use state::State;
@@ -44,6 +45,8 @@ pub struct Body {
     pub(crate) uniform_inverse_mass: Option<f32>,
     pub(crate) damping: Option<NodeDamping>,
     pub(crate) pins: Pins,
+    /// What a substep found in each tile.
+    pub(crate) surveys: Vec<Survey>,
     pub(crate) surface: Vec<[u32; 3]>,
     pub(crate) state: State,
     /// Where the coordinates of the state begin.
@@ -115,6 +118,7 @@ impl Body {
             inverse_masses,
             damping,
             pins,
+            surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
             surface,
             state: State::new(node_count)?,
             origin: DVec3::ZERO,
@@ -221,24 +225,24 @@ impl Body {
     }
 
     /// Makes sure that the state's forces belong to its positions and velocities.
-    pub(crate) fn refresh_forces(&mut self) {
+    pub(crate) fn refresh_forces(&mut self, team: &Team) {
         if self.forces_current {
             return;
         }
+        let springs = &*self.springs;
         let (positions, velocities, forces) = self.state.forces_mut();
-        let motion = Motion::at(positions, self.springs.damped().then_some(velocities));
-        let mut sums = TileForces::ZERO;
-        for tile in 0..tile_count(positions.len()) {
-            self.springs.forces(tile, &motion, &mut sums);
-            let nodes = tile_nodes(tile, positions.len());
-            for (forces, sums) in forces.axes_mut().into_iter().zip(sums.axes()) {
-                forces[nodes.clone()].copy_from_slice(&sums[..nodes.len()]);
+        let motion = Motion::at(positions, springs.damped().then_some(velocities));
+        team.pass(tile_count(positions.len()), forces.tiles_mut(), |tile, forces| {
+            let mut sums = TileForces::ZERO;
+            springs.forces(tile, &motion, &mut sums);
+            for (forces, sums) in forces.into_iter().zip(sums.axes()) {
+                forces.copy_from_slice(&sums[..forces.len()]);
             }
-        }
+        });
     }
 
     /// Makes the step in progress, of `substeps` substeps, the current state.
-    pub(crate) fn commit(&mut self, substeps: u32, carry: Carry) {
+    pub(crate) fn commit(&mut self, substeps: u32, carry: Carry, team: &Team) {
         self.state.commit();
         self.carry = carry;
         self.forces_current = true;
@@ -249,7 +253,7 @@ impl Body {
             contacts.commit();
         }
         self.clear_pending();
-        self.publish();
+        self.publish(team);
         self.follow();
     }
 
@@ -266,13 +270,27 @@ impl Body {
         self.forces_applied = false;
     }
 
-    fn publish(&mut self) {
-        for (published, local) in self.published_positions.iter_mut().zip(self.state.positions().iter()) {
-            *published = (local.as_dvec3() + self.origin).as_vec3();
-        }
-        for (published, velocity) in self.published_velocities.iter_mut().zip(self.state.velocities().iter()) {
-            *published = velocity;
-        }
+    fn publish(&mut self, team: &Team) {
+        let origin = self.origin;
+        let (positions, velocities) = (self.state.positions(), self.state.velocities());
+        let published = (
+            Tiles::new(&mut self.published_positions, TILE),
+            Tiles::new(&mut self.published_velocities, TILE),
+        );
+        let count = positions.len();
+        team.pass(
+            tile_count(count),
+            published,
+            |tile, (published_positions, published_velocities)| {
+                let nodes = tile_nodes(tile, count);
+                for (published, local) in published_positions.iter_mut().zip(positions.of(nodes.clone())) {
+                    *published = (local.as_dvec3() + origin).as_vec3();
+                }
+                for (published, velocity) in published_velocities.iter_mut().zip(velocities.of(nodes)) {
+                    *published = velocity;
+                }
+            },
+        );
     }
 
     /// Moves the origin of its coordinates after it.

@@ -156,7 +156,7 @@ impl Axis<'_> {
 
 /// What there is to know of a tile after a kick.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Survey {
+pub(crate) struct Survey {
     /// The box of its velocities; what is NaN is not in it.
     pub velocities: Bounds,
     /// Whether the squares of its velocities, and of its positions where they were looked at, are finite.
