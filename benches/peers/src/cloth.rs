@@ -38,13 +38,7 @@ impl Cloth {
 
     /// As arguments of a command; [`Cloth::from_arguments`] reads them.
     pub fn arguments(&self) -> Vec<String> {
-        let numbers = [
-            self.spacing,
-            self.node_mass,
-            self.stiffness,
-            self.gravity,
-            self.step,
-        ];
+        let numbers = [self.spacing, self.node_mass, self.stiffness, self.gravity, self.step];
         let mut arguments = vec![self.side.to_string()];
         arguments.extend(numbers.iter().map(f32::to_string));
         arguments

@@ -15,7 +15,9 @@ pub struct RapierCloth {
 impl Contender for RapierCloth {
     fn build(cloth: &Cloth, threads: usize) -> Result<Self, String> {
         let mut world = PhysicsWorld::new();
-        world.configure_thread_pool(threads).map_err(|error| error.to_string())?;
+        world
+            .configure_thread_pool(threads)
+            .map_err(|error| error.to_string())?;
         world.gravity = Vector::new(0.0, -cloth.gravity, 0.0);
         let parameters = &mut world.integration_parameters;
         parameters.dt = cloth.step;
@@ -26,8 +28,13 @@ impl Contender for RapierCloth {
         let softness = |mass: f32| SpringCoefficients::new((cloth.stiffness / mass).sqrt() / TAU, 0.0);
         let edges: Vec<[u32; 2]> = cloth.springs().collect();
         let pinned = cloth.pinned();
-        let at_a_pin = edges.iter().enumerate().filter(|(_, edge)| edge.iter().any(|node| pinned.contains(node)));
-        let edge_softness = at_a_pin.map(|(edge, _)| (edge as u32, softness(cloth.node_mass))).collect();
+        let at_a_pin = edges
+            .iter()
+            .enumerate()
+            .filter(|(_, edge)| edge.iter().any(|node| pinned.contains(node)));
+        let edge_softness = at_a_pin
+            .map(|(edge, _)| (edge as u32, softness(cloth.node_mass)))
+            .collect();
         let mut builder = SoftBodyBuilder::new(cloth.positions().map(Vector::from).collect())
             .particle_mass(cloth.node_mass)
             .pinned_particles(pinned)
