@@ -1,7 +1,5 @@
 """The cloth in NVIDIA Warp on the processor: symplectic Euler, each node looking at its 8 neighbours in the grid."""
 
-import os
-
 import cloth as common
 
 cloth = common.Cloth()
@@ -11,13 +9,7 @@ except ImportError:
     common.refuse("Warp is not installed (pip install warp-lang)")
 
 wp.config.quiet = True
-wp.config.kernel_cache_dir = os.environ["SINEW_PEERS_CACHE"]
 wp.init()
-before = common.memory("VmRSS:")
-
-side = cloth.side
-x = wp.array(cloth.positions().reshape(-1, 3), dtype=wp.vec3, device="cpu")
-v = wp.zeros(side * side, dtype=wp.vec3, device="cpu")
 
 
 @wp.kernel
@@ -47,7 +39,12 @@ def drift(x: wp.array(dtype=wp.vec3), v: wp.array(dtype=wp.vec3), side: int, dt:
         x[node] = x[node] + dt * v[node]
 
 
-dt = cloth.step
+wp.load_module(device="cpu")
+before = common.memory("VmRSS:")
+
+side, dt = cloth.side, cloth.step
+x = wp.array(cloth.positions().reshape(-1, 3), dtype=wp.vec3, device="cpu")
+v = wp.zeros(side * side, dtype=wp.vec3, device="cpu")
 pull = dt * cloth.stiffness / cloth.node_mass
 kick_inputs = [x, v, side, cloth.spacing, pull, dt * cloth.gravity]
 first = wp.launch(kick, dim=side * side, inputs=kick_inputs, device="cpu", record_cmd=True)

@@ -89,9 +89,10 @@ impl Contender {
             .args(&self.command[1..])
             .arg(self.threads.to_string())
             .args(cloth.arguments())
-            // Nothing is to be left beside the scripts, nor in the user's caches.
+            // Nothing is to be left beside the scripts, nor in the user's caches, nor asked of a server.
             .env("PYTHONDONTWRITEBYTECODE", "1")
-            .env("SINEW_PEERS_CACHE", target().join("peers/cache"))
+            .env("XDG_CACHE_HOME", target().join("peers/cache"))
+            .env("TI_SKIP_VERSION_CHECK", "ON")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

@@ -25,7 +25,7 @@ process of its own, taking turns. A step's time is what the engine's own step ca
 Stretch: length / rest length - 1 over the springs after one simulated second. The explicit ones solve the same equations
 and should agree; Rapier and Bullet stop before a step has converged, which stretches the cloth or damps its motion.
 Height: mean over the nodes, for comparison that all fell alike. Body: resident memory beyond that before the cloth was
-built, after some steps; what Taichi and Warp compile counts. Process: the most that the whole process had, Python and the
+built, after some steps; what Taichi compiles counts. Process: the most that the whole process had, Python and the
 cloth's input included.
 ";
 
