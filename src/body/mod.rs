@@ -26,7 +26,7 @@ use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability, Survey};
 use crate::springs::{ChosenKernel, Loops, Motion, Springs, TILE, TileForces, store, tile_count, tile_nodes};
-use crate::threads::{Each, Team, Tiles};
+use crate::threads::{Items, Team, Tiles};
 use order::NodeOrder;
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
@@ -294,7 +294,7 @@ impl Body {
         let published = (
             Tiles::new(&mut self.published_positions, TILE),
             Tiles::new(&mut self.published_velocities, TILE),
-            Each::new(&mut self.boxes),
+            Items::new(&mut self.boxes),
         );
         team.pass(
             tile_count(count),
