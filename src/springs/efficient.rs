@@ -4,9 +4,10 @@
 //! that a list must be followed from link to link: here sixteen lists are followed side by side, so that the waits for
 //! memory overlap.
 
-use super::batch::Batch;
 use super::chain::{Chain, Element, unlinked};
 use super::ends::Ends;
+use super::gather::{Gather, LANES};
+use super::kept::{DampedLink, KeptLink};
 use super::kernels::{ChosenKernel, prefetch};
 use super::{Link, Loops, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
@@ -23,7 +24,7 @@ pub(super) struct Efficient {
     spring_count: usize,
     damped: bool,
     /// The size of an element is a multiple of a pointer's: a link with damping takes no more than one without.
-    lists: Vec<Chain<Link>>,
+    lists: Vec<Chain<DampedLink>>,
 }
 
 impl Efficient {
@@ -34,7 +35,7 @@ impl Efficient {
         for node in 0..node_count {
             let mut list = Chain::EMPTY;
             for link in ends.links(node) {
-                list.push(link)?;
+                list.push(DampedLink::of(&link))?;
             }
             lists.push(list);
         }
@@ -47,29 +48,39 @@ impl Efficient {
     }
 
     fn has(&self, a: u32, b: u32) -> bool {
-        self.lists[a as usize].iter().any(|link| link.neighbour == b)
+        self.lists[a as usize].iter().any(|link| link.neighbour() == b)
     }
 
     #[inline(always)]
     fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         let nodes = tile_nodes(tile, self.lists.len());
-        let mut batch = Batch::<DAMPED>::new(motion, nodes.start, nodes.len(), forces);
+        let gather = Gather::<DAMPED>::new(motion, nodes.start);
         let mut fetched = nodes.start;
         for node in nodes.clone() {
             if node == fetched {
                 fetched = nodes.end.min(node + SIDE_BY_SIDE);
                 fetch(&self.lists[node..fetched]);
             }
-            batch.add(node, self.lists[node].iter().copied());
+            let mut sum = gather.begin(node);
+            let mut next = self.lists[node].first();
+            while next.is_some() {
+                let mut links = [DampedLink::EMPTY; LANES];
+                for link in &mut links {
+                    let Some(element) = next else { break };
+                    *link = element.value;
+                    next = element.next();
+                }
+                gather.add(&mut sum, &links);
+            }
+            gather.finish(&sum, forces);
         }
-        batch.finish();
     }
 }
 
 /// Follows lists side by side, so that all their links are in the nearest cache.
 #[inline(always)]
-fn fetch(lists: &[Chain<Link>]) {
-    let mut followed: [Option<&Element<Link>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
+fn fetch(lists: &[Chain<DampedLink>]) {
+    let mut followed: [Option<&Element<DampedLink>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
     for (followed, list) in followed.iter_mut().zip(lists) {
         *followed = list.first();
     }
@@ -118,12 +129,12 @@ impl Springs for Efficient {
     }
 
     fn bytes(&self) -> (usize, usize) {
-        let links = 2 * self.spring_count * size_of::<Element<Link>>();
-        (links, links + self.lists.capacity() * size_of::<Chain<Link>>())
+        let links = 2 * self.spring_count * size_of::<Element<DampedLink>>();
+        (links, links + self.lists.capacity() * size_of::<Chain<DampedLink>>())
     }
 
     fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
-        self.lists[node].iter().copied().for_each(see);
+        self.lists[node].iter().map(DampedLink::link).for_each(see);
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
@@ -144,7 +155,7 @@ impl Springs for Efficient {
         if !self.damped {
             (link_a.damping, link_b.damping) = (0.0, 0.0);
         }
-        let (link_a, link_b) = (unlinked(link_a)?, unlinked(link_b)?);
+        let (link_a, link_b) = (unlinked(DampedLink::of(&link_a))?, unlinked(DampedLink::of(&link_b))?);
         self.lists[a as usize].put(link_a);
         self.lists[b as usize].put(link_b);
         self.spring_count += 1;
@@ -154,7 +165,7 @@ impl Springs for Efficient {
     fn remove(&mut self, a: u32, b: u32) -> Result<()> {
         for (node, neighbour) in [(a, b), (b, a)] {
             // Both ends have it, or none.
-            if !self.lists[node as usize].remove(|link| link.neighbour == neighbour) {
+            if !self.lists[node as usize].remove(|link| link.neighbour() == neighbour) {
                 return Err(not_joined(a, b));
             }
         }

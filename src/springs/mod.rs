@@ -1,11 +1,11 @@
 //! The springs of a body: how they are kept, and the forces of a tile's.
 
-mod batch;
 mod chain;
 mod dynamic_bulk;
 mod efficient;
 mod ends;
 mod fast_link;
+mod gather;
 mod kept;
 mod kernels;
 mod law;
