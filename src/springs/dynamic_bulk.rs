@@ -5,10 +5,10 @@
 
 use super::chain::{Chain, Element, Unlinked, unlinked};
 use super::ends::Ends;
-use super::gather::Gather;
-use super::kept::{KeptLink, empty_place, links, place_of, vacate};
-use super::kernels::{ChosenKernel, prefetch};
-use super::{Link, Loops, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::gather::{Gather, prefetch_row};
+use super::kept::{KeptLink, NOBODY, empty_place, links, place_of, vacate};
+use super::kernels::prefetch;
+use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
@@ -111,7 +111,6 @@ impl<L: KeptLink> Bulks<L> {
 /// Springs in chains of arrays.
 #[derive(Debug)]
 pub(super) struct DynamicBulk<L> {
-    kernel: ChosenKernel,
     spring_count: usize,
     springs_per_node: usize,
     nodes: Vec<Bulks<L>>,
@@ -119,7 +118,7 @@ pub(super) struct DynamicBulk<L> {
 
 impl<L: KeptLink> DynamicBulk<L> {
     /// Arrays of `springs_per_node` places; 0: chosen from the springs.
-    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+    pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let springs_per_node = match springs_per_node {
             0 => (2 * springs.len()).div_ceil(node_count).clamp(1, LARGEST_CHOICE),
@@ -135,7 +134,6 @@ impl<L: KeptLink> DynamicBulk<L> {
             nodes.push(bulks);
         }
         Ok(Self {
-            kernel,
             spring_count: springs.len(),
             springs_per_node,
             nodes,
@@ -148,50 +146,26 @@ impl<L: KeptLink> DynamicBulk<L> {
         let gather = Gather::<DAMPED>::new(motion, nodes.start);
         for node in nodes {
             if let Some(ahead) = self.nodes.get(node + AHEAD) {
-                let array = ahead.first.as_ptr().cast::<u8>();
-                for line in (0..size_of_val(&*ahead.first).min(FETCHED)).step_by(64) {
-                    prefetch(array.wrapping_add(line));
-                }
+                prefetch_row(ahead.first.as_ptr(), size_of_val(&*ahead.first));
                 if let Some(more) = ahead.more.first() {
                     prefetch(more);
                 }
             }
             let bulks = &self.nodes[node];
-            let mut sum = gather.begin(node);
-            gather.add_row(&mut sum, &bulks.first);
-            for bulk in bulks.more.iter() {
-                gather.add_row(&mut sum, bulk);
-            }
-            gather.finish(&sum, forces);
+            let more = bulks.more.iter().flat_map(|bulk| taken(bulk));
+            gather.node(node, taken(&bulks.first).chain(more).map(L::link), forces);
         }
     }
+}
+
+/// The links of an array, without a look at how many they are.
+#[inline(always)]
+fn taken<L: KeptLink>(bulk: &Bulk<L>) -> impl Iterator<Item = &L> {
+    bulk.iter().take_while(|link| link.neighbour() != NOBODY)
 }
 
 /// The most places that are chosen for an array.
 const LARGEST_CHOICE: usize = 32;
-
-/// How much of an array is fetched ahead, bytes; the processor sees by itself how a longer one goes on.
-const FETCHED: usize = 512;
-
-struct TileLoop<'a, 'b, L> {
-    storage: &'b DynamicBulk<L>,
-    tile: usize,
-    motion: &'b Motion<'a>,
-    forces: &'b mut TileForces,
-}
-
-impl<L: KeptLink> Loops for TileLoop<'_, '_, L> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        if L::DAMPED && self.motion.velocities.is_some() {
-            self.storage.tile_forces::<true>(self.tile, self.motion, self.forces);
-        } else {
-            self.storage.tile_forces::<false>(self.tile, self.motion, self.forces);
-        }
-    }
-}
 
 impl<L: KeptLink> Springs for DynamicBulk<L> {
     fn damped(&self) -> bool {
@@ -218,12 +192,11 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        self.kernel.run(TileLoop {
-            storage: self,
-            tile,
-            motion,
-            forces,
-        });
+        if L::DAMPED && motion.velocities.is_some() {
+            self.tile_forces::<true>(tile, motion, forces);
+        } else {
+            self.tile_forces::<false>(tile, motion, forces);
+        }
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {

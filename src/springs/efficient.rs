@@ -6,10 +6,10 @@
 
 use super::chain::{Chain, Element, unlinked};
 use super::ends::Ends;
-use super::gather::{Gather, LANES};
+use super::gather::Gather;
 use super::kept::{DampedLink, KeptLink};
-use super::kernels::{ChosenKernel, prefetch};
-use super::{Link, Loops, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::kernels::prefetch;
+use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
@@ -20,7 +20,6 @@ const SIDE_BY_SIDE: usize = 16;
 /// Springs in linked lists.
 #[derive(Debug)]
 pub(super) struct Efficient {
-    kernel: ChosenKernel,
     spring_count: usize,
     damped: bool,
     /// The size of an element is a multiple of a pointer's: a link with damping takes no more than one without.
@@ -28,7 +27,7 @@ pub(super) struct Efficient {
 }
 
 impl Efficient {
-    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring]) -> Result<Self> {
+    pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let mut lists = memory::reserved(node_count)?;
         // Node by node: what is followed together is allocated together.
@@ -40,7 +39,6 @@ impl Efficient {
             lists.push(list);
         }
         Ok(Self {
-            kernel,
             spring_count: springs.len(),
             damped: springs.iter().any(|spring| spring.damping != 0.0),
             lists,
@@ -61,18 +59,7 @@ impl Efficient {
                 fetched = nodes.end.min(node + SIDE_BY_SIDE);
                 fetch(&self.lists[node..fetched]);
             }
-            let mut sum = gather.begin(node);
-            let mut next = self.lists[node].first();
-            while next.is_some() {
-                let mut links = [DampedLink::EMPTY; LANES];
-                for link in &mut links {
-                    let Some(element) = next else { break };
-                    *link = element.value;
-                    next = element.next();
-                }
-                gather.add(&mut sum, &links);
-            }
-            gather.finish(&sum, forces);
+            gather.node(node, self.lists[node].iter().map(DampedLink::link), forces);
         }
     }
 }
@@ -99,26 +86,6 @@ fn fetch(lists: &[Chain<DampedLink>]) {
     }
 }
 
-struct TileLoop<'a, 'b> {
-    storage: &'b Efficient,
-    tile: usize,
-    motion: &'b Motion<'a>,
-    forces: &'b mut TileForces,
-}
-
-impl Loops for TileLoop<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        if self.motion.velocities.is_some() {
-            self.storage.tile_forces::<true>(self.tile, self.motion, self.forces);
-        } else {
-            self.storage.tile_forces::<false>(self.tile, self.motion, self.forces);
-        }
-    }
-}
-
 impl Springs for Efficient {
     fn damped(&self) -> bool {
         self.damped
@@ -138,12 +105,11 @@ impl Springs for Efficient {
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        self.kernel.run(TileLoop {
-            storage: self,
-            tile,
-            motion,
-            forces,
-        });
+        if motion.velocities.is_some() {
+            self.tile_forces::<true>(tile, motion, forces);
+        } else {
+            self.tile_forces::<false>(tile, motion, forces);
+        }
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {

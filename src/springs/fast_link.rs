@@ -4,10 +4,9 @@
 //! nodes x places x the size of a link.
 
 use super::ends::Ends;
-use super::gather::Gather;
-use super::kept::{KeptLink, empty_place, links, place_of, vacate};
-use super::kernels::{ChosenKernel, prefetch};
-use super::{Link, Loops, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::gather::{Gather, prefetch_row};
+use super::kept::{KeptLink, NOBODY, empty_place, links, place_of, vacate};
+use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -15,13 +14,9 @@ use crate::memory;
 /// How many nodes ahead rows are fetched from memory.
 const AHEAD: usize = 16;
 
-/// How much of a row is fetched ahead, bytes; the processor sees by itself how a longer one goes on.
-const FETCHED: usize = 512;
-
 /// Springs in rows.
 #[derive(Debug)]
 pub(super) struct FastLink<L> {
-    kernel: ChosenKernel,
     node_count: usize,
     spring_count: usize,
     springs_per_node: usize,
@@ -30,7 +25,7 @@ pub(super) struct FastLink<L> {
 
 impl<L: KeptLink> FastLink<L> {
     /// Rows of `springs_per_node` places; 0: as many as the node with the most springs needs, at least one.
-    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+    pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let (node, longest) = ends.longest();
         let springs_per_node = if springs_per_node == 0 {
@@ -51,7 +46,6 @@ impl<L: KeptLink> FastLink<L> {
             }
         }
         Ok(Self {
-            kernel,
             node_count,
             spring_count: springs.len(),
             springs_per_node,
@@ -78,13 +72,6 @@ impl<L: KeptLink> FastLink<L> {
     }
 }
 
-struct TileLoop<'a, 'b, L> {
-    storage: &'b FastLink<L>,
-    tile: usize,
-    motion: &'b Motion<'a>,
-    forces: &'b mut TileForces,
-}
-
 impl<L: KeptLink> FastLink<L> {
     #[inline(always)]
     fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
@@ -93,26 +80,9 @@ impl<L: KeptLink> FastLink<L> {
         let gather = Gather::<DAMPED>::new(motion, nodes.start);
         let rows = self.places[nodes.start * width..nodes.end * width].chunks_exact(width);
         for (node, row) in nodes.zip(rows) {
-            let ahead = row.as_ptr().wrapping_add(AHEAD * width).cast::<u8>();
-            for line in (0..size_of_val(row).min(FETCHED)).step_by(64) {
-                prefetch(ahead.wrapping_add(line));
-            }
-            let mut sum = gather.begin(node);
-            gather.add_row(&mut sum, row);
-            gather.finish(&sum, forces);
-        }
-    }
-}
-
-impl<L: KeptLink> Loops for TileLoop<'_, '_, L> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        if L::DAMPED && self.motion.velocities.is_some() {
-            self.storage.tile_forces::<true>(self.tile, self.motion, self.forces);
-        } else {
-            self.storage.tile_forces::<false>(self.tile, self.motion, self.forces);
+            prefetch_row(row.as_ptr().wrapping_add(AHEAD * width), size_of_val(row));
+            let links = row.iter().take_while(|link| link.neighbour() != NOBODY);
+            gather.node(node, links.map(L::link), forces);
         }
     }
 }
@@ -138,12 +108,11 @@ impl<L: KeptLink> Springs for FastLink<L> {
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        self.kernel.run(TileLoop {
-            storage: self,
-            tile,
-            motion,
-            forces,
-        });
+        if L::DAMPED && motion.velocities.is_some() {
+            self.tile_forces::<true>(tile, motion, forces);
+        } else {
+            self.tile_forces::<false>(tile, motion, forces);
+        }
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {
