@@ -4,11 +4,12 @@
 //! that a list must be followed from link to link: here sixteen lists are followed side by side, so that the waits for
 //! memory overlap.
 
-use super::batch::Batch;
 use super::chain::{Chain, Element, unlinked};
 use super::ends::Ends;
-use super::kernels::{ChosenKernel, prefetch};
-use super::{Link, Loops, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::gather::Gather;
+use super::kept::{DampedLink, KeptLink};
+use super::kernels::prefetch;
+use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
@@ -19,27 +20,25 @@ const SIDE_BY_SIDE: usize = 16;
 /// Springs in linked lists.
 #[derive(Debug)]
 pub(super) struct Efficient {
-    kernel: ChosenKernel,
     spring_count: usize,
     damped: bool,
     /// The size of an element is a multiple of a pointer's: a link with damping takes no more than one without.
-    lists: Vec<Chain<Link>>,
+    lists: Vec<Chain<DampedLink>>,
 }
 
 impl Efficient {
-    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring]) -> Result<Self> {
+    pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let mut lists = memory::reserved(node_count)?;
         // Node by node: what is followed together is allocated together.
         for node in 0..node_count {
             let mut list = Chain::EMPTY;
             for link in ends.links(node) {
-                list.push(link)?;
+                list.push(DampedLink::of(&link))?;
             }
             lists.push(list);
         }
         Ok(Self {
-            kernel,
             spring_count: springs.len(),
             damped: springs.iter().any(|spring| spring.damping != 0.0),
             lists,
@@ -47,29 +46,28 @@ impl Efficient {
     }
 
     fn has(&self, a: u32, b: u32) -> bool {
-        self.lists[a as usize].iter().any(|link| link.neighbour == b)
+        self.lists[a as usize].iter().any(|link| link.neighbour() == b)
     }
 
     #[inline(always)]
     fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         let nodes = tile_nodes(tile, self.lists.len());
-        let mut batch = Batch::<DAMPED>::new(motion, nodes.start, nodes.len(), forces);
+        let gather = Gather::<DAMPED>::new(motion, nodes.start);
         let mut fetched = nodes.start;
         for node in nodes.clone() {
             if node == fetched {
                 fetched = nodes.end.min(node + SIDE_BY_SIDE);
                 fetch(&self.lists[node..fetched]);
             }
-            batch.add(node, self.lists[node].iter().copied());
+            gather.node(node, self.lists[node].iter().map(DampedLink::link), forces);
         }
-        batch.finish();
     }
 }
 
 /// Follows lists side by side, so that all their links are in the nearest cache.
 #[inline(always)]
-fn fetch(lists: &[Chain<Link>]) {
-    let mut followed: [Option<&Element<Link>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
+fn fetch(lists: &[Chain<DampedLink>]) {
+    let mut followed: [Option<&Element<DampedLink>>; SIDE_BY_SIDE] = [None; SIDE_BY_SIDE];
     for (followed, list) in followed.iter_mut().zip(lists) {
         *followed = list.first();
     }
@@ -88,26 +86,6 @@ fn fetch(lists: &[Chain<Link>]) {
     }
 }
 
-struct TileLoop<'a, 'b> {
-    storage: &'b Efficient,
-    tile: usize,
-    motion: &'b Motion<'a>,
-    forces: &'b mut TileForces,
-}
-
-impl Loops for TileLoop<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        if self.motion.velocities.is_some() {
-            self.storage.tile_forces::<true>(self.tile, self.motion, self.forces);
-        } else {
-            self.storage.tile_forces::<false>(self.tile, self.motion, self.forces);
-        }
-    }
-}
-
 impl Springs for Efficient {
     fn damped(&self) -> bool {
         self.damped
@@ -118,21 +96,20 @@ impl Springs for Efficient {
     }
 
     fn bytes(&self) -> (usize, usize) {
-        let links = 2 * self.spring_count * size_of::<Element<Link>>();
-        (links, links + self.lists.capacity() * size_of::<Chain<Link>>())
+        let links = 2 * self.spring_count * size_of::<Element<DampedLink>>();
+        (links, links + self.lists.capacity() * size_of::<Chain<DampedLink>>())
     }
 
     fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
-        self.lists[node].iter().copied().for_each(see);
+        self.lists[node].iter().map(DampedLink::link).for_each(see);
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        self.kernel.run(TileLoop {
-            storage: self,
-            tile,
-            motion,
-            forces,
-        });
+        if motion.velocities.is_some() {
+            self.tile_forces::<true>(tile, motion, forces);
+        } else {
+            self.tile_forces::<false>(tile, motion, forces);
+        }
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {
@@ -144,7 +121,7 @@ impl Springs for Efficient {
         if !self.damped {
             (link_a.damping, link_b.damping) = (0.0, 0.0);
         }
-        let (link_a, link_b) = (unlinked(link_a)?, unlinked(link_b)?);
+        let (link_a, link_b) = (unlinked(DampedLink::of(&link_a))?, unlinked(DampedLink::of(&link_b))?);
         self.lists[a as usize].put(link_a);
         self.lists[b as usize].put(link_b);
         self.spring_count += 1;
@@ -154,7 +131,7 @@ impl Springs for Efficient {
     fn remove(&mut self, a: u32, b: u32) -> Result<()> {
         for (node, neighbour) in [(a, b), (b, a)] {
             // Both ends have it, or none.
-            if !self.lists[node as usize].remove(|link| link.neighbour == neighbour) {
+            if !self.lists[node as usize].remove(|link| link.neighbour() == neighbour) {
                 return Err(not_joined(a, b));
             }
         }

@@ -10,6 +10,9 @@ pub(super) trait KeptLink: Copy + Send + Sync + std::fmt::Debug + 'static {
     /// Whether damping is kept.
     const DAMPED: bool;
 
+    /// An empty place.
+    const EMPTY: Self;
+
     fn of(link: &Link) -> Self;
 
     fn link(&self) -> Link;
@@ -36,6 +39,11 @@ pub(super) struct DampedLink {
 
 impl KeptLink for UndampedLink {
     const DAMPED: bool = false;
+    const EMPTY: Self = Self {
+        neighbour: NOBODY,
+        stiffness: 0.0,
+        rest_length: 0.0,
+    };
 
     #[inline(always)]
     fn of(link: &Link) -> Self {
@@ -64,6 +72,10 @@ impl KeptLink for UndampedLink {
 
 impl KeptLink for DampedLink {
     const DAMPED: bool = true;
+    const EMPTY: Self = Self {
+        undamped: UndampedLink::EMPTY,
+        damping: 0.0,
+    };
 
     #[inline(always)]
     fn of(link: &Link) -> Self {
@@ -85,4 +97,29 @@ impl KeptLink for DampedLink {
     fn neighbour(&self) -> u32 {
         self.undamped.neighbour
     }
+}
+
+/// The links in a row of places: they come first, behind them all places are empty.
+#[inline]
+pub(super) fn links<L: KeptLink>(row: &[L]) -> &[L] {
+    let count = row.iter().position(|link| link.neighbour() == NOBODY);
+    &row[..count.unwrap_or(row.len())]
+}
+
+/// The first empty place of a row.
+pub(super) fn empty_place<L: KeptLink>(row: &[L]) -> Option<usize> {
+    let count = links(row).len();
+    (count < row.len()).then_some(count)
+}
+
+/// Where in a row the link to `neighbour` is.
+pub(super) fn place_of<L: KeptLink>(row: &[L], neighbour: u32) -> Option<usize> {
+    links(row).iter().position(|link| link.neighbour() == neighbour)
+}
+
+/// Empties a place with a link; the row's last link moves there.
+pub(super) fn vacate<L: KeptLink>(row: &mut [L], place: usize) {
+    let last = links(row).len() - 1;
+    row[place] = row[last];
+    row[last] = L::EMPTY;
 }

@@ -1,11 +1,11 @@
 //! The springs of a body: how they are kept, and the forces of a tile's.
 
-mod batch;
 mod chain;
 mod dynamic_bulk;
 mod efficient;
 mod ends;
 mod fast_link;
+mod gather;
 mod kept;
 mod kernels;
 mod law;
@@ -105,13 +105,11 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     let damped = springs.iter().any(|spring| spring.damping != 0.0);
     Ok(match (definition.storage, damped) {
         (Storage::Packed, _) => Box::new(Packed::new(kernel, node_count, springs, definition.rounding())?),
-        (Storage::Efficient, _) => Box::new(Efficient::new(kernel, node_count, springs)?),
-        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(kernel, node_count, springs, width)?),
-        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(kernel, node_count, springs, width)?),
-        (Storage::DynamicBulk, false) => {
-            Box::new(DynamicBulk::<UndampedLink>::new(kernel, node_count, springs, width)?)
-        }
-        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?),
+        (Storage::Efficient, _) => Box::new(Efficient::new(node_count, springs)?),
+        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(node_count, springs, width)?),
+        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(node_count, springs, width)?),
+        (Storage::DynamicBulk, false) => Box::new(DynamicBulk::<UndampedLink>::new(node_count, springs, width)?),
+        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(node_count, springs, width)?),
     })
 }
 
