@@ -112,6 +112,7 @@ pub fn run(report: &mut Report, effort: Effort) {
     }
     report.progress("C: steps");
     let results = interleave(contenders, effort);
+    report.disturbed(results.waited);
     let mut table = Table::new(&["asked for", "substep, ms", "of plain", "springs, MB", "body, MB"]);
     for (name, springs, whole) in bytes {
         let (Some(samples), Some(plain)) = (results.get(name), results.get(PLAIN)) else {

@@ -10,6 +10,7 @@ pub struct Report {
     text: String,
     not_offered: BTreeMap<String, String>,
     plots: Vec<(String, String)>,
+    waited: f64,
 }
 
 impl Report {
@@ -19,6 +20,7 @@ impl Report {
             text: String::new(),
             not_offered: BTreeMap::new(),
             plots: Vec::new(),
+            waited: 0.0,
         }
     }
 
@@ -36,6 +38,11 @@ impl Report {
         if self.not_offered.insert(what.to_owned(), reason.to_owned()).is_none() {
             eprintln!("!! NOT OFFERED: {what}: {reason}");
         }
+    }
+
+    /// Notes the share of some measurement's time in which the machine ran other programs.
+    pub fn disturbed(&mut self, waited: f64) {
+        self.waited = self.waited.max(waited);
     }
 
     /// A plot beside the report, shown in it.
@@ -56,6 +63,14 @@ impl Report {
         }
         if self.not_offered.is_empty() {
             missing.push_str("Nothing: everything asked for was measured.\n");
+        }
+        if self.waited > 0.05 {
+            let _ = write!(
+                missing,
+                "\n**The machine was busy**: for up to {:.0} % of the time it ran other programs. Times on two threads are not \
+                 to be relied on, and others are too long by what caches and memory were shared with.\n",
+                100.0 * self.waited
+            );
         }
         self.write(&missing);
         self.progress("done");

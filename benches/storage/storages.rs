@@ -154,6 +154,7 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, nodes
         contenders.push(Contender::new(*name, 1, move |steps| body.step(way, steps)));
     }
     let times = interleave(contenders, effort);
+    report.disturbed(times.waited);
     drop((worn, rivals));
     for (_, storage, body) in &mut fresh {
         if *storage == Storage::FastLink {

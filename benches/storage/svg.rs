@@ -14,7 +14,7 @@ pub struct Series {
 const COLOURS: [&str; 10] = [
     "#1f6fb4", "#d1495b", "#2e8b57", "#8e5ea2", "#e08e2b", "#3aa6a6", "#7a5c3e", "#c2569b", "#6b7280", "#9aa52c",
 ];
-const WIDTH: f64 = 920.0;
+const WIDTH: f64 = 980.0;
 const HEIGHT: f64 = 520.0;
 const LEFT: f64 = 80.0;
 const RIGHT: f64 = 670.0;
@@ -158,8 +158,11 @@ fn tick(value: f64) -> String {
     match value {
         value if value >= 999_999.0 => format!("{:.0}M", value * 1e-6),
         value if value >= 999.0 => format!("{:.0}K", value * 1e-3),
-        value if value >= 0.999 => format!("{value:.0}"),
-        value => format!("{value:.6}").trim_end_matches('0').to_owned(),
+        value if value >= 9.99 => format!("{value:.0}"),
+        value => format!("{value:.6}")
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned(),
     }
 }
 
