@@ -117,7 +117,7 @@ fn edit_in_motion(parts: &Parts, seed: u64) {
             if alive.contains(&sorted([a, b])) {
                 continue;
             }
-            let (stiffness, rest_length) = (2.0 + random.signed(), 0.02 + 0.01 * random.signed());
+            let (stiffness, rest_length) = (0.2 + 0.1 * random.signed(), 0.02 + 0.01 * random.signed());
             for scene in &mut scenes {
                 let body = scene.body_mut();
                 body.add_spring(a, b, stiffness, Some(rest_length)).expect("room");
@@ -425,7 +425,7 @@ fn a_hub_of_thousands_is_pulled_from_all_sides() {
         DVec3::new(angle.cos(), angle.sin(), 0.0).as_vec3()
     };
     let mut parts = Parts::nodes((0..RAYS).map(ray).collect(), 1e-3);
-    // In the middle of the numbers, so that its links go both ways; a row of so many places for each node is too much.
+    // Rows of so many places for each node would be too much: FAST_LINK is left out.
     parts.positions.push(Vec3::new(0.1, 0.2, 0.3));
     parts.masses.push(10.0);
     parts.node_dampings.push(0.0);
@@ -434,11 +434,13 @@ fn a_hub_of_thousands_is_pulled_from_all_sides() {
     }
     parts.rest_lengths.iter_mut().for_each(|length| *length *= 0.9);
     let mut reference = parts.reference(Vec3::ZERO);
-    let h = 1e-3;
+    let h = 2e-4;
     (0..20).for_each(|_| reference.step(h));
     for storage in [Storage::Packed, Storage::Efficient, Storage::DynamicBulk] {
         let mut scene = scene(&parts, storage, 0);
-        scene.run(h as f32, 20);
+        for _ in 0..20 {
+            assert_eq!(scene.step(h as f32).substeps, 1);
+        }
         let error = largest_difference(&scene.positions(), &reference.positions);
         assert!(error < 2e-6, "{storage:?}: {error} m");
         for node in (0..RAYS as u32).rev() {

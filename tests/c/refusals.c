@@ -164,9 +164,7 @@ static void body_definitions(void)
     BODY(INVALID, "storage", def.storage = UINT32_MAX);
     BODY(INVALID, "solver", def.solver = 3);
     BODY(INVALID, "solver", def.solver = UINT32_MAX);
-    BODY(UNSUPPORTED, "storage", def.storage = SINEW_STORAGE_EFFICIENT);
-    BODY(UNSUPPORTED, "storage", def.storage = SINEW_STORAGE_FAST_LINK);
-    BODY(UNSUPPORTED, "storage", def.storage = SINEW_STORAGE_DYNAMIC_BULK);
+    BODY(CAPACITY, "springs_per_node", def.storage = SINEW_STORAGE_FAST_LINK; def.springs_per_node = 1);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_IMPLICIT);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_NEWTON);
 
