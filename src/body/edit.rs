@@ -140,7 +140,8 @@ impl Body {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, the nodes are one, they have a spring already, or a number is
-    /// negative or not finite. [`Error::OutOfMemory`].
+    /// negative or not finite. [`Error::Capacity`]: a node has no free place in a row of fixed length.
+    /// [`Error::OutOfMemory`].
     pub fn add_spring(&mut self, a: u32, b: u32, stiffness: f32, rest_length: Option<f32>) -> Result<()> {
         let nodes = self.check_pair(a, b)?;
         not_negative("stiffness", stiffness)?;
