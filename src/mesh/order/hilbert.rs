@@ -12,10 +12,16 @@ const BITS: u32 = 16;
 /// The nodes along the curve; those at one place of it in their own order.
 pub(super) fn along_curve(positions: &[Vec3]) -> Result<Vec<u32>> {
     let low = positions.iter().fold(DVec3::INFINITY, |low, p| low.min(p.as_dvec3()));
-    let high = positions.iter().fold(DVec3::NEG_INFINITY, |high, p| high.max(p.as_dvec3()));
+    let high = positions
+        .iter()
+        .fold(DVec3::NEG_INFINITY, |high, p| high.max(p.as_dvec3()));
     // Cubes, not boxes: neighbours are near in metres. Without any extent all are at place 0.
     let extent = (high - low).max_element();
-    let scale = if extent > 0.0 { f64::from((1 << BITS) - 1) / extent } else { 0.0 };
+    let scale = if extent > 0.0 {
+        f64::from((1 << BITS) - 1) / extent
+    } else {
+        0.0
+    };
 
     let mut keyed = memory::reserved(positions.len())?;
     keyed.extend((0..).zip(positions).map(|(node, p): (u32, _)| {

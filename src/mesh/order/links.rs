@@ -11,10 +11,10 @@ pub(super) struct Links {
 }
 
 impl Links {
-    /// The links of `node_count` nodes, where node `n` of the springs is called `names[n]`.
-    pub fn new(node_count: usize, springs: &[[u32; 2]], names: &[u32]) -> Result<Self> {
+    /// The links of nodes of which number `n` of the springs is called `names[n]`.
+    pub fn new(springs: &[[u32; 2]], names: &[u32]) -> Result<Self> {
         // Counted one place late, so that filling in moves each start to its place.
-        let mut starts = memory::filled(0_usize, node_count + 2)?;
+        let mut starts = memory::filled(0_usize, names.len() + 2)?;
         let mut renamed = memory::reserved(springs.len())?;
         for spring in springs {
             let [a, b] = spring.map(|node| names[node as usize]);
