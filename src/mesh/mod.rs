@@ -4,6 +4,7 @@
 //! that is already in memory.
 
 mod file;
+mod order;
 mod organ;
 mod shapes;
 mod tidy;
