@@ -209,12 +209,6 @@ impl BodyDefinition<'_> {
     }
 
     fn check_offered(&self) -> Result<()> {
-        if self.storage != Storage::Packed {
-            return Err(Error::Unsupported(format!(
-                "storage is {:?}: this version offers Packed alone",
-                self.storage
-            )));
-        }
         if self.solver != Solver::Verlet {
             return Err(Error::Unsupported(format!(
                 "solver is {:?}: this version offers Verlet alone",
