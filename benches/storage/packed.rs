@@ -33,6 +33,8 @@ const KERNELS: [(&str, Kernel); 4] = [
     ("portable", Kernel::Portable),
 ];
 
+const MOST_FOR_KERNELS: usize = 100_000;
+
 const C_PLAIN: &str = "C";
 const C_PREFETCH: &str = "C, prefetch";
 
@@ -157,8 +159,8 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, kind:
             }
         }
     }
-    // Large bodies differ by their memory, which is the same for all kernels.
-    if nodes <= 1_000_000 {
+    // Large bodies wait for memory, whatever the kernel.
+    if nodes <= MOST_FOR_KERNELS {
         for (name, kernel) in KERNELS {
             let setup = Setup {
                 kernel,
@@ -196,10 +198,12 @@ fn measure(report: &mut Report, effort: Effort, library: Option<&Library>, kind:
     }
     if let Some(library) = library {
         let mut body = FastLink::new(library, &scene);
-        contenders.push(Contender::new(C_PLAIN, 1, move |steps| body.step(Way::PLAIN, steps)));
-        let mut body = FastLink::new(library, &scene);
         let way = fastest_way(&mut body);
-        contenders.push(Contender::new(C_PREFETCH, 1, move |steps| body.step(way, steps)));
+        let body = Rc::new(RefCell::new(body));
+        for (name, way) in [(C_PLAIN, Way::PLAIN), (C_PREFETCH, way)] {
+            let body = Rc::clone(&body);
+            contenders.push(Contender::new(name, 1, move |steps| body.borrow_mut().step(way, steps)));
+        }
     }
     let results = interleave(contenders, effort);
     report.disturbed(results.waited);

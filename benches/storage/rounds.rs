@@ -31,6 +31,9 @@ impl Effort {
     };
 }
 
+/// A unit of work of so many seconds needs no second look before it is measured.
+const LONG: f64 = 0.3;
+
 /// Something whose time is measured.
 pub struct Contender<'a> {
     pub name: String,
@@ -96,12 +99,14 @@ impl Results {
 /// Measures all contenders, round by round.
 pub fn interleave(mut contenders: Vec<Contender>, effort: Effort) -> Results {
     let start = Instant::now();
-    // The first units are slower: memory is touched for the first time.
     let units: Vec<usize> = contenders
         .iter_mut()
         .map(|contender| {
-            (contender.work)(1);
-            let once = seconds(contender.threads, clock::time(|| (contender.work)(1)));
+            // The first unit is slower: memory is touched for the first time. Of what is long, that is all the same.
+            let mut once = seconds(contender.threads, clock::time(|| (contender.work)(1)));
+            if once < LONG {
+                once = seconds(contender.threads, clock::time(|| (contender.work)(1)));
+            }
             (effort.sample / once.max(1e-9)).ceil().clamp(1.0, 1e6) as usize
         })
         .collect();

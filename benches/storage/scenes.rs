@@ -119,12 +119,13 @@ impl Scene {
 
     /// An organ of tetrahedra, about so many nodes, uneven, pinned at one end.
     pub fn organ(nodes: usize) -> Self {
-        // An organ of length 1 and spacing s has about 0.46 / s³ nodes; the surface adds to small ones.
-        let mut spacing = (0.4 / nodes as f64).cbrt().min(0.124);
+        // An organ of length 1 and spacing s has about 0.154 / s³ nodes, small ones more for their surface.
+        const COARSEST: f64 = 0.124;
+        let mut spacing = (0.154 / nodes as f64).cbrt().min(COARSEST);
         let mut mesh = Mesh::organ(1.0, spacing as f32).expect("an organ of this spacing");
         if nodes <= 100_000 {
-            spacing *= (mesh.positions.len() as f64 / nodes as f64).cbrt();
-            mesh = Mesh::organ(1.0, spacing.min(0.124) as f32).expect("an organ of this spacing");
+            spacing = (spacing * (mesh.positions.len() as f64 / nodes as f64).cbrt()).min(COARSEST);
+            mesh = Mesh::organ(1.0, spacing as f32).expect("an organ of this spacing");
         }
         let springs = mesh.edges().expect("memory for the edges");
         let spacing = spacing as f32;
