@@ -164,7 +164,9 @@ impl Body {
             Error::InvalidArgument(_) => Error::invalid(format!("nodes {a} and {b} have a spring already")),
             error => error,
         })?;
-        self.springs_changed();
+        self.forces_current = false;
+        let stability = self.carry.stability;
+        self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
         Ok(())
     }
 
@@ -176,13 +178,9 @@ impl Body {
         let [own_a, own_b] = self.check_pair(a, b)?;
         let told = |_| Error::invalid(format!("nodes {a} and {b} have no spring"));
         self.springs.remove(own_a, own_b).map_err(told)?;
-        self.springs_changed();
-        Ok(())
-    }
-
-    fn springs_changed(&mut self) {
+        // What was stable still is.
         self.forces_current = false;
-        self.carry.stability = Stability::UNKNOWN;
+        Ok(())
     }
 
     fn set_velocity(&mut self, node: u32, velocity: Vec3) {

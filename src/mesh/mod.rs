@@ -16,6 +16,7 @@ use crate::memory;
 use crate::{Error, Result};
 
 pub use file::{MeshFormat, load};
+pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
 pub use topology::{boundary, edges, is_closed};
 
@@ -103,9 +104,4 @@ fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: 
         }
     }
     Ok(())
-}
-
-/// Stands in for the search for a node order.
-pub(crate) fn best_order(_: &[glam::Vec3], _: &[[u32; 2]]) -> Result<Option<Vec<u32>>> {
-    Ok(None)
 }
