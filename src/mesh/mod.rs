@@ -105,3 +105,8 @@ fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: 
     }
     Ok(())
 }
+
+/// Stands in for the search for a node order.
+pub(crate) fn best_order(_: &[glam::Vec3], _: &[[u32; 2]]) -> Result<Option<Vec<u32>>> {
+    Ok(None)
+}

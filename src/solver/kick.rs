@@ -172,10 +172,7 @@ impl Survey {
     /// What there is to know of both.
     pub fn and(self, other: Self) -> Self {
         Self {
-            velocities: Bounds {
-                min: self.velocities.min.min(other.velocities.min),
-                max: self.velocities.max.max(other.velocities.max),
-            },
+            velocities: self.velocities.and(&other.velocities),
             finite: self.finite && other.finite,
         }
     }
@@ -183,12 +180,8 @@ impl Survey {
 
 /// Looks at the velocities of a tile, and at positions as well if only for being finite.
 pub(super) fn look(kernel: ChosenKernel, velocities: [&[f32]; 3], positions: Option<[&[f32]; 3]>) -> Survey {
-    let ranges = kernel.ranges(velocities);
     Survey {
-        velocities: Bounds {
-            min: ranges.map(|range| range.least).into(),
-            max: ranges.map(|range| range.greatest).into(),
-        },
+        velocities: kernel.ranges(velocities).into(),
         finite: positions.is_none_or(|positions| kernel.run(AreFinite([velocities, positions]))),
     }
 }
