@@ -95,8 +95,11 @@ impl Steps {
 
 /// The whole multiple of the axes that an offset in axes comes nearest to, and whether it is near and not 0.
 pub(super) fn whole(offset: DVec3) -> ([i32; 3], bool) {
-    let rounded = offset.round().clamp(DVec3::splat(-REACH), DVec3::splat(REACH));
-    let near = (offset - rounded).abs().max_element() < NEAR && rounded != DVec3::ZERO;
-    // What is not a number becomes 0.
-    (rounded.to_array().map(|steps| steps as i32), near)
+    // Conversion of numbers above 0 rounds down; every processor has it, and to round as such not every one.
+    let up = REACH + 0.5;
+    let steps = offset.clamp(DVec3::splat(-REACH), DVec3::splat(REACH)) + up;
+    let steps = steps.to_array().map(|step| step as i32 - REACH as i32);
+    let [x, y, z] = steps.map(f64::from);
+    let near = (offset - DVec3::new(x, y, z)).abs().max_element() < NEAR && steps != [0; 3];
+    (steps, near)
 }

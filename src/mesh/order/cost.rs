@@ -41,7 +41,7 @@ pub(super) fn cost(order: &[u32], links: &Links) -> Result<f64> {
     let places = inverse(order)?;
     let mut block = Block::default();
     // Odd, as the rows of a grid are rarely that long.
-    let step = order.len() / MOST_NODES | 1;
+    let step = (order.len() / MOST_NODES) | 1;
     let mut sum = 0.0;
     let mut counted = 0;
     for (index, nodes) in order.chunks(PIECE).enumerate().step_by(step) {

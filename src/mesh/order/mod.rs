@@ -40,7 +40,7 @@ pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]]) -> Result<Opt
     if springs.is_empty() {
         return Ok(None);
     }
-    // Nodes are named along the curve here: whatever walks from neighbour to neighbour then stays in the caches, ten times
+    // Nodes are named along the curve here: whatever walks from neighbour to neighbour then stays in the caches, several times
     // as fast where nodes are given in random order.
     let curve = along_curve(positions)?;
     let given = inverse(&curve)?;

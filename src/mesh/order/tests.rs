@@ -66,7 +66,7 @@ fn mixed((positions, springs): &Body) -> Body {
 }
 
 fn organ() -> Body {
-    let organ = Mesh::organ(0.2, 0.2 / 30.0).expect("a sound organ");
+    let organ = Mesh::organ(0.2, 0.2 / 40.0).expect("a sound organ");
     let springs = organ.edges().expect("memory for a test");
     (organ.positions, springs)
 }
@@ -140,7 +140,7 @@ fn an_organ_is_no_worse_than_as_given_however_it_is_mixed() {
     let given = organ();
     let mixed = mixed(&given);
     let (best_given, best_mixed) = (best_cost(&given), best_cost(&mixed));
-    assert!(best_given <= cost_as_given(&given));
+    assert!(best_given <= cost_as_given(&given), "{best_given}");
     assert!(best_mixed <= 1.01 * cost_as_given(&given), "{best_mixed}");
     assert!(best_mixed < 0.6 * cost_as_given(&mixed), "{best_mixed}");
 }
