@@ -11,10 +11,17 @@ pub(crate) struct Slots<T> {
 }
 
 #[derive(Debug)]
-struct Slot<T> {
+pub(crate) struct Slot<T> {
     /// How many things have lived here.
     generation: u32,
     content: Option<T>,
+}
+
+impl<T> Slot<T> {
+    /// What lives here.
+    pub fn content_mut(&mut self) -> Option<&mut T> {
+        self.content.as_mut()
+    }
 }
 
 /// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
@@ -89,6 +96,11 @@ impl<T> Slots<T> {
             .iter_mut()
             .enumerate()
             .filter_map(|(index, slot)| slot.content.as_mut().map(|content| (index, content)))
+    }
+
+    /// All places, free ones too.
+    pub fn slots_mut(&mut self) -> &mut [Slot<T>] {
+        &mut self.slots
     }
 
     fn index(&self, id: SlotId) -> Result<usize> {

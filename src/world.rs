@@ -9,13 +9,20 @@ use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
 use crate::solver::{Outcome, StepRequest, attempt};
 use crate::springs::{ChosenKernel, Kernel};
+use crate::threads::{Items, RunTasks, Team, Threads};
+
+/// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
+const SHARED_FROM: usize = 8192;
+
+/// Small bodies of fewer nodes in all are not worth waking anybody.
+const WORTH_SHARING: usize = 1024;
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldDefinition {
     /// m/s².
     pub gravity: Vec3,
-    /// 1: the caller's thread alone.
+    /// 1: the caller's thread alone; 0: one per core; at most 256. What comes of a step is the same for any number.
     pub thread_count: u32,
     /// 0: as many as stability needs; n: exactly n per step.
     pub substeps: u32,
@@ -25,6 +32,8 @@ pub struct WorldDefinition {
     pub tolerance: f32,
     /// The instructions that springs and nodes are worked on with.
     pub kernel: Kernel,
+    /// A job system whose threads are used instead of the world's own: it is given up to `thread_count` tasks a step.
+    pub tasks: Option<RunTasks>,
 }
 
 impl Default for WorldDefinition {
@@ -37,6 +46,7 @@ impl Default for WorldDefinition {
             max_substeps: 1000,
             tolerance: 0.0,
             kernel: Kernel::Best,
+            tasks: None,
         }
     }
 }
@@ -67,33 +77,33 @@ pub struct ToolId(pub(crate) SlotId);
 pub struct World {
     definition: WorldDefinition,
     kernel: ChosenKernel,
+    threads: Threads,
     bodies: Slots<Body>,
     tools: Slots<Tool>,
     /// The ways of the tools in the step in progress.
     paths: Vec<ToolPath>,
-    /// How the step in progress ended for each body.
-    outcomes: Vec<Outcome>,
+    /// How the step in progress ended for each body, at its place.
+    outcomes: Vec<Option<Outcome>>,
 }
 
 impl World {
     /// An empty world.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: more than one thread.
+    /// [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: the processor does not offer the
+    /// kernel, or the system not so many threads.
     pub fn new(definition: WorldDefinition) -> Result<Self> {
         finite_vector("gravity", definition.gravity)?;
         not_negative("tolerance", definition.tolerance)?;
         if definition.max_substeps == 0 {
             return Err(Error::invalid("max_substeps is 0: must be at least 1"));
         }
-        if definition.thread_count != 1 {
-            return Err(Error::Unsupported(format!(
-                "thread_count is {}: this version steps on the caller's thread alone, 1",
-                definition.thread_count
-            )));
-        }
         Ok(Self {
             kernel: definition.kernel.choose()?,
+            threads: match definition.tasks {
+                Some(tasks) => Threads::of_tasks(tasks, definition.thread_count)?,
+                None => Threads::new(definition.thread_count)?,
+            },
             definition,
             bodies: Slots::new("body"),
             tools: Slots::new("tool"),
@@ -249,24 +259,51 @@ impl World {
             return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
         }
         self.plan_tools();
-        self.attempt_bodies(dt);
-        let report = self.report();
-        if self
-            .outcomes
-            .iter()
-            .any(|outcome| matches!(outcome, Outcome::Unstable { .. }))
-        {
-            return Err(Error::Unstable {
+        let Self {
+            definition,
+            threads,
+            bodies,
+            paths,
+            outcomes,
+            ..
+        } = self;
+        let request = StepRequest {
+            dt,
+            gravity: definition.gravity,
+            substeps: definition.substeps,
+            max_substeps: definition.max_substeps,
+            tolerance: definition.tolerance,
+            tools: paths,
+        };
+        let shared = is_worth_sharing(bodies);
+        let mut step = |team: &Team| {
+            attempt_bodies(bodies, outcomes, &request, team);
+            let report = report(bodies, outcomes);
+            let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
+            if outcomes.iter().flatten().any(unstable) {
+                return Err(report);
+            }
+            commit_bodies(bodies, outcomes, team);
+            Ok(report)
+        };
+        let report = if shared {
+            threads.lead(step)
+        } else {
+            step(&Team::alone())
+        };
+        match report {
+            Ok(report) => {
+                self.commit_tools(dt);
+                Ok(report)
+            }
+            Err(report) => Err(Error::Unstable {
                 report,
                 allowed: match self.definition.substeps {
                     0 => self.definition.max_substeps,
                     fixed => fixed,
                 },
-            });
+            }),
         }
-        self.commit_bodies();
-        self.commit_tools(dt);
-        Ok(report)
     }
 
     /// A hash over everything that the next step depends on; to be compared within one version.
@@ -296,65 +333,13 @@ impl World {
         }
     }
 
-    fn attempt_bodies(&mut self, dt: f32) {
-        let request = StepRequest {
-            dt,
-            gravity: self.definition.gravity,
-            substeps: self.definition.substeps,
-            max_substeps: self.definition.max_substeps,
-            tolerance: self.definition.tolerance,
-            tools: &self.paths,
-        };
-        self.outcomes.clear();
-        for (_, body) in self.bodies.iter_mut() {
-            self.outcomes.push(attempt(body, &request));
-        }
-    }
-
-    fn report(&self) -> StepReport {
-        let mut report = StepReport {
-            substeps: 0,
-            stable_substep: f32::INFINITY,
-            bodies_restored: 0,
-            error_estimate: 0.0,
-        };
-        for (outcome, (_, body)) in self.outcomes.iter().zip(self.bodies.iter()) {
-            let stable_substep = match *outcome {
-                Outcome::Done { substeps, carry, error } => {
-                    report.substeps = report.substeps.max(substeps);
-                    report.error_estimate = report.error_estimate.max(error);
-                    carry.stability.limit
-                }
-                Outcome::NotFinite => {
-                    report.bodies_restored += 1;
-                    body.carry.stability.limit
-                }
-                Outcome::Unstable { stable_substep, error } => {
-                    report.error_estimate = report.error_estimate.max(error);
-                    Some(stable_substep)
-                }
-            };
-            report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
-        }
-        report
-    }
-
-    fn commit_bodies(&mut self) {
-        for (outcome, (_, body)) in self.outcomes.iter().zip(self.bodies.iter_mut()) {
-            match *outcome {
-                Outcome::Done { substeps, carry, .. } => body.commit(substeps, carry),
-                Outcome::NotFinite | Outcome::Unstable { .. } => body.clear_pending(),
-            }
-        }
-    }
-
     fn commit_tools(&mut self, dt: f32) {
         let dt = f64::from(dt);
         for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
             let mut force = glam::DVec3::ZERO;
             let mut torque = glam::DVec3::ZERO;
-            for (outcome, (_, body)) in self.outcomes.iter().zip(self.bodies.iter()) {
-                if let (Outcome::Done { .. }, Some(contacts)) = (outcome, &body.contacts) {
+            for (place, body) in self.bodies.iter() {
+                if let (Some(Outcome::Done { .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
                     force += contacts.loads()[index].impulse / dt;
                     torque += contacts.loads()[index].angular_impulse / dt;
                 }
@@ -365,6 +350,87 @@ impl World {
             if let Some(target) = tool.target.take() {
                 tool.pose = target;
             }
+        }
+    }
+}
+
+/// Whether there is work for more than one thread.
+fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
+    let sizes = || bodies.iter().map(|(_, body)| body.node_count());
+    sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
+}
+
+/// Attempts the step of every body: the small ones are shared among the threads, the large ones each by all threads.
+fn attempt_bodies(bodies: &mut Slots<Body>, outcomes: &mut Vec<Option<Outcome>>, request: &StepRequest, team: &Team) {
+    outcomes.clear();
+    outcomes.resize(bodies.places(), None);
+    let small = bodies
+        .iter()
+        .filter(|(_, body)| body.node_count() < SHARED_FROM)
+        .count();
+    if small > 1 {
+        let contents = Items::new(bodies.slots_mut());
+        team.pass(
+            outcomes.len(),
+            (contents, Items::new(outcomes)),
+            |_, (slot, outcome)| {
+                if let Some(body) = slot.content_mut()
+                    && body.node_count() < SHARED_FROM
+                {
+                    *outcome = Some(attempt(body, request, &Team::alone()));
+                }
+            },
+        );
+    }
+    for (place, body) in bodies.iter_mut() {
+        if outcomes[place].is_none() {
+            let alone = body.node_count() < SHARED_FROM;
+            outcomes[place] = Some(if alone {
+                attempt(body, request, &Team::alone())
+            } else {
+                attempt(body, request, team)
+            });
+        }
+    }
+}
+
+fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
+    let mut report = StepReport {
+        substeps: 0,
+        stable_substep: f32::INFINITY,
+        bodies_restored: 0,
+        error_estimate: 0.0,
+    };
+    for (place, body) in bodies.iter() {
+        let stable_substep = match outcomes[place] {
+            Some(Outcome::Done { substeps, carry, error }) => {
+                report.substeps = report.substeps.max(substeps);
+                report.error_estimate = report.error_estimate.max(error);
+                carry.stability.limit()
+            }
+            Some(Outcome::Unstable { stable_substep, error }) => {
+                report.error_estimate = report.error_estimate.max(error);
+                Some(stable_substep)
+            }
+            Some(Outcome::NotFinite) | None => {
+                report.bodies_restored += 1;
+                body.carry.stability.limit()
+            }
+        };
+        report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
+    }
+    report
+}
+
+fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], team: &Team) {
+    for (place, body) in bodies.iter_mut() {
+        match outcomes[place] {
+            Some(Outcome::Done { substeps, carry, .. }) => {
+                let alone = Team::alone();
+                let team = if body.node_count() < SHARED_FROM { &alone } else { team };
+                body.commit(substeps, carry, team);
+            }
+            _ => body.clear_pending(),
         }
     }
 }

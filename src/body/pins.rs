@@ -1,10 +1,10 @@
 //! Nodes that are held: where they are led, and the force it takes.
 
-use std::ops::Range;
-
 use glam::{DVec3, Vec3};
 
 use crate::error::Result;
+use crate::springs::TILE;
+use crate::threads::Ragged;
 
 /// A node that is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +25,8 @@ pub(crate) struct Pin {
 #[derive(Debug, Default)]
 pub(crate) struct Pins {
     pins: Vec<Pin>,
+    /// Where the pins of each tile begin, up to the last tile that has some.
+    tiles: Vec<usize>,
 }
 
 impl Pins {
@@ -36,11 +38,9 @@ impl Pins {
         self.pins.iter_mut()
     }
 
-    /// The pins of these nodes.
-    pub fn within_mut(&mut self, nodes: &Range<usize>) -> &mut [Pin] {
-        let first = self.pins.partition_point(|pin| (pin.node as usize) < nodes.start);
-        let count = self.pins[first..].partition_point(|pin| (pin.node as usize) < nodes.end);
-        &mut self.pins[first..first + count]
+    /// The pins of each tile.
+    pub fn tiles_mut(&mut self) -> Ragged<'_, Pin> {
+        Ragged::new(&mut self.pins, &self.tiles)
     }
 
     pub fn get(&self, node: u32) -> Option<&Pin> {
@@ -63,7 +63,13 @@ impl Pins {
                 travel: Vec3::ZERO,
                 force_sum: DVec3::ZERO,
             };
+            let tiles = node as usize / TILE + 1;
+            self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?;
             self.pins.insert(index, pin);
+            if tiles > self.tiles.len() {
+                self.tiles.resize(tiles, index);
+            }
+            self.tiles[tiles..].iter_mut().for_each(|start| *start += 1);
         }
         Ok(())
     }
@@ -73,11 +79,42 @@ impl Pins {
         let found = self.find(node);
         if let Ok(index) = found {
             self.pins.remove(index);
+            self.tiles[node as usize / TILE + 1..]
+                .iter_mut()
+                .for_each(|start| *start -= 1);
         }
         found.is_ok()
     }
 
     fn find(&self, node: u32) -> std::result::Result<usize, usize> {
         self.pins.binary_search_by_key(&node, |pin| pin.node)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::threads::Team;
+
+    #[test]
+    fn every_tile_has_its_own_pins() {
+        let mut seed = 1_u64;
+        let mut pins = Pins::default();
+        for _ in 0..2000 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let node = (seed >> 33) as u32 % (8 * TILE as u32);
+            if seed >> 32 & 1 == 0 {
+                pins.insert(node).expect("memory");
+            } else {
+                pins.remove(node);
+            }
+            let count = pins.iter().count();
+            let seen = std::sync::atomic::AtomicUsize::new(0);
+            Team::alone().pass(8, pins.tiles_mut(), |tile, pins| {
+                assert!(pins.iter().all(|pin| pin.node as usize / TILE == tile));
+                seen.fetch_add(pins.len(), std::sync::atomic::Ordering::Relaxed);
+            });
+            assert_eq!(seen.into_inner(), count);
+        }
     }
 }

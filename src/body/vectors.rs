@@ -6,6 +6,8 @@ use glam::Vec3;
 
 use crate::error::Result;
 use crate::memory;
+use crate::springs::TILE;
+use crate::threads::Tiles;
 
 /// How many numbers there are to spare on either side: a kernel that takes the neighbours of sixteen nodes in one load may
 /// read so far beyond the ends.
@@ -93,9 +95,9 @@ impl Vectors {
         self.axes().map(|axis| &axis[nodes.clone()])
     }
 
-    #[inline(always)]
-    pub fn slices_mut(&mut self, nodes: Range<usize>) -> [&mut [f32]; 3] {
-        self.axes_mut().map(|axis| &mut axis[nodes.clone()])
+    /// The coordinates along each axis, tile by tile.
+    pub fn tiles_mut(&mut self) -> [Tiles<'_, f32>; 3] {
+        self.axes_mut().map(|axis| Tiles::new(axis, TILE))
     }
 
     /// The coordinates along each axis with [`MARGIN`] readable numbers before the first and at least as many after the
@@ -110,7 +112,12 @@ impl Vectors {
 
     /// All of them, in order.
     pub fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
-        let [x, y, z] = self.axes();
+        self.of(0..self.len())
+    }
+
+    /// Those of some nodes, in order.
+    pub fn of(&self, nodes: Range<usize>) -> impl Iterator<Item = Vec3> + '_ {
+        let [x, y, z] = self.slices(nodes);
         x.iter().zip(y).zip(z).map(|((&x, &y), &z)| Vec3::new(x, y, z))
     }
 

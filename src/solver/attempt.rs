@@ -7,6 +7,7 @@ use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
 use crate::contact::{Contacts, ToolPath};
+use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
 const RESERVE: f32 = 0.8;
@@ -55,14 +56,14 @@ pub(crate) enum Outcome {
 }
 
 /// Takes a step of `body` without making it current.
-pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
-    body.refresh_forces();
+pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+    body.refresh_forces(team);
     let known = body.carry.stability;
     let is_worth_estimating = || {
-        let substeps = request.dt / (RESERVE * known.anywhere);
+        let substeps = request.dt / (RESERVE * known.limit_anywhere());
         request.substeps == 0 && known.is_coarse() && substeps > WORTH_ESTIMATING
     };
-    let stability = if known.limit.is_none() || is_worth_estimating() {
+    let stability = if known.limit().is_none() || is_worth_estimating() {
         Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions())
     } else {
         known
@@ -72,7 +73,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
         ..body.carry
     };
     if request.substeps > 0 {
-        return match verlet::run(body, request, request.substeps, 0, start) {
+        return match verlet::run(body, request, request.substeps, 0, start, team) {
             Ok(taken) => finish(body, request.substeps, taken, 0.0),
             Err(too_long) => Outcome::Unstable {
                 stable_substep: too_long.stable_substep,
@@ -80,29 +81,29 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest) -> Outcome {
             },
         };
     }
-    match run_stably(body, request, start) {
+    match run_stably(body, request, start, team) {
         Err(too_long) => Outcome::Unstable {
             stable_substep: too_long.stable_substep,
             error: 0.0,
         },
         Ok((substeps, taken)) if request.tolerance == 0.0 => finish(body, substeps, taken, 0.0),
-        Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry),
+        Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry, team),
     }
 }
 
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
-fn run_stably(body: &mut Body, request: &StepRequest, start: Carry) -> Result<(u32, Taken), TooLong> {
-    let mut stable_substep = start.stability.limit.unwrap_or(f32::INFINITY);
+fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team) -> Result<(u32, Taken), TooLong> {
+    let mut stable_substep = start.stability.limit().unwrap_or(f32::INFINITY);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
-            stable_substep = start.stability.anywhere;
+            stable_substep = start.stability.limit_anywhere();
         }
         let needed = (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil();
         if needed > f64::from(request.max_substeps) {
             break;
         }
         let substeps = needed.max(1.0) as u32;
-        match verlet::run(body, request, substeps, middle(substeps), start) {
+        match verlet::run(body, request, substeps, middle(substeps), start, team) {
             Ok(taken) => return Ok((substeps, taken)),
             Err(found) => stable_substep = stable_substep.min(found.stable_substep),
         }
@@ -120,21 +121,28 @@ fn middle(substeps: u32) -> u32 {
 ///
 /// The difference bounds the error of the finer step whatever the order at which the step converges, from 1 on: contact
 /// is of order 1, and modes that the step does not resolve are of no order at all.
-fn run_to_tolerance(body: &mut Body, request: &StepRequest, substeps: u32, start: Carry, coarse: Carry) -> Outcome {
+fn run_to_tolerance(
+    body: &mut Body,
+    request: &StepRequest,
+    substeps: u32,
+    start: Carry,
+    coarse: Carry,
+    team: &Team,
+) -> Outcome {
     let mut substeps = substeps;
     let mut middle = middle(substeps);
     let mut carry = coarse;
     let mut error = 0.0;
     compare(body, request, &carry);
     loop {
-        let stable_substep = carry.stability.limit.unwrap_or(f32::INFINITY);
+        let stable_substep = carry.stability.limit().unwrap_or(f32::INFINITY);
         substeps = substeps.saturating_mul(2);
         middle = middle.saturating_mul(2);
         if substeps > request.max_substeps || substeps == u32::MAX {
             return Outcome::Unstable { stable_substep, error };
         }
         // What was not stable after all may be so with twice the substeps.
-        let Ok(finer) = verlet::run(body, request, substeps, middle, start) else {
+        let Ok(finer) = verlet::run(body, request, substeps, middle, start, team) else {
             continue;
         };
         carry = finer.carry;
@@ -149,7 +157,7 @@ fn run_to_tolerance(body: &mut Body, request: &StepRequest, substeps: u32, start
 fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
     let (positions, velocities) = body.state.newest();
     // 1 over the highest frequency.
-    let time = (0.5 * carry.stability.limit.unwrap_or(f32::INFINITY)).min(request.dt);
+    let time = (0.5 * carry.stability.limit().unwrap_or(f32::INFINITY)).min(request.dt);
     body.coarse
         .as_mut()
         .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))

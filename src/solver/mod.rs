@@ -9,4 +9,5 @@ mod verlet;
 
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
 pub(crate) use gravity::GravityKicks;
+pub(crate) use kick::Survey;
 pub(crate) use stability::Stability;

@@ -8,6 +8,7 @@ use super::attempt::StepRequest;
 use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, InverseMasses, Pin, Vectors};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
 
 /// Which part of a step a substep is.
 pub(super) struct Part {
@@ -31,7 +32,7 @@ impl Part {
 
 /// Changes the velocities by the forces at the latest positions, moves the nodes by them, and puts the pinned ones where
 /// they are led; `fall` is what gravity gives in this kick, m/s.
-pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec3) -> Survey {
+pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec3, team: &Team) -> Survey {
     let node_count = body.node_count();
     let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
     let state = body.state.substep();
@@ -44,8 +45,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         applied: body.applied.as_ref(),
         damping: body.damping.as_ref(),
     };
-    let mut forces = TileForces::ZERO;
-    let tiles = (0..tile_count(node_count)).map(|tile| (tile, tile_nodes(tile, node_count)));
+    let tiles = tile_count(node_count);
     if !part.begins
         && let Some(predicted) = &mut body.predicted_velocities
     {
@@ -56,10 +56,13 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             positions: state.positions,
             velocities: state.velocities,
         };
-        for (tile, nodes) in tiles.clone() {
-            let pins = body.pins.within_mut(&nodes);
-            prediction.take(tile, nodes.clone(), predicted.slices_mut(nodes), pins, &mut forces);
-        }
+        team.pass(
+            tiles,
+            (predicted.tiles_mut(), body.pins.tiles_mut()),
+            |tile, (predicted, pins)| {
+                prediction.take(tile, tile_nodes(tile, node_count), predicted, pins);
+            },
+        );
     }
     let pass = Pass {
         springs: &*body.springs,
@@ -73,17 +76,27 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         first_velocities: state.first_velocities,
         first_forces: state.first_forces,
     };
-    let mut survey = Survey::NOTHING;
-    for (tile, nodes) in tiles {
-        let mut written = Written {
-            velocities: state.velocities.slices_mut(nodes.clone()),
-            next_positions: state.next_positions.slices_mut(nodes.clone()),
-            forces: state.forces.slices_mut(nodes.clone()),
-            pins: body.pins.within_mut(&nodes),
-        };
-        survey = survey.and(pass.take(tile, nodes, &mut written, &mut forces));
-    }
-    survey
+    let written = (
+        state.velocities.tiles_mut(),
+        state.next_positions.tiles_mut(),
+        state.forces.tiles_mut(),
+        body.pins.tiles_mut(),
+        Items::new(&mut body.surveys),
+    );
+    team.pass(
+        tiles,
+        written,
+        |tile, (velocities, next_positions, forces, pins, survey)| {
+            let mut written = Written {
+                velocities,
+                next_positions,
+                forces,
+                pins,
+            };
+            *survey = pass.take(tile, tile_nodes(tile, node_count), &mut written);
+        },
+    );
+    body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and)
 }
 
 /// What a first visit of damped springs reads: it finds the velocities at the time of the positions.
@@ -96,14 +109,9 @@ struct Prediction<'a> {
 }
 
 impl Prediction<'_> {
-    fn take(
-        &self,
-        tile: usize,
-        nodes: Range<usize>,
-        mut predicted: [&mut [f32]; 3],
-        pins: &[Pin],
-        forces: &mut TileForces,
-    ) {
+    fn take(&self, tile: usize, nodes: Range<usize>, mut predicted: [&mut [f32]; 3], pins: &[Pin]) {
+        let mut forces = TileForces::ZERO;
+        let forces = &mut forces;
         let motion = Motion::at(self.positions, Some(self.velocities));
         self.springs.forces(tile, &motion, forces);
         let velocities = self.velocities.slices(nodes.clone());
@@ -148,7 +156,9 @@ struct Written<'a> {
 }
 
 impl Pass<'_> {
-    fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written, forces: &mut TileForces) -> Survey {
+    fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written) -> Survey {
+        let mut forces = TileForces::ZERO;
+        let forces = &mut forces;
         if self.part.begins {
             for (forces, first) in forces
                 .axes_mut()

@@ -12,6 +12,7 @@ use super::stability::Stability;
 use super::substep::{Part, kick_and_drift};
 use crate::body::{Body, Bounds, Mobility};
 use crate::contact::Meeting;
+use crate::threads::Team;
 
 /// The substep asked for is longer than what is stable, or the motion made it so on the way.
 #[derive(Clone, Copy, Debug)]
@@ -36,11 +37,12 @@ pub(super) fn run(
     substeps: u32,
     middle: u32,
     start: Carry,
+    team: &Team,
 ) -> Result<Taken, TooLong> {
     let mut carry = start;
     let mut finite = true;
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-    let check = |stability: &Stability| match stability.limit {
+    let check = |stability: &Stability| match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
     };
@@ -56,7 +58,7 @@ pub(super) fn run(
         };
         let kicked = if part.is_half() { 0.5 * substep } else { substep };
         let fall = carry.gravity.next(request.gravity, kicked);
-        let survey = kick_and_drift(body, request, &part, fall);
+        let survey = kick_and_drift(body, request, &part, fall, team);
         carry.gravity.velocities = meet_tools(body, request, &part, survey.velocities);
         if part.ends {
             // What tools have done was not looked at.

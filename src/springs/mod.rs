@@ -15,7 +15,7 @@ mod tile;
 use std::fmt::Debug;
 
 pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, Loops};
+pub(crate) use kernels::{ChosenKernel, Loops, Range};
 pub(crate) use law::separation;
 use packed::Packed;
 pub(crate) use packed::Rounding;
@@ -98,10 +98,9 @@ pub(crate) trait Springs: Debug + Send + Sync {
     fn remove(&mut self, a: u32, b: u32) -> Result<()>;
 }
 
-/// The springs of a body, kept as its definition asks.
-pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition) -> Result<Box<dyn Springs>> {
+/// `springs`, kept as a body's definition asks.
+pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: &[Spring]) -> Result<Box<dyn Springs>> {
     let node_count = definition.positions.len();
-    let springs = &*definition.resolved_springs()?;
     let width = definition.springs_per_node as usize;
     let damped = springs.iter().any(|spring| spring.damping != 0.0);
     Ok(match (definition.storage, damped) {

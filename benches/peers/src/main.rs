@@ -1,0 +1,210 @@
+//! The same cloth, side by side in one run: sinew, Taichi, NVIDIA Warp, Rapier's soft bodies and Bullet's.
+//!
+//! ```text
+//! cd benches/peers && cargo run --release             # some 20 minutes
+//! cd benches/peers && cargo run --release -- --quick  # below one minute
+//! ```
+//!
+//! What is not installed is skipped, loudly. A table is printed and written to `target/report/peers.md`, with what was
+//! asked of each engine.
+
+mod child;
+mod cloth;
+mod contender;
+mod protocol;
+mod rapier_cloth;
+mod report;
+mod sinew_cloth;
+
+use cloth::Cloth;
+use contender::{Contender, Running};
+use protocol::Report;
+
+/// How long to measure.
+struct Effort {
+    /// Nodes along an edge of each cloth.
+    sides: &'static [u32],
+    /// Seconds that a contender may take for its simulated second; fewer steps otherwise.
+    seconds: f64,
+}
+
+const FULL: Effort = Effort {
+    sides: &[100, 316, 1000],
+    seconds: 120.0,
+};
+const QUICK: Effort = Effort {
+    sides: &[100, 316],
+    seconds: 1.0,
+};
+
+/// Contenders take turns this often, so that what else the machine does hits all.
+const ROUNDS: usize = 10;
+
+/// Steps before the first that is timed; a slow engine has fewer.
+const WARM_UP: usize = 10;
+
+/// What was measured of a contender on one cloth, or why nothing was.
+pub struct Row {
+    pub contender: Contender,
+    pub result: Result<Measured, String>,
+}
+
+/// What was measured of a contender on one cloth.
+pub struct Measured {
+    pub version: String,
+    /// Median over the steps.
+    pub milliseconds: f64,
+    /// A tenth of the steps took less: what remains where something else uses the machine.
+    pub fast_milliseconds: f64,
+    /// Steps that were timed.
+    pub steps: usize,
+    /// Whether the report is of the end of one simulated second.
+    pub whole_second: bool,
+    pub report: Report,
+}
+
+/// A contender in the course of being measured.
+struct Run {
+    running: Running,
+    /// Steps per round.
+    share: usize,
+    warm_up: usize,
+    milliseconds: Vec<f64>,
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.first().map(String::as_str) {
+        None => compare(&FULL),
+        Some("--quick") => compare(&QUICK),
+        Some("child") => serve(&arguments[1..]),
+        Some(other) => {
+            eprintln!("{other} is not understood: --quick, or nothing");
+            std::process::exit(2);
+        }
+    }
+}
+
+/// Is one of the contenders.
+fn serve(arguments: &[String]) {
+    let cloth = arguments.get(2..).and_then(Cloth::from_arguments).expect("a cloth");
+    let threads = arguments[1].parse().expect("a thread count");
+    match arguments[0].as_str() {
+        "sinew" => child::serve::<sinew_cloth::SinewCloth>(&cloth, threads),
+        "rapier" => child::serve::<rapier_cloth::RapierCloth>(&cloth, threads),
+        other => panic!("{other} is not built in"),
+    }
+}
+
+fn compare(effort: &Effort) {
+    let mut skipped = Vec::new();
+    let mut contenders = Vec::new();
+    for contender in contender::all() {
+        match contender {
+            Ok(contender) => contenders.push(contender),
+            Err(reason) => skipped.push(reason),
+        }
+    }
+    let mut tables = Vec::new();
+    for &side in effort.sides {
+        let cloth = Cloth::new(side);
+        let rows = measure(&cloth, &contenders, effort.seconds);
+        for row in &rows {
+            if let Err(reason) = &row.result {
+                let Contender { name, threads, .. } = row.contender;
+                let reason = format!("{name} on {threads} thread(s): {reason}");
+                if !skipped.contains(&reason) {
+                    skipped.push(reason);
+                }
+            }
+        }
+        tables.push((cloth, rows));
+    }
+    let text = report::markdown(&tables, &skipped);
+    println!("{text}");
+    let folder = contender::target().join("report");
+    let file = folder.join("peers.md");
+    match std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&file, text)) {
+        Ok(()) => eprintln!("written to {}", file.display()),
+        Err(error) => eprintln!("{}: {error}", file.display()),
+    }
+    for reason in &skipped {
+        eprintln!("SKIPPED: {reason}");
+    }
+}
+
+/// Measures everyone on one cloth, in turns.
+fn measure(cloth: &Cloth, contenders: &[Contender], seconds: f64) -> Vec<Row> {
+    let mut runs: Vec<(Contender, Result<Run, String>)> = Vec::new();
+    for contender in contenders {
+        let Contender { name, threads, .. } = contender;
+        eprintln!("{0} x {0}: {name} on {threads} thread(s) is built", cloth.side);
+        let run = Run::start(contender, cloth, seconds);
+        runs.push((contender.clone(), run));
+    }
+    for round in 1..=ROUNDS {
+        eprintln!("{0} x {0}: round {round} of {ROUNDS}", cloth.side);
+        for (_, run) in &mut runs {
+            if let Ok(started) = run
+                && let Err(error) = started.round()
+            {
+                *run = Err(error);
+            }
+        }
+    }
+    let rows = runs.into_iter().map(|(contender, run)| Row {
+        contender,
+        result: run.and_then(|run| run.finish(cloth)),
+    });
+    rows.collect()
+}
+
+impl Run {
+    /// Builds the cloth and finds how many steps there is time for: those of one second, or fewer.
+    fn start(contender: &Contender, cloth: &Cloth, seconds: f64) -> Result<Self, String> {
+        let mut running = contender.start(cloth)?;
+        // The first steps compile and allocate.
+        let mut warm_up = 0;
+        let mut fastest = f64::INFINITY;
+        let mut spent = 0.0;
+        while warm_up < WARM_UP && (warm_up < 2 || spent < 0.1 * seconds * 1e3) {
+            let milliseconds = running.steps(1)?[0];
+            fastest = fastest.min(milliseconds);
+            spent += milliseconds;
+            warm_up += 1;
+        }
+        let affordable = (seconds * 1e3 / fastest) as usize;
+        let share = affordable.min(cloth.steps_per_second() - warm_up) / ROUNDS;
+        Ok(Self {
+            running,
+            share: share.max(1),
+            warm_up,
+            milliseconds: Vec::new(),
+        })
+    }
+
+    fn round(&mut self) -> Result<(), String> {
+        self.milliseconds.extend(self.running.steps(self.share)?);
+        Ok(())
+    }
+
+    fn finish(mut self, cloth: &Cloth) -> Result<Measured, String> {
+        let done = self.warm_up + self.milliseconds.len();
+        let left = cloth.steps_per_second().saturating_sub(done);
+        // What the rounds did not divide.
+        let whole_second = left < ROUNDS;
+        if whole_second {
+            self.running.steps(left)?;
+        }
+        let steps = self.milliseconds.len();
+        self.milliseconds.sort_unstable_by(f64::total_cmp);
+        Ok(Measured {
+            version: self.running.version.clone(),
+            milliseconds: self.milliseconds[steps / 2],
+            fast_milliseconds: self.milliseconds[steps / 10],
+            steps,
+            whole_second,
+            report: self.running.report()?,
+        })
+    }
+}
