@@ -57,19 +57,15 @@ fn the_count_counts() {
 
 #[test]
 fn a_step_allocates_nothing() {
-    for storage in [
-        Storage::Packed,
-        Storage::Efficient,
-        Storage::FastLink,
-        Storage::DynamicBulk,
-    ] {
-        steps_allocate_nothing(storage);
+    steps_allocate_nothing(Storage::Packed, &[0.0, 1e-4]);
+    for storage in [Storage::Efficient, Storage::FastLink, Storage::DynamicBulk] {
+        steps_allocate_nothing(storage, &[0.0]);
     }
 }
 
-fn steps_allocate_nothing(storage: Storage) {
+fn steps_allocate_nothing(storage: Storage, tolerances: &[f32]) {
     let mesh = Mesh::cloth([0.2, 0.2], [12, 12]).expect("a cloth");
-    for tolerance in [0.0, 1e-4] {
+    for &tolerance in tolerances {
         let definition = WorldDefinition {
             tolerance,
             ..WorldDefinition::default()

@@ -190,10 +190,8 @@ fn each_spring_has_its_own_damping() {
     let mut undamped = scene(&parts, Storage::Efficient, 0);
     undamped.body_mut().set_velocities(&velocities).expect("velocities");
     undamped.run(5e-4, 100);
-    assert!(
-        largest_difference(&moved[1], &undamped.positions()) > 1e-3,
-        "no damping"
-    );
+    let effect = largest_difference(&moved[1], &undamped.positions());
+    assert!(effect > 1e-4, "damping changes {effect} m");
     for (positions, storage) in moved.iter().zip(ALL) {
         let difference = largest_difference(&moved[0], positions);
         assert!(difference < 2e-6, "{storage:?}: {difference} m");

@@ -87,7 +87,7 @@ pub struct BodyDefinition<'a> {
     /// How the springs are kept.
     pub storage: Storage,
     /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
-    /// springs given, as many as the node with the most has, or as nodes have on average.
+    /// springs given, as many as the node with the most has, or what takes the least memory.
     pub springs_per_node: u32,
     /// How the body is moved.
     pub solver: Solver,
