@@ -120,7 +120,7 @@ pub fn run(report: &mut Report, effort: Effort) {
         };
         table.row(vec![
             name.to_owned(),
-            milliseconds(samples.median() / f64::from(SUBSTEPS)),
+            milliseconds(samples.minimum() / f64::from(SUBSTEPS)),
             digits(samples.ratio(plain)),
             megabytes(springs),
             whole.map_or("-".into(), megabytes),

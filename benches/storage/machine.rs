@@ -36,8 +36,8 @@ pub fn describe(report: &mut Report, quick: bool) {
         let _ = writeln!(text, "- Load when this began: {load}.");
     }
     text.push_str(
-        "- Times are medians over rounds in which all contenders of a size take turns; ratios are medians of the ratios \
-         within rounds. What runs on one thread is measured in processor time of that thread, what runs on several on \
+        "- Times are the least over rounds in which all contenders of a size take turns: what disturbs makes them longer, \
+         never shorter. Ratios are medians of the ratios within rounds. What runs on one thread is measured in processor time of that thread, what runs on several on \
          the wall's clock.\n",
     );
     if quick {

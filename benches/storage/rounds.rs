@@ -25,8 +25,8 @@ impl Effort {
     };
     pub const QUICK: Self = Self {
         quick: true,
-        rounds: 5,
-        patience: Duration::from_secs(2),
+        rounds: 4,
+        patience: Duration::from_secs(1),
         sample: 2e-3,
     };
 }

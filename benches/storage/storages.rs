@@ -282,7 +282,7 @@ impl Knife {
 }
 
 fn cell(samples: Option<&Samples>) -> String {
-    samples.map_or("not offered".into(), |samples| milliseconds(samples.median()))
+    samples.map_or("not offered".into(), |samples| milliseconds(samples.minimum()))
 }
 
 /// As the paper's table.
@@ -321,7 +321,7 @@ fn details(report: &mut Report, sizes: &[Size]) {
         "nodes",
         "storage",
         "step, ms",
-        "least, ms",
+        "median, ms",
         "of PACKED",
         "fragmented, ms",
         "of fresh",
@@ -346,8 +346,8 @@ fn details(report: &mut Report, sizes: &[Size]) {
             let worn = size.times.get(&fragmented(name));
             let packed = size.times.get("PACKED");
             cells.extend([
-                milliseconds(fresh.median()),
                 milliseconds(fresh.minimum()),
+                milliseconds(fresh.median()),
                 packed.map_or(String::new(), |packed| digits(fresh.ratio(packed))),
                 cell(worn),
                 worn.map_or(String::new(), |worn| digits(worn.ratio(fresh))),
@@ -365,7 +365,7 @@ fn details(report: &mut Report, sizes: &[Size]) {
 
 fn figure(report: &mut Report, sizes: &[Size]) {
     let points = |name: &str| {
-        let point = |size: &Size| Some((size.nodes as f64, 1e3 * size.times.get(name)?.median()));
+        let point = |size: &Size| Some((size.nodes as f64, 1e3 * size.times.get(name)?.minimum()));
         sizes.iter().filter_map(point).collect()
     };
     let mut series = Vec::new();
