@@ -178,8 +178,11 @@ impl Body {
         let [own_a, own_b] = self.check_pair(a, b)?;
         let told = |_| Error::invalid(format!("nodes {a} and {b} have no spring"));
         self.springs.remove(own_a, own_b).map_err(told)?;
-        // What was stable still is.
         self.forces_current = false;
+        // What was stable still is; nothing limits what has no springs.
+        if self.springs.spring_count() == 0 {
+            self.carry.stability = Stability::UNKNOWN;
+        }
         Ok(())
     }
 

@@ -4,7 +4,6 @@
 //! that is already in memory.
 
 mod file;
-#[cfg_attr(not(test), expect(dead_code, reason = "packed storage does not reorder yet"))]
 pub(crate) mod order;
 mod organ;
 mod shapes;
