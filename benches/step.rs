@@ -1,11 +1,12 @@
 //! The time of a VERLET step, as springs per second: a step here is one substep, and visits each spring once.
+#![allow(clippy::print_stderr)]
 
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Pose, Shape, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Pose, Shape, Storage, ToolDefinition, Values, World, WorldDefinition};
 
 /// Short enough for every body here.
 const SUBSTEP: f32 = 1e-4;
@@ -114,6 +115,29 @@ fn features(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// How the springs are kept: a sheet of 10K nodes in each storage that is offered.
+fn storages(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("storages");
+    group.sample_size(20);
+    let (positions, springs) = grid(100);
+    for storage in [
+        Storage::Packed,
+        Storage::FastLink,
+        Storage::DynamicBulk,
+        Storage::Efficient,
+    ] {
+        let body = BodyDefinition {
+            storage,
+            ..definition(&positions, &springs)
+        };
+        match world().create_body(&body) {
+            Ok(_) => measure(&mut group, BenchmarkId::new(format!("{storage:?}"), 10_000), &body),
+            Err(error) => eprintln!("NOT OFFERED: {error}"),
+        }
+    }
+    group.finish();
+}
+
 /// What a tool costs: far away, near, and pressed into a cloth.
 fn tools(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("tools");
@@ -166,5 +190,5 @@ fn tools(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, sizes, features, tools);
+criterion_group!(benches, sizes, features, storages, tools);
 criterion_main!(benches);

@@ -44,6 +44,31 @@
 #define SINEW_VERSION (((SINEW_VERSION_MAJOR << 16) | (SINEW_VERSION_MINOR << 8)) | SINEW_VERSION_PATCH)
 
 /**
+ * uint32_t: the instructions that springs and nodes are worked on with. The widest that the processor offers.
+ */
+#define SINEW_KERNEL_BEST 0
+
+/**
+ * The same bits on every processor.
+ */
+#define SINEW_KERNEL_PORTABLE 1
+
+/**
+ * x86-64: AVX2 and FMA.
+ */
+#define SINEW_KERNEL_AVX2 2
+
+/**
+ * x86-64: AVX-512 F, BW, DQ and VL.
+ */
+#define SINEW_KERNEL_AVX512 3
+
+/**
+ * AArch64.
+ */
+#define SINEW_KERNEL_NEON 4
+
+/**
  * The default: laid out for the processor.
  */
 #define SINEW_STORAGE_PACKED 0
@@ -168,6 +193,22 @@ typedef struct sinew_world sinew_world;
 typedef int32_t sinew_status;
 
 /**
+ * A part of a step, to be called once for every index that sinew_run_tasks was told, with the task_data it was given.
+ */
+typedef void (*sinew_task)(void *task_data, uint32_t index);
+
+/**
+ * Runs a step's tasks on the threads of a job system: calls task(task_data, index) once for every index from 0 to
+ * count - 1, on any threads, in any order, even one after another, and returns when all of these calls have. Calling it
+ * later than that is an error that is not found out.
+ *
+ * Calls that overlap share the work; each lasts until the step is taken, so that no more tasks should run at once than
+ * there are cores free for them. The first to begin takes the step, wherever it runs; with none, the step is taken by
+ * the caller's thread. Runs within sinew_world_step, and must not use the world.
+ */
+typedef void (*sinew_run_tasks)(void *context, sinew_task task, void *task_data, uint32_t count);
+
+/**
  * How a world steps. Filled by sinew_world_def_init.
  */
 typedef struct sinew_world_def {
@@ -180,7 +221,8 @@ typedef struct sinew_world_def {
    */
   float gravity[3];
   /**
-   * 1, the default: the caller's thread alone; 0: one per core.
+   * 1, the default: the caller's thread alone; 0: one per core; at most 256. Results are the same for every number. A
+   * world's threads end with it, and sleep while it is not stepped or too small to share.
    */
   uint32_t thread_count;
   /**
@@ -199,6 +241,23 @@ typedef struct sinew_world_def {
    * 0.
    */
   uint32_t reserved;
+  /**
+   * Nullable, the default: the world has threads of its own. Else these are used instead, thread_count tasks a step, 1:
+   * never called; it is called by steps that are worth sharing, as long as the world lives.
+   */
+  sinew_run_tasks run_tasks;
+  /**
+   * What run_tasks is given; nullable.
+   */
+  void *tasks_context;
+  /**
+   * SINEW_KERNEL_...; default SINEW_KERNEL_BEST.
+   */
+  uint32_t kernel;
+  /**
+   * 0.
+   */
+  uint32_t reserved2;
 } sinew_world_def;
 
 /**
@@ -688,13 +747,16 @@ sinew_status sinew_world_def_init(struct sinew_world_def *def, size_t struct_siz
 /**
  * Creates an empty world, which the caller destroys with sinew_world_destroy.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread_count other than 1),
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread could not be started, or the
+ * processor does not offer the kernel),
  * SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
- * `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+ * `def` is NULL or a definition of the size that it states, with a `run_tasks` that keeps its word; `out` is NULL or
+ * writable.
  */
-sinew_status sinew_world_create(const struct sinew_world_def *def, struct sinew_world **out);
+sinew_status sinew_world_create(const struct sinew_world_def *def,
+                                struct sinew_world **out);
 
 /**
  * Destroys a world with all that is in it. NULL: nothing.

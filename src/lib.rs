@@ -21,5 +21,5 @@ pub use diagnostics::{Energy, StorageReport};
 pub use error::{Error, Result};
 pub use picture::PictureDefinition;
 pub use springs::Kernel;
-pub use threads::{JobSystem, RunTasks, Task};
+pub use threads::RunTasks;
 pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};

@@ -9,10 +9,13 @@ use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
 use crate::solver::{Outcome, StepRequest, attempt};
 use crate::springs::{ChosenKernel, Kernel};
-use crate::threads::{Each, JobSystem, Team, Threads};
+use crate::threads::{Items, RunTasks, Team, Threads};
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
+
+/// Small bodies of fewer nodes in all are not worth waking anybody.
+const WORTH_SHARING: usize = 1024;
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +32,8 @@ pub struct WorldDefinition {
     pub tolerance: f32,
     /// The instructions that springs and nodes are worked on with.
     pub kernel: Kernel,
-    /// What a step's work is handed to, as `thread_count` tasks; `None`: threads of the world's own.
-    pub jobs: Option<JobSystem>,
+    /// A job system whose threads are used instead of the world's own: it is given up to `thread_count` tasks a step.
+    pub tasks: Option<RunTasks>,
 }
 
 impl Default for WorldDefinition {
@@ -43,7 +46,7 @@ impl Default for WorldDefinition {
             max_substeps: 1000,
             tolerance: 0.0,
             kernel: Kernel::Best,
-            jobs: None,
+            tasks: None,
         }
     }
 }
@@ -97,7 +100,10 @@ impl World {
         }
         Ok(Self {
             kernel: definition.kernel.choose()?,
-            threads: Threads::new(definition.thread_count, definition.jobs)?,
+            threads: match definition.tasks {
+                Some(tasks) => Threads::of_tasks(tasks, definition.thread_count)?,
+                None => Threads::new(definition.thread_count)?,
+            },
             definition,
             bodies: Slots::new("body"),
             tools: Slots::new("tool"),
@@ -269,7 +275,8 @@ impl World {
             tolerance: definition.tolerance,
             tools: paths,
         };
-        let report = threads.lead(|team| {
+        let shared = is_worth_sharing(bodies);
+        let mut step = |team: &Team| {
             attempt_bodies(bodies, outcomes, &request, team);
             let report = report(bodies, outcomes);
             let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
@@ -278,7 +285,12 @@ impl World {
             }
             commit_bodies(bodies, outcomes, team);
             Ok(report)
-        });
+        };
+        let report = if shared {
+            threads.lead(step)
+        } else {
+            step(&Team::alone())
+        };
         match report {
             Ok(report) => {
                 self.commit_tools(dt);
@@ -342,6 +354,12 @@ impl World {
     }
 }
 
+/// Whether there is work for more than one thread.
+fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
+    let sizes = || bodies.iter().map(|(_, body)| body.node_count());
+    sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
+}
+
 /// Attempts the step of every body: the small ones are shared among the threads, the large ones each by all threads.
 fn attempt_bodies(bodies: &mut Slots<Body>, outcomes: &mut Vec<Option<Outcome>>, request: &StepRequest, team: &Team) {
     outcomes.clear();
@@ -351,14 +369,18 @@ fn attempt_bodies(bodies: &mut Slots<Body>, outcomes: &mut Vec<Option<Outcome>>,
         .filter(|(_, body)| body.node_count() < SHARED_FROM)
         .count();
     if small > 1 {
-        let contents = Each::new(bodies.slots_mut());
-        team.pass(outcomes.len(), (contents, Each::new(outcomes)), |_, (slot, outcome)| {
-            if let Some(body) = slot.content_mut()
-                && body.node_count() < SHARED_FROM
-            {
-                *outcome = Some(attempt(body, request, &Team::alone()));
-            }
-        });
+        let contents = Items::new(bodies.slots_mut());
+        team.pass(
+            outcomes.len(),
+            (contents, Items::new(outcomes)),
+            |_, (slot, outcome)| {
+                if let Some(body) = slot.content_mut()
+                    && body.node_count() < SHARED_FROM
+                {
+                    *outcome = Some(attempt(body, request, &Team::alone()));
+                }
+            },
+        );
     }
     for (place, body) in bodies.iter_mut() {
         if outcomes[place].is_none() {
@@ -384,7 +406,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
             Some(Outcome::Done { substeps, carry, error }) => {
                 report.substeps = report.substeps.max(substeps);
                 report.error_estimate = report.error_estimate.max(error);
-                carry.stability.limit
+                carry.stability.limit()
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);
@@ -392,7 +414,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
             }
             Some(Outcome::NotFinite) | None => {
                 report.bodies_restored += 1;
-                body.carry.stability.limit
+                body.carry.stability.limit()
             }
         };
         report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));

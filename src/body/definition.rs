@@ -86,7 +86,8 @@ pub struct BodyDefinition<'a> {
     pub tetrahedra: &'a [[u32; 4]],
     /// How the springs are kept.
     pub storage: Storage,
-    /// The row width or chunk size of the storage; 0: chosen from the springs given.
+    /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
+    /// springs given, as many as the node with the most has, or as nodes have on average.
     pub springs_per_node: u32,
     /// How the body is moved.
     pub solver: Solver,
@@ -209,12 +210,6 @@ impl BodyDefinition<'_> {
     }
 
     fn check_offered(&self) -> Result<()> {
-        if self.storage != Storage::Packed {
-            return Err(Error::Unsupported(format!(
-                "storage is {:?}: this version offers Packed alone",
-                self.storage
-            )));
-        }
         if self.solver != Solver::Verlet {
             return Err(Error::Unsupported(format!(
                 "solver is {:?}: this version offers Verlet alone",

@@ -36,7 +36,7 @@ impl Body {
             None => self.applied.insert(Vectors::zeros(count)?),
         };
         for (&node, &force) in nodes.iter().zip(forces) {
-            let node = node as usize;
+            let node = self.order.own(node) as usize;
             if self.inverse_masses[node] == 0.0 {
                 continue;
             }
@@ -66,8 +66,8 @@ impl Body {
     pub fn set_velocities(&mut self, velocities: &[Vec3]) -> Result<()> {
         expect_count("velocities", velocities.len(), self.node_count())?;
         finite_vectors("velocities", velocities)?;
-        for (node, &velocity) in velocities.iter().enumerate() {
-            if self.inverse_masses[node] > 0.0 {
+        for (node, &velocity) in (0..).zip(velocities) {
+            if self.inverse_masses[self.order.own(node) as usize] > 0.0 {
                 self.set_velocity(node, velocity);
             }
         }
@@ -81,10 +81,11 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node.
     pub fn pin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
-        if self.pins.get(node).is_none() {
-            self.pins.insert(node)?;
-            self.inverse_masses[node as usize] = 0.0;
-            self.set_velocity(node as usize, Vec3::ZERO);
+        let own = self.order.own(node);
+        if self.pins.get(own).is_none() {
+            self.pins.insert(own)?;
+            self.inverse_masses[own as usize] = 0.0;
+            self.set_velocity(node, Vec3::ZERO);
             self.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
@@ -96,14 +97,15 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
-        let mass = self.masses[node as usize];
+        let own = self.order.own(node);
+        let mass = self.masses[own as usize];
         if mass == 0.0 {
             return Err(Error::invalid(format!(
                 "node {node} has no mass: it is pinned for good"
             )));
         }
-        if self.pins.remove(node) {
-            self.inverse_masses[node as usize] = 1.0 / mass;
+        if self.pins.remove(own) {
+            self.inverse_masses[own as usize] = 1.0 / mass;
             self.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
@@ -116,7 +118,7 @@ impl Body {
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
         self.check_node(&"node", node)?;
         finite_vector("position", position)?;
-        match self.pins.get_mut(node) {
+        match self.pins.get_mut(self.order.own(node)) {
             Some(pin) => pin.target = Some(position),
             None => return Err(not_pinned(node)),
         }
@@ -129,7 +131,8 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or it is not pinned.
     pub fn pin_force(&self, node: u32) -> Result<Vec3> {
         self.check_node(&"node", node)?;
-        self.pins.get(node).map(|pin| pin.force).ok_or_else(|| not_pinned(node))
+        let pin = self.pins.get(self.order.own(node));
+        pin.map(|pin| pin.force).ok_or_else(|| not_pinned(node))
     }
 
     /// Joins two nodes by a spring without damping: `stiffness` in N/m, `rest_length` in metres, `None`: the current
@@ -137,25 +140,33 @@ impl Body {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, the nodes are one, they have a spring already, or a number is
-    /// negative or not finite. [`Error::OutOfMemory`].
+    /// negative or not finite. [`Error::Capacity`]: a node has no free place in a row of fixed length.
+    /// [`Error::OutOfMemory`].
     pub fn add_spring(&mut self, a: u32, b: u32, stiffness: f32, rest_length: Option<f32>) -> Result<()> {
-        self.check_pair(a, b)?;
+        let nodes = self.check_pair(a, b)?;
         not_negative("stiffness", stiffness)?;
         let rest_length = match rest_length {
             Some(length) => length,
-            None => distance(
-                self.state.positions().get(a as usize),
-                self.state.positions().get(b as usize),
-            ),
+            None => {
+                let [a, b] = nodes.map(|node| self.state.positions().get(node as usize));
+                distance(a, b)
+            }
         };
         not_negative("rest_length", rest_length)?;
-        self.springs.add(&Spring {
-            nodes: [a, b],
+        let spring = Spring {
+            nodes,
             stiffness,
             rest_length,
             damping: 0.0,
+        };
+        // What is invalid is told in the caller's numbers.
+        self.springs.add(&spring).map_err(|error| match error {
+            Error::InvalidArgument(_) => Error::invalid(format!("nodes {a} and {b} have a spring already")),
+            error => error,
         })?;
-        self.springs_changed();
+        self.forces_current = false;
+        let stability = self.carry.stability;
+        self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
         Ok(())
     }
 
@@ -164,20 +175,18 @@ impl Body {
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or no spring between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
-        self.check_pair(a, b)?;
-        self.springs.remove(a, b)?;
-        self.springs_changed();
+        let [own_a, own_b] = self.check_pair(a, b)?;
+        let told = |_| Error::invalid(format!("nodes {a} and {b} have no spring"));
+        self.springs.remove(own_a, own_b).map_err(told)?;
+        // What was stable still is.
+        self.forces_current = false;
         Ok(())
     }
 
-    fn springs_changed(&mut self) {
-        self.forces_current = false;
-        self.carry.stability = Stability::UNKNOWN;
-    }
-
-    fn set_velocity(&mut self, node: usize, velocity: Vec3) {
-        self.state.velocities_mut().set(node, velocity);
-        self.published_velocities[node] = velocity;
+    fn set_velocity(&mut self, node: u32, velocity: Vec3) {
+        let own = self.order.own(node) as usize;
+        self.state.velocities_mut().set(own, velocity);
+        self.published_velocities[node as usize] = velocity;
         if self.springs.damped() {
             self.forces_current = false;
         }
@@ -193,7 +202,8 @@ impl Body {
         )))
     }
 
-    fn check_pair(&self, a: u32, b: u32) -> Result<()> {
+    /// The body's own numbers of two nodes that a spring may join.
+    fn check_pair(&self, a: u32, b: u32) -> Result<[u32; 2]> {
         self.check_node(&"a", a)?;
         self.check_node(&"b", b)?;
         if a == b {
@@ -201,7 +211,7 @@ impl Body {
                 "a and b are both {a}: a spring joins two nodes"
             )));
         }
-        Ok(())
+        Ok([a, b].map(|node| self.order.own(node)))
     }
 }
 

@@ -5,6 +5,7 @@ mod damping;
 mod definition;
 mod edit;
 mod hash;
+mod order;
 mod origin;
 mod pins;
 mod state;
@@ -24,8 +25,9 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability, Survey};
-use crate::springs::{ChosenKernel, Motion, Packed, Springs, TILE, TileForces, tile_count, tile_nodes};
-use crate::threads::{Team, Tiles};
+use crate::springs::{ChosenKernel, Loops, Motion, Springs, TILE, TileForces, store, tile_count, tile_nodes};
+use crate::threads::{Items, Team, Tiles};
+use order::NodeOrder;
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
 use state::State;
@@ -35,6 +37,8 @@ use state::State;
 /// Coordinates and indices are the caller's throughout.
 #[derive(Debug)]
 pub struct Body {
+    /// The numbers of nodes inside are its own, but in `surface` and what is published.
+    order: NodeOrder,
     pub(crate) springs: Box<dyn Springs>,
     pub(crate) kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
@@ -47,7 +51,9 @@ pub struct Body {
     pub(crate) pins: Pins,
     /// What a substep found in each tile.
     pub(crate) surveys: Vec<Survey>,
-    pub(crate) surface: Vec<[u32; 3]>,
+    /// The box about the nodes of each tile when they were last published, in its own coordinates.
+    boxes: Vec<Bounds>,
+    surface: Vec<[u32; 3]>,
     pub(crate) state: State,
     /// Where the coordinates of the state begin.
     pub(crate) origin: DVec3,
@@ -80,24 +86,32 @@ impl Body {
     pub(crate) fn new(definition: &BodyDefinition, needs: Needs) -> Result<Self> {
         definition.check()?;
         let node_count = definition.positions.len();
-        let springs = definition.resolved_springs()?;
-        let packed = Packed::new(needs.kernel, node_count, &springs, definition.rounding())?;
+        let mut springs = definition.resolved_springs()?;
+        let order = match definition.storage {
+            Storage::Packed => NodeOrder::for_springs(definition.positions, &springs)?,
+            _ => NodeOrder::default(),
+        };
+        for spring in &mut springs {
+            spring.nodes = spring.nodes.map(|node| order.own(node));
+        }
+        let springs = store(needs.kernel, definition, &springs)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
         let mut inverse_masses = memory::reserved(node_count)?;
-        for node in 0..node_count {
-            let mass = definition.masses.get(node);
+        for node in 0..node_count as u32 {
+            let mass = definition.masses.get(order.caller(node) as usize);
             masses.push(mass);
             inverse_masses.push(if mass > 0.0 { 1.0 / mass } else { 0.0 });
             if mass == 0.0 {
-                pins.insert(node as u32)?;
+                pins.insert(node)?;
             }
         }
         let damping = if definition.node_dampings.all_zero() {
             None
         } else {
             let mut rates = memory::reserved(node_count)?;
-            rates.extend((0..node_count).map(|node| definition.node_dampings.get(node) * inverse_masses[node]));
+            let damping = |node: usize| definition.node_dampings.get(order.caller(node as u32) as usize);
+            rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
             Some(NodeDamping::new(rates)?)
         };
         let surface = if definition.triangles.is_empty() {
@@ -106,9 +120,10 @@ impl Body {
             memory::copied(definition.triangles)?
         };
         let mut body = Self {
-            predicted_velocities: packed.damped().then(|| Vectors::zeros(node_count)).transpose()?,
+            order,
+            predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
-            springs: Box::new(packed),
+            springs,
             kernel: needs.kernel,
             uniform_inverse_mass: match definition.masses {
                 Values::Uniform(mass) => Some(1.0 / mass),
@@ -119,6 +134,7 @@ impl Body {
             damping,
             pins,
             surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
+            boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
             state: State::new(node_count)?,
             origin: DVec3::ZERO,
@@ -171,9 +187,11 @@ impl Body {
     pub fn spring_pairs(&self) -> Result<Vec<[u32; 2]>> {
         let mut pairs = memory::reserved(self.springs.spring_count())?;
         for node in 0..self.node_count() as u32 {
-            self.springs.visit(node as usize, &mut |link| {
-                if link.neighbour > node {
-                    pairs.push([node, link.neighbour]);
+            let own = self.order.own(node) as usize;
+            self.springs.visit(own, &mut |link| {
+                let neighbour = self.order.caller(link.neighbour);
+                if neighbour > node {
+                    pairs.push([node, neighbour]);
                 }
             });
         }
@@ -196,15 +214,13 @@ impl Body {
         }
     }
 
-    /// The box about all nodes, in its own coordinates.
-    pub(crate) fn bounds(&self) -> Bounds {
-        Bounds::of(self.state.positions().iter())
-    }
-
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
         match &mut self.contacts {
             Some(contacts) => contacts.reserve(tools)?,
-            None => self.contacts = Some(Contacts::new(self.node_count(), &self.surface, tools)?),
+            None => {
+                let surface = self.order.own_triangles(&self.surface)?;
+                self.contacts = Some(Contacts::new(self.node_count(), &surface, tools)?);
+            }
         }
         Ok(())
     }
@@ -213,8 +229,9 @@ impl Body {
     fn place(&mut self, positions: &[Vec3]) {
         self.origin = shift_towards(Bounds::of(positions.iter().copied()));
         let local = self.state.positions_mut();
-        for (node, position) in positions.iter().enumerate() {
-            local.set(node, (position.as_dvec3() - self.origin).as_vec3());
+        for (node, position) in (0..).zip(positions) {
+            let own = self.order.own(node) as usize;
+            local.set(own, (position.as_dvec3() - self.origin).as_vec3());
         }
         self.published_positions.copy_from_slice(positions);
         self.forces_current = false;
@@ -271,23 +288,37 @@ impl Body {
     }
 
     fn publish(&mut self, team: &Team) {
-        let origin = self.origin;
+        let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
         let (positions, velocities) = (self.state.positions(), self.state.velocities());
+        let count = positions.len();
         let published = (
             Tiles::new(&mut self.published_positions, TILE),
             Tiles::new(&mut self.published_velocities, TILE),
+            Items::new(&mut self.boxes),
         );
-        let count = positions.len();
         team.pass(
             tile_count(count),
             published,
-            |tile, (published_positions, published_velocities)| {
+            |tile, (to_positions, to_velocities, bounds)| {
                 let nodes = tile_nodes(tile, count);
-                for (published, local) in published_positions.iter_mut().zip(positions.of(nodes.clone())) {
-                    *published = (local.as_dvec3() + origin).as_vec3();
-                }
-                for (published, velocity) in published_velocities.iter_mut().zip(velocities.of(nodes)) {
-                    *published = velocity;
+                *bounds = kernel.ranges(positions.slices(nodes.clone())).into();
+                if order.is_callers() {
+                    kernel.run(Publish {
+                        from: positions.slices(nodes.clone()),
+                        origin,
+                        to: to_positions,
+                    });
+                    kernel.run(Publish {
+                        from: velocities.slices(nodes),
+                        origin: DVec3::ZERO,
+                        to: to_velocities,
+                    });
+                } else {
+                    let own = |node: usize| order.own(node as u32) as usize;
+                    for (node, (position, velocity)) in nodes.zip(to_positions.iter_mut().zip(to_velocities)) {
+                        *position = (positions.get(own(node)).as_dvec3() + origin).as_vec3();
+                        *velocity = velocities.get(own(node));
+                    }
                 }
             },
         );
@@ -295,7 +326,8 @@ impl Body {
 
     /// Moves the origin of its coordinates after it.
     fn follow(&mut self) {
-        let shift = shift_towards(self.bounds());
+        let bounds = self.boxes.iter().fold(Bounds::EMPTY, Bounds::and);
+        let shift = shift_towards(bounds);
         if shift == DVec3::ZERO {
             return;
         }
@@ -306,6 +338,27 @@ impl Body {
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
+        }
+    }
+}
+
+/// Writes vectors side by side, in the world's coordinates.
+struct Publish<'a> {
+    from: [&'a [f32]; 3],
+    origin: DVec3,
+    to: &'a mut [Vec3],
+}
+
+impl Loops for Publish<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [x, y, z] = self.from;
+        let origin = self.origin;
+        for (((to, &x), &y), &z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
+            let placed = |local: f32, origin: f64| (f64::from(local) + origin) as f32;
+            *to = Vec3::new(placed(x, origin.x), placed(y, origin.y), placed(z, origin.z));
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::springs::Range;
+
 /// The smallest grid on which an origin is chosen, in metres; a body of one node has no extent of its own.
 const SMALLEST_GRID: f64 = 1.0 / 1024.0;
 
@@ -30,6 +32,14 @@ impl Bounds {
         }
     }
 
+    /// The box about both.
+    pub fn and(self, other: &Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
     pub fn extended(self, margin: f32) -> Self {
         Self {
             min: self.min - margin,
@@ -43,6 +53,15 @@ impl Bounds {
 
     pub fn overlaps(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
+    }
+}
+
+impl From<[Range; 3]> for Bounds {
+    fn from(ranges: [Range; 3]) -> Self {
+        Self {
+            min: ranges.map(|range| range.least).into(),
+            max: ranges.map(|range| range.greatest).into(),
+        }
     }
 }
 

@@ -26,7 +26,7 @@ pub(crate) struct Pin {
 pub(crate) struct Pins {
     pins: Vec<Pin>,
     /// Where the pins of each tile begin, up to the last tile that has some.
-    tiles: Vec<u32>,
+    tiles: Vec<usize>,
 }
 
 impl Pins {
@@ -67,7 +67,7 @@ impl Pins {
             self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?;
             self.pins.insert(index, pin);
             if tiles > self.tiles.len() {
-                self.tiles.resize(tiles, index as u32);
+                self.tiles.resize(tiles, index);
             }
             self.tiles[tiles..].iter_mut().for_each(|start| *start += 1);
         }

@@ -1,14 +1,43 @@
 //! Worlds.
 
+use std::mem::offset_of;
+
 use glam::Vec3;
+use libc::c_void;
 
 use super::guard::{guard, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::error::{Error, Result};
+use crate::springs::Kernel;
+use crate::threads::RunTasks;
 use crate::world::{StepReport, World, WorldDefinition};
 
 pub use super::guard::sinew_world;
+
+/// uint32_t: the instructions that springs and nodes are worked on with. The widest that the processor offers.
+pub const SINEW_KERNEL_BEST: u32 = 0;
+/// The same bits on every processor.
+pub const SINEW_KERNEL_PORTABLE: u32 = 1;
+/// x86-64: AVX2 and FMA.
+pub const SINEW_KERNEL_AVX2: u32 = 2;
+/// x86-64: AVX-512 F, BW, DQ and VL.
+pub const SINEW_KERNEL_AVX512: u32 = 3;
+/// AArch64.
+pub const SINEW_KERNEL_NEON: u32 = 4;
+
+/// A part of a step, to be called once for every index that sinew_run_tasks was told, with the task_data it was given.
+pub type sinew_task = Option<unsafe extern "C" fn(task_data: *mut c_void, index: u32)>;
+
+/// Runs a step's tasks on the threads of a job system: calls task(task_data, index) once for every index from 0 to
+/// count - 1, on any threads, in any order, even one after another, and returns when all of these calls have. Calling it
+/// later than that is an error that is not found out.
+///
+/// Calls that overlap share the work; each lasts until the step is taken, so that no more tasks should run at once than
+/// there are cores free for them. The first to begin takes the step, wherever it runs; with none, the step is taken by
+/// the caller's thread. Runs within sinew_world_step, and must not use the world.
+pub type sinew_run_tasks =
+    Option<unsafe extern "C" fn(context: *mut c_void, task: sinew_task, task_data: *mut c_void, count: u32)>;
 
 /// How a world steps. Filled by sinew_world_def_init.
 #[repr(C)]
@@ -18,7 +47,8 @@ pub struct sinew_world_def {
     pub struct_size: usize,
     /// m/s^2; default 0 -9.81 0.
     pub gravity: [f32; 3],
-    /// 1, the default: the caller's thread alone; 0: one per core.
+    /// 1, the default: the caller's thread alone; 0: one per core; at most 256. Results are the same for every number. A
+    /// world's threads end with it, and sleep while it is not stepped or too small to share.
     pub thread_count: u32,
     /// 0, the default: as many as stability needs; n: exactly n per step.
     pub substeps: u32,
@@ -28,6 +58,15 @@ pub struct sinew_world_def {
     pub tolerance: f32,
     /// 0.
     pub reserved: u32,
+    /// Nullable, the default: the world has threads of its own. Else these are used instead, thread_count tasks a step, 1:
+    /// never called; it is called by steps that are worth sharing, as long as the world lives.
+    pub run_tasks: sinew_run_tasks,
+    /// What run_tasks is given; nullable.
+    pub tasks_context: *mut c_void,
+    /// SINEW_KERNEL_...; default SINEW_KERNEL_BEST.
+    pub kernel: u32,
+    /// 0.
+    pub reserved2: u32,
 }
 
 /// What a step did; filled on SINEW_STATUS_OK and SINEW_STATUS_UNSTABLE.
@@ -46,9 +85,9 @@ pub struct sinew_step_report {
     pub error_estimate: f32,
 }
 
-// SAFETY: repr(C), begins with struct_size, numbers alone.
+// SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
 unsafe impl Versioned for sinew_world_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[offset_of!(Self, run_tasks), size_of::<Self>()];
     const NAME: &'static str = "sinew_world_def";
 }
 
@@ -69,18 +108,35 @@ impl sinew_world_def {
             max_substeps: defaults.max_substeps,
             tolerance: defaults.tolerance,
             reserved: 0,
+            run_tasks: None,
+            tasks_context: std::ptr::null_mut(),
+            kernel: SINEW_KERNEL_BEST,
+            reserved2: 0,
         }
     }
 
-    fn definition(&self) -> Result<WorldDefinition> {
+    /// # Safety
+    /// `run_tasks` is NULL or what [`sinew_run_tasks`] says, for as long as a world of this definition lives.
+    unsafe fn definition(&self) -> Result<WorldDefinition> {
         memory::reserved("reserved", self.reserved)?;
+        memory::reserved("reserved2", self.reserved2)?;
+        // SAFETY: the same contract.
+        let run_tasks = |run| unsafe { RunTasks::from_c(run, self.tasks_context) };
         Ok(WorldDefinition {
             gravity: Vec3::from_array(self.gravity),
             thread_count: self.thread_count,
+            tasks: self.run_tasks.map(run_tasks),
             substeps: self.substeps,
             max_substeps: self.max_substeps,
             tolerance: self.tolerance,
-            ..WorldDefinition::default()
+            kernel: match self.kernel {
+                SINEW_KERNEL_BEST => Kernel::Best,
+                SINEW_KERNEL_PORTABLE => Kernel::Portable,
+                SINEW_KERNEL_AVX2 => Kernel::Avx2,
+                SINEW_KERNEL_AVX512 => Kernel::Avx512,
+                SINEW_KERNEL_NEON => Kernel::Neon,
+                unknown => return Err(Error::invalid(format!("kernel is {unknown}: no SINEW_KERNEL_..."))),
+            },
         })
     }
 }
@@ -111,11 +167,13 @@ pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_
 
 /// Creates an empty world, which the caller destroys with sinew_world_destroy.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread_count other than 1),
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread could not be started, or the
+/// processor does not offer the kernel),
 /// SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
-/// `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+/// `def` is NULL or a definition of the size that it states, with a `run_tasks` that keeps its word; `out` is NULL or
+/// writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *mut *mut sinew_world) -> sinew_status {
     guard(|| {
@@ -123,7 +181,8 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
         let out = unsafe { memory::output("out", out) }?;
         // SAFETY: the same contract.
         let def = unsafe { memory::definition("def", def, sinew_world_def::defaults()) }?;
-        let world = World::new(def.definition()?)?;
+        // SAFETY: the same contract.
+        let world = World::new(unsafe { def.definition() }?)?;
         *out = Box::into_raw(Box::new(sinew_world::new(world)));
         Ok(())
     })

@@ -4,6 +4,7 @@
 //! that is already in memory.
 
 mod file;
+mod order;
 mod organ;
 mod shapes;
 mod tidy;
@@ -15,6 +16,7 @@ use crate::memory;
 use crate::{Error, Result};
 
 pub use file::{MeshFormat, load};
+pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
 pub use topology::{boundary, edges, is_closed};
 

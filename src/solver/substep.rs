@@ -8,7 +8,7 @@ use super::attempt::StepRequest;
 use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, InverseMasses, Pin, Vectors};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
-use crate::threads::{Each, Team};
+use crate::threads::{Items, Team};
 
 /// Which part of a step a substep is.
 pub(super) struct Part {
@@ -81,7 +81,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         state.next_positions.tiles_mut(),
         state.forces.tiles_mut(),
         body.pins.tiles_mut(),
-        Each::new(&mut body.surveys),
+        Items::new(&mut body.surveys),
     );
     team.pass(
         tiles,

@@ -1,5 +1,12 @@
 //! The springs of a body: how they are kept, and the forces of a tile's.
 
+mod chain;
+mod dynamic_bulk;
+mod efficient;
+mod ends;
+mod fast_link;
+mod gather;
+mod kept;
 mod kernels;
 mod law;
 mod packed;
@@ -8,13 +15,18 @@ mod tile;
 use std::fmt::Debug;
 
 pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, Loops};
+pub(crate) use kernels::{ChosenKernel, Loops, Range};
 pub(crate) use law::separation;
-pub(crate) use packed::{Packed, Rounding};
+use packed::Packed;
+pub(crate) use packed::Rounding;
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
-use crate::body::{Spring, Vectors};
-use crate::error::Result;
+use crate::body::{BodyDefinition, Spring, Storage, Vectors};
+use crate::error::{Error, Result};
+use dynamic_bulk::DynamicBulk;
+use efficient::Efficient;
+use fast_link::FastLink;
+use kept::{DampedLink, UndampedLink};
 
 /// One end of a spring, as the node at the other end sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +38,19 @@ pub(crate) struct Link {
     pub rest_length: f32,
     /// N s/m
     pub damping: f32,
+}
+
+impl Link {
+    /// A spring as each of its nodes sees it.
+    fn ends(spring: &Spring) -> [Self; 2] {
+        let [a, b] = spring.nodes;
+        [b, a].map(|neighbour| Self {
+            neighbour,
+            stiffness: spring.stiffness,
+            rest_length: spring.rest_length,
+            damping: spring.damping,
+        })
+    }
 }
 
 /// What spring forces depend on, and what is wanted next.
@@ -71,4 +96,27 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// Removes the spring between `a` and `b`; refused where there is none.
     fn remove(&mut self, a: u32, b: u32) -> Result<()>;
+}
+
+/// `springs`, kept as a body's definition asks.
+pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: &[Spring]) -> Result<Box<dyn Springs>> {
+    let node_count = definition.positions.len();
+    let width = definition.springs_per_node as usize;
+    let damped = springs.iter().any(|spring| spring.damping != 0.0);
+    Ok(match (definition.storage, damped) {
+        (Storage::Packed, _) => Box::new(Packed::new(kernel, node_count, springs, definition.rounding())?),
+        (Storage::Efficient, _) => Box::new(Efficient::new(node_count, springs)?),
+        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(node_count, springs, width)?),
+        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(node_count, springs, width)?),
+        (Storage::DynamicBulk, false) => Box::new(DynamicBulk::<UndampedLink>::new(node_count, springs, width)?),
+        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(node_count, springs, width)?),
+    })
+}
+
+fn already_joined(a: u32, b: u32) -> Error {
+    Error::invalid(format!("nodes {a} and {b} have a spring already"))
+}
+
+fn not_joined(a: u32, b: u32) -> Error {
+    Error::invalid(format!("nodes {a} and {b} have no spring"))
 }

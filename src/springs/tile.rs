@@ -40,7 +40,7 @@ impl TileForces {
 
     #[inline(always)]
     pub fn get(&self, place: usize) -> Vec3 {
-        Vec3::from(self.axes.map(|axis| axis[place]))
+        Vec3::from(self.axes().map(|axis| axis[place]))
     }
 
     #[inline(always)]

@@ -1,130 +1,180 @@
-//! Data that is cut into parts, one for each tile, which threads may write at the same time.
+//! Data that tiles change, cut so that each has a part of its own.
+#![allow(dead_code, reason = "solvers choose what they need")]
 
 use std::marker::PhantomData;
 
-/// Data in parts.
+/// Data in parts that do not overlap.
 ///
 /// # Safety
-/// Parts of different tiles have nothing in common that either could write, and may be handed to other threads. Where
-/// [`Split::check`] returns, there is a part for every tile.
+/// For every number of tiles that it [`fits`](Self::fits), parts of different tiles may be used at the same time, on
+/// different threads.
 pub(crate) unsafe trait Split: Sync {
+    /// What the work on a tile is given.
     type Part;
 
-    /// Panics where there are fewer parts than `tiles`.
-    fn check(&self, tiles: usize);
+    /// Whether there is a part for each of so many tiles, and none is left over.
+    fn fits(&self, tiles: usize) -> bool;
 
     /// The part of a tile.
     ///
     /// # Safety
-    /// `check` has returned for more tiles than `tile`, and nobody else has this part.
+    /// It fits more tiles than `tile`, and this part is asked for once.
     unsafe fn part(&self, tile: usize) -> Self::Part;
 }
 
-/// A slice in tiles of the same length; the last may be shorter.
-#[derive(Debug)]
-pub(crate) struct Tiles<'a, T> {
-    first: *mut T,
-    count: usize,
-    tile: usize,
+/// A slice, borrowed mutably by whoever asks for a range that nobody else has.
+struct Shared<'a, T> {
+    start: *mut T,
+    length: usize,
     slice: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: it stands for a mutable slice of which threads take disjoint parts.
-unsafe impl<T: Send> Sync for Tiles<'_, T> {}
+// SAFETY: `range` is all it offers, which hands out values of `&mut T`.
+unsafe impl<T: Send> Sync for Shared<'_, T> {}
+
+impl<'a, T> Shared<'a, T> {
+    fn new(slice: &'a mut [T]) -> Self {
+        Self {
+            start: slice.as_mut_ptr(),
+            length: slice.len(),
+            slice: PhantomData,
+        }
+    }
+
+    /// # Safety
+    /// `start <= end <= length`, and no other range that is asked for overlaps this one.
+    unsafe fn range(&self, start: usize, end: usize) -> &'a mut [T] {
+        // SAFETY: within the slice, which is borrowed for as long; nobody else has this range.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(start), end - start) }
+    }
+}
+
+/// A slice in pieces of one length, the last shorter.
+pub(crate) struct Tiles<'a, T> {
+    slice: Shared<'a, T>,
+    length: usize,
+}
 
 impl<'a, T> Tiles<'a, T> {
-    /// `slice` in tiles of `tile` entries, more than 0.
-    pub fn new(slice: &'a mut [T], tile: usize) -> Self {
-        assert!(tile > 0);
+    /// Pieces of `length`, above 0.
+    pub fn new(slice: &'a mut [T], length: usize) -> Self {
+        assert!(length > 0, "tiles have a length");
         Self {
-            first: slice.as_mut_ptr(),
-            count: slice.len(),
-            tile,
-            slice: PhantomData,
+            slice: Shared::new(slice),
+            length,
         }
     }
 }
 
-// SAFETY: tiles do not overlap.
+// SAFETY: pieces of a slice one after another.
 unsafe impl<'a, T: Send> Split for Tiles<'a, T> {
     type Part = &'a mut [T];
 
-    fn check(&self, tiles: usize) {
-        assert!(tiles <= self.count.div_ceil(self.tile), "a tile beyond the end");
+    fn fits(&self, tiles: usize) -> bool {
+        self.slice.length.div_ceil(self.length) == tiles
     }
 
     unsafe fn part(&self, tile: usize) -> &'a mut [T] {
-        let start = tile * self.tile;
-        let count = self.tile.min(self.count - start);
-        // SAFETY: within the slice, by `check`; nobody else has it.
-        unsafe { std::slice::from_raw_parts_mut(self.first.add(start), count) }
+        let start = tile * self.length;
+        let end = self.slice.length.min(start + self.length);
+        // SAFETY: the tile is below the slice's length over the tiles', rounded up.
+        unsafe { self.slice.range(start, end) }
     }
 }
 
-/// One entry of a slice for each tile.
-#[derive(Debug)]
-pub(crate) struct Each<'a, T>(Tiles<'a, T>);
+/// A slice with one item for each tile.
+pub(crate) struct Items<'a, T>(Shared<'a, T>);
 
-impl<'a, T> Each<'a, T> {
+impl<'a, T> Items<'a, T> {
+    /// As many tiles as the slice has items.
     pub fn new(slice: &'a mut [T]) -> Self {
-        Self(Tiles::new(slice, 1))
+        Self(Shared::new(slice))
     }
 }
 
-// SAFETY: entries do not overlap.
-unsafe impl<'a, T: Send> Split for Each<'a, T> {
+// SAFETY: each item is a part of its own.
+unsafe impl<'a, T: Send> Split for Items<'a, T> {
     type Part = &'a mut T;
 
-    fn check(&self, tiles: usize) {
-        self.0.check(tiles);
+    fn fits(&self, tiles: usize) -> bool {
+        self.0.length == tiles
     }
 
     unsafe fn part(&self, tile: usize) -> &'a mut T {
-        // SAFETY: the same contract; such a tile has one entry.
-        unsafe { &mut *self.0.first.add(tile) }
+        // SAFETY: the tile is below the slice's length; an item is asked for once.
+        unsafe { &mut *self.0.start.add(tile) }
     }
 }
 
-/// A slice in parts of different lengths.
-#[derive(Debug)]
+/// A slice in pieces of various lengths.
 pub(crate) struct Ragged<'a, T> {
-    whole: Tiles<'a, T>,
-    starts: &'a [u32],
+    slice: Shared<'a, T>,
+    starts: &'a [usize],
 }
 
 impl<'a, T> Ragged<'a, T> {
-    /// The part of tile i is from `starts[i]` up to `starts[i + 1]`, or the slice's end; it is empty where there is no
-    /// `starts[i]`.
-    pub fn new(slice: &'a mut [T], starts: &'a [u32]) -> Self {
-        let sorted = starts.is_sorted() && starts.last().is_none_or(|&last| last as usize <= slice.len());
-        assert!(sorted, "parts that overlap or end beyond the slice");
+    /// Pieces from each of these places to the next, from the last to the end, and then empty ones. They go up, within
+    /// the slice.
+    ///
+    /// # Panics
+    /// Where they do not.
+    pub fn new(slice: &'a mut [T], starts: &'a [usize]) -> Self {
+        let end = starts.last().copied().unwrap_or(0);
+        assert!(starts.is_sorted() && end <= slice.len(), "pieces lie in order within");
         Self {
-            whole: Tiles::new(slice, 1),
+            slice: Shared::new(slice),
             starts,
         }
     }
 }
 
-// SAFETY: sorted starts make parts that do not overlap.
+// SAFETY: pieces of a slice one after another.
 unsafe impl<'a, T: Send> Split for Ragged<'a, T> {
     type Part = &'a mut [T];
 
-    fn check(&self, _: usize) {}
+    fn fits(&self, tiles: usize) -> bool {
+        self.starts.len() <= tiles
+    }
 
     unsafe fn part(&self, tile: usize) -> &'a mut [T] {
-        let start = |tile: usize| self.starts.get(tile).map_or(self.whole.count, |&start| start as usize);
+        let start = |tile: usize| self.starts.get(tile).copied().unwrap_or(self.slice.length);
         let (start, end) = (start(tile), start(tile + 1));
-        // SAFETY: within the slice, because starts are sorted up to its end; nobody else has it.
-        unsafe { std::slice::from_raw_parts_mut(self.whole.first.add(start), end - start) }
+        // SAFETY: `new` has seen that the starts go up and stay within.
+        unsafe { self.slice.range(start, end) }
     }
 }
 
-// SAFETY: each of the three does as it says.
-unsafe impl<D: Split> Split for [D; 3] {
-    type Part = [D::Part; 3];
+// SAFETY: nothing.
+unsafe impl Split for () {
+    type Part = ();
 
-    fn check(&self, tiles: usize) {
-        self.iter().for_each(|data| data.check(tiles));
+    fn fits(&self, _tiles: usize) -> bool {
+        true
+    }
+
+    unsafe fn part(&self, _tile: usize) {}
+}
+
+// SAFETY: what is in it does the same, or there is nothing.
+unsafe impl<D: Split> Split for Option<D> {
+    type Part = Option<D::Part>;
+
+    fn fits(&self, tiles: usize) -> bool {
+        self.as_ref().is_none_or(|data| data.fits(tiles))
+    }
+
+    unsafe fn part(&self, tile: usize) -> Self::Part {
+        // SAFETY: the same contract.
+        self.as_ref().map(|data| unsafe { data.part(tile) })
+    }
+}
+
+// SAFETY: each does the same, and they share nothing.
+unsafe impl<D: Split, const N: usize> Split for [D; N] {
+    type Part = [D::Part; N];
+
+    fn fits(&self, tiles: usize) -> bool {
+        self.iter().all(|data| data.fits(tiles))
     }
 
     unsafe fn part(&self, tile: usize) -> Self::Part {
@@ -133,24 +183,32 @@ unsafe impl<D: Split> Split for [D; 3] {
     }
 }
 
-macro_rules! tuple {
-    ($($name:ident $index:tt),+) => {
-        // SAFETY: each of them does as it says.
-        unsafe impl<$($name: Split),+> Split for ($($name,)+) {
-            type Part = ($($name::Part,)+);
+macro_rules! split_tuples {
+    ($($name:ident)*) => {
+        // SAFETY: each does the same, and they share nothing.
+        #[allow(non_snake_case)]
+        unsafe impl<$($name: Split),*> Split for ($($name,)*) {
+            type Part = ($($name::Part,)*);
 
-            fn check(&self, tiles: usize) {
-                $(self.$index.check(tiles);)+
+            fn fits(&self, tiles: usize) -> bool {
+                let ($($name,)*) = self;
+                true $(&& $name.fits(tiles))*
             }
 
             unsafe fn part(&self, tile: usize) -> Self::Part {
+                let ($($name,)*) = self;
                 // SAFETY: the same contract.
-                unsafe { ($(self.$index.part(tile),)+) }
+                unsafe { ($($name.part(tile),)*) }
             }
         }
     };
 }
 
-tuple!(A 0, B 1);
-tuple!(A 0, B 1, C 2);
-tuple!(A 0, B 1, C 2, D 3, E 4);
+split_tuples!(A);
+split_tuples!(A B);
+split_tuples!(A B C);
+split_tuples!(A B C D);
+split_tuples!(A B C D E);
+split_tuples!(A B C D E F);
+split_tuples!(A B C D E F G);
+split_tuples!(A B C D E F G H);

@@ -1,127 +1,268 @@
-use std::ffi::c_void;
+//! Every tile once, whoever comes to help.
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
 
-use super::jobs::Task;
-use super::{Each, JobSystem, Ragged, Team, Threads, Tiles};
+use super::split::Split;
+use super::*;
+use crate::error::Error;
 
-/// A fixed generator.
-fn random(seed: &mut u64, below: usize) -> usize {
-    *seed = seed
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
-    (*seed >> 33) as usize % below
-}
+/// Numbers that look random (SplitMix64).
+struct Random(u64);
 
-/// Passes of random sizes, over all kinds of parts: each entry of each is met once.
-fn check_passes(team: &Team, passes: usize) {
-    let mut seed = 1;
-    for _ in 0..passes {
-        let tile = 1 + random(&mut seed, 9);
-        let tiles = random(&mut seed, 70);
-        let mut numbers = vec![0_u32; (tiles * tile).saturating_sub(random(&mut seed, tile))];
-        let mut each = vec![0_usize; tiles];
-        let mut starts: Vec<u32> = (0..tiles / 2).map(|_| random(&mut seed, 30) as u32).collect();
-        starts.sort_unstable();
-        let mut ragged = vec![0_usize; 30];
-        let data = (
-            Tiles::new(&mut numbers, tile),
-            Each::new(&mut each),
-            Ragged::new(&mut ragged, &starts),
-        );
-        team.pass(tiles, data, |tile, (numbers, each, ragged)| {
-            numbers.iter_mut().for_each(|number| *number += 1);
-            *each += tile + 1;
-            ragged.iter_mut().for_each(|entry| *entry += tile + 1);
-        });
-        assert!(numbers.iter().all(|&number| number == 1));
-        assert!(each.iter().enumerate().all(|(tile, &entry)| entry == tile + 1));
-        let mut expected = vec![0; 30];
-        for tile in 0..tiles {
-            let start = |tile: usize| starts.get(tile).map_or(30, |&start| start as usize);
-            expected[start(tile)..start(tile + 1)].fill(tile + 1);
-        }
-        assert_eq!(ragged, expected);
+impl Random {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) % end as u64) as usize
     }
 }
 
+type Task<'a> = &'a (dyn Fn(u32) + Sync);
+
+fn in_order(count: u32, task: Task) {
+    (0..count).for_each(task);
+}
+
+fn in_reverse(count: u32, task: Task) {
+    (0..count).rev().for_each(task);
+}
+
+fn on_threads(count: u32, task: Task) {
+    thread::scope(|scope| {
+        for index in 0..count {
+            scope.spawn(move || task(index));
+        }
+    });
+}
+
+/// Two at a time, the others when these have ended.
+fn on_two_threads(count: u32, task: Task) {
+    let next = AtomicU32::new(0);
+    thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= count {
+                        break;
+                    }
+                    task(index);
+                }
+            });
+        }
+    });
+}
+
+fn never(_count: u32, _task: Task) {}
+
+fn too_often(count: u32, task: Task) {
+    for _ in 0..3 {
+        on_threads(count, task);
+    }
+}
+
+fn everybody() -> Vec<Threads> {
+    let workers = (1..=5).map(|count| Threads::new(count).expect("threads"));
+    let systems: [&'static (dyn Fn(u32, Task) + Sync); 6] =
+        [&in_order, &in_reverse, &on_threads, &on_two_threads, &never, &too_often];
+    let tasks = systems.map(|run| Threads::of_tasks(RunTasks::new(run), 3).expect("room"));
+    workers.chain(tasks).collect()
+}
+
 #[test]
-fn every_tile_is_worked_on_once() {
-    check_passes(&Team::alone(), 100);
-    for count in 1..=5 {
-        let mut threads = Threads::new(count, None).expect("threads");
+fn every_tile_of_every_pass_is_run_once_with_its_own_part() {
+    for mut threads in everybody() {
+        let name = format!("{threads:?}");
+        let mut random = Random(7);
         for _ in 0..20 {
-            threads.lead(|team| check_passes(team, 50));
-            std::thread::sleep(std::time::Duration::from_micros(100));
+            let passes: Vec<usize> = (0..20).map(|_| random.below(40)).collect();
+            let length = 1 + random.below(9);
+            let results: Vec<Vec<usize>> = threads.lead(|team| {
+                let run = |&tiles: &usize| {
+                    let mut places = vec![0; tiles * length];
+                    let mut runs = vec![0; tiles];
+                    let data = (Tiles::new(&mut places, length), Items::new(&mut runs));
+                    team.pass(tiles, data, |tile, (part, runs)| {
+                        assert_eq!(part.len(), length);
+                        part.iter_mut().for_each(|place| *place += tile + 1);
+                        *runs += 1;
+                    });
+                    assert_eq!(runs, vec![1; tiles], "{name}");
+                    places
+                };
+                passes.iter().map(run).collect()
+            });
+            for (places, tiles) in results.iter().zip(&passes) {
+                let expected: Vec<usize> = (0..tiles * length).map(|place| place / length + 1).collect();
+                assert_eq!(*places, expected, "{name}");
+            }
         }
     }
 }
 
 #[test]
-fn a_panic_is_passed_on_and_the_threads_go_on() {
-    let mut threads = Threads::new(3, None).expect("threads");
-    for spoilt in 0..20 {
-        let caught = catch_unwind(AssertUnwindSafe(|| {
-            threads.lead(|team| {
-                let mut numbers = [0; 20];
-                team.pass(20, Each::new(&mut numbers), |tile, _| {
-                    if tile == spoilt {
-                        std::panic::resume_unwind(Box::new("spoilt"));
+fn passes_see_what_the_one_before_has_written() {
+    for mut threads in everybody() {
+        let name = format!("{threads:?}");
+        const TILES: usize = 7;
+        let mut values = [[0_u64; TILES]; 2];
+        threads.lead(|team| {
+            for round in 0..200 {
+                let [old, new] = &mut values;
+                let old = &*old;
+                team.pass(TILES, Items::new(new), |tile, value| {
+                    *value = old[tile] + old[(tile + 1) % TILES] + round;
+                    *value %= 1_000_003;
+                });
+                values.swap(0, 1);
+            }
+        });
+        let mut expected = [0_u64; TILES];
+        for round in 0..200 {
+            let old = expected;
+            for tile in 0..TILES {
+                expected[tile] = (old[tile] + old[(tile + 1) % TILES] + round) % 1_000_003;
+            }
+        }
+        assert_eq!(values[0], expected, "{name}");
+    }
+}
+
+#[test]
+fn workers_that_have_slept_come_back() {
+    let mut threads = Threads::new(3).expect("threads");
+    for round in 0..20 {
+        let met = AtomicUsize::new(0);
+        threads.lead(|team| {
+            // Each waits for the others, so that all three must come; a worker that falls asleep while a pass begins is
+            // woken by the next.
+            while met.load(Ordering::Relaxed) < 3 {
+                met.store(0, Ordering::Relaxed);
+                team.pass(3, (), |_, ()| {
+                    met.fetch_add(1, Ordering::Relaxed);
+                    let mut patience = 1000;
+                    while met.load(Ordering::Relaxed) < 3 && patience > 0 {
+                        thread::sleep(Duration::from_micros(20));
+                        patience -= 1;
                     }
                 });
-            });
-        }));
-        let payload = caught.expect_err("a panic");
-        assert_eq!(payload.downcast_ref::<&str>(), Some(&"spoilt"));
-        threads.lead(|team| check_passes(team, 5));
-    }
-}
-
-/// How the job system at hand runs tasks.
-#[derive(Clone, Copy)]
-enum Manner {
-    InOrder,
-    Backwards,
-    SideBySide,
-    Never,
-}
-
-unsafe extern "C" fn run_tasks(context: *mut c_void, task: Task, task_data: *mut c_void, count: u32) {
-    // SAFETY: the context is a manner; tasks are run as they ask for.
-    let run = |index: u32, data: usize| unsafe { task(data as *mut c_void, index) };
-    let data = task_data as usize;
-    // SAFETY: the context is a manner.
-    match unsafe { *context.cast::<Manner>() } {
-        Manner::InOrder => (0..count).for_each(|index| run(index, data)),
-        Manner::Backwards => (0..count).rev().for_each(|index| run(index, data)),
-        Manner::SideBySide => std::thread::scope(|scope| {
-            for index in 0..count {
-                scope.spawn(move || run(index, data));
             }
-        }),
-        Manner::Never => {}
+        });
+        thread::sleep(Duration::from_micros(100 * (round % 4)));
     }
 }
 
 #[test]
-fn any_job_system_will_do() {
-    for mut manner in [Manner::InOrder, Manner::Backwards, Manner::SideBySide, Manner::Never] {
-        // SAFETY: the context outlives the threads.
-        let jobs = unsafe { JobSystem::new(run_tasks, (&raw mut manner).cast()) };
-        let mut threads = Threads::new(4, Some(jobs)).expect("threads");
-        let led = AtomicUsize::new(0);
-        for _ in 0..20 {
-            threads.lead(|team| {
-                led.fetch_add(1, Ordering::Relaxed);
-                check_passes(team, 20);
-            });
+fn a_panic_goes_on_at_the_leader_and_the_threads_live_on() {
+    for mut threads in everybody() {
+        let name = format!("{threads:?}");
+        for bad in 0..12 {
+            let running = AtomicUsize::new(0);
+            let caught = catch_unwind(AssertUnwindSafe(|| {
+                threads.lead(|team| {
+                    let caught = catch_unwind(AssertUnwindSafe(|| {
+                        team.pass(12, (), |tile, ()| {
+                            running.fetch_add(1, Ordering::Relaxed);
+                            let stop = tile == bad;
+                            running.fetch_sub(1, Ordering::Relaxed);
+                            assert!(!stop, "tile {tile}");
+                        });
+                    }));
+                    assert_eq!(running.load(Ordering::Relaxed), 0, "{name}: quiet by now");
+                    let panic = caught.expect_err("a tile panicked");
+                    assert_eq!(panic.downcast_ref::<String>(), Some(&format!("tile {bad}")), "{name}");
+                    std::panic::resume_unwind(panic);
+                });
+            }));
+            let panic = caught.expect_err("the leader panicked");
+            assert_eq!(panic.downcast_ref::<String>(), Some(&format!("tile {bad}")), "{name}");
+            let mut runs = [0; 12];
+            threads.lead(|team| team.pass(12, Items::new(&mut runs), |_, runs| *runs += 1));
+            assert_eq!(runs, [1; 12], "{name}");
         }
-        assert_eq!(led.into_inner(), 20);
+    }
+}
+
+#[test]
+fn what_the_leader_answers_is_handed_on() {
+    for mut threads in everybody() {
+        assert_eq!(threads.lead(|_| "once".to_owned()), "once");
+    }
+    let mut threads = Threads::new(3).expect("threads");
+    assert_eq!((threads.lead(|team| team.count()), threads.count()), (3, 3));
+    let mut nobody = Threads::of_tasks(RunTasks::new(&never), 3).expect("room");
+    assert_eq!((nobody.lead(|team| team.count()), nobody.count()), (1, 3));
+}
+
+#[test]
+fn data_must_have_as_many_parts_as_there_are_tiles() {
+    let team = Team::alone();
+    let mut values = [0; 10];
+    let mut refused = |tiles, length| {
+        let pass = || team.pass(tiles, Tiles::new(&mut values, length), |_, _| {});
+        catch_unwind(AssertUnwindSafe(pass)).is_err()
+    };
+    assert!(!refused(10, 1) && !refused(4, 3) && !refused(1, 100));
+    assert!(refused(9, 1) && refused(11, 1) && refused(3, 3) && refused(0, 3) && refused(2, 100));
+    let fits = |data: &dyn Fn(&mut [i32], usize) -> bool, tiles| data(&mut [0; 10], tiles);
+    let items = |values: &mut [i32], tiles: usize| Items::new(values).fits(tiles);
+    assert!(fits(&items, 10) && !fits(&items, 9) && !fits(&items, 11));
+    let ragged = |values: &mut [i32], tiles: usize| Ragged::new(values, &[0, 4, 4, 10]).fits(tiles);
+    // Tiles beyond the last start have empty pieces.
+    assert!(fits(&ragged, 4) && !fits(&ragged, 3) && fits(&ragged, 5));
+    let pair = |values: &mut [i32], tiles: usize| ((), Some(Items::new(values)), None::<()>).fits(tiles);
+    assert!(fits(&pair, 10) && !fits(&pair, 9));
+    for starts in [&[0, 5, 4][..], &[0, 11]] {
+        let cut = || drop(Ragged::new(&mut [0; 10], starts));
+        assert!(catch_unwind(cut).is_err(), "{starts:?}");
+    }
+}
+
+#[test]
+fn parts_are_what_they_are_said_to_be() {
+    let mut threads = Threads::new(2).expect("threads");
+    let mut ragged: Vec<usize> = vec![9; 12];
+    let mut short = [[0_usize; 2]; 3];
+    let mut columns: [Vec<usize>; 3] = std::array::from_fn(|_| vec![0; 7]);
+    let starts = [2, 3, 3, 9];
+    threads.lead(|team| {
+        team.pass(4, Ragged::new(&mut ragged, &starts), |tile, part| part.fill(tile));
+        let [a, b, c] = &mut columns;
+        let columns = [a, b, c].map(|column| Tiles::new(column, 3));
+        let data = (columns, Some(Items::new(&mut short)), None::<Items<u8>>);
+        team.pass(3, data, |tile, (columns, short, none)| {
+            assert!(none.is_none());
+            for (axis, column) in columns.into_iter().enumerate() {
+                column.fill(10 * axis + tile);
+            }
+            if let Some(short) = short {
+                *short = [tile, tile + 1];
+            }
+        });
+    });
+    assert_eq!(ragged, [9, 9, 0, 2, 2, 2, 2, 2, 2, 3, 3, 3]);
+    assert_eq!(short, [[0, 1], [1, 2], [2, 3]]);
+    for (axis, column) in columns.iter().enumerate() {
+        let expected: Vec<usize> = [0, 0, 0, 1, 1, 1, 2].iter().map(|tile| 10 * axis + tile).collect();
+        assert_eq!(*column, expected);
     }
 }
 
 #[test]
 fn too_many_threads_are_refused() {
-    let error = Threads::new(257, None).expect_err("too many");
-    assert!(error.to_string().contains("thread_count is 257"), "{error}");
+    let cores = thread::available_parallelism().map_or(1, usize::from).min(256);
+    assert_eq!(Threads::new(0).expect("threads").count(), cores);
+    let run = RunTasks::new(&in_order);
+    assert_eq!(Threads::of_tasks(run, 256).expect("room").count(), 256);
+    for refused in [Threads::new(257), Threads::of_tasks(run, 257), Threads::new(u32::MAX)] {
+        match refused {
+            Err(Error::InvalidArgument(message)) => assert!(message.contains("thread_count"), "{message}"),
+            other => panic!("{other:?}"),
+        }
+    }
 }

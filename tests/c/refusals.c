@@ -30,9 +30,12 @@ static void world_definitions(void)
     REFUSES_SIZES(sinew_world_def, sizeof(contract_world_def), sinew_world_def def = good_world(); def.struct_size = size,
                   sinew_world_create(&def, &out.world));
     WORLD(INVALID, "reserved", def.reserved = 1);
+    WORLD(INVALID, "reserved2", def.reserved2 = 1);
+    WORLD(INVALID, "kernel", def.kernel = 5);
+    WORLD(INVALID, "kernel", def.kernel = UINT32_MAX);
     WORLD(INVALID, "max_substeps", def.max_substeps = 0);
-    WORLD(UNSUPPORTED, "thread_count", def.thread_count = 0);
-    WORLD(UNSUPPORTED, "thread_count", def.thread_count = 2);
+    WORLD(INVALID, "thread_count", def.thread_count = 257);
+    WORLD(INVALID, "thread_count", def.thread_count = UINT32_MAX);
     for (i = 0; i < OR_NEGATIVE; i++)
         WORLD(INVALID, "tolerance", def.tolerance = bad[i]);
     for (i = 0; i < NOT_FINITE; i++)
@@ -164,9 +167,7 @@ static void body_definitions(void)
     BODY(INVALID, "storage", def.storage = UINT32_MAX);
     BODY(INVALID, "solver", def.solver = 3);
     BODY(INVALID, "solver", def.solver = UINT32_MAX);
-    BODY(UNSUPPORTED, "storage", def.storage = SINEW_STORAGE_EFFICIENT);
-    BODY(UNSUPPORTED, "storage", def.storage = SINEW_STORAGE_FAST_LINK);
-    BODY(UNSUPPORTED, "storage", def.storage = SINEW_STORAGE_DYNAMIC_BULK);
+    BODY(CAPACITY, "springs_per_node", def.storage = SINEW_STORAGE_FAST_LINK; def.springs_per_node = 1);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_IMPLICIT);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_NEWTON);
 

@@ -9,6 +9,7 @@ use super::reference::Reference;
 pub const FREE: WorldDefinition = WorldDefinition {
     gravity: Vec3::ZERO,
     thread_count: 1,
+    tasks: None,
     substeps: 0,
     max_substeps: 1000,
     tolerance: 0.0,

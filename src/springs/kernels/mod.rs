@@ -17,6 +17,7 @@ mod strays;
 
 pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
 use forces::TileLinks;
+pub(super) use prefetch::prefetch;
 pub(crate) use range::Range;
 
 use crate::error::{Error, Result};

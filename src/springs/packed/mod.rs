@@ -7,6 +7,8 @@
 
 mod materials;
 mod pack;
+#[cfg(test)]
+mod tests;
 
 use materials::Kinds;
 pub(crate) use materials::Rounding;

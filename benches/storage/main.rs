@@ -1,0 +1,89 @@
+//! The time and memory of a step against the number of nodes: the table and the figure of Halic, Kockara, Bayrak, Rowe and
+//! Chen (section 4: table 3 and figure 8) for their three storages, and PACKED against what the processor allows.
+//!
+//! `cargo bench --bench storage [-- --quick] [--only a|b|c]` writes `target/report/storage.md` and plots beside it.
+#![allow(clippy::print_stderr)]
+
+mod bodies;
+mod clock;
+mod fast_link;
+mod features;
+mod heap;
+mod limits;
+mod machine;
+mod packed;
+mod report;
+mod rounds;
+mod scenes;
+mod storages;
+mod svg;
+
+use report::Report;
+use rounds::Effort;
+
+/// What is asked for on the command line.
+struct Options {
+    quick: bool,
+    /// Of the experiments a, b and c.
+    experiments: String,
+}
+
+impl Options {
+    fn from_arguments() -> Result<Self, String> {
+        let mut options = Self {
+            quick: false,
+            experiments: "abc".into(),
+        };
+        let mut arguments = std::env::args().skip(1);
+        while let Some(argument) = arguments.next() {
+            match argument.as_str() {
+                // Given by cargo itself.
+                "--bench" => {}
+                "--quick" => options.quick = true,
+                "--only" => match arguments.next() {
+                    Some(letter) if ["a", "b", "c"].contains(&letter.as_str()) => options.experiments = letter,
+                    other => return Err(format!("--only {other:?}: must be a, b or c")),
+                },
+                other => return Err(format!("{other}: there is --quick, and --only a|b|c")),
+            }
+        }
+        Ok(options)
+    }
+}
+
+fn main() -> std::process::ExitCode {
+    let options = match Options::from_arguments() {
+        Ok(options) => options,
+        Err(message) => {
+            eprintln!("{message}");
+            return std::process::ExitCode::FAILURE;
+        }
+    };
+    let effort = if options.quick { Effort::QUICK } else { Effort::FULL };
+    let mut report = Report::new();
+    machine::describe(&mut report, options.quick);
+    let library = fast_link::Library::compile();
+    if let Err(reason) = &library {
+        report.not_offered("fast link in C", reason);
+    }
+    let library = library.ok();
+    if options.experiments.contains('a') {
+        storages::run(&mut report, effort, library.as_ref());
+    }
+    if options.experiments.contains('b') {
+        packed::run(&mut report, effort, library.as_ref());
+    }
+    if options.experiments.contains('c') {
+        features::run(&mut report, effort);
+    }
+    match report.finish() {
+        Ok(path) => {
+            eprintln!("report: {}", path.display());
+            std::process::ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("the report could not be written: {error}");
+            std::process::ExitCode::FAILURE
+        }
+    }
+}

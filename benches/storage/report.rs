@@ -1,0 +1,162 @@
+//! What comes of it all: `target/report/storage.md`, and lines on the way.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+pub struct Report {
+    start: Instant,
+    text: String,
+    not_offered: BTreeMap<String, String>,
+    plots: Vec<(String, String)>,
+    waited: f64,
+}
+
+impl Report {
+    pub fn new() -> Self {
+        Self {
+            start: Instant::now(),
+            text: String::new(),
+            not_offered: BTreeMap::new(),
+            plots: Vec::new(),
+            waited: 0.0,
+        }
+    }
+
+    pub fn progress(&self, line: &str) {
+        eprintln!("[{:6.1} s] {line}", self.start.elapsed().as_secs_f64());
+    }
+
+    pub fn write(&mut self, text: &str) {
+        eprint!("{text}");
+        self.text.push_str(text);
+    }
+
+    /// Says loudly, once, what this version or this machine does not have.
+    pub fn not_offered(&mut self, what: &str, reason: &str) {
+        if self.not_offered.insert(what.to_owned(), reason.to_owned()).is_none() {
+            eprintln!("!! NOT OFFERED: {what}: {reason}");
+        }
+    }
+
+    /// Notes the share of some measurement's time in which the machine ran other programs.
+    pub fn disturbed(&mut self, waited: f64) {
+        self.waited = self.waited.max(waited);
+    }
+
+    /// A plot beside the report, shown in it.
+    pub fn plot(&mut self, file: &str, title: &str, svg: String) {
+        self.plots.push((file.to_owned(), svg));
+        self.write(&format!("\n![{title}]({file})\n"));
+    }
+
+    pub fn table(&mut self, table: &Table) {
+        self.write(&table.to_string());
+    }
+
+    /// Writes it all to `target/report`.
+    pub fn finish(mut self) -> std::io::Result<PathBuf> {
+        let mut missing = String::from("\n## Not offered\n\n");
+        for (what, reason) in &self.not_offered {
+            let _ = writeln!(missing, "- **{what}**: {reason}");
+        }
+        if self.not_offered.is_empty() {
+            missing.push_str("Nothing: everything asked for was measured.\n");
+        }
+        if self.waited > 0.05 {
+            let _ = write!(
+                missing,
+                "\n**The machine was busy**: for up to {:.0} % of the time it ran other programs. Times on two threads are not \
+                 to be relied on, and others are too long by what caches and memory were shared with.\n",
+                100.0 * self.waited
+            );
+        }
+        self.write(&missing);
+        self.progress("done");
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report");
+        std::fs::create_dir_all(&folder)?;
+        for (file, svg) in &self.plots {
+            std::fs::write(folder.join(file), svg)?;
+        }
+        let path = folder.join("storage.md");
+        std::fs::write(&path, &self.text)?;
+        Ok(path)
+    }
+}
+
+/// A Markdown table.
+pub struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub fn new(header: &[&str]) -> Self {
+        Self {
+            rows: vec![header.iter().map(|&cell| cell.to_owned()).collect()],
+        }
+    }
+
+    pub fn row(&mut self, cells: Vec<String>) {
+        assert_eq!(cells.len(), self.rows[0].len(), "a cell for each column");
+        self.rows.push(cells);
+    }
+}
+
+impl std::fmt::Display for Table {
+    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let width = |column: usize| {
+            self.rows
+                .iter()
+                .map(|row| row[column].chars().count())
+                .max()
+                .unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.rows[0].len()).map(width).collect();
+        writeln!(out)?;
+        for (index, row) in self.rows.iter().enumerate() {
+            for (cell, &width) in row.iter().zip(&widths) {
+                write!(out, "| {cell:>width$} ")?;
+            }
+            writeln!(out, "|")?;
+            if index == 0 {
+                for &width in &widths {
+                    write!(out, "|{}:", "-".repeat(width + 1))?;
+                }
+                writeln!(out, "|")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Seconds in milliseconds, three digits.
+pub fn milliseconds(seconds: f64) -> String {
+    digits(1e3 * seconds)
+}
+
+/// Three digits.
+pub fn digits(value: f64) -> String {
+    match value.abs() {
+        size if !size.is_finite() => "-".into(),
+        size if size >= 99.95 => format!("{value:.0}"),
+        size if size >= 9.995 => format!("{value:.1}"),
+        size if size >= 0.9995 => format!("{value:.2}"),
+        size if size >= 0.0995 => format!("{value:.3}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
+/// Megabytes of 10^6.
+pub fn megabytes(bytes: usize) -> String {
+    digits(bytes as f64 * 1e-6)
+}
+
+/// How many nodes, short.
+pub fn count(nodes: usize) -> String {
+    match nodes {
+        0..1_000 => nodes.to_string(),
+        1_000..10_000 => format!("{:.1}K", nodes as f64 * 1e-3),
+        _ => format!("{:.0}K", nodes as f64 * 1e-3),
+    }
+}

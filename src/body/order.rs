@@ -1,0 +1,63 @@
+//! The order in which a body keeps its nodes, and the caller's.
+
+use glam::Vec3;
+
+use super::definition::Spring;
+use crate::error::Result;
+use crate::memory;
+
+/// Where each node is kept, for bodies that do not keep them in the caller's order.
+///
+/// A node is called by the caller's number at the door, and by its own number, its place in every list of the body, inside.
+#[derive(Debug, Default)]
+pub(crate) struct NodeOrder {
+    /// For each of the caller's numbers the body's own; empty where they are the same.
+    own: Vec<u32>,
+    /// The reverse.
+    caller: Vec<u32>,
+}
+
+impl NodeOrder {
+    /// The order that suits these springs best.
+    pub fn for_springs(positions: &[Vec3], springs: &[Spring]) -> Result<Self> {
+        let mut pairs = memory::reserved(springs.len())?;
+        pairs.extend(springs.iter().map(|spring| spring.nodes));
+        match crate::mesh::best_order(positions, &pairs)? {
+            Some(order) => Self::new(order),
+            None => Ok(Self::default()),
+        }
+    }
+
+    /// Whether nodes are kept in the caller's order.
+    pub fn is_callers(&self) -> bool {
+        self.own.is_empty()
+    }
+
+    /// The order in which the caller's number `caller[i]` is kept at place i.
+    fn new(caller: Vec<u32>) -> Result<Self> {
+        let mut own = memory::filled(0, caller.len())?;
+        for (place, &number) in (0..).zip(&caller) {
+            own[number as usize] = place;
+        }
+        Ok(Self { own, caller })
+    }
+
+    /// The body's own number of one of the caller's.
+    #[inline]
+    pub fn own(&self, caller: u32) -> u32 {
+        self.own.get(caller as usize).map_or(caller, |&own| own)
+    }
+
+    /// The caller's number of one of the body's own.
+    #[inline]
+    pub fn caller(&self, own: u32) -> u32 {
+        self.caller.get(own as usize).map_or(own, |&caller| caller)
+    }
+
+    /// The body's own numbers of the corners of triangles.
+    pub fn own_triangles(&self, triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>> {
+        let mut owned = memory::reserved(triangles.len())?;
+        owned.extend(triangles.iter().map(|corners| corners.map(|corner| self.own(corner))));
+        Ok(owned)
+    }
+}

@@ -1,0 +1,226 @@
+//! DYNAMIC_BULK: a chain of arrays per node (Halic et al., section 4).
+//!
+//! Where a node's arrays are full another is added, and nothing is copied; one that becomes empty is given back. The
+//! first array of each node is named in a table, those beyond it in a linked list.
+
+use super::chain::{Chain, Element, Unlinked, unlinked};
+use super::ends::Ends;
+use super::gather::{Gather, prefetch_row};
+use super::kept::{KeptLink, NOBODY, empty_place, links, place_of, vacate};
+use super::kernels::prefetch;
+use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use crate::body::Spring;
+use crate::error::Result;
+use crate::memory;
+
+/// How many nodes ahead arrays are fetched from memory.
+const AHEAD: usize = 16;
+
+/// An array of places, the first of them with links; not allocated while no place has one.
+type Bulk<L> = Box<[L]>;
+
+/// The arrays of one node.
+#[derive(Debug)]
+struct Bulks<L> {
+    first: Bulk<L>,
+    more: Chain<Bulk<L>>,
+}
+
+/// Where a node's next link goes, with memory for it.
+enum Room<L> {
+    Open,
+    First(Bulk<L>),
+    More(Unlinked<Bulk<L>>),
+}
+
+impl<L: KeptLink> Bulks<L> {
+    fn none() -> Self {
+        Self {
+            first: Bulk::default(),
+            more: Chain::EMPTY,
+        }
+    }
+
+    fn links(&self) -> impl Iterator<Item = &L> {
+        std::iter::once(&self.first)
+            .chain(self.more.iter())
+            .flat_map(|bulk| links(bulk))
+    }
+
+    fn has(&self, neighbour: u32) -> bool {
+        self.links().any(|link| link.neighbour() == neighbour)
+    }
+
+    /// An array with an empty place.
+    fn open(&mut self) -> Option<&mut Bulk<L>> {
+        let is_open = |bulk: &Bulk<L>| empty_place(bulk).is_some();
+        if is_open(&self.first) {
+            Some(&mut self.first)
+        } else {
+            self.more.find_mut(is_open)
+        }
+    }
+
+    /// Finds room for a link, in a new array of `places` where there is none.
+    fn room(&mut self, places: usize) -> Result<Room<L>> {
+        if self.open().is_some() {
+            return Ok(Room::Open);
+        }
+        let bulk = memory::filled(L::EMPTY, places)?.into_boxed_slice();
+        if self.first.is_empty() {
+            Ok(Room::First(bulk))
+        } else {
+            Ok(Room::More(unlinked(bulk)?))
+        }
+    }
+
+    /// Puts in a link where room was found.
+    fn insert(&mut self, link: &Link, room: Room<L>) {
+        match room {
+            Room::Open => {}
+            Room::First(bulk) => self.first = bulk,
+            Room::More(bulk) => self.more.put(bulk),
+        }
+        if let Some(bulk) = self.open()
+            && let Some(place) = empty_place(bulk)
+        {
+            bulk[place] = L::of(link);
+        }
+    }
+
+    /// Takes out the link to a neighbour; whether there was one.
+    fn remove(&mut self, neighbour: u32) -> bool {
+        if let Some(place) = place_of(&self.first, neighbour) {
+            vacate(&mut self.first, place);
+            if links(&self.first).is_empty() {
+                self.first = Bulk::default();
+            }
+            return true;
+        }
+        let Some(bulk) = self.more.find_mut(|bulk| place_of(bulk, neighbour).is_some()) else {
+            return false;
+        };
+        if let Some(place) = place_of(bulk, neighbour) {
+            vacate(bulk, place);
+        }
+        self.more.remove(|bulk| links(bulk).is_empty());
+        true
+    }
+}
+
+/// Springs in chains of arrays.
+#[derive(Debug)]
+pub(super) struct DynamicBulk<L> {
+    spring_count: usize,
+    springs_per_node: usize,
+    nodes: Vec<Bulks<L>>,
+}
+
+impl<L: KeptLink> DynamicBulk<L> {
+    /// Arrays of `springs_per_node` places; 0: chosen from the springs.
+    pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+        let ends = Ends::of(node_count, springs)?;
+        let springs_per_node = match springs_per_node {
+            0 => (2 * springs.len()).div_ceil(node_count).clamp(1, LARGEST_CHOICE),
+            chosen => chosen,
+        };
+        let mut nodes = memory::reserved(node_count)?;
+        for node in 0..node_count {
+            let mut bulks = Bulks::none();
+            for link in ends.links(node) {
+                let room = bulks.room(springs_per_node)?;
+                bulks.insert(&link, room);
+            }
+            nodes.push(bulks);
+        }
+        Ok(Self {
+            spring_count: springs.len(),
+            springs_per_node,
+            nodes,
+        })
+    }
+
+    #[inline(always)]
+    fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        let nodes = tile_nodes(tile, self.nodes.len());
+        let gather = Gather::<DAMPED>::new(motion, nodes.start);
+        for node in nodes {
+            if let Some(ahead) = self.nodes.get(node + AHEAD) {
+                prefetch_row(ahead.first.as_ptr(), size_of_val(&*ahead.first));
+                if let Some(more) = ahead.more.first() {
+                    prefetch(more);
+                }
+            }
+            let bulks = &self.nodes[node];
+            let more = bulks.more.iter().flat_map(|bulk| taken(bulk));
+            gather.node(node, taken(&bulks.first).chain(more).map(L::link), forces);
+        }
+    }
+}
+
+/// The links of an array, without a look at how many they are.
+#[inline(always)]
+fn taken<L: KeptLink>(bulk: &Bulk<L>) -> impl Iterator<Item = &L> {
+    bulk.iter().take_while(|link| link.neighbour() != NOBODY)
+}
+
+/// The most places that are chosen for an array.
+const LARGEST_CHOICE: usize = 32;
+
+impl<L: KeptLink> Springs for DynamicBulk<L> {
+    fn damped(&self) -> bool {
+        L::DAMPED
+    }
+
+    fn spring_count(&self) -> usize {
+        self.spring_count
+    }
+
+    fn bytes(&self) -> (usize, usize) {
+        let mut held = self.nodes.capacity() * size_of::<Bulks<L>>();
+        for bulks in &self.nodes {
+            held += size_of_val(&*bulks.first);
+            for bulk in bulks.more.iter() {
+                held += size_of::<Element<Bulk<L>>>() + size_of_val(&**bulk);
+            }
+        }
+        (2 * self.spring_count * size_of::<L>(), held)
+    }
+
+    fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
+        self.nodes[node].links().map(L::link).for_each(see);
+    }
+
+    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        if L::DAMPED && motion.velocities.is_some() {
+            self.tile_forces::<true>(tile, motion, forces);
+        } else {
+            self.tile_forces::<false>(tile, motion, forces);
+        }
+    }
+
+    fn add(&mut self, spring: &Spring) -> Result<()> {
+        let [a, b] = spring.nodes;
+        if self.nodes[a as usize].has(b) {
+            return Err(already_joined(a, b));
+        }
+        let room_a = self.nodes[a as usize].room(self.springs_per_node)?;
+        let room_b = self.nodes[b as usize].room(self.springs_per_node)?;
+        let [link_a, link_b] = Link::ends(spring);
+        self.nodes[a as usize].insert(&link_a, room_a);
+        self.nodes[b as usize].insert(&link_b, room_b);
+        self.spring_count += 1;
+        Ok(())
+    }
+
+    fn remove(&mut self, a: u32, b: u32) -> Result<()> {
+        for (node, neighbour) in [(a, b), (b, a)] {
+            // Both ends have it, or none.
+            if !self.nodes[node as usize].remove(neighbour) {
+                return Err(not_joined(a, b));
+            }
+        }
+        self.spring_count -= 1;
+        Ok(())
+    }
+}

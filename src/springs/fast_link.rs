@@ -1,0 +1,140 @@
+//! FAST_LINK: one array with a row per node (Halic et al., section 4).
+//!
+//! A row holds its links first and empty places behind them. Nothing else is kept, not even a count: the memory is
+//! nodes x places x the size of a link.
+
+use super::ends::Ends;
+use super::gather::{Gather, prefetch_row};
+use super::kept::{KeptLink, NOBODY, empty_place, links, place_of, vacate};
+use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use crate::body::Spring;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// How many nodes ahead rows are fetched from memory.
+const AHEAD: usize = 16;
+
+/// Springs in rows.
+#[derive(Debug)]
+pub(super) struct FastLink<L> {
+    node_count: usize,
+    spring_count: usize,
+    springs_per_node: usize,
+    places: Vec<L>,
+}
+
+impl<L: KeptLink> FastLink<L> {
+    /// Rows of `springs_per_node` places; 0: as many as the node with the most springs needs, at least one.
+    pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+        let ends = Ends::of(node_count, springs)?;
+        let (node, longest) = ends.longest();
+        let springs_per_node = if springs_per_node == 0 {
+            longest.max(1)
+        } else {
+            springs_per_node
+        };
+        if longest > springs_per_node {
+            return Err(Error::Capacity(format!(
+                "springs_per_node is {springs_per_node}: node {node} has {longest} springs"
+            )));
+        }
+        let count = node_count.checked_mul(springs_per_node).ok_or(Error::OutOfMemory)?;
+        let mut places = memory::filled(L::EMPTY, count)?;
+        for (node, row) in places.chunks_exact_mut(springs_per_node).enumerate() {
+            for (place, link) in row.iter_mut().zip(ends.links(node)) {
+                *place = L::of(&link);
+            }
+        }
+        Ok(Self {
+            node_count,
+            spring_count: springs.len(),
+            springs_per_node,
+            places,
+        })
+    }
+
+    fn row(&self, node: u32) -> &[L] {
+        let width = self.springs_per_node;
+        &self.places[node as usize * width..][..width]
+    }
+
+    fn row_mut(&mut self, node: u32) -> &mut [L] {
+        let width = self.springs_per_node;
+        &mut self.places[node as usize * width..][..width]
+    }
+
+    /// The place of a node's next link.
+    fn empty_place(&self, node: u32) -> Result<usize> {
+        empty_place(self.row(node)).ok_or_else(|| {
+            let width = self.springs_per_node;
+            Error::Capacity(format!("node {node} has {width} springs: springs_per_node is {width}"))
+        })
+    }
+}
+
+impl<L: KeptLink> FastLink<L> {
+    #[inline(always)]
+    fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        let nodes = tile_nodes(tile, self.node_count);
+        let width = self.springs_per_node;
+        let gather = Gather::<DAMPED>::new(motion, nodes.start);
+        let rows = self.places[nodes.start * width..nodes.end * width].chunks_exact(width);
+        for (node, row) in nodes.zip(rows) {
+            prefetch_row(row.as_ptr().wrapping_add(AHEAD * width), size_of_val(row));
+            let links = row.iter().take_while(|link| link.neighbour() != NOBODY);
+            gather.node(node, links.map(L::link), forces);
+        }
+    }
+}
+
+impl<L: KeptLink> Springs for FastLink<L> {
+    fn damped(&self) -> bool {
+        L::DAMPED
+    }
+
+    fn spring_count(&self) -> usize {
+        self.spring_count
+    }
+
+    fn bytes(&self) -> (usize, usize) {
+        (
+            2 * self.spring_count * size_of::<L>(),
+            self.places.capacity() * size_of::<L>(),
+        )
+    }
+
+    fn visit(&self, node: usize, see: &mut dyn FnMut(Link)) {
+        links(self.row(node as u32)).iter().map(L::link).for_each(see);
+    }
+
+    fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+        if L::DAMPED && motion.velocities.is_some() {
+            self.tile_forces::<true>(tile, motion, forces);
+        } else {
+            self.tile_forces::<false>(tile, motion, forces);
+        }
+    }
+
+    fn add(&mut self, spring: &Spring) -> Result<()> {
+        let [a, b] = spring.nodes;
+        if place_of(self.row(a), b).is_some() {
+            return Err(already_joined(a, b));
+        }
+        let places = [self.empty_place(a)?, self.empty_place(b)?];
+        for ((node, place), link) in spring.nodes.into_iter().zip(places).zip(Link::ends(spring)) {
+            self.row_mut(node)[place] = L::of(&link);
+        }
+        self.spring_count += 1;
+        Ok(())
+    }
+
+    fn remove(&mut self, a: u32, b: u32) -> Result<()> {
+        for (node, neighbour) in [(a, b), (b, a)] {
+            // Both ends have it, or none.
+            let place = place_of(self.row(node), neighbour).ok_or_else(|| not_joined(a, b))?;
+            vacate(self.row_mut(node), place);
+        }
+        self.spring_count -= 1;
+        Ok(())
+    }
+}

@@ -1,0 +1,125 @@
+//! What is kept of a link: bodies without damping along springs do not pay for it.
+
+use super::Link;
+
+/// No node: a body has fewer.
+pub(super) const NOBODY: u32 = u32::MAX;
+
+/// A link as a storage keeps it.
+pub(super) trait KeptLink: Copy + Send + Sync + std::fmt::Debug + 'static {
+    /// Whether damping is kept.
+    const DAMPED: bool;
+
+    /// An empty place.
+    const EMPTY: Self;
+
+    fn of(link: &Link) -> Self;
+
+    fn link(&self) -> Link;
+
+    fn neighbour(&self) -> u32;
+}
+
+/// A link of a body without damping along springs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct UndampedLink {
+    neighbour: u32,
+    stiffness: f32,
+    rest_length: f32,
+}
+
+/// A link of a body with damping along springs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DampedLink {
+    undamped: UndampedLink,
+    damping: f32,
+}
+
+impl KeptLink for UndampedLink {
+    const DAMPED: bool = false;
+    const EMPTY: Self = Self {
+        neighbour: NOBODY,
+        stiffness: 0.0,
+        rest_length: 0.0,
+    };
+
+    #[inline(always)]
+    fn of(link: &Link) -> Self {
+        Self {
+            neighbour: link.neighbour,
+            stiffness: link.stiffness,
+            rest_length: link.rest_length,
+        }
+    }
+
+    #[inline(always)]
+    fn link(&self) -> Link {
+        Link {
+            neighbour: self.neighbour,
+            stiffness: self.stiffness,
+            rest_length: self.rest_length,
+            damping: 0.0,
+        }
+    }
+
+    #[inline(always)]
+    fn neighbour(&self) -> u32 {
+        self.neighbour
+    }
+}
+
+impl KeptLink for DampedLink {
+    const DAMPED: bool = true;
+    const EMPTY: Self = Self {
+        undamped: UndampedLink::EMPTY,
+        damping: 0.0,
+    };
+
+    #[inline(always)]
+    fn of(link: &Link) -> Self {
+        Self {
+            undamped: UndampedLink::of(link),
+            damping: link.damping,
+        }
+    }
+
+    #[inline(always)]
+    fn link(&self) -> Link {
+        Link {
+            damping: self.damping,
+            ..self.undamped.link()
+        }
+    }
+
+    #[inline(always)]
+    fn neighbour(&self) -> u32 {
+        self.undamped.neighbour
+    }
+}
+
+/// The links in a row of places: they come first, behind them all places are empty.
+#[inline]
+pub(super) fn links<L: KeptLink>(row: &[L]) -> &[L] {
+    let count = row.iter().position(|link| link.neighbour() == NOBODY);
+    &row[..count.unwrap_or(row.len())]
+}
+
+/// The first empty place of a row.
+pub(super) fn empty_place<L: KeptLink>(row: &[L]) -> Option<usize> {
+    let count = links(row).len();
+    (count < row.len()).then_some(count)
+}
+
+/// Where in a row the link to `neighbour` is.
+pub(super) fn place_of<L: KeptLink>(row: &[L], neighbour: u32) -> Option<usize> {
+    links(row).iter().position(|link| link.neighbour() == neighbour)
+}
+
+/// Empties a place with a link; the row's last link moves there.
+pub(super) fn vacate<L: KeptLink>(row: &mut [L], place: usize) {
+    let last = links(row).len() - 1;
+    row[place] = row[last];
+    row[last] = L::EMPTY;
+}

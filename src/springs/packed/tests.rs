@@ -1,0 +1,311 @@
+use std::collections::BTreeMap;
+
+use glam::{DVec3, Vec3};
+
+use super::{Packed, Rounding};
+use crate::body::{Spring, Vectors};
+use crate::springs::{Kernel, Link, Motion, Springs, TileForces, tile_count, tile_nodes};
+
+const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
+
+/// A fixed generator.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as usize % limit
+    }
+
+    fn unit(&mut self) -> f32 {
+        self.below(1 << 24) as f32 / (1 << 24) as f32
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
+    }
+}
+
+/// Springs between nodes, by their lower and their higher node.
+type Pairs = BTreeMap<[u32; 2], Spring>;
+
+fn join(pairs: &mut Pairs, a: usize, b: usize, [stiffness, rest_length, damping]: [f32; 3]) {
+    if a != b {
+        let nodes = [a.min(b) as u32, a.max(b) as u32];
+        let spring = Spring {
+            nodes,
+            stiffness,
+            rest_length,
+            damping,
+        };
+        pairs.entry(nodes).or_insert(spring);
+    }
+}
+
+/// A band of neighbours at even distances, each spring as `of` says.
+fn band(count: usize, offsets: &[usize], mut of: impl FnMut(usize) -> [f32; 3]) -> Pairs {
+    let mut pairs = Pairs::new();
+    for (kind, &offset) in offsets.iter().enumerate() {
+        for node in 0..count.saturating_sub(offset) {
+            join(&mut pairs, node, node + offset, of(kind));
+        }
+    }
+    pairs
+}
+
+/// All the ways in which springs lie: how many nodes, and what joins them.
+fn bodies(damped: bool) -> Vec<(&'static str, usize, Pairs)> {
+    let mut random = Random(7);
+    let damping = if damped { 0.5 } else { 0.0 };
+    let shared = |kind: usize| [10.0 + kind as f32, 0.1 * (1 + kind) as f32, damping];
+    let mut bodies = vec![
+        ("a pair", 2, band(2, &[1], shared)),
+        ("runs", 1000, band(1000, &[1, 17, 31, 32, 33], shared)),
+        (
+            "runs without a number that sixteen divides",
+            77,
+            band(77, &[1, 40, 76], shared),
+        ),
+        ("no springs", 20, Pairs::new()),
+    ];
+    let mut own = Random(8);
+    let each = |_| [own.unit(), own.unit(), damping * own.unit()];
+    bodies.push(("runs with parameters of their own", 700, band(700, &[1, 2, 50], each)));
+    let mut lengths = Random(9);
+    let uniform = |_| [25.0, lengths.unit(), damping];
+    bodies.push(("runs of one stiffness", 700, band(700, &[1, 2, 50], uniform)));
+    for (name, count, links) in [("gathers", 3000, 12_000), ("far gathers", 150_000, 400_000)] {
+        let mut pairs = Pairs::new();
+        for _ in 0..links {
+            let (a, b) = (random.below(count), random.below(count));
+            join(
+                &mut pairs,
+                a,
+                b,
+                [random.unit(), random.unit(), damping * random.unit()],
+            );
+        }
+        bodies.push((name, count, pairs));
+    }
+    let mut pairs = band(5000, &[1], shared);
+    for node in 1..4000 {
+        join(&mut pairs, 100, node, [random.unit(), random.unit(), damping]);
+    }
+    bodies.push(("a star", 5000, pairs));
+    bodies
+}
+
+fn vectors(count: usize, random: &mut Random) -> Vectors {
+    let mut vectors = Vectors::zeros(count).expect("memory");
+    for node in 0..count {
+        vectors.set(node, random.vector());
+    }
+    vectors
+}
+
+fn packed(kernel: Kernel, count: usize, pairs: &Pairs) -> Option<Packed> {
+    let springs: Vec<Spring> = pairs.values().copied().collect();
+    let packed = Packed::new(kernel.choose().ok()?, count, &springs, Rounding { reach: 0.0 });
+    Some(packed.expect("memory"))
+}
+
+fn forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
+    let mut all = Vec::new();
+    for tile in 0..tile_count(positions.len()) {
+        let mut forces = TileForces::ZERO;
+        packed.forces(tile, &Motion::at(positions, velocities), &mut forces);
+        all.extend((0..tile_nodes(tile, positions.len()).len()).map(|place| forces.get(place)));
+    }
+    all
+}
+
+/// The same in `f64`, and how large the terms of each sum are.
+fn reference(pairs: &Pairs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<(DVec3, f64)> {
+    let mut forces = vec![(DVec3::ZERO, 0.0); positions.len()];
+    for spring in pairs.values() {
+        let [a, b] = spring.nodes.map(|node| node as usize);
+        let way = positions.get(b).as_dvec3() - positions.get(a).as_dvec3();
+        let direction = if way == DVec3::ZERO { DVec3::X } else { way.normalize() };
+        let rate = velocities.map_or(0.0, |velocities| {
+            direction.dot(velocities.get(b).as_dvec3() - velocities.get(a).as_dvec3())
+        });
+        let tension = f64::from(spring.stiffness) * (way.length() - f64::from(spring.rest_length));
+        let damping = f64::from(spring.damping) * rate;
+        let size = f64::from(spring.stiffness) * (way.length() + f64::from(spring.rest_length)) + damping.abs();
+        for (node, sign) in [(a, 1.0), (b, -1.0)] {
+            forces[node].0 += direction * (sign * (tension + damping));
+            forces[node].1 += size;
+        }
+    }
+    forces
+}
+
+#[test]
+fn every_kernel_computes_the_forces() {
+    for damped in [false, true] {
+        for (name, count, pairs) in bodies(damped) {
+            let mut random = Random(3);
+            let mut positions = vectors(count, &mut random);
+            // Some nodes coincide, all the way or nearly.
+            for node in (0..count.saturating_sub(60)).step_by(97) {
+                positions.set(node + 1, positions.get(node));
+                positions.set(node + 50, positions.get(node) + Vec3::splat(1e-22));
+            }
+            let velocities = damped.then(|| vectors(count, &mut random));
+            let expected = reference(&pairs, &positions, velocities.as_ref());
+            let mut tried = 0;
+            for kernel in KERNELS {
+                let Some(packed) = packed(kernel, count, &pairs) else {
+                    continue;
+                };
+                tried += 1;
+                assert_eq!(packed.damped(), damped && !pairs.is_empty());
+                let found = forces(&packed, &positions, velocities.as_ref().filter(|_| packed.damped()));
+                let mut sum = DVec3::ZERO;
+                for (node, (found, (expected, size))) in found.iter().zip(&expected).enumerate() {
+                    let error = (found.as_dvec3() - *expected).length();
+                    assert!(
+                        error <= 1e-6 * size,
+                        "{name}, {kernel:?}, node {node}: {found} for {expected}"
+                    );
+                    sum += found.as_dvec3();
+                }
+                // Each end sees the opposite of what the other sees: only the sums of each node are rounded.
+                let total: f64 = expected.iter().map(|(_, size)| size).sum();
+                assert!(sum.length() <= 1e-7 * total.max(1e-30), "{name}, {kernel:?}: {sum}");
+            }
+            assert!(tried >= 1);
+        }
+    }
+}
+
+#[test]
+fn springs_come_back_as_they_were_given() {
+    for damped in [false, true] {
+        for (name, count, pairs) in bodies(damped) {
+            let packed = packed(Kernel::Best, count, &pairs).expect("a kernel");
+            assert_eq!(packed.spring_count(), pairs.len());
+            assert_eq!(links(&packed, count), pairs, "{name}");
+        }
+    }
+}
+
+/// The springs, as both of their nodes see them.
+fn links(packed: &dyn Springs, count: usize) -> Pairs {
+    let mut ends: BTreeMap<[u32; 2], Vec<Link>> = BTreeMap::new();
+    for node in 0..count as u32 {
+        packed.visit(node as usize, &mut |link| {
+            let pair = [node.min(link.neighbour), node.max(link.neighbour)];
+            ends.entry(pair).or_default().push(link);
+        });
+    }
+    let spring = |(nodes, ends): ([u32; 2], Vec<Link>)| {
+        assert_eq!(ends.len(), 2, "{nodes:?}");
+        let of = |link: &Link| (link.stiffness, link.rest_length, link.damping);
+        assert_eq!(of(&ends[0]), of(&ends[1]));
+        let (stiffness, rest_length, damping) = of(&ends[0]);
+        let spring = Spring {
+            nodes,
+            stiffness,
+            rest_length,
+            damping,
+        };
+        (nodes, spring)
+    };
+    ends.into_iter().map(spring).collect()
+}
+
+#[test]
+fn any_change_of_springs_is_kept() {
+    let mut random = Random(5);
+    let count = 1200;
+    let mut pairs = band(count, &[1, 30, 31], |kind| [10.0, 0.1 + kind as f32, 0.0]);
+    let mut packed = packed(Kernel::Best, count, &pairs).expect("a kernel");
+    let positions = vectors(count, &mut random);
+    for round in 0..12 {
+        for _ in 0..500 {
+            let (a, b) = (random.below(count) as u32, random.below(count) as u32);
+            let nodes = [a.min(b), a.max(b)];
+            // Springs of a kind that the body has many of, and others.
+            let stiffness = if random.below(2) == 0 { 10.0 } else { random.unit() };
+            let spring = Spring {
+                nodes,
+                stiffness,
+                rest_length: 0.1,
+                damping: 0.0,
+            };
+            if a == b {
+                continue;
+            } else if pairs.contains_key(&nodes) {
+                assert!(packed.add(&spring).is_err());
+            } else {
+                assert!(packed.remove(a, b).is_err());
+                packed.add(&spring).expect("memory");
+                pairs.insert(nodes, spring);
+            }
+        }
+        let share = if round == 9 { 10 } else { 3 };
+        let removed: Vec<[u32; 2]> = pairs
+            .keys()
+            .copied()
+            .filter(|_| random.below(share) > 0 && round > 5)
+            .collect();
+        for [a, b] in removed {
+            packed.remove(b, a).expect("a spring");
+            pairs.remove(&[a, b]);
+        }
+        assert_eq!(packed.spring_count(), pairs.len());
+        assert_eq!(links(&packed, count), pairs);
+        let expected = reference(&pairs, &positions, None);
+        for (found, (expected, size)) in forces(&packed, &positions, None).iter().zip(expected) {
+            assert!((found.as_dvec3() - expected).length() <= 1e-6 * size);
+        }
+        let (used, held) = packed.bytes();
+        assert!(used <= held);
+    }
+}
+
+#[test]
+fn rest_lengths_that_differ_by_rounding_are_one() {
+    let count = 1000;
+    let spacing = 0.01;
+    let springs: Vec<Spring> = (1..count)
+        .map(|node| {
+            // As a caller gets them from positions.
+            let rest_length = node as f32 * spacing - (node - 1) as f32 * spacing;
+            Spring {
+                nodes: [node - 1, node],
+                stiffness: 1.0,
+                rest_length,
+                damping: 0.0,
+            }
+        })
+        .collect();
+    let lengths: std::collections::BTreeSet<u32> = springs.iter().map(|spring| spring.rest_length.to_bits()).collect();
+    assert!(lengths.len() > 10);
+    let kernel = Kernel::Best.choose().expect("a kernel");
+    let reach = count as f32 * spacing;
+    let given = Packed::new(kernel, count as usize, &springs, Rounding { reach: 0.0 }).expect("memory");
+    let derived = Packed::new(kernel, count as usize, &springs, Rounding { reach }).expect("memory");
+    // No column brings rest lengths of its own.
+    let (one, many) = (derived.bytes().0, given.bytes().0);
+    assert!(3 * one < 2 * many, "{one} bytes for {many}");
+    for (node, spring) in springs.iter().enumerate() {
+        derived.visit(node, &mut |link| {
+            assert!((link.rest_length - spacing).abs() <= f32::EPSILON * reach);
+        });
+        given.visit(node, &mut |link| {
+            let known = |spring: &Spring| spring.rest_length == link.rest_length;
+            let nearby = &springs[node.saturating_sub(1)..=node];
+            assert!(
+                nearby.iter().any(known),
+                "{} for {}",
+                link.rest_length,
+                spring.rest_length
+            );
+        });
+    }
+}
