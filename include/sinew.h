@@ -374,8 +374,8 @@ typedef struct sinew_body_def {
   uint32_t storage;
   /**
    * FAST_LINK: places of each node, SINEW_STATUS_CAPACITY where a node has more springs; DYNAMIC_BULK: places of each
-   * array. 0, the default: chosen from the springs given, as many as the node with the most has, or as nodes have on
-   * average. Other storages do not use it.
+   * array. 0, the default: chosen from the springs given, as many as the node with the most has, or what takes the
+   * least memory. Other storages do not use it.
    */
   uint32_t springs_per_node;
   /**
