@@ -19,7 +19,7 @@ fn declared() -> BTreeSet<String> {
     }
     code.push_str(rest);
     code.lines()
-        .filter(|line| !line.starts_with('#'))
+        .filter(|line| !line.starts_with('#') && !line.starts_with("typedef"))
         .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
         .map(str::to_owned)
         .collect()
