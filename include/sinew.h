@@ -373,7 +373,9 @@ typedef struct sinew_body_def {
    */
   uint32_t storage;
   /**
-   * Row width or chunk size; 0, the default: chosen from the springs given.
+   * FAST_LINK: places of each node, SINEW_STATUS_CAPACITY where a node has more springs; DYNAMIC_BULK: places of each
+   * array. 0, the default: chosen from the springs given, as many as the node with the most has, or what takes the
+   * least memory. Other storages do not use it.
    */
   uint32_t springs_per_node;
   /**
@@ -813,8 +815,8 @@ sinew_status sinew_body_def_init(struct sinew_body_def *def, size_t struct_size)
 /**
  * Creates a body; copies what `def` points to.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a storage other than PACKED, a solver other than
- * VERLET), SINEW_STATUS_OUT_OF_MEMORY.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a solver other than VERLET), SINEW_STATUS_CAPACITY
+ * (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
@@ -967,7 +969,7 @@ sinew_status sinew_body_get_pin_force(const struct sinew_world *world,
  * One spring per pair.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the pair has a spring), SINEW_STATUS_STALE_ID,
- * SINEW_STATUS_OUT_OF_MEMORY.
+ * SINEW_STATUS_CAPACITY (FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.

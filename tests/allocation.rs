@@ -6,7 +6,7 @@ use std::cell::Cell;
 
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Error, Pose, Shape, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Error, Pose, Shape, Storage, ToolDefinition, Values, World, WorldDefinition};
 
 /// Counts what this thread asks for.
 struct Counting;
@@ -57,8 +57,15 @@ fn the_count_counts() {
 
 #[test]
 fn a_step_allocates_nothing() {
+    steps_allocate_nothing(Storage::Packed, &[0.0, 1e-4]);
+    for storage in [Storage::Efficient, Storage::FastLink, Storage::DynamicBulk] {
+        steps_allocate_nothing(storage, &[0.0]);
+    }
+}
+
+fn steps_allocate_nothing(storage: Storage, tolerances: &[f32]) {
     let mesh = Mesh::cloth([0.2, 0.2], [12, 12]).expect("a cloth");
-    for tolerance in [0.0, 1e-4] {
+    for &tolerance in tolerances {
         let definition = WorldDefinition {
             tolerance,
             ..WorldDefinition::default()
@@ -71,6 +78,7 @@ fn a_step_allocates_nothing() {
             stiffnesses: Values::Uniform(50.0),
             node_dampings: Values::Uniform(1e-3),
             spring_dampings: Values::Uniform(1e-3),
+            storage,
             ..BodyDefinition::default()
         };
         let cloth = world.create_body(&cloth).expect("a body");
@@ -104,7 +112,7 @@ fn a_step_allocates_nothing() {
             assert_eq!(
                 asked(|| drop(world.step(0.004))),
                 0,
-                "tolerance {tolerance}, step {step}"
+                "{storage:?}, tolerance {tolerance}, step {step}"
             );
         }
         let refused = asked(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));

@@ -7,6 +7,7 @@ use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, BodyId, Error, Pose, RunTasks, Shape, ToolDefinition, Values, World, WorldDefinition};
 
 type Task<'a> = &'a (dyn Fn(u32) + Sync);
+type System = &'static (dyn for<'a> Fn(u32, Task<'a>) + Sync);
 
 fn in_reverse(count: u32, task: Task) {
     (0..count).rev().for_each(task);
@@ -105,7 +106,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     for count in [0, 2, 3, 5] {
         assert!(moved(threads(count)) == alone, "{count} threads");
     }
-    let systems: [(&str, &'static (dyn Fn(u32, Task) + Sync)); 3] = [
+    let systems: [(&str, System); 3] = [
         ("in reverse", &in_reverse),
         ("on threads", &on_threads),
         ("never", &never),

@@ -86,7 +86,8 @@ pub struct BodyDefinition<'a> {
     pub tetrahedra: &'a [[u32; 4]],
     /// How the springs are kept.
     pub storage: Storage,
-    /// The row width or chunk size of the storage; 0: chosen from the springs given.
+    /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
+    /// springs given, as many as the node with the most has, or what takes the least memory.
     pub springs_per_node: u32,
     /// How the body is moved.
     pub solver: Solver,

@@ -140,7 +140,8 @@ impl Body {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, the nodes are one, they have a spring already, or a number is
-    /// negative or not finite. [`Error::OutOfMemory`].
+    /// negative or not finite. [`Error::Capacity`]: a node has no free place in a row of fixed length.
+    /// [`Error::OutOfMemory`].
     pub fn add_spring(&mut self, a: u32, b: u32, stiffness: f32, rest_length: Option<f32>) -> Result<()> {
         let nodes = self.check_pair(a, b)?;
         not_negative("stiffness", stiffness)?;
@@ -163,7 +164,9 @@ impl Body {
             Error::InvalidArgument(_) => Error::invalid(format!("nodes {a} and {b} have a spring already")),
             error => error,
         })?;
-        self.springs_changed();
+        self.forces_current = false;
+        let stability = self.carry.stability;
+        self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
         Ok(())
     }
 
@@ -175,13 +178,12 @@ impl Body {
         let [own_a, own_b] = self.check_pair(a, b)?;
         let told = |_| Error::invalid(format!("nodes {a} and {b} have no spring"));
         self.springs.remove(own_a, own_b).map_err(told)?;
-        self.springs_changed();
-        Ok(())
-    }
-
-    fn springs_changed(&mut self) {
         self.forces_current = false;
-        self.carry.stability = Stability::UNKNOWN;
+        // What was stable still is; nothing limits what has no springs.
+        if self.springs.spring_count() == 0 {
+            self.carry.stability = Stability::UNKNOWN;
+        }
+        Ok(())
     }
 
     fn set_velocity(&mut self, node: u32, velocity: Vec3) {

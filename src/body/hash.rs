@@ -45,8 +45,7 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
-        let stability = &self.carry.stability;
-        hasher.write_floats(&[stability.limit.unwrap_or(-1.0), stability.reach]);
+        hasher.write_floats(&self.carry.stability.floats());
         for bits in self.carry.gravity.bits() {
             hasher.write_u64(bits);
         }

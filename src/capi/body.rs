@@ -82,7 +82,9 @@ pub struct sinew_body_def {
     pub tetrahedron_count: usize,
     /// SINEW_STORAGE_...
     pub storage: u32,
-    /// Row width or chunk size; 0, the default: chosen from the springs given.
+    /// FAST_LINK: places of each node, SINEW_STATUS_CAPACITY where a node has more springs; DYNAMIC_BULK: places of each
+    /// array. 0, the default: chosen from the springs given, as many as the node with the most has, or what takes the
+    /// least memory. Other storages do not use it.
     pub springs_per_node: u32,
     /// SINEW_SOLVER_...
     pub solver: u32,
@@ -295,8 +297,8 @@ pub unsafe extern "C" fn sinew_body_def_init(def: *mut sinew_body_def, struct_si
 
 /// Creates a body; copies what `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a storage other than PACKED, a solver other than
-/// VERLET), SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a solver other than VERLET), SINEW_STATUS_CAPACITY
+/// (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
@@ -540,7 +542,7 @@ pub unsafe extern "C" fn sinew_body_get_pin_force(
 /// One spring per pair.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the pair has a spring), SINEW_STATUS_STALE_ID,
-/// SINEW_STATUS_OUT_OF_MEMORY.
+/// SINEW_STATUS_CAPACITY (FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.

@@ -1,4 +1,4 @@
-//! The C interface: a thin room in front of the Rust one, and the only one that sees raw pointers.
+//! The C interface: a thin room in front of the Rust one, where a caller's pointers are checked.
 //!
 //! `include/sinew.h` is generated from here. Every function checks its pointers, catches what might panic, and writes
 //! its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).

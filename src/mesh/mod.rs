@@ -4,6 +4,7 @@
 //! that is already in memory.
 
 mod file;
+pub(crate) mod order;
 mod organ;
 mod shapes;
 mod tidy;
@@ -15,6 +16,7 @@ use crate::memory;
 use crate::{Error, Result};
 
 pub use file::{MeshFormat, load};
+pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
 pub use topology::{boundary, edges, is_closed};
 
@@ -102,9 +104,4 @@ fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: 
         }
     }
     Ok(())
-}
-
-/// Stands in for the search for a node order.
-pub(crate) fn best_order(_: &[glam::Vec3], _: &[[u32; 2]]) -> Result<Option<Vec<u32>>> {
-    Ok(None)
 }

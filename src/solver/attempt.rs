@@ -60,10 +60,10 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
     body.refresh_forces(team);
     let known = body.carry.stability;
     let is_worth_estimating = || {
-        let substeps = request.dt / (RESERVE * known.anywhere);
+        let substeps = request.dt / (RESERVE * known.limit_anywhere());
         request.substeps == 0 && known.is_coarse() && substeps > WORTH_ESTIMATING
     };
-    let stability = if known.limit.is_none() || is_worth_estimating() {
+    let stability = if known.limit().is_none() || is_worth_estimating() {
         Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions())
     } else {
         known
@@ -93,10 +93,10 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
 
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
 fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team) -> Result<(u32, Taken), TooLong> {
-    let mut stable_substep = start.stability.limit.unwrap_or(f32::INFINITY);
+    let mut stable_substep = start.stability.limit().unwrap_or(f32::INFINITY);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
-            stable_substep = start.stability.anywhere;
+            stable_substep = start.stability.limit_anywhere();
         }
         let needed = (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil();
         if needed > f64::from(request.max_substeps) {
@@ -135,7 +135,7 @@ fn run_to_tolerance(
     let mut error = 0.0;
     compare(body, request, &carry);
     loop {
-        let stable_substep = carry.stability.limit.unwrap_or(f32::INFINITY);
+        let stable_substep = carry.stability.limit().unwrap_or(f32::INFINITY);
         substeps = substeps.saturating_mul(2);
         middle = middle.saturating_mul(2);
         if substeps > request.max_substeps || substeps == u32::MAX {
@@ -157,7 +157,7 @@ fn run_to_tolerance(
 fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
     let (positions, velocities) = body.state.newest();
     // 1 over the highest frequency.
-    let time = (0.5 * carry.stability.limit.unwrap_or(f32::INFINITY)).min(request.dt);
+    let time = (0.5 * carry.stability.limit().unwrap_or(f32::INFINITY)).min(request.dt);
     body.coarse
         .as_mut()
         .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))

@@ -107,14 +107,14 @@ impl Axis<'_> {
                 self.each(|place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall));
             }
             (Some(damping), inverse_masses) => {
-                let loss = &damping.loss[self.nodes.clone()];
-                let gain = &damping.gain[self.nodes.clone()];
                 let nodes = self.nodes.clone();
-                let half = kick.half;
+                let (loss, gain) = (&damping.loss[nodes.clone()], &damping.gain[nodes.clone()]);
+                // Two half kicks in one: the second loses from what the first left.
+                let (whole, share) = if kick.half { (1.0, 0.0) } else { (2.0, 1.0) };
                 let damped = move |place: usize, acceleration: f32, velocity: f32| {
-                    // Two half kicks in one: the second loses from what the first left.
-                    let both = if half { 1.0 } else { 2.0 - loss[place] };
-                    velocity + ((acceleration + gravity) * (gain[place] * both) - velocity * (loss[place] * both))
+                    let (loss, gain) = (loss[place], gain[place]);
+                    let both = whole - share * loss;
+                    velocity + ((acceleration + gravity) * (gain * both) - velocity * (loss * both))
                 };
                 match inverse_masses {
                     InverseMasses::Uniform(inverse_mass) => {

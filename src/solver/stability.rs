@@ -16,24 +16,76 @@ use crate::springs::{Springs, separation};
 /// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
+/// What bounds a body's frequencies and its dampings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rates {
+    /// The highest frequency squared, 1/s².
+    stiffest: f32,
+    /// The highest rate of damping, 1/s.
+    most_damped: f32,
+}
+
+impl Rates {
+    const ZERO: Self = Self {
+        stiffest: 0.0,
+        most_damped: 0.0,
+    };
+
+    /// The longest stable substep, s; infinity where there is no limit.
+    fn limit(self) -> f32 {
+        let damping = 0.5 * self.most_damped;
+        2.0 / ((self.stiffest + damping * damping).sqrt() + damping)
+    }
+
+    /// Takes a node in, as it is now.
+    fn take(&mut self, sums: &Sums) {
+        let across = sums.across;
+        let directed = sums.along.largest_eigenvalue_beyond(self.stiffest - across);
+        self.stiffest = self.stiffest.max(directed + across);
+        self.most_damped = sums.damping.largest_eigenvalue_beyond(self.most_damped);
+        // Springs beyond the range of `f32` allow no substep at all.
+        if !(sums.anywhere.stiffest.is_finite() && sums.anywhere.most_damped.is_finite()) {
+            self.stiffest = f32::INFINITY;
+        }
+    }
+
+    /// Takes in a node's rates.
+    fn take_rates(&mut self, rates: Self) {
+        self.stiffest = self.stiffest.max(rates.stiffest);
+        self.most_damped = self.most_damped.max(rates.most_damped);
+        if !(rates.stiffest.is_finite() && rates.most_damped.is_finite()) {
+            self.stiffest = f32::INFINITY;
+        }
+    }
+}
+
 /// What is known about the longest stable substep of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stability {
-    /// The longest stable substep at the positions of the last estimate, s; `None`: not estimated since the body's
-    /// springs, masses or pins changed.
-    pub limit: Option<f32>,
+    /// At the positions of the last estimate; `None`: not estimated since the body's masses or pins changed.
+    now: Option<Rates>,
+    /// Wherever the nodes are.
+    anywhere: Rates,
     /// How far neighbours may still move against each other before the estimate is stale, m.
-    pub reach: f32,
-    /// The longest substep that is stable wherever the nodes are, s; 0 where `limit` is not known.
-    pub anywhere: f32,
+    reach: f32,
 }
 
 impl Stability {
     pub const UNKNOWN: Self = Self {
-        limit: None,
+        now: None,
+        anywhere: Rates::ZERO,
         reach: 0.0,
-        anywhere: 0.0,
     };
+
+    /// The longest stable substep, s, where it is known.
+    pub fn limit(&self) -> Option<f32> {
+        self.now.map(Rates::limit)
+    }
+
+    /// The longest substep that is stable wherever the nodes are, s, where `limit` is known.
+    pub fn limit_anywhere(&self) -> f32 {
+        self.anywhere.limit()
+    }
 
     /// Whether the estimate still holds after neighbours have moved against each other by up to `travel` more.
     pub fn holds_after(&mut self, travel: f32) -> bool {
@@ -43,8 +95,8 @@ impl Stability {
 
     /// The same, where `substep` is so short that the nodes may be anywhere: an estimate that never gets stale.
     pub fn for_short(self, substep: f32) -> Option<Self> {
-        (substep <= self.anywhere).then_some(Self {
-            limit: Some(self.anywhere),
+        (self.now.is_some() && substep <= self.limit_anywhere()).then_some(Self {
+            now: Some(self.anywhere),
             reach: f32::INFINITY,
             ..self
         })
@@ -52,47 +104,64 @@ impl Stability {
 
     /// Whether another estimate may allow longer substeps at the positions as they are now.
     pub fn is_coarse(&self) -> bool {
-        self.reach == f32::INFINITY && self.limit.is_some_and(f32::is_finite)
+        self.reach == f32::INFINITY && self.now.is_some_and(|rates| rates.limit().is_finite())
     }
 
     /// The longest stable substep at these positions, and how long that is true.
     pub fn estimate(springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
-        let mut stiffest = 0.0_f32;
-        let mut most_damped = 0.0_f32;
+        let mut now = Rates::ZERO;
+        let mut anywhere = Rates::ZERO;
         let mut reach = f32::INFINITY;
-        let (mut stiffest_anywhere, mut most_damped_anywhere) = (0.0_f32, 0.0_f32);
-        for (node, &inverse_mass) in inverse_masses.iter().enumerate() {
-            if inverse_mass == 0.0 {
-                continue;
-            }
-            let sums = Sums::of(node, inverse_mass, springs, inverse_masses, positions);
-            let across = sums.across;
-            stiffest = stiffest.max(sums.along.largest_eigenvalue_beyond(stiffest - across) + across);
-            most_damped = sums.damping.largest_eigenvalue_beyond(most_damped);
-            stiffest_anywhere = stiffest_anywhere.max(sums.stiffness_anywhere);
-            most_damped_anywhere = most_damped_anywhere.max(sums.damping_anywhere);
-            // Springs beyond the range of `f32` allow no substep at all.
-            if !(sums.stiffness_anywhere.is_finite() && sums.damping_anywhere.is_finite()) {
-                stiffest = f32::INFINITY;
-            }
-            // Nothing that moves can make a node matter whose springs are too weak even together.
-            if sums.stiffness_anywhere > stiffest || sums.damping_anywhere > most_damped {
-                reach = reach.min(sums.shortest);
+        for node in 0..inverse_masses.len() {
+            if let Some(sums) = Sums::of(node, springs, inverse_masses, positions) {
+                now.take(&sums);
+                anywhere.take_rates(sums.anywhere);
+                // Nothing that moves can make a node matter whose springs are too weak even together.
+                if sums.may_exceed(&now) {
+                    reach = reach.min(sums.shortest);
+                }
             }
         }
         Self {
-            limit: Some(limit(stiffest, most_damped)),
+            now: Some(now),
+            anywhere,
             reach: TRAVEL_BEFORE_ESTIMATE * reach,
-            anywhere: limit(stiffest_anywhere, most_damped_anywhere),
         }
     }
-}
 
-/// The longest stable substep for squared frequencies up to `stiffest` and rates of damping up to `most_damped`, s;
-/// infinity where there is no limit.
-fn limit(stiffest: f32, most_damped: f32) -> f32 {
-    let damping = 0.5 * most_damped;
-    2.0 / ((stiffest + damping * damping).sqrt() + damping)
+    /// The same after these nodes got another spring: no other node has to be looked at.
+    pub fn joined(self, nodes: [u32; 2], springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
+        let Some(mut now) = self.now else {
+            return self;
+        };
+        let mut joined = self;
+        for node in nodes {
+            let Some(sums) = Sums::of(node as usize, springs, inverse_masses, positions) else {
+                continue;
+            };
+            joined.anywhere.take_rates(sums.anywhere);
+            if self.is_coarse() {
+                now.take_rates(sums.anywhere);
+                continue;
+            }
+            now.take(&sums);
+            if sums.may_exceed(&now) {
+                joined.reach = joined.reach.min(TRAVEL_BEFORE_ESTIMATE * sums.shortest);
+            }
+        }
+        joined.now = Some(now);
+        joined
+    }
+
+    /// What the next step depends on.
+    pub fn floats(&self) -> [f32; 5] {
+        let now = self.now.unwrap_or(Rates {
+            stiffest: -1.0,
+            most_damped: -1.0,
+        });
+        let Rates { stiffest, most_damped } = self.anywhere;
+        [now.stiffest, now.most_damped, stiffest, most_damped, self.reach]
+    }
 }
 
 /// The springs of one node, added up.
@@ -104,21 +173,24 @@ struct Sums {
     /// The matrices of damping, 1/s.
     damping: Symmetric,
     /// What stiffness and damping can be at most, wherever the nodes are.
-    stiffness_anywhere: f32,
-    damping_anywhere: f32,
+    anywhere: Rates,
     /// The shortest length over which one of the matrices changes, m.
     shortest: f32,
 }
 
 impl Sums {
-    fn of(node: usize, inverse_mass: f32, springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
+    /// `None`: the node is pinned.
+    fn of(node: usize, springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Option<Self> {
+        let inverse_mass = inverse_masses[node];
+        if inverse_mass == 0.0 {
+            return None;
+        }
         let position = positions.get(node);
         let mut sums = Self {
             along: Symmetric::default(),
             across: 0.0,
             damping: Symmetric::default(),
-            stiffness_anywhere: 0.0,
-            damping_anywhere: 0.0,
+            anywhere: Rates::ZERO,
             shortest: f32::INFINITY,
         };
         springs.visit(node, &mut |link| {
@@ -126,7 +198,7 @@ impl Sums {
             let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
             let inverse_mass = inverse_mass + inverse_masses[neighbour];
             let stiffness = link.stiffness * inverse_mass;
-            sums.stiffness_anywhere += stiffness;
+            sums.anywhere.stiffest += stiffness;
             // Stretched to twice its rest length a spring is half as stiff across as along, and so on: only the rest
             // has a direction.
             let directed = if length > link.rest_length {
@@ -141,12 +213,17 @@ impl Sums {
             }
             if link.damping > 0.0 {
                 let damping = link.damping * inverse_mass;
-                sums.damping_anywhere += damping;
+                sums.anywhere.most_damped += damping;
                 sums.damping.add_outer(direction, damping);
                 sums.shortest = sums.shortest.min(length);
             }
         });
-        sums
+        Some(sums)
+    }
+
+    /// Whether the node can get rates beyond these by moving.
+    fn may_exceed(&self, rates: &Rates) -> bool {
+        self.anywhere.stiffest > rates.stiffest || self.anywhere.most_damped > rates.most_damped
     }
 }
 

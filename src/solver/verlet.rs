@@ -42,7 +42,7 @@ pub(super) fn run(
     let mut carry = start;
     let mut finite = true;
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-    let check = |stability: &Stability| match stability.limit {
+    let check = |stability: &Stability| match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
     };

@@ -3,6 +3,8 @@
 //! Where a node's arrays are full another is added, and nothing is copied; one that becomes empty is given back. The
 //! first array of each node is named in a table, those beyond it in a linked list.
 
+use std::ops::RangeInclusive;
+
 use super::chain::{Chain, Element, Unlinked, unlinked};
 use super::ends::Ends;
 use super::gather::{Gather, prefetch_row};
@@ -121,7 +123,7 @@ impl<L: KeptLink> DynamicBulk<L> {
     pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let springs_per_node = match springs_per_node {
-            0 => (2 * springs.len()).div_ceil(node_count).clamp(1, LARGEST_CHOICE),
+            0 => least_memory::<L>(node_count, &ends),
             chosen => chosen,
         };
         let mut nodes = memory::reserved(node_count)?;
@@ -164,8 +166,20 @@ fn taken<L: KeptLink>(bulk: &Bulk<L>) -> impl Iterator<Item = &L> {
     bulk.iter().take_while(|link| link.neighbour() != NOBODY)
 }
 
-/// The most places that are chosen for an array.
-const LARGEST_CHOICE: usize = 32;
+/// The places of an array that are chosen from, where none are asked for.
+const CHOICE: RangeInclusive<usize> = 4..=32;
+
+/// The number of places with which the arrays take the least memory: in time there is hardly a difference.
+fn least_memory<L>(node_count: usize, ends: &Ends) -> usize {
+    let bytes = |places: &usize| {
+        let of_node = |node| {
+            let arrays = ends.links(node).len().div_ceil(*places);
+            arrays * places * size_of::<L>() + arrays.saturating_sub(1) * size_of::<Element<Bulk<L>>>()
+        };
+        (0..node_count).map(of_node).sum::<usize>()
+    };
+    CHOICE.min_by_key(bytes).unwrap_or(*CHOICE.end())
+}
 
 impl<L: KeptLink> Springs for DynamicBulk<L> {
     fn damped(&self) -> bool {

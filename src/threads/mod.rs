@@ -39,7 +39,7 @@ enum Others {
     #[default]
     Nobody,
     Workers(Workers),
-    Tasks(Tasks),
+    Tasks(Box<Tasks>),
 }
 
 impl Threads {
@@ -63,7 +63,7 @@ impl Threads {
     pub fn of_tasks(run_tasks: RunTasks, count: u32) -> Result<Self> {
         Ok(Self(match resolved(count)? {
             1 => Others::Nobody,
-            count => Others::Tasks(Tasks::new(run_tasks, count)?),
+            count => Others::Tasks(Box::new(Tasks::new(run_tasks, count)?)),
         }))
     }
 

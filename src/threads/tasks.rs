@@ -42,7 +42,7 @@ unsafe impl Sync for RunTasks {}
 impl RunTasks {
     /// A function that calls the task it is given once for every index below the count, on any threads, in any order,
     /// even one after another, and returns when all of them have.
-    pub fn new(run: &'static (dyn Fn(u32, &(dyn Fn(u32) + Sync)) + Sync)) -> Self {
+    pub fn new(run: &'static Run) -> Self {
         Self(System::Rust(run))
     }
 

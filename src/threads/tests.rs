@@ -23,6 +23,7 @@ impl Random {
 }
 
 type Task<'a> = &'a (dyn Fn(u32) + Sync);
+type System = &'static (dyn for<'a> Fn(u32, Task<'a>) + Sync);
 
 fn in_order(count: u32, task: Task) {
     (0..count).for_each(task);
@@ -68,8 +69,7 @@ fn too_often(count: u32, task: Task) {
 
 fn everybody() -> Vec<Threads> {
     let workers = (1..=5).map(|count| Threads::new(count).expect("threads"));
-    let systems: [&'static (dyn Fn(u32, Task) + Sync); 6] =
-        [&in_order, &in_reverse, &on_threads, &on_two_threads, &never, &too_often];
+    let systems: [System; 6] = [&in_order, &in_reverse, &on_threads, &on_two_threads, &never, &too_often];
     let tasks = systems.map(|run| Threads::of_tasks(RunTasks::new(run), 3).expect("room"));
     workers.chain(tasks).collect()
 }
@@ -218,7 +218,7 @@ fn data_must_have_as_many_parts_as_there_are_tiles() {
     let pair = |values: &mut [i32], tiles: usize| ((), Some(Items::new(values)), None::<()>).fits(tiles);
     assert!(fits(&pair, 10) && !fits(&pair, 9));
     for starts in [&[0, 5, 4][..], &[0, 11]] {
-        let cut = || drop(Ragged::new(&mut [0; 10], starts));
+        let cut = || assert!(Ragged::new(&mut [0; 10], starts).fits(10));
         assert!(catch_unwind(cut).is_err(), "{starts:?}");
     }
 }

@@ -184,6 +184,41 @@ static void springs_come_and_go(void)
     sinew_world_destroy(world);
 }
 
+static void full_rows_refuse(void)
+{
+    static const float positions[] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0};
+    static const uint32_t springs[] = {0, 1, 1, 2};
+    sinew_world *world = a_world(0.0f);
+    sinew_storage_report before, after;
+    sinew_body_def def;
+    sinew_body_id body;
+    uint64_t hash;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    def.positions = positions;
+    def.node_count = 4;
+    def.node_mass = 0.5f;
+    def.stiffness = 100.0f;
+    def.springs = springs;
+    def.spring_count = 2;
+    def.storage = SINEW_STORAGE_FAST_LINK;
+    def.springs_per_node = 2;
+    MUST(sinew_body_create(world, &def, &body));
+    hash = hash_of(world);
+    before.struct_size = after.struct_size = sizeof before;
+    MUST(sinew_body_get_storage_report(world, body, &before));
+    CHECK(before.bytes_used == 2 * 2 * 12 && before.bytes_reserved == 4 * 2 * 12);
+    CHECK(sinew_body_add_spring(world, body, 1, 3, 100.0f, 1.0f) == SINEW_STATUS_CAPACITY);
+    CHECK(sinew_body_add_spring(world, body, 3, 1, 100.0f, 1.0f) == SINEW_STATUS_CAPACITY);
+    MUST(sinew_body_get_storage_report(world, body, &after));
+    CHECK(memcmp(&before, &after, sizeof before) == 0);
+    CHECK(hash_of(world) == hash);
+    MUST(sinew_body_remove_spring(world, body, 0, 1));
+    MUST(sinew_body_add_spring(world, body, 3, 1, 100.0f, 1.0f)); /* the place is free again */
+    steps(world, 0.001f, 1);
+    CHECK(velocity(world, body, 3, 0) < 0.0f && velocity(world, body, 0, 0) == 0.0f);
+    sinew_world_destroy(world);
+}
+
 static void positions_and_velocities_are_set_apart(void)
 {
     const float places[] = {0, 5, 0, 1, 6, 0}, speeds[] = {1, 0, 0, 0, 2, 0};
@@ -280,6 +315,7 @@ int main(void)
     a_pin_holds_moves_and_lets_go();
     a_pin_carries_what_hangs_from_it();
     springs_come_and_go();
+    full_rows_refuse();
     positions_and_velocities_are_set_apart();
     a_step_that_cannot_be_taken();
     the_report_counts_substeps();

@@ -167,6 +167,7 @@ static void body_definitions(void)
     BODY(INVALID, "storage", def.storage = UINT32_MAX);
     BODY(INVALID, "solver", def.solver = 3);
     BODY(INVALID, "solver", def.solver = UINT32_MAX);
+    BODY(CAPACITY, "springs_per_node", def.storage = SINEW_STORAGE_FAST_LINK; def.springs_per_node = 1);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_IMPLICIT);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_NEWTON);
 

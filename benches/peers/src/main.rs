@@ -119,17 +119,21 @@ fn compare(effort: &Effort) {
             }
         }
         tables.push((cloth, rows));
+        // After each size: a run that is cut short has measured something.
+        write(&report::markdown(&tables, &skipped));
     }
-    let text = report::markdown(&tables, &skipped);
-    println!("{text}");
+    println!("{}", report::markdown(&tables, &skipped));
+    for reason in &skipped {
+        eprintln!("SKIPPED: {reason}");
+    }
+}
+
+fn write(text: &str) {
     let folder = contender::target().join("report");
     let file = folder.join("peers.md");
     match std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&file, text)) {
         Ok(()) => eprintln!("written to {}", file.display()),
         Err(error) => eprintln!("{}: {error}", file.display()),
-    }
-    for reason in &skipped {
-        eprintln!("SKIPPED: {reason}");
     }
 }
 

@@ -278,8 +278,8 @@ impl Tile<'_> {
                 }
             }
         }
-        for lane in 0..batch.count {
-            let mut force = Vec3::new(found[0][lane], found[1][lane], found[2][lane]);
+        for (lane, &place) in batch.places[..batch.count].iter().enumerate() {
+            let mut force = Vec3::from(found.map(|axis| axis[lane]));
             if coincide {
                 let link = Link {
                     neighbour: batch.neighbours[lane],
@@ -289,7 +289,7 @@ impl Tile<'_> {
                 };
                 force = careful.link(batch.nodes[lane] as usize, &link);
             }
-            let place = usize::from(batch.places[lane]);
+            let place = usize::from(place);
             forces.set(place, forces.get(place) + force);
         }
     }

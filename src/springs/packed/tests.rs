@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use glam::{DVec3, Vec3};
 
@@ -239,12 +240,14 @@ fn any_change_of_springs_is_kept() {
             };
             if a == b {
                 continue;
-            } else if pairs.contains_key(&nodes) {
-                assert!(packed.add(&spring).is_err());
-            } else {
-                assert!(packed.remove(a, b).is_err());
-                packed.add(&spring).expect("memory");
-                pairs.insert(nodes, spring);
+            }
+            match pairs.entry(nodes) {
+                Entry::Occupied(_) => assert!(packed.add(&spring).is_err()),
+                Entry::Vacant(place) => {
+                    assert!(packed.remove(a, b).is_err());
+                    packed.add(&spring).expect("memory");
+                    place.insert(spring);
+                }
             }
         }
         let share = if round == 9 { 10 } else { 3 };

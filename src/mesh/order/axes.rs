@@ -1,0 +1,105 @@
+//! The axes of a lattice at one of its nodes.
+
+use glam::{DMat3, DVec3, Vec3};
+
+/// An offset is taken for the whole multiple of the axes that it comes this near to, in axes.
+pub(super) const NEAR: f64 = 0.25;
+
+/// The smallest height of an axis over those before it, in its length.
+const STEEP: f64 = 0.3;
+
+/// No spring of a lattice reaches further than this many axes.
+const REACH: f64 = 4.0;
+
+/// Three vectors, of which a lattice steps along the first ones: in a sheet the third is its normal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Axes([Vec3; 3]);
+
+impl Axes {
+    /// The first of these offsets that do not lie in one line or plane with those before: the axes, and how many there are.
+    pub fn of(offsets: impl Iterator<Item = DVec3>) -> (Self, usize) {
+        let mut axes = Self::default();
+        let mut count = 0;
+        for offset in offsets {
+            if count < 3 && axes.height(count, offset) > STEEP * offset.length() {
+                axes.0[count] = offset.as_vec3();
+                count += 1;
+            }
+        }
+        axes.complete(count);
+        (axes, count)
+    }
+
+    /// What takes an offset in space to one in axes: not of numbers if they lie in a plane.
+    pub fn inverse(&self) -> DMat3 {
+        let [a, b, c] = self.0.map(|axis| axis.as_dvec3());
+        DMat3::from_cols(a, b, c).inverse()
+    }
+
+    /// Takes the first `count` axes from steps along them, as far as there are any, and the rest accordingly.
+    pub fn fit(&mut self, steps: &Steps, count: usize) {
+        for axis in 0..count {
+            if steps.counts[axis] > 0.0 {
+                self.0[axis] = (steps.sums[axis] / steps.counts[axis]).as_vec3();
+            }
+        }
+        self.complete(count);
+    }
+
+    /// How far an offset reaches out of what the first axes span.
+    fn height(&self, count: usize, offset: DVec3) -> f64 {
+        let [a, b, _] = self.0.map(|axis| axis.as_dvec3());
+        match count {
+            0 => offset.length(),
+            1 => offset.cross(a.normalize_or_zero()).length(),
+            _ => offset.dot(a.cross(b).normalize_or_zero()).abs(),
+        }
+    }
+
+    /// Makes up what is missing, at right angles to the first axes.
+    fn complete(&mut self, count: usize) {
+        if count == 0 {
+            self.0[0] = Vec3::X;
+        }
+        let a = self.0[0].as_dvec3();
+        if count < 2 {
+            self.0[1] = (a.normalize_or(DVec3::X).any_orthogonal_vector().normalize() * a.length()).as_vec3();
+        }
+        if count < 3 {
+            let normal = a.cross(self.0[1].as_dvec3()).normalize_or_zero();
+            self.0[2] = (normal * a.length()).as_vec3();
+        }
+    }
+}
+
+/// Single steps along the axes, in space.
+#[derive(Default)]
+pub(super) struct Steps {
+    sums: [DVec3; 3],
+    counts: [f64; 3],
+}
+
+impl Steps {
+    /// Adds an offset that is this whole multiple of the axes, if that is a single step.
+    pub fn add(&mut self, offset: DVec3, multiple: [i32; 3]) {
+        let axis = match multiple {
+            [1 | -1, 0, 0] => 0,
+            [0, 1 | -1, 0] => 1,
+            [0, 0, 1 | -1] => 2,
+            _ => return,
+        };
+        self.sums[axis] += offset * f64::from(multiple[axis]);
+        self.counts[axis] += 1.0;
+    }
+}
+
+/// The whole multiple of the axes that an offset in axes comes nearest to, and whether it is near and not 0.
+pub(super) fn whole(offset: DVec3) -> ([i32; 3], bool) {
+    // Conversion of numbers above 0 rounds down; every processor has it, and to round as such not every one.
+    let up = REACH + 0.5;
+    let steps = offset.clamp(DVec3::splat(-REACH), DVec3::splat(REACH)) + up;
+    let steps = steps.to_array().map(|step| step as i32 - REACH as i32);
+    let [x, y, z] = steps.map(f64::from);
+    let near = (offset - DVec3::new(x, y, z)).abs().max_element() < NEAR && steps != [0; 3];
+    (steps, near)
+}
