@@ -84,8 +84,9 @@ struct fast_link *fast_link_create(uint32_t node_count, uint32_t springs_per_nod
 const float *fast_link_positions(const struct fast_link *body) { return &body->positions->x; }
 
 /* The force of a node's springs; each spring is worked out at both of its ends. */
-static inline struct vector spring_force(const struct vector *restrict positions, const struct link *restrict row,
-                                         uint32_t count, struct vector here) {
+static inline __attribute__((always_inline)) struct vector row_force(const struct vector *restrict positions,
+                                                                     const struct link *restrict row, uint32_t count,
+                                                                     struct vector here) {
   struct vector force = {0.0f, 0.0f, 0.0f};
   for (uint32_t k = 0; k < count; k++) {
     struct vector there = positions[row[k].neighbour];
@@ -97,6 +98,14 @@ static inline struct vector spring_force(const struct vector *restrict positions
     force.z += pull * z;
   }
   return force;
+}
+
+/* Eight neighbours, as most nodes of a sheet have, are unrolled by the compiler. */
+static inline __attribute__((always_inline)) struct vector spring_force(const struct vector *restrict positions,
+                                                                        const struct link *restrict row, uint32_t count,
+                                                                        struct vector here) {
+  if (count == 8) return row_force(positions, row, 8, here);
+  return row_force(positions, row, count, here);
 }
 
 /* The first, the middle and the last neighbour of a node some nodes ahead: on a grid, one in each of the three rows. */
