@@ -167,30 +167,41 @@ impl Tile<'_> {
             let here = self.places::<L, DAMPED>(|axis| L::load(axis.add(node)));
             let mut sums = Sums([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
-            let links = |run: &Run| {
-                let damping = if DAMPED {
-                    self.materials[usize::from(run.material)].damping
-                } else {
-                    0.0
-                };
-                Links {
-                    spring: Spring {
-                        stiffness: L::splat(run.stiffness),
-                        rest_length: L::splat(run.rest_length),
-                        damping: L::splat(damping),
-                    },
-                    there: self.beside::<L, DAMPED>(node, run.offset),
-                    lanes: u32::from(run.lanes) >> lane,
-                }
-            };
             let (groups, rest) = runs.as_chunks::<GROUP>();
             for group in groups {
-                sums.add::<GROUP, DAMPED>(here, group.each_ref().map(links));
+                // Written out: a closure may be compiled on its own, without the kernel's instructions.
+                let mut links = [self.run::<L, DAMPED>(&group[0], node, lane); GROUP];
+                for (links, run) in links.iter_mut().zip(group).skip(1) {
+                    *links = self.run::<L, DAMPED>(run, node, lane);
+                }
+                sums.add::<GROUP, DAMPED>(here, links);
             }
             for run in rest {
-                sums.add::<1, DAMPED>(here, [links(run)]);
+                sums.add::<1, DAMPED>(here, [self.run::<L, DAMPED>(run, node, lane)]);
             }
             sums
+        }
+    }
+
+    /// A run from the nodes from `node` on.
+    #[inline(always)]
+    unsafe fn run<L: Lanes, const DAMPED: bool>(&self, run: &Run, node: usize, lane: usize) -> Links<L> {
+        let damping = if DAMPED {
+            self.materials[usize::from(run.material)].damping
+        } else {
+            0.0
+        };
+        // SAFETY: as in `runs`.
+        unsafe {
+            Links {
+                spring: Spring {
+                    stiffness: L::splat(run.stiffness),
+                    rest_length: L::splat(run.rest_length),
+                    damping: L::splat(damping),
+                },
+                there: self.beside::<L, DAMPED>(node, run.offset),
+                lanes: u32::from(run.lanes) >> lane,
+            }
         }
     }
 
@@ -296,11 +307,12 @@ impl Tile<'_> {
 
     #[inline(always)]
     unsafe fn places<L: Lanes, const DAMPED: bool>(&self, fetch: impl Fn(*const f32) -> L) -> Place<L> {
-        let position = self.positions.map(&fetch);
+        let [x, y, z] = self.positions;
+        let position = [fetch(x), fetch(y), fetch(z)];
         match self.velocities {
-            Some(velocities) if DAMPED => Place {
+            Some([x, y, z]) if DAMPED => Place {
                 position,
-                velocity: velocities.map(&fetch),
+                velocity: [fetch(x), fetch(y), fetch(z)],
             },
             _ => Place {
                 position,
