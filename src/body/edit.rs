@@ -6,6 +6,7 @@ use super::definition::{Spring, distance, expect_count, finite_vector, finite_ve
 use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
 use crate::solver::{GravityKicks, Stability};
+use crate::springs::{already_joined, not_joined};
 
 impl Body {
     /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node.
@@ -161,7 +162,7 @@ impl Body {
         };
         // What is invalid is told in the caller's numbers.
         self.springs.add(&spring).map_err(|error| match error {
-            Error::InvalidArgument(_) => Error::invalid(format!("nodes {a} and {b} have a spring already")),
+            Error::InvalidArgument(_) => already_joined(a, b),
             error => error,
         })?;
         self.forces_current = false;
@@ -176,8 +177,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or no spring between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
         let [own_a, own_b] = self.check_pair(a, b)?;
-        let told = |_| Error::invalid(format!("nodes {a} and {b} have no spring"));
-        self.springs.remove(own_a, own_b).map_err(told)?;
+        self.springs.remove(own_a, own_b).map_err(|_| not_joined(a, b))?;
         self.forces_current = false;
         // What was stable still is; nothing limits what has no springs.
         if self.springs.spring_count() == 0 {

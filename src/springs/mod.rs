@@ -113,10 +113,12 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     })
 }
 
-fn already_joined(a: u32, b: u32) -> Error {
+/// Why a spring is not added.
+pub(crate) fn already_joined(a: u32, b: u32) -> Error {
     Error::invalid(format!("nodes {a} and {b} have a spring already"))
 }
 
-fn not_joined(a: u32, b: u32) -> Error {
+/// Why a spring is not removed.
+pub(crate) fn not_joined(a: u32, b: u32) -> Error {
     Error::invalid(format!("nodes {a} and {b} have no spring"))
 }

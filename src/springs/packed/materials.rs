@@ -104,11 +104,11 @@ impl Kinds {
 
     /// The place of the kind that a spring is of by its definition; `None`: it is one of its own.
     #[inline]
-    pub fn find(&self, spring: &Spring) -> Option<u16> {
+    pub fn find(&self, own: &Material) -> Option<u16> {
         self.place(|kind| {
-            kind.material.stiffness == spring.stiffness
-                && kind.material.damping == spring.damping
-                && (kind.shortest..=kind.longest).contains(&spring.rest_length)
+            kind.material.stiffness == own.stiffness
+                && kind.material.damping == own.damping
+                && (kind.shortest..=kind.longest).contains(&own.rest_length)
         })
     }
 

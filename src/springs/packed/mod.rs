@@ -10,14 +10,17 @@ mod pack;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use materials::Kinds;
 pub(crate) use materials::Rounding;
 use pack::{Loose, NO_KIND, pack};
 
+use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
-use super::{Link, Motion, Springs, TILE, TileForces, tile_count, tile_nodes};
+use super::{Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes};
 use crate::body::Spring;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::memory;
 
 /// How many links may be added to a tile before it is packed again.
@@ -50,12 +53,12 @@ impl Tile {
     }
 }
 
-impl From<&Spring> for Material {
-    fn from(spring: &Spring) -> Self {
+impl Material {
+    fn of(link: &Link) -> Self {
         Self {
-            stiffness: spring.stiffness,
-            rest_length: spring.rest_length,
-            damping: spring.damping,
+            stiffness: link.stiffness,
+            rest_length: link.rest_length,
+            damping: link.damping,
         }
     }
 }
@@ -85,48 +88,39 @@ impl Packed {
             kinds,
             tiles: memory::reserved(tile_count(node_count))?,
         };
-        // The ends of springs in the order of their nodes: a counting sort.
-        let mut firsts = memory::filled(0_usize, node_count + 1)?;
-        for spring in springs {
-            for node in spring.nodes {
-                firsts[node as usize + 1] += 1;
-            }
-        }
-        for node in 0..node_count {
-            firsts[node + 1] += firsts[node];
-        }
-        let mut ends = memory::filled((0_u32, 0_u32), 2 * springs.len())?;
-        for (index, &Spring { nodes: [a, b], .. }) in springs.iter().enumerate() {
-            for (node, neighbour) in [(a, b), (b, a)] {
-                let place = &mut firsts[node as usize];
-                ends[*place] = (neighbour, index as u32);
-                *place += 1;
-            }
-        }
-        // By now each entry is where the node's ends end.
+        let ends = Ends::of(node_count, springs)?;
         let mut links = Vec::new();
         for tile in 0..tile_count(node_count) {
             let nodes = tile_nodes(tile, node_count);
             links.clear();
-            let start = |node: usize| if node == 0 { 0 } else { firsts[node - 1] };
-            links.try_reserve(firsts[nodes.end - 1] - start(nodes.start))?;
             for node in nodes.clone() {
-                for &(neighbour, index) in &ends[start(node)..firsts[node]] {
-                    let spring = &springs[index as usize];
-                    let kind = packed.kinds.find(spring);
-                    links.push(Loose {
-                        node: node as u32,
-                        neighbour,
-                        kind: kind.unwrap_or(NO_KIND),
-                        own: kind.map_or(spring.into(), |kind| packed.materials[usize::from(kind)]),
-                    });
-                }
+                let of_node = ends.links(node);
+                links.try_reserve(of_node.len())?;
+                links.extend(of_node.map(|link| {
+                    let kind = packed.kinds.find(&Material::of(&link));
+                    packed.loose(node, &link, kind)
+                }));
             }
-            let count = links.len();
-            let columns = pack(nodes, node_count, packed.damped, &packed.materials, &mut links)?;
-            packed.tiles.push(Tile::new(columns, count));
+            packed.tiles.push(packed.packed(nodes, &mut links)?);
         }
         Ok(packed)
+    }
+
+    /// An end of a spring of this kind, to be packed.
+    fn loose(&self, node: usize, link: &Link, kind: Option<u16>) -> Loose {
+        Loose {
+            node: node as u32,
+            neighbour: link.neighbour,
+            kind: kind.unwrap_or(NO_KIND),
+            own: kind.map_or(Material::of(link), |kind| self.materials[usize::from(kind)]),
+        }
+    }
+
+    /// A tile of these links, whose order is lost.
+    fn packed(&self, nodes: Range<usize>, links: &mut [Loose]) -> Result<Tile> {
+        let count = links.len();
+        let columns = pack(nodes, self.node_count, self.damped, &self.materials, links)?;
+        Ok(Tile::new(columns, count))
     }
 
     fn tile(&self, node: u32) -> &Tile {
@@ -158,26 +152,14 @@ impl Packed {
         for node in nodes.clone() {
             let mut room = Ok(());
             self.visit(node, &mut |link| {
-                let own = Material {
-                    stiffness: link.stiffness,
-                    rest_length: link.rest_length,
-                    damping: link.damping,
-                };
                 if room.is_ok() {
-                    let loose = Loose {
-                        node: node as u32,
-                        neighbour: link.neighbour,
-                        kind: self.kinds.find_exactly(&own).unwrap_or(NO_KIND),
-                        own,
-                    };
-                    room = memory::push(&mut links, loose);
+                    let kind = self.kinds.find_exactly(&Material::of(&link));
+                    room = memory::push(&mut links, self.loose(node, &link, kind));
                 }
             });
             room?;
         }
-        let count = links.len();
-        let columns = pack(nodes, self.node_count, self.damped, &self.materials, &mut links)?;
-        Ok(Tile::new(columns, count))
+        self.packed(nodes, &mut links)
     }
 }
 
@@ -215,19 +197,13 @@ impl Springs for Packed {
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
         if self.has(a, b) {
-            return Err(Error::invalid(format!("nodes {a} and {b} have a spring already")));
+            return Err(already_joined(a, b));
         }
         for node in [a, b] {
             // Both ends may be in one tile.
             self.tile_mut(node).columns.strays_mut().reserve(2)?;
         }
-        for (node, neighbour) in [(a, b), (b, a)] {
-            let link = Link {
-                neighbour,
-                stiffness: spring.stiffness,
-                rest_length: spring.rest_length,
-                damping: if self.damped { spring.damping } else { 0.0 },
-            };
+        for (node, link) in spring.nodes.into_iter().zip(Link::ends(spring)) {
             self.tile_mut(node).columns.strays_mut().insert(node as usize, &link);
         }
         self.spring_count += 1;
@@ -238,7 +214,7 @@ impl Springs for Packed {
 
     fn remove(&mut self, a: u32, b: u32) -> Result<()> {
         if !self.has(a, b) {
-            return Err(Error::invalid(format!("nodes {a} and {b} have no spring")));
+            return Err(not_joined(a, b));
         }
         for (node, neighbour) in [(a, b), (b, a)] {
             let tile = self.tile_mut(node);
