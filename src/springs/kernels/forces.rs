@@ -7,10 +7,10 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
-use super::ChosenKernel;
 use super::columns::{Columns, Ends, LANES, Material, Run};
 use super::lanes::Lanes;
 use super::prefetch::prefetch;
+use super::{ChosenKernel, WithLanes};
 use crate::body::{MARGIN, Vectors};
 use crate::springs::law::separation;
 use crate::springs::{Link, Motion, TileForces};
@@ -41,7 +41,7 @@ impl Columns {
             positions,
             velocities,
         };
-        kernel.forces(TileLinks { tile, careful, forces });
+        kernel.run_with_lanes(TileLinks { tile, careful, forces });
     }
 }
 
@@ -50,7 +50,7 @@ impl Columns {
 const GROUP: usize = 4;
 
 /// The forces on a tile, for a kernel to compute.
-pub(super) struct TileLinks<'a> {
+struct TileLinks<'a> {
     tile: Tile<'a>,
     careful: Careful<'a>,
     forces: &'a mut TileForces,
@@ -67,11 +67,11 @@ struct Tile<'a> {
     soon: [*const f32; 6],
 }
 
-impl TileLinks<'_> {
-    /// # Safety
-    /// The processor has the instructions of `L`.
+impl WithLanes for TileLinks<'_> {
+    type Output = ();
+
     #[inline(always)]
-    pub(super) unsafe fn run<L: Lanes>(self) {
+    unsafe fn run<L: Lanes>(self) {
         // SAFETY: the same contract.
         unsafe {
             if self.tile.velocities.is_some() {
@@ -81,7 +81,9 @@ impl TileLinks<'_> {
             }
         }
     }
+}
 
+impl TileLinks<'_> {
     #[inline(always)]
     unsafe fn sum<L: Lanes, const DAMPED: bool>(self) {
         let Self { tile, careful, forces } = self;

@@ -16,9 +16,10 @@ mod range;
 mod strays;
 
 pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
-use forces::TileLinks;
+use lanes::Lanes;
 pub(super) use prefetch::prefetch;
 pub(crate) use range::Range;
+use range::Ranges;
 
 use crate::error::{Error, Result};
 
@@ -94,92 +95,70 @@ pub(crate) trait Loops {
     fn run(self) -> Self::Output;
 }
 
+/// Work that is written for any kernel's lanes.
+trait WithLanes {
+    type Output;
+
+    /// To be marked `#[inline(always)]`, as [`Loops::run`].
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    unsafe fn run<L: Lanes>(self) -> Self::Output;
+}
+
+/// Plain loops have no need of lanes.
+struct Plain<L>(L);
+
+impl<L: Loops> WithLanes for Plain<L> {
+    type Output = L::Output;
+
+    #[inline(always)]
+    unsafe fn run<Unused: Lanes>(self) -> L::Output {
+        self.0.run()
+    }
+}
+
 impl ChosenKernel {
     /// Runs `loops` with the kernel's instructions.
     #[inline]
     pub(crate) fn run<L: Loops>(self, loops: L) -> L::Output {
-        match self.0 {
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: a kernel is chosen only where the processor has its instructions.
-            Kernel::Avx512 => unsafe { run_avx512(loops) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the same.
-            Kernel::Avx2 => unsafe { run_avx2(loops) },
-            _ => loops.run(),
-        }
+        self.run_with_lanes(Plain(loops))
     }
 
     /// The ranges of some numbers along each axis.
     pub(crate) fn ranges(self, axes: [&[f32]; 3]) -> [Range; 3] {
-        match self.0 {
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: a kernel is chosen only where the processor has its instructions.
-            Kernel::Avx512 => unsafe { ranges_avx512(axes) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: the same.
-            Kernel::Avx2 => unsafe { ranges_avx2(axes) },
-            #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
-            // SAFETY: every processor of this kind has them.
-            Kernel::Neon => axes.map(|axis| unsafe { range::range::<neon::NeonLanes>(axis) }),
-            // SAFETY: no special instructions.
-            _ => axes.map(|axis| unsafe { range::range::<portable::PortableLanes>(axis) }),
-        }
+        self.run_with_lanes(Ranges(axes))
     }
 
-    /// Computes the forces on a tile.
-    fn forces(self, links: TileLinks) {
+    /// Runs `work` with the kernel's lanes.
+    #[inline]
+    fn run_with_lanes<W: WithLanes>(self, work: W) -> W::Output {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: a kernel is chosen only where the processor has its instructions.
-            Kernel::Avx512 => unsafe { forces_avx512(links) },
+            Kernel::Avx512 => unsafe { run_avx512(work) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: the same.
-            Kernel::Avx2 => unsafe { forces_avx2(links) },
+            Kernel::Avx2 => unsafe { run_avx2(work) },
             #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
             // SAFETY: every processor of this kind has them.
-            Kernel::Neon => unsafe { links.run::<neon::NeonLanes>() },
+            Kernel::Neon => unsafe { work.run::<neon::NeonLanes>() },
             // SAFETY: no special instructions.
-            _ => unsafe { links.run::<portable::PortableLanes>() },
+            _ => unsafe { work.run::<portable::PortableLanes>() },
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
-fn run_avx512<L: Loops>(loops: L) -> L::Output {
-    loops.run()
+fn run_avx512<W: WithLanes>(work: W) -> W::Output {
+    // SAFETY: these are the instructions.
+    unsafe { work.run::<avx512::Avx512Lanes>() }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn run_avx2<L: Loops>(loops: L) -> L::Output {
-    loops.run()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
-fn forces_avx512(links: TileLinks) {
+fn run_avx2<W: WithLanes>(work: W) -> W::Output {
     // SAFETY: these are the instructions.
-    unsafe { links.run::<avx512::Avx512Lanes>() }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn forces_avx2(links: TileLinks) {
-    // SAFETY: these are the instructions.
-    unsafe { links.run::<avx2::Avx2Lanes>() }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
-fn ranges_avx512(axes: [&[f32]; 3]) -> [Range; 3] {
-    // SAFETY: these are the instructions.
-    axes.map(|axis| unsafe { range::range::<avx512::Avx512Lanes>(axis) })
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn ranges_avx2(axes: [&[f32]; 3]) -> [Range; 3] {
-    // SAFETY: these are the instructions.
-    axes.map(|axis| unsafe { range::range::<avx2::Avx2Lanes>(axis) })
+    unsafe { work.run::<avx2::Avx2Lanes>() }
 }

@@ -1,5 +1,6 @@
 //! The least and the greatest of many numbers.
 
+use super::WithLanes;
 use super::lanes::Lanes;
 
 /// The least and the greatest of some numbers; of what is NaN nothing is said.
@@ -23,12 +24,26 @@ impl Range {
     }
 }
 
+/// The ranges of some numbers along each axis, for a kernel to find.
+pub(super) struct Ranges<'a>(pub [&'a [f32]; 3]);
+
+impl WithLanes for Ranges<'_> {
+    type Output = [Range; 3];
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> [Range; 3] {
+        let [x, y, z] = self.0;
+        // SAFETY: the same contract.
+        unsafe { [range::<L>(x), range::<L>(y), range::<L>(z)] }
+    }
+}
+
 /// The range of `values`.
 ///
 /// # Safety
 /// The processor has the instructions of `L`.
 #[inline(always)]
-pub(super) unsafe fn range<L: Lanes>(values: &[f32]) -> Range {
+unsafe fn range<L: Lanes>(values: &[f32]) -> Range {
     // Two chains, because each step of one waits for the one before.
     let (pairs, rest) = values.split_at(values.len() / (2 * L::COUNT) * (2 * L::COUNT));
     let mut lanes = [f32::INFINITY; 16];
