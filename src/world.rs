@@ -281,6 +281,7 @@ impl World {
             let report = report(bodies, outcomes);
             let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
             if outcomes.iter().flatten().any(unstable) {
+                bodies.iter_mut().for_each(|(_, body)| body.put_back());
                 return Err(report);
             }
             commit_bodies(bodies, outcomes, team);
@@ -430,7 +431,10 @@ fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], team: &
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit(substeps, carry, team);
             }
-            _ => body.clear_pending(),
+            _ => {
+                body.put_back();
+                body.clear_pending();
+            }
         }
     }
 }

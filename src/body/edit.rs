@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::definition::{Spring, distance, expect_count, finite_vector, finite_vectors, not_negative};
 use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
-use crate::solver::{GravityKicks, Stability};
-use crate::springs::{already_joined, not_joined};
+use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
+use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
     /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node.
@@ -56,6 +56,7 @@ impl Body {
     pub fn set_positions(&mut self, positions: &[Vec3]) -> Result<()> {
         expect_count("positions", positions.len(), self.node_count())?;
         finite_vectors("positions", positions)?;
+        close(self);
         self.place(positions);
         Ok(())
     }
@@ -67,6 +68,7 @@ impl Body {
     pub fn set_velocities(&mut self, velocities: &[Vec3]) -> Result<()> {
         expect_count("velocities", velocities.len(), self.node_count())?;
         finite_vectors("velocities", velocities)?;
+        close(self);
         for (node, &velocity) in (0..).zip(velocities) {
             if self.inverse_masses[self.order.own(node) as usize] > 0.0 {
                 self.set_velocity(node, velocity);
@@ -105,7 +107,9 @@ impl Body {
                 "node {node} has no mass: it is pinned for good"
             )));
         }
-        if self.pins.remove(own) {
+        if self.pins.get(own).is_some() {
+            close(self);
+            self.pins.remove(own);
             self.inverse_masses[own as usize] = 1.0 / mass;
             self.carry.stability = Stability::UNKNOWN;
         }
@@ -132,8 +136,10 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or it is not pinned.
     pub fn pin_force(&self, node: u32) -> Result<Vec3> {
         self.check_node(&"node", node)?;
-        let pin = self.pins.get(self.order.own(node));
-        pin.map(|pin| pin.force).ok_or_else(|| not_pinned(node))
+        let pin = self.pins.get(self.order.own(node)).ok_or_else(|| not_pinned(node))?;
+        let closing = self.carry.closing.as_ref();
+        let positions = self.state.positions();
+        Ok(mean_force(pin, closing, &*self.springs, positions, &self.masses))
     }
 
     /// Joins two nodes by a spring without damping: `stiffness` in N/m, `rest_length` in metres, `None`: the current
@@ -166,6 +172,7 @@ impl Body {
             error => error,
         })?;
         self.forces_current = false;
+        self.make_up_for_spring(Link::ends(&spring), -1.0);
         let stability = self.carry.stability;
         self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
         Ok(())
@@ -177,8 +184,20 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or no spring between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
         let [own_a, own_b] = self.check_pair(a, b)?;
-        self.springs.remove(own_a, own_b).map_err(|_| not_joined(a, b))?;
+        let mut link = None;
+        self.springs.visit(own_a as usize, &mut |other| {
+            if other.neighbour == own_b {
+                link = Some(other);
+            }
+        });
+        let link = link.ok_or_else(|| not_joined(a, b))?;
+        self.springs.remove(own_a, own_b)?;
         self.forces_current = false;
+        let other = Link {
+            neighbour: own_a,
+            ..link
+        };
+        self.make_up_for_spring([link, other], 1.0);
         // What was stable still is; nothing limits what has no springs.
         if self.springs.spring_count() == 0 {
             self.carry.stability = Stability::UNKNOWN;
@@ -186,10 +205,23 @@ impl Body {
         Ok(())
     }
 
+    /// Keeps the velocities at the time of the positions as they are after a spring has come (sign -1) or gone (1), given
+    /// as each of its nodes sees it.
+    fn make_up_for_spring(&mut self, [a, b]: [Link; 2], sign: f32) {
+        if self.carry.closing.is_none() {
+            return;
+        }
+        self.published.forget_velocities();
+        for (node, link) in [(b.neighbour, a), (a.neighbour, b)] {
+            let [here, there] = [node, link.neighbour].map(|node| self.state.positions().get(node as usize));
+            make_up_for(self, node, pull(node as usize, &link, there - here, None) * sign);
+        }
+    }
+
     fn set_velocity(&mut self, node: u32, velocity: Vec3) {
         let own = self.order.own(node) as usize;
         self.state.velocities_mut().set(own, velocity);
-        self.published_velocities[node as usize] = velocity;
+        self.published.forget_velocities();
         if self.springs.damped() {
             self.forces_current = false;
         }

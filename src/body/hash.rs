@@ -46,6 +46,10 @@ impl Body {
             }
         }
         hasher.write_floats(&self.carry.stability.floats());
+        if let Some(closing) = &self.carry.closing {
+            hasher.write_floats(&[closing.substep]);
+            hasher.write_floats(&closing.gravity.to_array());
+        }
         for bits in self.carry.gravity.bits() {
             hasher.write_u64(bits);
         }

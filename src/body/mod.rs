@@ -8,6 +8,7 @@ mod hash;
 mod order;
 mod origin;
 mod pins;
+mod published;
 mod state;
 mod vectors;
 
@@ -25,11 +26,12 @@ use crate::diagnostics::{Energy, StorageReport};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Stability, Survey};
-use crate::springs::{ChosenKernel, Loops, Motion, Springs, TILE, TileForces, store, tile_count, tile_nodes};
-use crate::threads::{Items, Team, Tiles};
+use crate::springs::{ChosenKernel, Springs, store, tile_count};
+use crate::threads::Team;
 use order::NodeOrder;
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
+use published::Published;
 use state::State;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
@@ -64,13 +66,12 @@ pub struct Body {
     pub(crate) contacts: Option<Contacts>,
     pub(crate) carry: Carry,
     /// Whether the state's forces belong to its positions and velocities.
-    forces_current: bool,
+    pub(crate) forces_current: bool,
     /// Whether `applied` holds anything.
-    forces_applied: bool,
+    pub(crate) forces_applied: bool,
     /// Kept only in worlds with a tolerance.
     pub(crate) coarse: Option<CoarseStep>,
-    published_positions: Vec<Vec3>,
-    published_velocities: Vec<Vec3>,
+    published: Published,
 }
 
 /// What a world asks of its bodies.
@@ -146,11 +147,11 @@ impl Body {
                     min: Vec3::ZERO,
                     max: Vec3::ZERO,
                 }),
+                closing: None,
             },
             forces_current: false,
             forces_applied: false,
-            published_positions: memory::filled(Vec3::ZERO, node_count)?,
-            published_velocities: memory::filled(Vec3::ZERO, node_count)?,
+            published: Published::new(node_count)?,
         };
         body.place(definition.positions);
         if needs.tools > 0 {
@@ -162,17 +163,6 @@ impl Body {
     /// How many nodes it has.
     pub fn node_count(&self) -> usize {
         self.masses.len()
-    }
-
-    /// Where each node is, in metres, in the caller's order.
-    pub fn positions(&self) -> &[Vec3] {
-        &self.published_positions
-    }
-
-    /// How fast each node moves at the time of the positions, in m/s, in the caller's order; a pinned node moves as it
-    /// was led in the last step.
-    pub fn velocities(&self) -> &[Vec3] {
-        &self.published_velocities
     }
 
     /// The triangles that are drawn and touched, outward: those of its definition, or the boundary of its tetrahedra.
@@ -201,6 +191,11 @@ impl Body {
     /// Its energy at the time of the positions.
     pub fn energy(&self, gravity: Vec3) -> Energy {
         Energy::of(self, gravity)
+    }
+
+    /// The caller's number of one of its own nodes.
+    pub(crate) fn callers(&self, own: usize) -> usize {
+        self.order.caller(own as u32) as usize
     }
 
     /// How much memory its springs take.
@@ -233,7 +228,7 @@ impl Body {
             let own = self.order.own(node) as usize;
             local.set(own, (position.as_dvec3() - self.origin).as_vec3());
         }
-        self.published_positions.copy_from_slice(positions);
+        self.published.positions_mut().copy_from_slice(positions);
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
         if let Some(contacts) = &mut self.contacts {
@@ -241,30 +236,15 @@ impl Body {
         }
     }
 
-    /// Makes sure that the state's forces belong to its positions and velocities.
-    pub(crate) fn refresh_forces(&mut self, team: &Team) {
-        if self.forces_current {
-            return;
-        }
-        let springs = &*self.springs;
-        let (positions, velocities, forces) = self.state.forces_mut();
-        let motion = Motion::at(positions, springs.damped().then_some(velocities));
-        team.pass(tile_count(positions.len()), forces.tiles_mut(), |tile, forces| {
-            let mut sums = TileForces::ZERO;
-            springs.forces(tile, &motion, &mut sums);
-            for (forces, sums) in forces.into_iter().zip(sums.axes()) {
-                forces.copy_from_slice(&sums[..forces.len()]);
-            }
-        });
-    }
-
     /// Makes the step in progress, of `substeps` substeps, the current state.
     pub(crate) fn commit(&mut self, substeps: u32, carry: Carry, team: &Team) {
         self.state.commit();
         self.carry = carry;
-        self.forces_current = true;
+        self.forces_current = carry.closing.is_none();
+        self.published.forget_velocities();
         for pin in self.pins.iter_mut() {
             pin.force = (pin.force_sum / f64::from(substeps)).as_vec3();
+            pin.closing_share = carry.closing.map_or(0.0, |_| 0.5 / substeps as f32);
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.commit();
@@ -272,6 +252,13 @@ impl Body {
         self.clear_pending();
         self.publish(team);
         self.follow();
+    }
+
+    /// Prepares again what an attempted step that is not committed has changed.
+    pub(crate) fn put_back(&mut self) {
+        if let (Some(damping), Some(closing)) = (&mut self.damping, &self.carry.closing) {
+            damping.prepare(closing.substep);
+        }
     }
 
     /// Forgets the forces and the ways of pins that were meant for the last step.
@@ -285,43 +272,6 @@ impl Body {
             applied.clear();
         }
         self.forces_applied = false;
-    }
-
-    fn publish(&mut self, team: &Team) {
-        let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
-        let (positions, velocities) = (self.state.positions(), self.state.velocities());
-        let count = positions.len();
-        let published = (
-            Tiles::new(&mut self.published_positions, TILE),
-            Tiles::new(&mut self.published_velocities, TILE),
-            Items::new(&mut self.boxes),
-        );
-        team.pass(
-            tile_count(count),
-            published,
-            |tile, (to_positions, to_velocities, bounds)| {
-                let nodes = tile_nodes(tile, count);
-                *bounds = kernel.ranges(positions.slices(nodes.clone())).into();
-                if order.is_callers() {
-                    kernel.run(Publish {
-                        from: positions.slices(nodes.clone()),
-                        origin,
-                        to: to_positions,
-                    });
-                    kernel.run(Publish {
-                        from: velocities.slices(nodes),
-                        origin: DVec3::ZERO,
-                        to: to_velocities,
-                    });
-                } else {
-                    let own = |node: usize| order.own(node as u32) as usize;
-                    for (node, (position, velocity)) in nodes.zip(to_positions.iter_mut().zip(to_velocities)) {
-                        *position = (positions.get(own(node)).as_dvec3() + origin).as_vec3();
-                        *velocity = velocities.get(own(node));
-                    }
-                }
-            },
-        );
     }
 
     /// Moves the origin of its coordinates after it.
@@ -338,27 +288,6 @@ impl Body {
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
-        }
-    }
-}
-
-/// Writes vectors side by side, in the world's coordinates.
-struct Publish<'a> {
-    from: [&'a [f32]; 3],
-    origin: DVec3,
-    to: &'a mut [Vec3],
-}
-
-impl Loops for Publish<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let [x, y, z] = self.from;
-        let origin = self.origin;
-        for (((to, &x), &y), &z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
-            let placed = |local: f32, origin: f64| (f64::from(local) + origin) as f32;
-            *to = Vec3::new(placed(x, origin.x), placed(y, origin.y), placed(z, origin.z));
         }
     }
 }

@@ -12,8 +12,10 @@ pub(crate) struct Pin {
     pub node: u32,
     /// Where the next step leads it, in the caller's coordinates; `None`: it stays.
     pub target: Option<Vec3>,
-    /// What holds it, mean over the last step, in newtons.
+    /// What holds it, mean over the last step, in newtons, but for the kick that closes the step where that is left open.
     pub force: Vec3,
+    /// What part of the mean that kick makes; 0: nothing is missing.
+    pub closing_share: f32,
     /// Where the step in progress leads it, in the body's coordinates, and the way there, in metres.
     pub goal: Vec3,
     pub travel: Vec3,
@@ -43,6 +45,12 @@ impl Pins {
         Ragged::new(&mut self.pins, &self.tiles)
     }
 
+    /// The pins of one tile.
+    pub fn of_tile(&self, tile: usize) -> &[Pin] {
+        let start = |tile: usize| self.tiles.get(tile).map_or(self.pins.len(), |&start| start);
+        &self.pins[start(tile)..start(tile + 1)]
+    }
+
     pub fn get(&self, node: u32) -> Option<&Pin> {
         self.find(node).ok().map(|index| &self.pins[index])
     }
@@ -59,6 +67,7 @@ impl Pins {
                 node,
                 target: None,
                 force: Vec3::ZERO,
+                closing_share: 0.0,
                 goal: Vec3::ZERO,
                 travel: Vec3::ZERO,
                 force_sum: DVec3::ZERO,

@@ -69,15 +69,6 @@ impl State {
         &self.forces[self.settled]
     }
 
-    /// Positions, velocities, and the spring forces to be written.
-    pub fn forces_mut(&mut self) -> (&Vectors, &Vectors, &mut Vectors) {
-        (
-            &self.positions[self.current],
-            &self.velocities[self.settled],
-            &mut self.forces[self.settled],
-        )
-    }
-
     /// Starts a step over, from what is current.
     pub fn begin(&mut self) {
         self.latest = self.current;

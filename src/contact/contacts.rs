@@ -141,6 +141,11 @@ impl Contacts {
         self.candidates.invalidate();
     }
 
+    /// Whether no tool was near in the last substep.
+    pub fn are_far(&self) -> bool {
+        self.loads.is_empty() || self.candidates.near().is_empty()
+    }
+
     /// What each tool of the step received.
     pub fn loads(&self) -> &[Load] {
         &self.loads

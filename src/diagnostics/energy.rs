@@ -18,13 +18,13 @@ pub struct Energy {
 impl Energy {
     pub(crate) fn of(body: &Body, gravity: Vec3) -> Self {
         let mut energy = Self::default();
-        let (positions, velocities) = (body.state.positions(), body.state.velocities());
+        let (positions, velocities) = (body.state.positions(), body.velocities());
         let gravity = gravity.as_dvec3();
         for node in 0..body.node_count() {
             let mass = f64::from(body.masses[node]);
             let position = positions.get(node).as_dvec3();
             if body.inverse_masses[node] > 0.0 {
-                energy.kinetic += 0.5 * mass * velocities.get(node).as_dvec3().length_squared();
+                energy.kinetic += 0.5 * mass * velocities[body.callers(node)].as_dvec3().length_squared();
             }
             energy.gravitational -= mass * gravity.dot(position + body.origin);
             body.springs.visit(node, &mut |link| {

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::closing::ClosingKick;
 use super::gravity::GravityKicks;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
@@ -37,6 +38,8 @@ pub(crate) struct StepRequest<'a> {
 pub(crate) struct Carry {
     pub stability: Stability,
     pub gravity: GravityKicks,
+    /// What the velocities lack to be those at the time of the positions.
+    pub closing: Option<ClosingKick>,
 }
 
 /// How an attempted step ended. Nothing is current before [`Body::commit`].
@@ -57,7 +60,6 @@ pub(crate) enum Outcome {
 
 /// Takes a step of `body` without making it current.
 pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
-    body.refresh_forces(team);
     let known = body.carry.stability;
     let is_worth_estimating = || {
         let substeps = request.dt / (RESERVE * known.limit_anywhere());

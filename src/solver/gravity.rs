@@ -25,9 +25,9 @@ impl GravityKicks {
         }
     }
 
-    /// The change of velocity that `gravity` gives in `duration` seconds.
-    pub fn next(&mut self, gravity: Vec3, duration: f32) -> Vec3 {
-        let wanted = gravity.as_dvec3() * f64::from(duration) + self.residual;
+    /// The change of velocity to be given where gravity asks for `change`, m/s.
+    pub fn next(&mut self, change: DVec3) -> Vec3 {
+        let wanted = change + self.residual;
         let fastest = self.velocities.min.abs().max(self.velocities.max.abs()).as_dvec3() + wanted.abs();
         let given = DVec3::new(
             whole_units(wanted.x, fastest.x),

@@ -13,12 +13,14 @@ use crate::springs::{ChosenKernel, Loops, TileForces};
 /// One kick of a body.
 #[derive(Clone, Copy)]
 pub(super) struct Kick<'a> {
-    /// s
+    /// How long the forces act, s.
+    pub duration: f32,
+    /// How long a drift after it takes, s.
     pub substep: f32,
     /// Whether it is half of one.
     pub half: bool,
     pub gravity: Vec3,
-    /// What gravity gives to a node without damping in this kick, whole or half, m/s.
+    /// What gravity gives to a node without damping in this kick, m/s.
     pub fall: Vec3,
     pub inverse_masses: InverseMasses<'a>,
     /// Forces from outside, N.
@@ -96,8 +98,7 @@ impl Axis<'_> {
     #[inline(always)]
     fn run(self) {
         let kick = self.kick;
-        let duration = if kick.half { 0.5 * kick.substep } else { kick.substep };
-        let (gravity, fall) = (self.gravity, self.fall);
+        let (duration, gravity, fall) = (kick.duration, self.gravity, self.fall);
         match (kick.damping, kick.inverse_masses) {
             (None, InverseMasses::Uniform(inverse_mass)) => {
                 self.each(|_, force, velocity| velocity + (force * inverse_mass * duration + fall));

@@ -1,6 +1,7 @@
 //! How bodies move: the solvers and what they share.
 
 mod attempt;
+mod closing;
 mod gravity;
 mod kick;
 mod stability;
@@ -8,6 +9,7 @@ mod substep;
 mod verlet;
 
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
+pub(crate) use closing::{close, make_up_for, mean_force, show_closed};
 pub(crate) use gravity::GravityKicks;
 pub(crate) use kick::Survey;
 pub(crate) use stability::Stability;

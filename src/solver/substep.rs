@@ -5,18 +5,41 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::attempt::StepRequest;
+use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, InverseMasses, Pin, Vectors};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
-/// Which part of a step a substep is.
+/// Where a kick's velocities come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Before {
+    /// The current state, at the time of the positions.
+    Current,
+    /// The current state, half a substep before the positions.
+    CurrentOpen,
+    /// The step in progress, at the time of the positions.
+    Closed,
+    /// The step in progress, half a substep before the positions.
+    Open,
+}
+
+/// One pass over a body: a kick, and the drift that follows it.
 pub(super) struct Part {
-    /// The first kick: half of one, with the forces that the last step ended with.
-    pub begins: bool,
-    /// The last kick: half of one, without a drift.
-    pub ends: bool,
-    /// Fractions of the step at which the substep starts and ends.
+    pub before: Before,
+    /// Whether it is the last of the step.
+    pub last: bool,
+    /// Whether the nodes drift after the kick; where they do not, the spring forces are kept.
+    pub drifts: bool,
+    /// Whether the kick is half of one.
+    pub half: bool,
+    /// How long forces act on nodes without damping, s.
+    pub duration: f32,
+    /// How much of that belongs to this step, in substeps.
+    pub share: f64,
+    /// What gravity gives to them, m/s.
+    pub fall: Vec3,
+    /// Fractions of the step at which the drift starts and ends.
     pub start: f64,
     pub end: f64,
     /// s
@@ -24,45 +47,88 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Whether its kick is half of one.
-    pub fn is_half(&self) -> bool {
-        self.begins || self.ends
+    /// The half kick that opens a step.
+    pub fn opening(substep: f32) -> Self {
+        Self {
+            before: Before::Current,
+            last: false,
+            drifts: true,
+            half: true,
+            duration: 0.5 * substep,
+            share: 0.5,
+            fall: Vec3::ZERO,
+            start: 0.0,
+            end: 0.0,
+            substep,
+        }
+    }
+
+    /// The kick that closes the last step becomes part of this one.
+    pub fn join(&mut self, closing: &ClosingKick) {
+        self.before = Before::CurrentOpen;
+        self.half = false;
+        self.duration += 0.5 * closing.substep;
+    }
+
+    /// The full kick of a later substep, in which gravity gives `fall`.
+    pub fn go_on(&mut self, fall: Vec3) {
+        self.before = Before::Open;
+        self.half = false;
+        self.duration = self.substep;
+        self.share = 1.0;
+        self.fall = fall;
+    }
+
+    /// The half kick that closes the step, in which gravity gives `fall`.
+    pub fn close(&mut self, fall: Vec3) {
+        *self = Self {
+            before: Before::Open,
+            last: true,
+            drifts: false,
+            fall,
+            start: 1.0,
+            end: 1.0,
+            ..Self::opening(self.substep)
+        };
     }
 }
 
 /// Changes the velocities by the forces at the latest positions, moves the nodes by them, and puts the pinned ones where
-/// they are led; `fall` is what gravity gives in this kick, m/s.
-pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, fall: Vec3, team: &Team) -> Survey {
+/// they are led.
+pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, team: &Team) -> Survey {
     let node_count = body.node_count();
     let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
     let state = body.state.substep();
     let kick = Kick {
+        duration: part.duration,
         substep: part.substep,
-        half: part.is_half(),
+        half: part.half,
         gravity: request.gravity,
-        fall,
+        fall: part.fall,
         inverse_masses,
-        applied: body.applied.as_ref(),
+        applied: body.applied.as_ref().filter(|_| body.forces_applied),
         damping: body.damping.as_ref(),
     };
     let tiles = tile_count(node_count);
-    if !part.begins
+    if part.before == Before::Open
         && let Some(predicted) = &mut body.predicted_velocities
     {
-        let prediction = Prediction {
+        let closed = Closed {
             springs: &*body.springs,
             kernel: body.kernel,
-            kick: Kick { half: true, ..kick },
+            kick: Kick {
+                duration: 0.5 * part.substep,
+                half: true,
+                fall: part.fall * (0.5 * part.substep / part.duration),
+                ..kick
+            },
             positions: state.positions,
             velocities: state.velocities,
         };
-        team.pass(
-            tiles,
-            (predicted.tiles_mut(), body.pins.tiles_mut()),
-            |tile, (predicted, pins)| {
-                prediction.take(tile, tile_nodes(tile, node_count), predicted, pins);
-            },
-        );
+        let written = (predicted.tiles_mut(), body.pins.tiles_mut());
+        team.pass(tiles, written, |tile, (mut predicted, pins)| {
+            closed.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
+        });
     }
     let pass = Pass {
         springs: &*body.springs,
@@ -72,9 +138,12 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         part,
         kick,
         positions: state.positions,
-        predicted_velocities: body.predicted_velocities.as_ref(),
         first_velocities: state.first_velocities,
-        first_forces: state.first_forces,
+        first_forces: (part.before == Before::Current && body.forces_current).then_some(state.first_forces),
+        damped_velocities: match part.before {
+            Before::Open => body.predicted_velocities.as_ref(),
+            _ => body.springs.damped().then_some(state.first_velocities),
+        },
     };
     let written = (
         state.velocities.tiles_mut(),
@@ -99,40 +168,6 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
     body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and)
 }
 
-/// What a first visit of damped springs reads: it finds the velocities at the time of the positions.
-struct Prediction<'a> {
-    springs: &'a dyn Springs,
-    kernel: ChosenKernel,
-    kick: Kick<'a>,
-    positions: &'a Vectors,
-    velocities: &'a Vectors,
-}
-
-impl Prediction<'_> {
-    fn take(&self, tile: usize, nodes: Range<usize>, mut predicted: [&mut [f32]; 3], pins: &[Pin]) {
-        let mut forces = TileForces::ZERO;
-        let forces = &mut forces;
-        let motion = Motion::at(self.positions, Some(self.velocities));
-        self.springs.forces(tile, &motion, forces);
-        let velocities = self.velocities.slices(nodes.clone());
-        copy(&mut predicted, velocities);
-        let first = nodes.start;
-        self.kernel.run(TileKick {
-            kick: &self.kick,
-            nodes,
-            forces,
-            velocities: predicted.each_mut().map(|axis| &mut **axis),
-            drift: None,
-        });
-        for pin in pins {
-            let place = pin.node as usize - first;
-            for (predicted, velocities) in predicted.iter_mut().zip(velocities) {
-                predicted[place] = velocities[place];
-            }
-        }
-    }
-}
-
 /// What all tiles of a substep read.
 struct Pass<'a> {
     springs: &'a dyn Springs,
@@ -142,9 +177,11 @@ struct Pass<'a> {
     part: &'a Part,
     kick: Kick<'a>,
     positions: &'a Vectors,
-    predicted_velocities: Option<&'a Vectors>,
     first_velocities: &'a Vectors,
-    first_forces: &'a Vectors,
+    /// The spring forces, where they are known.
+    first_forces: Option<&'a Vectors>,
+    /// The velocities at the time of the positions, where springs are damped.
+    damped_velocities: Option<&'a Vectors>,
 }
 
 /// What a tile of a substep writes.
@@ -159,26 +196,24 @@ impl Pass<'_> {
     fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written) -> Survey {
         let mut forces = TileForces::ZERO;
         let forces = &mut forces;
-        if self.part.begins {
-            for (forces, first) in forces
-                .axes_mut()
-                .into_iter()
-                .zip(self.first_forces.slices(nodes.clone()))
-            {
+        if let Some(first_forces) = self.first_forces {
+            for (forces, first) in forces.axes_mut().into_iter().zip(first_forces.slices(nodes.clone())) {
                 forces[..nodes.len()].copy_from_slice(first);
             }
-            copy(&mut written.velocities, self.first_velocities.slices(nodes.clone()));
         } else {
             let [vx, vy, vz] = written.velocities.each_ref().map(|axis| &**axis);
             let [x, y, z] = written.next_positions.each_ref().map(|axis| &**axis);
             let motion = Motion {
                 positions: self.positions,
-                velocities: self.predicted_velocities,
+                velocities: self.damped_velocities,
                 soon: [vx, vy, vz, x, y, z],
             };
             self.springs.forces(tile, &motion, forces);
         }
-        if self.part.ends {
+        if matches!(self.part.before, Before::Current | Before::CurrentOpen) {
+            copy(&mut written.velocities, self.first_velocities.slices(nodes.clone()));
+        }
+        if !self.part.drifts {
             copy(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
         }
         self.feel_pins(&nodes, forces, written.pins);
@@ -187,13 +222,19 @@ impl Pass<'_> {
             nodes: nodes.clone(),
             forces,
             velocities: written.velocities.each_mut().map(|axis| &mut **axis),
-            drift: (!self.part.ends).then(|| Drift {
+            drift: self.part.drifts.then(|| Drift {
                 positions: self.positions.slices(nodes.clone()),
                 next_positions: written.next_positions.each_mut().map(|axis| &mut **axis),
             }),
         });
         self.lead_pins(&nodes, written);
-        let positions = self.part.ends.then(|| self.positions.slices(nodes));
+        let positions = self.part.last.then(|| {
+            if self.part.drifts {
+                written.next_positions.each_ref().map(|axis| &**axis)
+            } else {
+                self.positions.slices(nodes)
+            }
+        });
         look(
             self.kernel,
             written.velocities.each_ref().map(|axis| &**axis),
@@ -203,11 +244,10 @@ impl Pass<'_> {
 
     /// Adds up what holds the pinned nodes.
     fn feel_pins(&self, nodes: &Range<usize>, forces: &TileForces, pins: &mut [Pin]) {
-        let share = if self.part.is_half() { 0.5 } else { 1.0 };
         for pin in pins {
             let node = pin.node as usize;
             let weight = self.request.gravity * self.masses[node];
-            pin.force_sum -= (forces.get(node - nodes.start) + weight).as_dvec3() * share;
+            pin.force_sum -= (forces.get(node - nodes.start) + weight).as_dvec3() * self.part.share;
         }
     }
 
@@ -217,7 +257,7 @@ impl Pass<'_> {
             let place = pin.node as usize - nodes.start;
             let velocity = pin.travel / self.request.dt;
             set(&mut written.velocities, place, velocity);
-            if !self.part.ends {
+            if self.part.drifts {
                 // From the start of the step, so that roundings do not add up.
                 let position = pin.goal - pin.travel * (1.0 - self.part.end) as f32;
                 set(&mut written.next_positions, place, position);

@@ -8,10 +8,11 @@
 use glam::DVec3;
 
 use super::attempt::{Carry, StepRequest};
+use super::closing::{ClosingKick, close_aside, may_stay_open};
 use super::stability::Stability;
-use super::substep::{Part, kick_and_drift};
+use super::substep::{Before, Part, kick_and_drift};
 use crate::body::{Body, Bounds, Mobility};
-use crate::contact::Meeting;
+use crate::contact::{Contacts, Meeting};
 use crate::threads::Team;
 
 /// The substep asked for is longer than what is stable, or the motion made it so on the way.
@@ -47,28 +48,20 @@ pub(super) fn run(
         _ => Ok(()),
     };
     check(&carry.stability)?;
-    begin(body, request, substep);
-    for index in 0..=substeps {
-        let part = Part {
-            begins: index == 0,
-            ends: index == substeps,
-            start: f64::from(index) / f64::from(substeps),
-            end: f64::from(index + 1) / f64::from(substeps),
-            substep,
-        };
-        let kicked = if part.is_half() { 0.5 * substep } else { substep };
-        let fall = carry.gravity.next(request.gravity, kicked);
-        let survey = kick_and_drift(body, request, &part, fall, team);
-        carry.gravity.velocities = meet_tools(body, request, &part, survey.velocities);
-        if part.ends {
-            // What tools have done was not looked at.
-            finite = if body.contacts.is_some() {
-                body.state.newest_is_finite()
-            } else {
-                survey.finite
-            };
-            break;
+    begin(body, request);
+    let may_stay_open = may_stay_open(body);
+    let mut part = opening(body, request, substep, &mut carry, team);
+    if let Some(damping) = &mut body.damping {
+        damping.prepare(substep);
+    }
+    for index in 0..substeps {
+        part.last = may_stay_open && index + 1 == substeps;
+        part.start = f64::from(index) / f64::from(substeps);
+        part.end = f64::from(index + 1) / f64::from(substeps);
+        if index > 0 {
+            part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
         }
+        finite = pass(body, request, &part, &mut carry, team);
         body.state.advance();
         if index + 1 == middle
             && let Some(coarse) = &mut body.coarse
@@ -84,15 +77,57 @@ pub(super) fn run(
             check(&carry.stability)?;
         }
     }
+    // What a tool touches is closed with it.
+    if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
+        carry.closing = Some(ClosingKick {
+            substep,
+            gravity: request.gravity,
+        });
+    } else {
+        part.close(
+            carry
+                .gravity
+                .next(request.gravity.as_dvec3() * f64::from(0.5 * substep)),
+        );
+        finite = pass(body, request, &part, &mut carry, team);
+    }
     Ok(Taken { carry, finite })
 }
 
-/// Starts the step over, from what is current.
-fn begin(body: &mut Body, request: &StepRequest, substep: f32) {
-    body.state.begin();
-    if let Some(damping) = &mut body.damping {
-        damping.prepare(substep);
+/// Takes one part of the step; whether what it leads to is finite, where it was looked at.
+fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
+    let survey = kick_and_drift(body, request, part, team);
+    carry.gravity.velocities = meet_tools(body, request, part, survey.velocities);
+    // What tools have done was not looked at.
+    if part.last && body.contacts.as_ref().is_some_and(|contacts| !contacts.are_far()) {
+        body.state.newest_is_finite()
+    } else {
+        survey.finite
     }
+}
+
+/// The first kick of a step: the half that opens it, together with the half that closes the last where that was left open.
+fn opening(body: &mut Body, request: &StepRequest, substep: f32, carry: &mut Carry, team: &Team) -> Part {
+    let mut part = Part::opening(substep);
+    let mut change = request.gravity.as_dvec3() * f64::from(part.duration);
+    match carry.closing.take() {
+        None => {}
+        Some(closing) if closing.joins(body, substep, request.gravity) => {
+            part.join(&closing);
+            change += closing.fall();
+        }
+        Some(closing) => {
+            close_aside(body, &closing, &mut carry.gravity, team);
+            part.before = Before::Closed;
+        }
+    }
+    part.fall = carry.gravity.next(change);
+    part
+}
+
+/// Starts the step over, from what is current.
+fn begin(body: &mut Body, request: &StepRequest) {
+    body.state.begin();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);
         pin.goal = match pin.target {
@@ -121,13 +156,13 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         start: part.start,
         end: part.end,
         substep: part.substep,
-        drifts: !part.ends,
+        drifts: part.drifts,
         fastest,
         mobility: Mobility {
             inverse_masses: &body.inverse_masses,
             damping: body.damping.as_ref(),
             substep: part.substep,
-            half: part.is_half(),
+            half: part.half,
         },
         positions: state.positions,
         velocities: state.velocities,

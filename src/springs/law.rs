@@ -24,7 +24,7 @@ pub(crate) fn separation(node: usize, neighbour: usize, offset: Vec3) -> (f32, V
 /// The force of a spring on `node`, N: along it, by its stretch and, where the velocity of the neighbour against the node
 /// is given, by the rate at which it lengthens (Halic et al., section 3).
 #[inline(always)]
-pub(super) fn pull(node: usize, link: &Link, offset: Vec3, velocity: Option<Vec3>) -> Vec3 {
+pub(crate) fn pull(node: usize, link: &Link, offset: Vec3, velocity: Option<Vec3>) -> Vec3 {
     let square = offset.length_squared();
     if square > 0.0 {
         let length = square.sqrt();

@@ -16,7 +16,7 @@ use std::fmt::Debug;
 
 pub use kernels::Kernel;
 pub(crate) use kernels::{ChosenKernel, Loops, Range};
-pub(crate) use law::separation;
+pub(crate) use law::{pull, separation};
 use packed::Packed;
 pub(crate) use packed::Rounding;
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
@@ -42,7 +42,7 @@ pub(crate) struct Link {
 
 impl Link {
     /// A spring as each of its nodes sees it.
-    fn ends(spring: &Spring) -> [Self; 2] {
+    pub fn ends(spring: &Spring) -> [Self; 2] {
         let [a, b] = spring.nodes;
         [b, a].map(|neighbour| Self {
             neighbour,

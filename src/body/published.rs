@@ -1,0 +1,141 @@
+//! What callers read: side by side, in their order and their coordinates.
+
+use std::ops::Range;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use glam::{DVec3, Vec3};
+
+use super::Body;
+use super::origin::Bounds;
+use crate::error::Result;
+use crate::memory;
+use crate::solver::show_closed;
+use crate::springs::{Loops, TILE, tile_count, tile_nodes};
+use crate::threads::{Items, Team, Tiles};
+
+/// Positions, written at the end of each step, and velocities, written when they are asked for.
+#[derive(Debug)]
+pub(super) struct Published {
+    positions: Vec<Vec3>,
+    velocities: OnceLock<Vec<Vec3>>,
+    /// Where velocities are written next, while there are none. Locked by who asks for them alone.
+    blank: Mutex<Vec<Vec3>>,
+}
+
+impl Published {
+    pub fn new(node_count: usize) -> Result<Self> {
+        Ok(Self {
+            positions: memory::filled(Vec3::ZERO, node_count)?,
+            velocities: OnceLock::new(),
+            blank: Mutex::new(memory::filled(Vec3::ZERO, node_count)?),
+        })
+    }
+
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    pub fn positions_mut(&mut self) -> &mut [Vec3] {
+        &mut self.positions
+    }
+
+    /// The velocities, as `write` puts them into a list of as many where that was not done since they changed.
+    fn velocities(&self, write: impl FnOnce(&mut [Vec3])) -> &[Vec3] {
+        self.velocities.get_or_init(|| {
+            let mut blank = self.blank.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut velocities = std::mem::take(&mut *blank);
+            write(&mut velocities);
+            velocities
+        })
+    }
+
+    /// To be called when velocities change.
+    pub fn forget_velocities(&mut self) {
+        if let Some(velocities) = self.velocities.take() {
+            *self.blank.get_mut().unwrap_or_else(PoisonError::into_inner) = velocities;
+        }
+    }
+}
+
+impl Body {
+    /// Where each node is, in metres, in the caller's order.
+    pub fn positions(&self) -> &[Vec3] {
+        self.published.positions()
+    }
+
+    /// How fast each node moves at the time of the positions, in m/s, in the caller's order; a pinned node moves as it
+    /// was led in the last step.
+    ///
+    /// The first call after a step works them out, which takes about as long as a substep on one thread, or waits for
+    /// another thread that does.
+    pub fn velocities(&self) -> &[Vec3] {
+        self.published.velocities(|to| {
+            let mut put = |nodes: Range<usize>, from: [&[f32]; 3]| {
+                if self.order.is_callers() {
+                    let (origin, to) = (DVec3::ZERO, &mut to[nodes]);
+                    self.kernel.run(Publish { from, origin, to });
+                } else {
+                    for (place, node) in nodes.enumerate() {
+                        to[self.order.caller(node as u32) as usize] = Vec3::from(from.map(|axis| axis[place]));
+                    }
+                }
+            };
+            let closing = self.carry.closing;
+            if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
+                put(0..self.node_count(), self.state.velocities().axes());
+            }
+        })
+    }
+
+    /// Writes the positions for callers, and finds the box of each tile.
+    pub(super) fn publish(&mut self, team: &Team) {
+        let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
+        let positions = self.state.positions();
+        let count = positions.len();
+        let written = (
+            Tiles::new(self.published.positions_mut(), TILE),
+            Items::new(&mut self.boxes),
+        );
+        team.pass(
+            tile_count(count),
+            written,
+            |tile, (to, bounds): (&mut [Vec3], &mut Bounds)| {
+                let nodes = tile_nodes(tile, count);
+                *bounds = kernel.ranges(positions.slices(nodes.clone())).into();
+                if order.is_callers() {
+                    kernel.run(Publish {
+                        from: positions.slices(nodes),
+                        origin,
+                        to,
+                    });
+                } else {
+                    for (node, to) in nodes.zip(to) {
+                        let own = order.own(node as u32) as usize;
+                        *to = (positions.get(own).as_dvec3() + origin).as_vec3();
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// Writes vectors side by side, in the world's coordinates.
+struct Publish<'a> {
+    from: [&'a [f32]; 3],
+    origin: DVec3,
+    to: &'a mut [Vec3],
+}
+
+impl Loops for Publish<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [x, y, z] = self.from;
+        let origin = self.origin;
+        for (((to, &x), &y), &z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
+            let placed = |local: f32, origin: f64| (f64::from(local) + origin) as f32;
+            *to = Vec3::new(placed(x, origin.x), placed(y, origin.y), placed(z, origin.z));
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The half kick that closes a step, left to the next one.
+//!
+//! It is made of the forces at the end of the step, with which the next step begins: there both halves are one kick, and
+//! the springs are visited once per substep. Until then the velocities are half a substep older than the positions. Who
+//! asks for them gets them closed, to the side, so that reading changes nothing.
+
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
+
+use super::gravity::GravityKicks;
+use super::kick::{Kick, Survey, TileKick, look};
+use crate::body::{Body, InverseMasses, NodeDamping, Pin, Vectors};
+use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
+
+/// A half kick that the velocities lack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ClosingKick {
+    /// The substep it is half of, s.
+    pub substep: f32,
+    pub gravity: Vec3,
+}
+
+impl ClosingKick {
+    /// What gravity gives in it, m/s.
+    pub fn fall(&self) -> DVec3 {
+        self.gravity.as_dvec3() * (0.5 * f64::from(self.substep))
+    }
+
+    /// Whether it can be one kick with the half kick that opens a step of `substep` seconds each: forces from outside
+    /// are not for both, and damping takes a different part of either.
+    pub fn joins(&self, body: &Body, substep: f32, gravity: Vec3) -> bool {
+        let same = Self { substep, gravity } == *self;
+        !body.forces_applied && (same || body.damping.is_none())
+    }
+
+    /// It as a kick of nodes with these masses; the factors of damping were prepared for its substep.
+    fn kick<'a>(&self, fall: Vec3, inverse_masses: InverseMasses<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
+        Kick {
+            duration: 0.5 * self.substep,
+            substep: self.substep,
+            half: true,
+            gravity: self.gravity,
+            fall,
+            inverse_masses,
+            applied: None,
+            damping,
+        }
+    }
+}
+
+/// Whether a step of `body` may be left open. Damping along springs and comparisons need velocities at its end, and forces
+/// from outside end with it.
+pub(super) fn may_stay_open(body: &Body) -> bool {
+    body.predicted_velocities.is_none() && body.coarse.is_none() && !body.forces_applied
+}
+
+/// Velocities brought up to the time of the positions, to the side.
+pub(super) struct Closed<'a> {
+    pub springs: &'a dyn Springs,
+    pub kernel: ChosenKernel,
+    /// Half of one.
+    pub kick: Kick<'a>,
+    pub positions: &'a Vectors,
+    pub velocities: &'a Vectors,
+}
+
+impl Closed<'_> {
+    /// Those of a tile; what is pinned keeps its own.
+    pub fn write(&self, tile: usize, nodes: Range<usize>, closed: &mut [&mut [f32]; 3], pins: &[Pin]) {
+        let mut forces = TileForces::ZERO;
+        let forces = &mut forces;
+        let damped = self.springs.damped().then_some(self.velocities);
+        self.springs.forces(tile, &Motion::at(self.positions, damped), forces);
+        let velocities = self.velocities.slices(nodes.clone());
+        for (closed, velocities) in closed.iter_mut().zip(velocities) {
+            closed.copy_from_slice(velocities);
+        }
+        let first = nodes.start;
+        self.kernel.run(TileKick {
+            kick: &self.kick,
+            nodes,
+            forces,
+            velocities: closed.each_mut().map(|axis| &mut **axis),
+            drift: None,
+        });
+        for pin in pins {
+            let place = pin.node as usize - first;
+            for (closed, velocities) in closed.iter_mut().zip(velocities) {
+                closed[place] = velocities[place];
+            }
+        }
+    }
+}
+
+/// Writes the closed velocities of the current state to those of the step in progress; `gravity` goes on. Where they would
+/// not be finite all stay as old as they are.
+pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut GravityKicks, team: &Team) {
+    if let Some(damping) = &mut body.damping {
+        damping.prepare(closing.substep);
+    }
+    let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
+    let state = body.state.substep();
+    let closed = Closed {
+        springs: &*body.springs,
+        kernel: body.kernel,
+        kick: closing.kick(gravity.next(closing.fall()), inverse_masses, body.damping.as_ref()),
+        positions: state.positions,
+        velocities: state.first_velocities,
+    };
+    let node_count = state.positions.len();
+    let written = (
+        state.velocities.tiles_mut(),
+        body.pins.tiles_mut(),
+        Items::new(&mut body.surveys),
+    );
+    team.pass(
+        tile_count(node_count),
+        written,
+        |tile, (mut velocities, pins, survey)| {
+            closed.write(tile, tile_nodes(tile, node_count), &mut velocities, pins);
+            let velocities = velocities.each_ref().map(|axis| &**axis);
+            *survey = look(closed.kernel, velocities, Some(velocities));
+        },
+    );
+    let survey = body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and);
+    if survey.finite {
+        gravity.velocities = survey.velocities;
+    } else {
+        state.velocities.copy_from(state.first_velocities);
+    }
+}
+
+/// Brings the velocities of `body` up to the time of its positions, where they are older.
+pub(crate) fn close(body: &mut Body) {
+    let Some(closing) = body.carry.closing else {
+        return;
+    };
+    let mut gravity = body.carry.gravity;
+    body.state.begin();
+    close_aside(body, &closing, &mut gravity, &Team::alone());
+    body.state.commit();
+    let Body {
+        pins,
+        springs,
+        state,
+        masses,
+        ..
+    } = body;
+    for pin in pins.iter_mut() {
+        pin.force = mean_force(pin, Some(&closing), &**springs, state.positions(), masses);
+        pin.closing_share = 0.0;
+    }
+    body.carry.gravity = gravity;
+    body.carry.closing = None;
+}
+
+/// Shows the velocities of `body` at the time of its positions, tile by tile; whether they are finite. Where they are not,
+/// the rest is not shown.
+pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut dyn FnMut(Range<usize>, [&[f32]; 3])) -> bool {
+    let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
+    let fall = { body.carry.gravity }.next(closing.fall());
+    let closed = Closed {
+        springs: &*body.springs,
+        kernel: body.kernel,
+        kick: closing.kick(fall, inverse_masses, body.damping.as_ref()),
+        positions: body.state.positions(),
+        velocities: body.state.velocities(),
+    };
+    let node_count = body.node_count();
+    let mut axes = [[0.0_f32; TILE]; 3];
+    (0..tile_count(node_count)).all(|tile| {
+        let nodes = tile_nodes(tile, node_count);
+        let mut axes = axes.each_mut().map(|axis| &mut axis[..nodes.len()]);
+        closed.write(tile, nodes.clone(), &mut axes, body.pins.of_tile(tile));
+        let axes = axes.map(|axis| &*axis);
+        let finite = look(closed.kernel, axes, Some(axes)).finite;
+        if finite {
+            see(nodes, axes);
+        }
+        finite
+    })
+}
+
+/// Changes the velocity of `node` so that closing it gives what it would give with `force` on top, N: for a spring that has
+/// just been removed, or with its force turned round for one that has just been added.
+pub(crate) fn make_up_for(body: &mut Body, node: u32, force: Vec3) {
+    let Some(closing) = body.carry.closing else {
+        return;
+    };
+    if let Some(pin) = body.pins.get_mut(node) {
+        pin.force -= force * pin.closing_share;
+        return;
+    }
+    let node = node as usize;
+    // Where damping takes nearly all of it within the half kick, there is nothing to make up for.
+    const LEFT: f32 = 1e-3;
+    let duration = match &body.damping {
+        None => 0.5 * closing.substep,
+        Some(damping) => damping.gain[node] / (1.0 - damping.loss[node]).max(LEFT),
+    };
+    let velocity = body.state.velocities().get(node) + force * (body.inverse_masses[node] * duration);
+    if velocity.length_squared().is_finite() {
+        body.state.velocities_mut().set(node, velocity);
+    }
+}
+
+/// What holds a pinned node, mean over the last step, N.
+pub(crate) fn mean_force(
+    pin: &Pin,
+    closing: Option<&ClosingKick>,
+    springs: &dyn Springs,
+    positions: &Vectors,
+    masses: &[f32],
+) -> Vec3 {
+    let Some(closing) = closing.filter(|_| pin.closing_share > 0.0) else {
+        return pin.force;
+    };
+    let node = pin.node as usize;
+    let mut force = closing.gravity * masses[node];
+    springs.visit(node, &mut |link| {
+        force += pull(
+            node,
+            &link,
+            positions.get(link.neighbour as usize) - positions.get(node),
+            None,
+        );
+    });
+    let force = pin.force - force * pin.closing_share;
+    if force.is_finite() { force } else { pin.force }
+}
