@@ -1,9 +1,10 @@
 //! VERLET: the paper's explicit integration (Halic et al., section 3) as leapfrog with kept velocities.
 //!
 //! A step of n substeps is half a kick, n drifts with full kicks between them, and half a kick: symmetric, of order 2,
-//! with the same positions as Verlet's own `2 x - x' + h² a`. Each substep visits the springs once: the force found at
-//! the end of a step is the one the next begins with. Damping along springs needs velocities at the time of the
-//! positions: a first visit predicts them, a second uses them (order 2 too; Heun's method).
+//! with the same positions as Verlet's own `2 x - x' + h² a`. Each substep visits the springs once: the half kick that
+//! closes a step is left to the next, which begins with the same forces, or where it cannot be left, its forces are kept
+//! for the next. Damping along springs needs velocities at the time of the positions: a first visit predicts them, a
+//! second uses them (order 2 too; Heun's method).
 
 use glam::DVec3;
 

@@ -13,9 +13,10 @@ pub struct Reference {
     pub springs: Vec<Spring>,
     /// N, constant.
     pub applied: Vec<DVec3>,
-    masses: Vec<f64>,
-    node_dampings: Vec<f64>,
-    gravity: DVec3,
+    /// kg, 0: held.
+    pub masses: Vec<f64>,
+    pub node_dampings: Vec<f64>,
+    pub gravity: DVec3,
 }
 
 impl Reference {
@@ -38,7 +39,8 @@ impl Reference {
         }
     }
 
-    pub fn accelerations(&self) -> Vec<DVec3> {
+    /// Of springs and from outside, N.
+    pub fn forces(&self) -> Vec<DVec3> {
         let mut forces = self.applied.clone();
         for &([a, b], stiffness, rest_length) in &self.springs {
             let (a, b) = (a as usize, b as usize);
@@ -48,11 +50,15 @@ impl Reference {
             forces[a] += force;
             forces[b] -= force;
         }
+        forces
+    }
+
+    pub fn accelerations(&self) -> Vec<DVec3> {
         let accelerate = |(force, &mass): (DVec3, &f64)| match mass {
             0.0 => DVec3::ZERO,
             mass => force / mass + self.gravity,
         };
-        forces.into_iter().zip(&self.masses).map(accelerate).collect()
+        self.forces().into_iter().zip(&self.masses).map(accelerate).collect()
     }
 
     /// Half a kick, a drift, half a kick; damping solved exactly over each half.
