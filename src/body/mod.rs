@@ -19,7 +19,7 @@ pub(crate) use damping::{InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
-pub(crate) use vectors::{MARGIN, Vectors};
+pub(crate) use vectors::{MARGIN, Vectors, View};
 
 use crate::contact::Contacts;
 use crate::diagnostics::{Energy, StorageReport};

@@ -47,8 +47,17 @@ impl Pins {
 
     /// The pins of one tile.
     pub fn of_tile(&self, tile: usize) -> &[Pin] {
-        let start = |tile: usize| self.tiles.get(tile).map_or(self.pins.len(), |&start| start);
-        &self.pins[start(tile)..start(tile + 1)]
+        &self.pins[self.start(tile)..self.start(tile + 1)]
+    }
+
+    /// Where the pins of a tile begin.
+    pub fn start(&self, tile: usize) -> usize {
+        self.tiles.get(tile).map_or(self.pins.len(), |&start| start)
+    }
+
+    /// The pins in pieces that begin at these places.
+    pub fn pieces_mut<'a>(&'a mut self, starts: &'a [usize]) -> Ragged<'a, Pin> {
+        Ragged::new(&mut self.pins, starts)
     }
 
     pub fn get(&self, node: u32) -> Option<&Pin> {

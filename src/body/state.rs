@@ -97,6 +97,20 @@ impl State {
         }
     }
 
+    /// Positions now, those of the next substep, and velocities, of a step that has taken its first substep; the one after
+    /// the next may write over the positions.
+    pub fn two_substeps(&mut self) -> [&mut Vectors; 3] {
+        assert_ne!(self.latest, self.current, "the current positions must survive");
+        let is_swapped = self.latest > self.next();
+        let current = self.current;
+        let mut others = (0..).zip(&mut self.positions).filter(|(place, _)| *place != current);
+        let [Some((_, first)), Some((_, second))] = [others.next(), others.next()] else {
+            unreachable!("there are three places");
+        };
+        let [latest, next] = if is_swapped { [second, first] } else { [first, second] };
+        [latest, next, &mut self.velocities[1 - self.settled]]
+    }
+
     /// The positions just written become the newest of the step in progress.
     pub fn advance(&mut self) {
         self.latest = self.next();

@@ -7,7 +7,7 @@ use glam::Vec3;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::TILE;
-use crate::threads::Tiles;
+use crate::threads::{Ragged, Tiles};
 
 /// How many numbers there are to spare on either side: a kernel that takes the neighbours of sixteen nodes in one load may
 /// read so far beyond the ends.
@@ -40,6 +40,53 @@ impl Floats {
 
     fn places(&self) -> Range<usize> {
         self.first..self.first + self.count
+    }
+
+    /// With a margin before the first and one after the last block of sixteen.
+    fn padded_places(&self) -> Range<usize> {
+        self.first - MARGIN..self.first + self.count.next_multiple_of(LINE) + MARGIN
+    }
+}
+
+/// Vectors of some nodes in a row, to be read; at the ends of a body also the numbers to spare beyond them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View<'a> {
+    axes: [&'a [f32]; 3],
+    /// What would be the number of the node that the first belongs to.
+    start: isize,
+}
+
+impl<'a> View<'a> {
+    /// Vectors along each axis from the node of this number on.
+    pub fn new(axes: [&'a [f32]; 3], start: isize) -> Self {
+        Self { axes, start }
+    }
+
+    /// Whether all of these may be read.
+    pub fn covers(&self, nodes: &Range<isize>) -> bool {
+        self.start <= nodes.start
+            && self
+                .axes
+                .iter()
+                .all(|axis| nodes.end - self.start <= axis.len() as isize)
+    }
+
+    #[inline(always)]
+    pub fn get(&self, node: usize) -> Vec3 {
+        Vec3::from(self.axes.map(|axis| axis[(node as isize - self.start) as usize]))
+    }
+
+    /// Those of some nodes along each axis.
+    #[inline(always)]
+    pub fn slices(&self, nodes: Range<usize>) -> [&'a [f32]; 3] {
+        let place = |node: usize| (node as isize - self.start) as usize;
+        self.axes.map(|axis| &axis[place(nodes.start)..place(nodes.end)])
+    }
+
+    /// Where node 0 would be along each axis, whether or not it is there.
+    #[inline(always)]
+    pub fn places(&self) -> [*const f32; 3] {
+        self.axes.map(|axis| axis.as_ptr().wrapping_offset(-self.start))
     }
 }
 
@@ -100,14 +147,32 @@ impl Vectors {
         self.axes_mut().map(|axis| Tiles::new(axis, TILE))
     }
 
-    /// The coordinates along each axis with [`MARGIN`] readable numbers before the first and at least as many after the
-    /// last, rounded up to whole blocks of sixteen.
+    /// All of them, to be read, with the margins on both sides.
     #[inline(always)]
-    pub fn with_margins(&self) -> [&[f32]; 3] {
-        self.axes.each_ref().map(|axis| {
-            let after = axis.count.next_multiple_of(LINE) + MARGIN;
-            &axis.values[axis.first - MARGIN..axis.first + after]
+    pub fn view(&self) -> View<'_> {
+        View {
+            axes: self.axes.each_ref().map(|axis| &axis.values[axis.padded_places()]),
+            start: -(MARGIN as isize),
+        }
+    }
+
+    /// The coordinates along each axis cut into pieces, each from the first node of a tile on; the first piece has the margin
+    /// before it and the last the margin after it. `starts` are to be those of [`Vectors::piece_start`].
+    pub fn pieces_mut<'a>(&'a mut self, starts: &'a [usize]) -> [Ragged<'a, f32>; 3] {
+        self.axes.each_mut().map(|axis| {
+            let places = axis.padded_places();
+            Ragged::new(&mut axis.values[places], starts)
         })
+    }
+
+    /// Where a piece begins that begins with this tile.
+    pub fn piece_start(tile: usize) -> usize {
+        if tile == 0 { 0 } else { MARGIN + tile * TILE }
+    }
+
+    /// What would be the number of the node that such a piece begins with.
+    pub fn piece_node(tile: usize) -> isize {
+        Self::piece_start(tile) as isize - MARGIN as isize
     }
 
     /// All of them, in order.
@@ -188,7 +253,7 @@ mod tests {
             for node in 0..count {
                 vectors.set(node, Vec3::splat(1.0 + node as f32));
             }
-            for (axis, padded) in vectors.axes().into_iter().zip(vectors.with_margins()) {
+            for (axis, padded) in vectors.axes().into_iter().zip(vectors.view().axes) {
                 assert!(axis.as_ptr().addr().is_multiple_of(64));
                 assert_eq!(&padded[MARGIN..MARGIN + count], axis);
                 assert!(padded.len() >= MARGIN + count.next_multiple_of(16) + MARGIN);

@@ -4,6 +4,7 @@ mod attempt;
 mod closing;
 mod gravity;
 mod kick;
+mod pipeline;
 mod stability;
 mod substep;
 mod verlet;

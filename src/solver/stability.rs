@@ -93,7 +93,16 @@ impl Stability {
         self.reach >= 0.0
     }
 
-    /// The same, where `substep` is so short that the nodes may be anywhere: an estimate that never gets stale.
+    /// For how many substeps the estimate holds in which neighbours move against each other by up to `travel` each, m.
+    pub fn substeps_of(&self, travel: f32) -> f32 {
+        if travel > 0.0 {
+            self.reach / travel
+        } else {
+            f32::INFINITY
+        }
+    }
+
+    /// The same estimate, where `substep` is so short that the nodes may be anywhere: an estimate that never gets stale.
     pub fn for_short(self, substep: f32) -> Option<Self> {
         (self.now.is_some() && substep <= self.limit_anywhere()).then_some(Self {
             now: Some(self.anywhere),

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::{Body, InverseMasses, Pin, Vectors};
+use crate::body::{Body, InverseMasses, Pin, Vectors, View};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -25,6 +25,7 @@ pub(super) enum Before {
 }
 
 /// One pass over a body: a kick, and the drift that follows it.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
     pub before: Before,
     /// Whether it is the last of the step.
@@ -137,8 +138,9 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         request,
         part,
         kick,
-        positions: state.positions,
-        first_velocities: state.first_velocities,
+        positions: state.positions.view(),
+        first_velocities: (part.before != Before::Open && part.before != Before::Closed)
+            .then_some(state.first_velocities),
         first_forces: (part.before == Before::Current && body.forces_current).then_some(state.first_forces),
         damped_velocities: match part.before {
             Before::Open => body.predicted_velocities.as_ref(),
@@ -162,40 +164,42 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
                 forces,
                 pins,
             };
-            *survey = pass.take(tile, tile_nodes(tile, node_count), &mut written);
+            let mut sums = TileForces::ZERO;
+            *survey = pass.take(tile, tile_nodes(tile, node_count), &mut written, &mut sums);
         },
     );
     body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and)
 }
 
 /// What all tiles of a substep read.
-struct Pass<'a> {
-    springs: &'a dyn Springs,
-    kernel: ChosenKernel,
-    masses: &'a [f32],
-    request: &'a StepRequest<'a>,
-    part: &'a Part,
-    kick: Kick<'a>,
-    positions: &'a Vectors,
-    first_velocities: &'a Vectors,
+pub(super) struct Pass<'a> {
+    pub springs: &'a dyn Springs,
+    pub kernel: ChosenKernel,
+    pub masses: &'a [f32],
+    pub request: &'a StepRequest<'a>,
+    pub part: &'a Part,
+    pub kick: Kick<'a>,
+    pub positions: View<'a>,
+    /// What the velocities are before the kick, where it is not what they are now.
+    pub first_velocities: Option<&'a Vectors>,
     /// The spring forces, where they are known.
-    first_forces: Option<&'a Vectors>,
+    pub first_forces: Option<&'a Vectors>,
     /// The velocities at the time of the positions, where springs are damped.
-    damped_velocities: Option<&'a Vectors>,
+    pub damped_velocities: Option<&'a Vectors>,
 }
 
 /// What a tile of a substep writes.
-struct Written<'a> {
-    velocities: [&'a mut [f32]; 3],
-    next_positions: [&'a mut [f32]; 3],
-    forces: [&'a mut [f32]; 3],
-    pins: &'a mut [Pin],
+pub(super) struct Written<'a> {
+    pub velocities: [&'a mut [f32]; 3],
+    pub next_positions: [&'a mut [f32]; 3],
+    /// Where spring forces are kept; nothing where the nodes drift.
+    pub forces: [&'a mut [f32]; 3],
+    pub pins: &'a mut [Pin],
 }
 
 impl Pass<'_> {
-    fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written) -> Survey {
-        let mut forces = TileForces::ZERO;
-        let forces = &mut forces;
+    /// Takes it for a tile; `forces` are for its use.
+    pub fn take(&self, tile: usize, nodes: Range<usize>, written: &mut Written, forces: &mut TileForces) -> Survey {
         if let Some(first_forces) = self.first_forces {
             for (forces, first) in forces.axes_mut().into_iter().zip(first_forces.slices(nodes.clone())) {
                 forces[..nodes.len()].copy_from_slice(first);
@@ -210,8 +214,8 @@ impl Pass<'_> {
             };
             self.springs.forces(tile, &motion, forces);
         }
-        if matches!(self.part.before, Before::Current | Before::CurrentOpen) {
-            copy(&mut written.velocities, self.first_velocities.slices(nodes.clone()));
+        if let Some(first_velocities) = self.first_velocities {
+            copy(&mut written.velocities, first_velocities.slices(nodes.clone()));
         }
         if !self.part.drifts {
             copy(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));

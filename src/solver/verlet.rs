@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
+use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
 use crate::body::{Body, Bounds, Mobility};
@@ -41,58 +42,147 @@ pub(super) fn run(
     start: Carry,
     team: &Team,
 ) -> Result<Taken, TooLong> {
-    let mut carry = start;
-    let mut finite = true;
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-    let check = |stability: &Stability| match stability.limit() {
+    check(&start.stability, substep)?;
+    let mut step = Step {
+        request,
+        substeps,
+        substep,
+        middle,
+        team,
+        pipeline: None,
+    };
+    // What must be known between substeps cannot be known in a pipeline.
+    if substeps > 2 && may_stay_open(body) && body.contacts.is_none() {
+        step.pipeline = Plan::of(&*body.springs, body.node_count());
+    }
+    if let Some(taken) = step.take(body, start)? {
+        return Ok(taken);
+    }
+    step.pipeline = None;
+    Ok(step.take(body, start)?.expect("only a pipeline goes too far"))
+}
+
+fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
+    match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
-    };
-    check(&carry.stability)?;
-    begin(body, request);
-    let may_stay_open = may_stay_open(body);
-    let mut part = opening(body, request, substep, &mut carry, team);
-    if let Some(damping) = &mut body.damping {
-        damping.prepare(substep);
     }
-    for index in 0..substeps {
-        part.last = may_stay_open && index + 1 == substeps;
-        part.start = f64::from(index) / f64::from(substeps);
-        part.end = f64::from(index + 1) / f64::from(substeps);
-        if index > 0 {
-            part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
-        }
-        finite = pass(body, request, &part, &mut carry, team);
-        body.state.advance();
-        if index + 1 == middle
-            && let Some(coarse) = &mut body.coarse
-        {
-            coarse.pass_middle(body.state.newest().0);
-        }
-        let Bounds { min, max } = carry.gravity.velocities;
-        if !carry.stability.holds_after(substep * (max - min).length()) {
-            carry.stability = carry.stability.for_short(substep).unwrap_or_else(|| {
-                let positions = body.state.newest().0;
-                Stability::estimate(&*body.springs, &body.inverse_masses, positions)
-            });
-            check(&carry.stability)?;
-        }
-    }
-    // What a tool touches is closed with it.
-    if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
-        carry.closing = Some(ClosingKick {
+}
+
+/// A step to be taken.
+struct Step<'a> {
+    request: &'a StepRequest<'a>,
+    substeps: u32,
+    /// s
+    substep: f32,
+    middle: u32,
+    team: &'a Team<'a>,
+    pipeline: Option<Plan>,
+}
+
+impl Step<'_> {
+    /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
+    fn take(&self, body: &mut Body, start: Carry) -> Result<Option<Taken>, TooLong> {
+        let Self {
+            request,
             substep,
-            gravity: request.gravity,
-        });
-    } else {
-        part.close(
-            carry
-                .gravity
-                .next(request.gravity.as_dvec3() * f64::from(0.5 * substep)),
-        );
-        finite = pass(body, request, &part, &mut carry, team);
+            substeps,
+            team,
+            ..
+        } = *self;
+        let mut carry = start;
+        let mut finite = true;
+        begin(body, request);
+        let may_stay_open = may_stay_open(body);
+        let mut part = opening(body, request, substep, &mut carry, team);
+        if let Some(damping) = &mut body.damping {
+            damping.prepare(substep);
+        }
+        let mut index = 0;
+        while index < substeps {
+            let mut parts = [part; DEEPEST];
+            let depth = if index == 0 { 1 } else { self.depth(index, &mut carry) };
+            for (index, part) in (index..).zip(&mut parts[..depth]) {
+                if index > 0 {
+                    part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
+                }
+                part.last = may_stay_open && index + 1 == substeps;
+                part.start = f64::from(index) / f64::from(substeps);
+                part.end = f64::from(index + 1) / f64::from(substeps);
+            }
+            let parts = &parts[..depth];
+            if let (2.., Some(plan)) = (depth, self.pipeline) {
+                let surveys = pipeline::run(body, request, parts, plan, team);
+                for survey in &surveys[..depth - 1] {
+                    if !carry.stability.holds_after(substep * diagonal(&survey.velocities)) {
+                        return Ok(None);
+                    }
+                }
+                carry.gravity.velocities = surveys[depth - 1].velocities;
+                finite = surveys[depth - 1].finite;
+            } else {
+                finite = pass(body, request, &parts[0], &mut carry, team);
+            }
+            for _ in parts {
+                body.state.advance();
+            }
+            index += depth as u32;
+            if index == self.middle
+                && let Some(coarse) = &mut body.coarse
+            {
+                coarse.pass_middle(body.state.newest().0);
+            }
+            if !carry
+                .stability
+                .holds_after(substep * diagonal(&carry.gravity.velocities))
+            {
+                carry.stability = carry.stability.for_short(substep).unwrap_or_else(|| {
+                    let positions = body.state.newest().0;
+                    Stability::estimate(&*body.springs, &body.inverse_masses, positions)
+                });
+                check(&carry.stability, substep)?;
+            }
+        }
+        // What a tool touches is closed with it.
+        if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
+            carry.closing = Some(ClosingKick {
+                substep,
+                gravity: request.gravity,
+            });
+        } else {
+            part.close(
+                carry
+                    .gravity
+                    .next(request.gravity.as_dvec3() * f64::from(0.5 * substep)),
+            );
+            finite = pass(body, request, &part, &mut carry, team);
+        }
+        Ok(Some(Taken { carry, finite }))
     }
-    Ok(Taken { carry, finite })
+
+    /// How many substeps are taken next in one go: as many as a pipeline takes, in even parts, and as the motion is known to
+    /// be stable for, if it does not become twice as fast.
+    fn depth(&self, index: u32, carry: &mut Carry) -> usize {
+        let Some(plan) = self.pipeline else {
+            return 1;
+        };
+        let left = (self.substeps - index) as usize;
+        let depth = left.div_ceil(left.div_ceil(plan.depth));
+        let travel = 2.0 * self.substep * diagonal(&carry.gravity.velocities);
+        let stable = |stability: &Stability| stability.substeps_of(travel).min(depth as f32) as usize;
+        if stable(&carry.stability) < depth
+            && let Some(anywhere) = carry.stability.for_short(self.substep)
+        {
+            carry.stability = anywhere;
+        }
+        stable(&carry.stability).max(1)
+    }
+}
+
+/// How fast two nodes may be against each other, m/s.
+fn diagonal(velocities: &Bounds) -> f32 {
+    (velocities.max - velocities.min).length()
 }
 
 /// Takes one part of the step; whether what it leads to is finite, where it was looked at.

@@ -145,7 +145,7 @@ impl<L: KeptLink> DynamicBulk<L> {
     #[inline(always)]
     fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         let nodes = tile_nodes(tile, self.nodes.len());
-        let gather = Gather::<DAMPED>::new(motion, nodes.start);
+        let gather = Gather::<DAMPED>::new(motion, nodes.start, self.nodes.len());
         for node in nodes {
             if let Some(ahead) = self.nodes.get(node + AHEAD) {
                 prefetch_row(ahead.first.as_ptr(), size_of_val(&*ahead.first));

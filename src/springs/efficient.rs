@@ -52,7 +52,7 @@ impl Efficient {
     #[inline(always)]
     fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         let nodes = tile_nodes(tile, self.lists.len());
-        let gather = Gather::<DAMPED>::new(motion, nodes.start);
+        let gather = Gather::<DAMPED>::new(motion, nodes.start, self.lists.len());
         let mut fetched = nodes.start;
         for node in nodes.clone() {
             if node == fetched {

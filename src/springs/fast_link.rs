@@ -77,7 +77,7 @@ impl<L: KeptLink> FastLink<L> {
     fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         let nodes = tile_nodes(tile, self.node_count);
         let width = self.springs_per_node;
-        let gather = Gather::<DAMPED>::new(motion, nodes.start);
+        let gather = Gather::<DAMPED>::new(motion, nodes.start, self.node_count);
         let rows = self.places[nodes.start * width..nodes.end * width].chunks_exact(width);
         for (node, row) in nodes.zip(rows) {
             prefetch_row(row.as_ptr().wrapping_add(AHEAD * width), size_of_val(row));

@@ -37,11 +37,11 @@ fn at([x, y, z]: [&[f32]; 3], node: usize) -> Vec3 {
 }
 
 impl<'a, const DAMPED: bool> Gather<'a, DAMPED> {
-    /// For the tile that begins with node `first`.
+    /// For the tile that begins with node `first`, of a body of `node_count`.
     #[inline(always)]
-    pub fn new(motion: &Motion<'a>, first: usize) -> Self {
+    pub fn new(motion: &Motion<'a>, first: usize, node_count: usize) -> Self {
         Self {
-            positions: even(motion.positions.axes()),
+            positions: even(motion.positions.slices(0..node_count)),
             velocities: motion.velocities.map_or([&[]; 3], |velocities| even(velocities.axes())),
             soon: motion.soon,
             first,

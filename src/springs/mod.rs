@@ -21,7 +21,7 @@ use packed::Packed;
 pub(crate) use packed::Rounding;
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
-use crate::body::{BodyDefinition, Spring, Storage, Vectors};
+use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
 use crate::error::{Error, Result};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
@@ -56,7 +56,7 @@ impl Link {
 /// What spring forces depend on, and what is wanted next.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion<'a> {
-    pub positions: &'a Vectors,
+    pub positions: View<'a>,
     /// Given where springs are damped.
     pub velocities: Option<&'a Vectors>,
     /// What the nodes of the tile need after the forces, to be fetched from memory meanwhile.
@@ -67,7 +67,7 @@ impl<'a> Motion<'a> {
     /// Nothing is wanted next.
     pub fn at(positions: &'a Vectors, velocities: Option<&'a Vectors>) -> Self {
         Self {
-            positions,
+            positions: positions.view(),
             velocities,
             soon: [&[]; 6],
         }
@@ -86,6 +86,12 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// Shows the links of `node`, each once.
     fn visit(&self, node: usize, see: &mut dyn FnMut(Link));
+
+    /// The nodes whose positions the forces of a tile are made of, and what lies between and at most sixteen beyond them;
+    /// `None`: any.
+    fn reads(&self, _tile: usize) -> Option<std::ops::Range<isize>> {
+        None
+    }
 
     /// Writes the spring forces on the nodes of `tile`, in newtons; with velocities also the damping along springs.
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces);

@@ -35,7 +35,6 @@ impl<'a> Team<'a> {
     }
 
     /// How many threads it has at most.
-    #[cfg(test)]
     pub fn count(&self) -> usize {
         self.others.map_or(1, |(board, _)| board.count())
     }

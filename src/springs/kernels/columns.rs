@@ -136,6 +136,8 @@ pub(crate) struct Columns {
     pub(super) count: usize,
     /// Nodes of the body.
     pub(super) node_count: usize,
+    /// The nodes that the kernel reads; sixteen more at most at the ends of a body.
+    pub(super) reads: Range<isize>,
     /// What small indices count from.
     pub(super) window: usize,
     pub(super) blocks: Vec<Ends>,
@@ -175,6 +177,7 @@ impl Columns {
             first: nodes.start,
             count: nodes.len(),
             node_count,
+            reads: nodes.start as isize..nodes.end.next_multiple_of(LANES) as isize,
             window: nodes
                 .start
                 .saturating_sub(WINDOW / 2)
@@ -237,6 +240,8 @@ impl Columns {
                     let neighbour = (first + lane).checked_add_signed(offset as isize);
                     assert!(neighbour.is_some_and(|neighbour| neighbour < self.node_count));
                 }
+                let start = first as isize + offset as isize;
+                self.reads_also(start..start + LANES as isize);
                 if material == OWN {
                     return memory::push(&mut self.own_runs, OwnRun { offset, lanes });
                 }
@@ -258,6 +263,9 @@ impl Columns {
                         .iter()
                         .all(|&neighbour| (neighbour as usize) < self.node_count)
                 );
+                for node in neighbours {
+                    self.reads_also(node as isize..node as isize + 1);
+                }
                 let gather = Gather { lanes, material };
                 if self.is_near(&column.neighbours) {
                     let indices = neighbours.map(|neighbour| (neighbour as usize - self.window) as u16);
@@ -269,6 +277,16 @@ impl Columns {
                 }
             }
         }
+    }
+
+    fn reads_also(&mut self, nodes: Range<isize>) {
+        self.reads.start = self.reads.start.min(nodes.start);
+        self.reads.end = self.reads.end.max(nodes.end);
+    }
+
+    /// The nodes whose positions forces are made of.
+    pub fn reads(&self) -> Range<isize> {
+        self.reads.clone()
     }
 
     fn is_near(&self, neighbours: &Neighbours) -> bool {
@@ -322,8 +340,15 @@ impl Columns {
         &self.strays
     }
 
-    pub fn strays_mut(&mut self) -> &mut Strays {
-        &mut self.strays
+    /// Makes room for `count` more links beside the columns.
+    pub fn reserve_strays(&mut self, count: usize) -> Result<()> {
+        self.strays.reserve(count)
+    }
+
+    /// Puts a link of `node` beside the columns, where there is room for it.
+    pub fn insert_stray(&mut self, node: usize, link: &Link) {
+        self.strays.insert(node, link);
+        self.reads_also(link.neighbour as isize..link.neighbour as isize + 1);
     }
 
     /// Bytes in use, and bytes held from the allocator.

@@ -11,7 +11,7 @@ use super::columns::{Columns, Ends, LANES, Material, Run};
 use super::lanes::Lanes;
 use super::prefetch::prefetch;
 use super::{ChosenKernel, WithLanes};
-use crate::body::{MARGIN, Vectors};
+use crate::body::{Vectors, View};
 use crate::springs::law::separation;
 use crate::springs::{Link, Motion, TileForces};
 
@@ -25,14 +25,13 @@ impl Columns {
         } = motion;
         let velocities = velocities.filter(|_| self.damped);
         // What the kernel reads without a check was checked against this.
-        assert_eq!(positions.len(), self.node_count);
+        assert!(positions.covers(&self.reads));
         assert!(velocities.is_none_or(|velocities| velocities.len() == self.node_count));
-        let place = |vectors: &Vectors| vectors.with_margins().map(|axis| axis[MARGIN..].as_ptr());
         let tile = Tile {
             columns: self,
             materials,
-            positions: place(positions),
-            velocities: velocities.map(place),
+            positions: positions.places(),
+            velocities: velocities.map(|velocities| velocities.view().places()),
             soon: soon.map(|wanted| wanted.as_ptr()),
         };
         let careful = Careful {
@@ -60,7 +59,7 @@ struct TileLinks<'a> {
 struct Tile<'a> {
     columns: &'a Columns,
     materials: &'a [Material],
-    /// The first node's coordinates, with [`MARGIN`] numbers before them and as many after the last block.
+    /// Where the coordinates of node 0 would be: what the columns read is there.
     positions: [*const f32; 3],
     velocities: Option<[*const f32; 3]>,
     /// What is wanted next, block by block.
@@ -166,7 +165,7 @@ impl Tile<'_> {
         // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
         // set, and within the margins elsewhere.
         unsafe {
-            let here = self.places::<L, DAMPED>(|axis| L::load(axis.add(node)));
+            let here = self.places::<L, DAMPED>(|axis| L::load(axis.wrapping_add(node)));
             let mut sums = Sums([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
             let (groups, rest) = runs.as_chunks::<GROUP>();
@@ -221,7 +220,7 @@ impl Tile<'_> {
         let mut own = start.own as usize;
         // SAFETY: as in `runs`; gathers were checked to lead to nodes of the body.
         unsafe {
-            let here = self.places::<L, DAMPED>(|axis| L::load(axis.add(node)));
+            let here = self.places::<L, DAMPED>(|axis| L::load(axis.wrapping_add(node)));
             for run in columns
                 .own_runs
                 .get_unchecked(start.own_runs as usize..end.own_runs as usize)
@@ -237,7 +236,7 @@ impl Tile<'_> {
                 let header = columns.near.get_unchecked(near);
                 let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.places::<L, DAMPED>(|axis| L::gather_near(axis.add(columns.window), indices));
+                let there = self.places::<L, DAMPED>(|axis| L::gather_near(axis.wrapping_add(columns.window), indices));
                 let links = Links {
                     spring,
                     there,
@@ -327,7 +326,7 @@ impl Tile<'_> {
     #[inline(always)]
     unsafe fn beside<L: Lanes, const DAMPED: bool>(&self, node: usize, offset: i32) -> Place<L> {
         // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
-        unsafe { self.places::<L, DAMPED>(|axis| L::load(axis.offset(node as isize + offset as isize))) }
+        unsafe { self.places::<L, DAMPED>(|axis| L::load(axis.wrapping_offset(node as isize + offset as isize))) }
     }
 
     /// The parameters of a column; `own` counts those that bring their own.
@@ -437,7 +436,7 @@ unsafe fn dot<L: Lanes>([ax, ay, az]: [L; 3], [bx, by, bz]: [L; 3]) -> L {
 struct Careful<'a> {
     columns: &'a Columns,
     materials: &'a [Material],
-    positions: &'a Vectors,
+    positions: View<'a>,
     velocities: Option<&'a Vectors>,
 }
 

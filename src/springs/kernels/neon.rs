@@ -38,13 +38,14 @@ impl Lanes for NeonLanes {
 
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
-        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.add(*indices.add(lane) as usize) });
+        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.wrapping_add(*indices.add(lane) as usize) });
         Self(unsafe { vld1q_f32(values.as_ptr()) })
     }
 
     #[inline(always)]
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
-        let values: [f32; 4] = std::array::from_fn(|lane| unsafe { *base.add(usize::from(*indices.add(lane))) });
+        let values: [f32; 4] =
+            std::array::from_fn(|lane| unsafe { *base.wrapping_add(usize::from(*indices.add(lane))) });
         Self(unsafe { vld1q_f32(values.as_ptr()) })
     }
 

@@ -30,13 +30,17 @@ impl Lanes for PortableLanes {
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
         // SAFETY: the caller's promise.
-        Self(from_fn(|lane| unsafe { *base.add(*indices.add(lane) as usize) }))
+        Self(from_fn(|lane| unsafe {
+            *base.wrapping_add(*indices.add(lane) as usize)
+        }))
     }
 
     #[inline(always)]
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
         // SAFETY: the caller's promise.
-        Self(from_fn(|lane| unsafe { *base.add(usize::from(*indices.add(lane))) }))
+        Self(from_fn(|lane| unsafe {
+            *base.wrapping_add(usize::from(*indices.add(lane)))
+        }))
     }
 
     #[inline(always)]

@@ -188,6 +188,10 @@ impl Springs for Packed {
         self.tile(node as u32).columns.visit(node, &self.materials, see);
     }
 
+    fn reads(&self, tile: usize) -> Option<Range<isize>> {
+        Some(self.tiles[tile].columns.reads())
+    }
+
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         self.tiles[tile]
             .columns
@@ -201,10 +205,10 @@ impl Springs for Packed {
         }
         for node in [a, b] {
             // Both ends may be in one tile.
-            self.tile_mut(node).columns.strays_mut().reserve(2)?;
+            self.tile_mut(node).columns.reserve_strays(2)?;
         }
         for (node, link) in spring.nodes.into_iter().zip(Link::ends(spring)) {
-            self.tile_mut(node).columns.strays_mut().insert(node as usize, &link);
+            self.tile_mut(node).columns.insert_stray(node as usize, &link);
         }
         self.spring_count += 1;
         self.mend(a);

@@ -56,7 +56,7 @@ pub(super) fn pack(
         let (block, after) = rest.split_at_mut(count);
         let strays = packer.block(first, block)?;
         columns.push_block(&packer.columns, materials)?;
-        columns.strays_mut().reserve(strays)?;
+        columns.reserve_strays(strays)?;
         for loose in &mut block[..strays] {
             let link = Link {
                 neighbour: loose.neighbour,
@@ -64,7 +64,7 @@ pub(super) fn pack(
                 rest_length: loose.own.rest_length,
                 damping: loose.own.damping,
             };
-            columns.strays_mut().insert(loose.node as usize, &link);
+            columns.insert_stray(loose.node as usize, &link);
         }
         rest = after;
         first += LANES;
