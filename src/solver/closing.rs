@@ -156,9 +156,12 @@ pub(crate) fn close(body: &mut Body) {
     body.carry.closing = None;
 }
 
+/// What is shown some nodes and their velocities along each axis.
+type See<'a> = dyn FnMut(Range<usize>, [&[f32]; 3]) + 'a;
+
 /// Shows the velocities of `body` at the time of its positions, tile by tile; whether they are finite. Where they are not,
 /// the rest is not shown.
-pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut dyn FnMut(Range<usize>, [&[f32]; 3])) -> bool {
+pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> bool {
     let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
     let fall = { body.carry.gravity }.next(closing.fall());
     let closed = Closed {

@@ -323,8 +323,8 @@ mod tests {
                             positions: [vec![0; tiles], vec![usize::MAX; tiles]],
                         };
                         let (starts, cuts) = (schedule.starts(), schedule.cuts());
-                        for stretch in 0..schedule.count {
-                            let piece = starts[stretch]..schedule.start(stretch + 1);
+                        for (stretch, &start) in starts[..schedule.count].iter().enumerate() {
+                            let piece = start..schedule.start(stretch + 1);
                             schedule.narrow(stretch, &mut |tile, substep| taken.take(tile, substep, piece.clone()));
                         }
                         for cut in 0..schedule.count - 1 {
