@@ -69,14 +69,21 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]) {
         unsafe {
-            // The guess has twelve bits: too few for a root by one correction, enough for its inverse.
-            let roots = values.map(|value| _mm256_sqrt_ps(value.0));
-            let guesses = values.map(|value| _mm256_rsqrt_ps(value.0));
-            let errors: [__m256; N] = from_fn(|n| _mm256_fnmadd_ps(roots[n], guesses[n], _mm256_set1_ps(1.0)));
-            let inverses = from_fn(|n| Self(_mm256_fmadd_ps(guesses[n], errors[n], guesses[n])));
-            (roots.map(Self), inverses)
+            let guesses = squares.map(|square| _mm256_rsqrt_ps(square.0));
+            let roots: [__m256; N] = from_fn(|n| _mm256_mul_ps(squares[n].0, guesses[n]));
+            // Newton's step: 1 / length = guess * corrections / 2.
+            let corrections: [__m256; N] = from_fn(|n| _mm256_fnmadd_ps(roots[n], guesses[n], _mm256_set1_ps(3.0)));
+            let tensions: [__m256; N] = from_fn(|n| _mm256_mul_ps(half_tensions[n].0, guesses[n]));
+            let pulls = from_fn(|n| Self(_mm256_fnmadd_ps(tensions[n], corrections[n], stiffnesses[n].0)));
+            let halves = guesses.map(|guess| _mm256_mul_ps(guess, _mm256_set1_ps(0.5)));
+            let inverses = from_fn(|n| Self(_mm256_mul_ps(halves[n], corrections[n])));
+            (pulls, inverses)
         }
     }
 

@@ -58,17 +58,21 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]) {
         unsafe {
-            let guesses = values.map(|value| _mm512_rsqrt14_ps(value.0));
-            // Newton's steps as corrections: what is rounded in them is small.
-            let roots: [__m512; N] = from_fn(|n| _mm512_mul_ps(values[n].0, guesses[n]));
-            let rests: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], roots[n], values[n].0));
+            let guesses = squares.map(|square| _mm512_rsqrt14_ps(square.0));
+            let roots: [__m512; N] = from_fn(|n| _mm512_mul_ps(squares[n].0, guesses[n]));
+            // Newton's step: 1 / length = guess * corrections / 2.
+            let corrections: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], guesses[n], _mm512_set1_ps(3.0)));
+            let tensions: [__m512; N] = from_fn(|n| _mm512_mul_ps(half_tensions[n].0, guesses[n]));
+            let pulls = from_fn(|n| Self(_mm512_fnmadd_ps(tensions[n], corrections[n], stiffnesses[n].0)));
             let halves = guesses.map(|guess| _mm512_mul_ps(guess, _mm512_set1_ps(0.5)));
-            let roots: [__m512; N] = from_fn(|n| _mm512_fmadd_ps(halves[n], rests[n], roots[n]));
-            let errors: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], guesses[n], _mm512_set1_ps(1.0)));
-            let inverses = from_fn(|n| Self(_mm512_fmadd_ps(guesses[n], errors[n], guesses[n])));
-            (roots.map(Self), inverses)
+            let inverses = from_fn(|n| Self(_mm512_mul_ps(halves[n], corrections[n])));
+            (pulls, inverses)
         }
     }
 

@@ -34,6 +34,14 @@ pub(crate) struct Material {
     pub damping: f32,
 }
 
+impl Material {
+    /// Half the force with which a spring would be pressed to length 0, N.
+    #[inline(always)]
+    pub fn half_tension(&self) -> f32 {
+        0.5 * self.stiffness * self.rest_length
+    }
+}
+
 /// Sixteen numbers in a cache line of their own.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +90,7 @@ pub(super) struct Run {
     /// Its place in the table of materials: what follows is a copy from there.
     pub material: u16,
     pub stiffness: f32,
-    pub rest_length: f32,
+    pub half_tension: f32,
 }
 
 /// A column of neighbours that lie side by side, of springs that bring their own parameters.
@@ -245,15 +253,13 @@ impl Columns {
                 if material == OWN {
                     return memory::push(&mut self.own_runs, OwnRun { offset, lanes });
                 }
-                let Material {
-                    stiffness, rest_length, ..
-                } = materials[usize::from(material)];
+                let shared = &materials[usize::from(material)];
                 let run = Run {
                     offset,
                     lanes,
                     material,
-                    stiffness,
-                    rest_length,
+                    stiffness: shared.stiffness,
+                    half_tension: shared.half_tension(),
                 };
                 memory::push(&mut self.runs, run)
             }

@@ -1,9 +1,8 @@
 //! The spring forces on the nodes of a tile, as many nodes at a time as the processor has lanes.
 //!
-//! The force of a spring is `k (L - L0) / L d` for the way d of length L to its other end. Both ends compute it in the same
-//! way, with opposite signs: no momentum is lost to rounding but where forces are added up.
-
-use std::array::from_fn;
+//! The force of a spring is `(k - k L0 / L) d` for the way d of length L to its other end: a quarter fewer operations than
+//! `k (L - L0) / L d`, and what it rounds is less than what positions are rounded by. Both ends compute it in the same way,
+//! with opposite signs: no momentum is lost to rounding but where forces are added up.
 
 use glam::Vec3;
 
@@ -137,7 +136,8 @@ struct Sums<L>([L; 3]);
 #[derive(Clone, Copy)]
 struct Spring<L> {
     stiffness: L,
-    rest_length: L,
+    /// Half the stiffness times the rest length.
+    half_tension: L,
     damping: L,
 }
 
@@ -197,7 +197,7 @@ impl Tile<'_> {
             Links {
                 spring: Spring {
                     stiffness: L::splat(run.stiffness),
-                    rest_length: L::splat(run.rest_length),
+                    half_tension: L::splat(run.half_tension),
                     damping: L::splat(damping),
                 },
                 there: self.beside::<L, DAMPED>(node, run.offset),
@@ -272,9 +272,11 @@ impl Tile<'_> {
             unsafe {
                 let here = self.places::<L, DAMPED>(|axis| L::gather(axis, batch.nodes.as_ptr().add(lane)));
                 let there = self.places::<L, DAMPED>(|axis| L::gather(axis, batch.neighbours.as_ptr().add(lane)));
+                let stiffness = L::load(batch.stiffnesses.0.as_ptr().add(lane));
+                let rest_length = L::load(batch.rest_lengths.0.as_ptr().add(lane));
                 let spring = Spring {
-                    stiffness: L::load(batch.stiffnesses.0.as_ptr().add(lane)),
-                    rest_length: L::load(batch.rest_lengths.0.as_ptr().add(lane)),
+                    stiffness,
+                    half_tension: half_tension(stiffness, rest_length),
                     damping: L::load(batch.dampings.0.as_ptr().add(lane)),
                 };
                 let mut sums = Sums([L::splat(0.0); 3]);
@@ -343,19 +345,20 @@ impl Tile<'_> {
                 let material = &self.materials[material];
                 return Spring {
                     stiffness: L::splat(material.stiffness),
-                    rest_length: L::splat(material.rest_length),
+                    half_tension: L::splat(material.half_tension()),
                     damping: L::splat(material.damping),
                 };
             }
             let columns = self.columns;
             let rest_length = L::load(columns.own_rest_lengths.get_unchecked(*own).0.as_ptr().add(lane));
+            let stiffness = if columns.own_stiffnesses.is_empty() {
+                L::splat(columns.own_stiffness)
+            } else {
+                L::load(columns.own_stiffnesses.get_unchecked(*own).0.as_ptr().add(lane))
+            };
             let spring = Spring {
-                stiffness: if columns.own_stiffnesses.is_empty() {
-                    L::splat(columns.own_stiffness)
-                } else {
-                    L::load(columns.own_stiffnesses.get_unchecked(*own).0.as_ptr().add(lane))
-                },
-                rest_length,
+                stiffness,
+                half_tension: half_tension(stiffness, rest_length),
                 damping: if DAMPED {
                     L::load(columns.own_dampings.get_unchecked(*own).0.as_ptr().add(lane))
                 } else {
@@ -398,11 +401,9 @@ impl<L: Lanes> Sums<L> {
         unsafe {
             let ways = links.map(|links| difference(links.there.position, here.position));
             let squares = ways.map(|way| dot(way, way));
-            let (lengths, inverses) = L::roots(squares);
-            // The stretch is exact where it is small: a product with the inverse would not be.
-            let stretches: [L; N] = from_fn(|n| lengths[n].subtract(links[n].spring.rest_length));
-            let tensions: [L; N] = from_fn(|n| stretches[n].multiply(links[n].spring.stiffness));
-            let mut factors: [L; N] = from_fn(|n| tensions[n].multiply(inverses[n]));
+            let stiffnesses = links.map(|links| links.spring.stiffness);
+            let half_tensions = links.map(|links| links.spring.half_tension);
+            let (mut factors, inverses) = L::pulls(squares, stiffnesses, half_tensions);
             if DAMPED {
                 for n in 0..N {
                     let rate = dot(ways[n], difference(links[n].there.velocity, here.velocity));
@@ -424,6 +425,12 @@ impl<L: Lanes> Sums<L> {
 unsafe fn difference<L: Lanes>([ax, ay, az]: [L; 3], [bx, by, bz]: [L; 3]) -> [L; 3] {
     // SAFETY: the same contract.
     unsafe { [ax.subtract(bx), ay.subtract(by), az.subtract(bz)] }
+}
+
+#[inline(always)]
+unsafe fn half_tension<L: Lanes>(stiffness: L, rest_length: L) -> L {
+    // SAFETY: the same contract.
+    unsafe { stiffness.multiply(L::splat(0.5)).multiply(rest_length) }
 }
 
 #[inline(always)]

@@ -31,8 +31,13 @@ pub(super) trait Lanes: Copy {
     /// `self * factor + summand`
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self;
 
-    /// The square root of each, within 0.51 units in its last place, and 1 over it, within 2^-22 of it; for normal numbers.
-    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]);
+    /// The forces of springs over their lengths, `stiffness - 2 half_tension / length`, and 1 over their lengths, within
+    /// 2^-22 of `2 half_tension / length` and of themselves, from the squares of the lengths; for normal numbers.
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]);
 
     /// 0 in the lanes whose bit in `mask` is not set.
     unsafe fn where_set(self, mask: u32) -> Self;

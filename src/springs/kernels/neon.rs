@@ -65,11 +65,18 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
-    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]) {
         unsafe {
-            let roots = values.map(|value| vsqrtq_f32(value.0));
-            let inverses = roots.map(|root| Self(vdivq_f32(vdupq_n_f32(1.0), root)));
-            (roots.map(Self), inverses)
+            let inverses = squares.map(|square| vdivq_f32(vdupq_n_f32(1.0), vsqrtq_f32(square.0)));
+            let pull = |n: usize| {
+                let tension = vaddq_f32(half_tensions[n].0, half_tensions[n].0);
+                Self(vfmsq_f32(stiffnesses[n].0, tension, inverses[n]))
+            };
+            (std::array::from_fn(pull), inverses.map(Self))
         }
     }
 

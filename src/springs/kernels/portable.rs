@@ -59,9 +59,17 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn roots<const N: usize>(values: [Self; N]) -> ([Self; N], [Self; N]) {
-        let roots = values.map(|value| value.0.map(f32::sqrt));
-        (roots.map(Self), roots.map(|root| Self(root.map(|root| 1.0 / root))))
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]) {
+        let inverses = squares.map(|square| square.0.map(|square| 1.0 / square.sqrt()));
+        let pull = |n: usize, lane: usize| {
+            let tension = 2.0 * half_tensions[n].0[lane];
+            stiffnesses[n].0[lane] - tension * inverses[n][lane]
+        };
+        (from_fn(|n| Self(from_fn(|lane| pull(n, lane)))), inverses.map(Self))
     }
 
     #[inline(always)]
