@@ -1,5 +1,7 @@
 //! The order in which a body keeps its nodes, and the caller's.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use super::definition::Spring;
@@ -46,6 +48,11 @@ impl NodeOrder {
     #[inline]
     pub fn own(&self, caller: u32) -> u32 {
         self.own.get(caller as usize).map_or(caller, |&own| own)
+    }
+
+    /// The body's own numbers of some of the caller's, where they are not the same.
+    pub fn owns(&self, callers: Range<usize>) -> &[u32] {
+        &self.own[callers]
     }
 
     /// The caller's number of one of the body's own.

@@ -10,8 +10,11 @@ use super::origin::Bounds;
 use crate::error::Result;
 use crate::memory;
 use crate::solver::show_closed;
-use crate::springs::{Loops, TILE, tile_count, tile_nodes};
+use crate::springs::{Loops, TILE, prefetch, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
+
+/// Positions in another order are fetched ahead in bodies of so many nodes.
+const FAR: usize = 1 << 16;
 
 /// Positions, written at the end of each step, and velocities, written when they are asked for.
 #[derive(Debug)]
@@ -37,6 +40,13 @@ impl Published {
 
     pub fn positions_mut(&mut self) -> &mut [Vec3] {
         &mut self.positions
+    }
+
+    /// The list of positions, and another as long that holds nothing while velocities were not asked for.
+    fn lists_mut(&mut self) -> [&mut [Vec3]; 2] {
+        self.forget_velocities();
+        let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
+        [&mut self.positions, blank]
     }
 
     /// The velocities, as `write` puts them into a list of as many where that was not done since they changed.
@@ -92,30 +102,31 @@ impl Body {
         let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
         let positions = self.state.positions();
         let count = positions.len();
-        let written = (
-            Tiles::new(self.published.positions_mut(), TILE),
-            Items::new(&mut self.boxes),
-        );
-        team.pass(
-            tile_count(count),
-            written,
-            |tile, (to, bounds): (&mut [Vec3], &mut Bounds)| {
-                let nodes = tile_nodes(tile, count);
-                *bounds = kernel.ranges(positions.slices(nodes.clone())).into();
-                if order.is_callers() {
-                    kernel.run(Publish {
-                        from: positions.slices(nodes),
-                        origin,
-                        to,
-                    });
-                } else {
-                    for (node, to) in nodes.zip(to) {
-                        let own = order.own(node as u32) as usize;
-                        *to = (positions.get(own).as_dvec3() + origin).as_vec3();
+        let [published, blank] = self.published.lists_mut();
+        let is_callers = order.is_callers();
+        let first = if is_callers { &mut *published } else { &mut *blank };
+        let written = (Tiles::new(first, TILE), Items::new(&mut self.boxes));
+        team.pass(tile_count(count), written, |tile, (to, bounds): (_, &mut Bounds)| {
+            let from = positions.slices(tile_nodes(tile, count));
+            *bounds = kernel.ranges(from).into();
+            kernel.run(Publish { from, origin, to });
+        });
+        if !is_callers {
+            // One way through memory for each node, not one for each of its coordinates.
+            let blank = &*blank;
+            team.pass(tile_count(count), Tiles::new(published, TILE), |tile, to| {
+                let own = order.owns(tile_nodes(tile, count));
+                // Fetched from memory all at once; what fits into a cache is not worth it.
+                if count >= FAR {
+                    for &own in own {
+                        prefetch(&raw const blank[own as usize]);
                     }
                 }
-            },
-        );
+                for (to, &own) in to.iter_mut().zip(own) {
+                    *to = blank[own as usize];
+                }
+            });
+        }
     }
 }
 
@@ -133,8 +144,8 @@ impl Loops for Publish<'_> {
     fn run(self) {
         let [x, y, z] = self.from;
         let origin = self.origin;
+        let placed = |local: f32, origin: f64| (f64::from(local) + origin) as f32;
         for (((to, &x), &y), &z) in self.to.iter_mut().zip(x).zip(y).zip(z) {
-            let placed = |local: f32, origin: f64| (f64::from(local) + origin) as f32;
             *to = Vec3::new(placed(x, origin.x), placed(y, origin.y), placed(z, origin.z));
         }
     }

@@ -15,7 +15,7 @@ mod tile;
 use std::fmt::Debug;
 
 pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, Loops, Range};
+pub(crate) use kernels::{ChosenKernel, Loops, Range, prefetch};
 pub(crate) use law::{pull, separation};
 use packed::Packed;
 pub(crate) use packed::Rounding;

@@ -17,7 +17,7 @@ mod strays;
 
 pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
 use lanes::Lanes;
-pub(super) use prefetch::prefetch;
+pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;
 use range::Ranges;
 
