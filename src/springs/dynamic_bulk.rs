@@ -7,10 +7,10 @@ use std::ops::RangeInclusive;
 
 use super::chain::{Chain, Element, Unlinked, unlinked};
 use super::ends::Ends;
-use super::gather::{Gather, prefetch_row};
-use super::kept::{KeptLink, NOBODY, empty_place, links, place_of, vacate};
-use super::kernels::prefetch;
-use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::gather::{Gather, RowStorage, Rows, prefetch_row};
+use super::kept::{KeptLink, empty_place, links, place_of, vacate};
+use super::kernels::{Eights, prefetch};
+use super::{ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
@@ -113,6 +113,7 @@ impl<L: KeptLink> Bulks<L> {
 /// Springs in chains of arrays.
 #[derive(Debug)]
 pub(super) struct DynamicBulk<L> {
+    kernel: ChosenKernel,
     spring_count: usize,
     springs_per_node: usize,
     nodes: Vec<Bulks<L>>,
@@ -120,7 +121,7 @@ pub(super) struct DynamicBulk<L> {
 
 impl<L: KeptLink> DynamicBulk<L> {
     /// Arrays of `springs_per_node` places; 0: chosen from the springs.
-    pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let springs_per_node = match springs_per_node {
             0 => least_memory::<L>(node_count, &ends),
@@ -136,14 +137,23 @@ impl<L: KeptLink> DynamicBulk<L> {
             nodes.push(bulks);
         }
         Ok(Self {
+            kernel,
             spring_count: springs.len(),
             springs_per_node,
             nodes,
         })
     }
+}
 
+impl<L: KeptLink> RowStorage for DynamicBulk<L> {
     #[inline(always)]
-    fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+    fn tile_forces<const DAMPED: bool>(
+        &self,
+        tile: usize,
+        motion: &Motion,
+        eights: impl Eights,
+        forces: &mut TileForces,
+    ) {
         let nodes = tile_nodes(tile, self.nodes.len());
         let gather = Gather::<DAMPED>::new(motion, nodes.start, self.nodes.len());
         for node in nodes {
@@ -154,16 +164,10 @@ impl<L: KeptLink> DynamicBulk<L> {
                 }
             }
             let bulks = &self.nodes[node];
-            let more = bulks.more.iter().flat_map(|bulk| taken(bulk));
-            gather.node(node, taken(&bulks.first).chain(more).map(L::link), forces);
+            let rows = std::iter::once(&bulks.first).chain(bulks.more.iter());
+            gather.node_of_rows(node, rows.map(|bulk| &**bulk), eights, forces);
         }
     }
-}
-
-/// The links of an array, without a look at how many they are.
-#[inline(always)]
-fn taken<L: KeptLink>(bulk: &Bulk<L>) -> impl Iterator<Item = &L> {
-    bulk.iter().take_while(|link| link.neighbour() != NOBODY)
 }
 
 /// The places of an array that are chosen from, where none are asked for.
@@ -206,11 +210,13 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        if L::DAMPED && motion.velocities.is_some() {
-            self.tile_forces::<true>(tile, motion, forces);
-        } else {
-            self.tile_forces::<false>(tile, motion, forces);
-        }
+        let storage = self;
+        self.kernel.run_with_eights(Rows {
+            storage,
+            tile,
+            motion,
+            forces,
+        });
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {

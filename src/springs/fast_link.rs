@@ -4,9 +4,10 @@
 //! nodes x places x the size of a link.
 
 use super::ends::Ends;
-use super::gather::{Gather, prefetch_row};
-use super::kept::{KeptLink, NOBODY, empty_place, links, place_of, vacate};
-use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::gather::{Gather, RowStorage, Rows, prefetch_row};
+use super::kept::{KeptLink, empty_place, links, place_of, vacate};
+use super::kernels::Eights;
+use super::{ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -17,6 +18,7 @@ const AHEAD: usize = 16;
 /// Springs in rows.
 #[derive(Debug)]
 pub(super) struct FastLink<L> {
+    kernel: ChosenKernel,
     node_count: usize,
     spring_count: usize,
     springs_per_node: usize,
@@ -25,7 +27,7 @@ pub(super) struct FastLink<L> {
 
 impl<L: KeptLink> FastLink<L> {
     /// Rows of `springs_per_node` places; 0: as many as the node with the most springs needs, at least one.
-    pub fn new(node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
+    pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
         let ends = Ends::of(node_count, springs)?;
         let (node, longest) = ends.longest();
         let springs_per_node = if springs_per_node == 0 {
@@ -46,6 +48,7 @@ impl<L: KeptLink> FastLink<L> {
             }
         }
         Ok(Self {
+            kernel,
             node_count,
             spring_count: springs.len(),
             springs_per_node,
@@ -72,17 +75,22 @@ impl<L: KeptLink> FastLink<L> {
     }
 }
 
-impl<L: KeptLink> FastLink<L> {
+impl<L: KeptLink> RowStorage for FastLink<L> {
     #[inline(always)]
-    fn tile_forces<const DAMPED: bool>(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
+    fn tile_forces<const DAMPED: bool>(
+        &self,
+        tile: usize,
+        motion: &Motion,
+        eights: impl Eights,
+        forces: &mut TileForces,
+    ) {
         let nodes = tile_nodes(tile, self.node_count);
         let width = self.springs_per_node;
         let gather = Gather::<DAMPED>::new(motion, nodes.start, self.node_count);
         let rows = self.places[nodes.start * width..nodes.end * width].chunks_exact(width);
         for (node, row) in nodes.zip(rows) {
             prefetch_row(row.as_ptr().wrapping_add(AHEAD * width), size_of_val(row));
-            let links = row.iter().take_while(|link| link.neighbour() != NOBODY);
-            gather.node(node, links.map(L::link), forces);
+            gather.node_of_rows(node, [row].into_iter(), eights, forces);
         }
     }
 }
@@ -108,11 +116,13 @@ impl<L: KeptLink> Springs for FastLink<L> {
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        if L::DAMPED && motion.velocities.is_some() {
-            self.tile_forces::<true>(tile, motion, forces);
-        } else {
-            self.tile_forces::<false>(tile, motion, forces);
-        }
+        let storage = self;
+        self.kernel.run_with_eights(Rows {
+            storage,
+            tile,
+            motion,
+            forces,
+        });
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {

@@ -1,11 +1,11 @@
 //! The force on a node as a sum over its own links: nothing else is written, so tiles can be worked on in any order.
 //!
-//! One link after the other, in plain code: on processors where a gather costs as much as the loads it stands for, many at
-//! a time are no faster as long as each place brings its own parameters.
+//! Links that lie side by side are worked on eight at a time where the processor can, others one after the other.
 
 use glam::Vec3;
 
-use super::kernels::prefetch;
+use super::kept::{KeptLink, NOBODY};
+use super::kernels::{Eights, Sight, WithEights, prefetch};
 use super::law::pull;
 use super::{Link, Motion, TileForces};
 
@@ -51,22 +51,127 @@ impl<'a, const DAMPED: bool> Gather<'a, DAMPED> {
     /// Writes the force of its links on `node`, and begins to fetch what is wanted after the forces.
     #[inline(always)]
     pub fn node(&self, node: usize, links: impl Iterator<Item = Link>, forces: &mut TileForces) {
+        self.fetch_soon(node);
+        let here = self.here(node);
+        let mut sum = Vec3::ZERO;
+        links.for_each(|link| sum += self.pull(here, &link));
+        forces.set(node - self.first, sum);
+    }
+
+    /// The same for links in arrays, empty places behind them.
+    #[inline(always)]
+    pub fn node_of_rows<'l, L: KeptLink>(
+        &self,
+        node: usize,
+        rows: impl Iterator<Item = &'l [L]>,
+        eights: impl Eights,
+        forces: &mut TileForces,
+    ) {
+        self.fetch_soon(node);
+        let here = self.here(node);
+        let sight = Sight {
+            positions: self.positions,
+            here: here.position,
+        };
+        let mut sum = Vec3::ZERO;
+        for row in rows {
+            let (groups, rest) = row.as_chunks::<8>();
+            for links in groups {
+                // Written out: a closure may be compiled on its own, without the kernel's instructions.
+                if !DAMPED
+                    && links[7].neighbour() != NOBODY
+                    && let Some(links) = L::eight(links)
+                    && let Some(force) = eights.pull(sight, links)
+                {
+                    sum += force;
+                } else {
+                    sum += self.pull_each(here, links);
+                }
+            }
+            sum += self.pull_each(here, rest);
+        }
+        forces.set(node - self.first, sum);
+    }
+
+    #[inline(always)]
+    fn fetch_soon(&self, node: usize) {
         let place = node - self.first;
         if place.is_multiple_of(LINE) {
             for axis in self.soon {
                 prefetch(axis.as_ptr().wrapping_add(place));
             }
         }
-        let position = at(self.positions, node);
-        let velocity = if DAMPED { at(self.velocities, node) } else { Vec3::ZERO };
+    }
+
+    #[inline(always)]
+    fn here(&self, node: usize) -> Here {
+        Here {
+            node,
+            position: at(self.positions, node),
+            velocity: if DAMPED { at(self.velocities, node) } else { Vec3::ZERO },
+        }
+    }
+
+    #[inline(always)]
+    fn pull(&self, here: Here, link: &Link) -> Vec3 {
+        let neighbour = link.neighbour as usize;
+        let offset = at(self.positions, neighbour) - here.position;
+        let velocity = DAMPED.then(|| at(self.velocities, neighbour) - here.velocity);
+        pull(here.node, link, offset, velocity)
+    }
+
+    #[inline(always)]
+    fn pull_each<L: KeptLink>(&self, here: Here, links: &[L]) -> Vec3 {
         let mut sum = Vec3::ZERO;
-        links.for_each(|link| {
-            let neighbour = link.neighbour as usize;
-            let offset = at(self.positions, neighbour) - position;
-            let velocity = DAMPED.then(|| at(self.velocities, neighbour) - velocity);
-            sum += pull(node, &link, offset, velocity);
-        });
-        forces.set(place, sum);
+        for link in links.iter().take_while(|link| link.neighbour() != NOBODY) {
+            sum += self.pull(here, &link.link());
+        }
+        sum
+    }
+}
+
+/// A node as its links see it.
+#[derive(Clone, Copy)]
+struct Here {
+    node: usize,
+    position: Vec3,
+    velocity: Vec3,
+}
+
+/// A storage that keeps the links of a node in arrays.
+pub(super) trait RowStorage {
+    /// Writes the forces on a tile. To be marked `#[inline(always)]`: it is compiled for each kernel.
+    fn tile_forces<const DAMPED: bool>(
+        &self,
+        tile: usize,
+        motion: &Motion,
+        eights: impl Eights,
+        forces: &mut TileForces,
+    );
+}
+
+/// The forces of such a storage on a tile, for a kernel to run.
+pub(super) struct Rows<'a, 'm, S> {
+    pub storage: &'a S,
+    pub tile: usize,
+    pub motion: &'a Motion<'m>,
+    pub forces: &'a mut TileForces,
+}
+
+impl<S: RowStorage> WithEights for Rows<'_, '_, S> {
+    #[inline(always)]
+    fn run<E: Eights>(self, eights: E) {
+        let Self {
+            storage,
+            tile,
+            motion,
+            forces,
+        } = self;
+        if motion.velocities.is_some() {
+            storage.tile_forces::<true>(tile, motion, eights, forces);
+        } else {
+            storage.tile_forces::<false>(tile, motion, eights, forces);
+        }
     }
 }
 

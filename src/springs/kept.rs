@@ -1,6 +1,7 @@
 //! What is kept of a link: bodies without damping along springs do not pay for it.
 
 use super::Link;
+use super::kernels::EightLinks;
 
 /// No node: a body has fewer.
 pub(super) const NOBODY: u32 = u32::MAX;
@@ -18,16 +19,13 @@ pub(super) trait KeptLink: Copy + Send + Sync + std::fmt::Debug + 'static {
     fn link(&self) -> Link;
 
     fn neighbour(&self) -> u32;
+
+    /// Eight links for a kernel, where it takes them.
+    fn eight(links: &[Self; 8]) -> Option<&EightLinks>;
 }
 
-/// A link of a body without damping along springs.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub(super) struct UndampedLink {
-    neighbour: u32,
-    stiffness: f32,
-    rest_length: f32,
-}
+/// A link of a body without damping along springs: the neighbour, and the bits of the stiffness and the rest length.
+pub(super) type UndampedLink = [u32; 3];
 
 /// A link of a body with damping along springs.
 #[repr(C)]
@@ -39,34 +37,32 @@ pub(super) struct DampedLink {
 
 impl KeptLink for UndampedLink {
     const DAMPED: bool = false;
-    const EMPTY: Self = Self {
-        neighbour: NOBODY,
-        stiffness: 0.0,
-        rest_length: 0.0,
-    };
+    const EMPTY: Self = [NOBODY, 0, 0];
 
     #[inline(always)]
     fn of(link: &Link) -> Self {
-        Self {
-            neighbour: link.neighbour,
-            stiffness: link.stiffness,
-            rest_length: link.rest_length,
-        }
+        [link.neighbour, link.stiffness.to_bits(), link.rest_length.to_bits()]
     }
 
     #[inline(always)]
     fn link(&self) -> Link {
+        let [neighbour, stiffness, rest_length] = *self;
         Link {
-            neighbour: self.neighbour,
-            stiffness: self.stiffness,
-            rest_length: self.rest_length,
+            neighbour,
+            stiffness: f32::from_bits(stiffness),
+            rest_length: f32::from_bits(rest_length),
             damping: 0.0,
         }
     }
 
     #[inline(always)]
     fn neighbour(&self) -> u32 {
-        self.neighbour
+        self[0]
+    }
+
+    #[inline(always)]
+    fn eight(links: &[Self; 8]) -> Option<&EightLinks> {
+        Some(links)
     }
 }
 
@@ -95,7 +91,12 @@ impl KeptLink for DampedLink {
 
     #[inline(always)]
     fn neighbour(&self) -> u32 {
-        self.undamped.neighbour
+        self.undamped.neighbour()
+    }
+
+    #[inline(always)]
+    fn eight(_links: &[Self; 8]) -> Option<&EightLinks> {
+        None
     }
 }
 

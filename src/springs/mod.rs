@@ -112,10 +112,12 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     Ok(match (definition.storage, damped) {
         (Storage::Packed, _) => Box::new(Packed::new(kernel, node_count, springs, definition.rounding())?),
         (Storage::Efficient, _) => Box::new(Efficient::new(node_count, springs)?),
-        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(node_count, springs, width)?),
-        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(node_count, springs, width)?),
-        (Storage::DynamicBulk, false) => Box::new(DynamicBulk::<UndampedLink>::new(node_count, springs, width)?),
-        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(node_count, springs, width)?),
+        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(kernel, node_count, springs, width)?),
+        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(kernel, node_count, springs, width)?),
+        (Storage::DynamicBulk, false) => {
+            Box::new(DynamicBulk::<UndampedLink>::new(kernel, node_count, springs, width)?)
+        }
+        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?),
     })
 }
 

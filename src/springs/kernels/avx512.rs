@@ -3,6 +3,10 @@
 use std::arch::x86_64::*;
 use std::array::from_fn;
 
+use glam::Vec3;
+
+use super::avx2::{Avx2Lanes, four};
+use super::eights::{EightLinks, Sight};
 use super::lanes::Lanes;
 
 #[derive(Clone, Copy)]
@@ -31,14 +35,15 @@ impl Lanes for Avx512Lanes {
 
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
-        unsafe { Self(_mm512_i32gather_ps::<4>(_mm512_loadu_si512(indices.cast()), base)) }
+        unsafe { Self(sixteen(from_fn(|lane| base.wrapping_add(*indices.add(lane) as usize)))) }
     }
 
     #[inline(always)]
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
         unsafe {
-            let indices = _mm512_cvtepu16_epi32(_mm256_loadu_si256(indices.cast()));
-            Self(_mm512_i32gather_ps::<4>(indices, base))
+            Self(sixteen(from_fn(|lane| {
+                base.wrapping_add(usize::from(*indices.add(lane)))
+            })))
         }
     }
 
@@ -77,6 +82,12 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
+    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
+        // Part of what a processor with AVX-512 has.
+        unsafe { Avx2Lanes::pull_eight(sight, links) }
+    }
+
+    #[inline(always)]
     unsafe fn where_set(self, mask: u32) -> Self {
         Self(unsafe { _mm512_maskz_mov_ps(mask as __mmask16, self.0) })
     }
@@ -94,5 +105,19 @@ impl Lanes for Avx512Lanes {
     #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         unsafe { _mm512_cmp_ps_mask::<_CMP_UNORD_Q>(self.0, self.0) != 0 }
+    }
+}
+
+/// Sixteen numbers from sixteen places.
+#[inline(always)]
+unsafe fn sixteen(places: [*const f32; 16]) -> __m512 {
+    let [a, b, c, d] =
+        [0, 4, 8, 12].map(|first| [places[first], places[first + 1], places[first + 2], places[first + 3]]);
+    // SAFETY: the caller promises the instructions and the places.
+    unsafe {
+        let lanes = _mm512_castps128_ps512(four(a));
+        let lanes = _mm512_insertf32x4::<1>(lanes, four(b));
+        let lanes = _mm512_insertf32x4::<2>(lanes, four(c));
+        _mm512_insertf32x4::<3>(lanes, four(d))
     }
 }

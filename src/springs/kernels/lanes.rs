@@ -1,5 +1,9 @@
 //! What the spring kernel asks of a processor: some numbers side by side.
 
+use glam::Vec3;
+
+use super::eights::{EightLinks, Sight, pull_one_by_one};
+
 /// A few `f32` side by side, and what the spring kernel does with them.
 ///
 /// # Safety
@@ -38,6 +42,12 @@ pub(super) trait Lanes: Copy {
         stiffnesses: [Self; N],
         half_tensions: [Self; N],
     ) -> ([Self; N], [Self; N]);
+
+    /// As [`Eights::pull`](super::Eights::pull).
+    #[inline(always)]
+    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
+        pull_one_by_one(sight, links)
+    }
 
     /// 0 in the lanes whose bit in `mask` is not set.
     unsafe fn where_set(self, mask: u32) -> Self;

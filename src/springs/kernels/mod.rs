@@ -6,6 +6,7 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod columns;
+mod eights;
 mod forces;
 mod lanes;
 #[cfg(all(target_arch = "aarch64", target_endian = "little"))]
@@ -16,6 +17,7 @@ mod range;
 mod strays;
 
 pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
+pub(super) use eights::{EightLinks, Eights, Sight, WithEights};
 use lanes::Lanes;
 pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;
