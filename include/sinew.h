@@ -879,7 +879,8 @@ sinew_status sinew_body_get_positions(const struct sinew_world *world,
 
 /**
  * Writes a view of how fast each node moves at the time of the positions, m/s; a pinned node as it was led in the last
- * step. Nothing is copied; see sinew_vec3_view for how long it lives.
+ * step. The first call after a step works them out, which takes about as long as a substep; see sinew_vec3_view for how
+ * long the view lives.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
  *

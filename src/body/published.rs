@@ -97,6 +97,12 @@ impl Body {
         })
     }
 
+    /// Where velocities are when they have been asked for.
+    pub(crate) fn published_velocities(&mut self) -> Range<*const Vec3> {
+        let [_, velocities] = self.published.lists_mut();
+        velocities.as_ptr_range()
+    }
+
     /// Writes the positions for callers, and finds the box of each tile.
     pub(super) fn publish(&mut self, team: &Team) {
         let (kernel, origin, order) = (self.kernel, self.origin, &self.order);

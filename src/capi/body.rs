@@ -404,7 +404,8 @@ pub unsafe extern "C" fn sinew_body_get_positions(
 }
 
 /// Writes a view of how fast each node moves at the time of the positions, m/s; a pinned node as it was led in the last
-/// step. Nothing is copied; see sinew_vec3_view for how long it lives.
+/// step. The first call after a step works them out, which takes about as long as a substep; see sinew_vec3_view for how
+/// long the view lives.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
 ///
@@ -464,7 +465,7 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
     // SAFETY: the same contract.
     unsafe {
         with_body_mut(world, body, |body| {
-            let own = body.velocities().as_ptr_range();
+            let own = body.published_velocities();
             let velocities = memory::array_apart("velocities", velocities.cast(), node_count, own)?;
             body.set_velocities(&velocities)
         })
