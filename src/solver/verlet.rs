@@ -102,7 +102,7 @@ impl Step<'_> {
         let mut index = 0;
         while index < substeps {
             let mut parts = [part; DEEPEST];
-            let depth = if index == 0 { 1 } else { self.depth(index, &mut carry) };
+            let depth = if index == 0 { 1 } else { self.depth(index, &carry) };
             for (index, part) in (index..).zip(&mut parts[..depth]) {
                 if index > 0 {
                     part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
@@ -116,7 +116,10 @@ impl Step<'_> {
                 let surveys = pipeline::run(body, request, parts, plan, team);
                 for survey in &surveys[..depth - 1] {
                     if !carry.stability.holds_after(substep * diagonal(&survey.velocities)) {
-                        return Ok(None);
+                        match carry.stability.for_short(substep) {
+                            Some(anywhere) => carry.stability = anywhere,
+                            None => return Ok(None),
+                        }
                     }
                 }
                 carry.gravity.velocities = surveys[depth - 1].velocities;
@@ -161,22 +164,20 @@ impl Step<'_> {
         Ok(Some(Taken { carry, finite }))
     }
 
-    /// How many substeps are taken next in one go: as many as a pipeline takes, in even parts, and as the motion is known to
-    /// be stable for, if it does not become twice as fast.
-    fn depth(&self, index: u32, carry: &mut Carry) -> usize {
+    /// How many substeps are taken next in one go: as many as a pipeline takes, in even parts, where the substep is stable
+    /// wherever the nodes are, else as the motion is known to be stable for if it does not become twice as fast.
+    fn depth(&self, index: u32, carry: &Carry) -> usize {
         let Some(plan) = self.pipeline else {
             return 1;
         };
         let left = (self.substeps - index) as usize;
         let depth = left.div_ceil(left.div_ceil(plan.depth));
-        let travel = 2.0 * self.substep * diagonal(&carry.gravity.velocities);
-        let stable = |stability: &Stability| stability.substeps_of(travel).min(depth as f32) as usize;
-        if stable(&carry.stability) < depth
-            && let Some(anywhere) = carry.stability.for_short(self.substep)
-        {
-            carry.stability = anywhere;
+        if carry.stability.for_short(self.substep).is_some() {
+            return depth;
         }
-        stable(&carry.stability).max(1)
+        let travel = 2.0 * self.substep * diagonal(&carry.gravity.velocities);
+        let stable = carry.stability.substeps_of(travel).min(depth as f32) as usize;
+        stable.max(1)
     }
 }
 

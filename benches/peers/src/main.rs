@@ -1,8 +1,9 @@
 //! The same cloth, side by side in one run: sinew, Taichi, NVIDIA Warp, Rapier's soft bodies and Bullet's.
 //!
 //! ```text
-//! cd benches/peers && cargo run --release             # some 20 minutes
-//! cd benches/peers && cargo run --release -- --quick  # below one minute
+//! cd benches/peers && cargo run --release                  # some 20 minutes
+//! cd benches/peers && cargo run --release -- --seconds 20  # each contender on each cloth, at most
+//! cd benches/peers && cargo run --release -- --quick       # below one minute
 //! ```
 //!
 //! What is not installed is skipped, loudly. A table is printed and written to `target/report/peers.md`, with what was
@@ -77,9 +78,16 @@ fn main() {
     match arguments.first().map(String::as_str) {
         None => compare(&FULL),
         Some("--quick") => compare(&QUICK),
+        Some("--seconds") => match arguments.get(1).and_then(|seconds| seconds.parse().ok()) {
+            Some(seconds) => compare(&Effort { seconds, ..FULL }),
+            None => {
+                eprintln!("--seconds: how many for each contender?");
+                std::process::exit(2);
+            }
+        },
         Some("child") => serve(&arguments[1..]),
         Some(other) => {
-            eprintln!("{other} is not understood: --quick, or nothing");
+            eprintln!("{other} is not understood: --quick, --seconds and a number, or nothing");
             std::process::exit(2);
         }
     }

@@ -5,7 +5,7 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
-use super::avx2::{Avx2Lanes, four};
+use super::avx2::{Avx2Lanes, four_at, four_near};
 use super::eights::{EightLinks, Sight};
 use super::lanes::Lanes;
 
@@ -35,15 +35,25 @@ impl Lanes for Avx512Lanes {
 
     #[inline(always)]
     unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
-        unsafe { Self(sixteen(from_fn(|lane| base.wrapping_add(*indices.add(lane) as usize)))) }
+        unsafe {
+            Self(sixteen(
+                four_at(base, indices),
+                four_at(base, indices.add(4)),
+                four_at(base, indices.add(8)),
+                four_at(base, indices.add(12)),
+            ))
+        }
     }
 
     #[inline(always)]
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
         unsafe {
-            Self(sixteen(from_fn(|lane| {
-                base.wrapping_add(usize::from(*indices.add(lane)))
-            })))
+            Self(sixteen(
+                four_near(base, indices),
+                four_near(base, indices.add(4)),
+                four_near(base, indices.add(8)),
+                four_near(base, indices.add(12)),
+            ))
         }
     }
 
@@ -108,16 +118,13 @@ impl Lanes for Avx512Lanes {
     }
 }
 
-/// Sixteen numbers from sixteen places.
 #[inline(always)]
-unsafe fn sixteen(places: [*const f32; 16]) -> __m512 {
-    let [a, b, c, d] =
-        [0, 4, 8, 12].map(|first| [places[first], places[first + 1], places[first + 2], places[first + 3]]);
-    // SAFETY: the caller promises the instructions and the places.
+unsafe fn sixteen(a: __m128, b: __m128, c: __m128, d: __m128) -> __m512 {
+    // SAFETY: the caller promises the instructions.
     unsafe {
-        let lanes = _mm512_castps128_ps512(four(a));
-        let lanes = _mm512_insertf32x4::<1>(lanes, four(b));
-        let lanes = _mm512_insertf32x4::<2>(lanes, four(c));
-        _mm512_insertf32x4::<3>(lanes, four(d))
+        let lanes = _mm512_castps128_ps512(a);
+        let lanes = _mm512_insertf32x4::<1>(lanes, b);
+        let lanes = _mm512_insertf32x4::<2>(lanes, c);
+        _mm512_insertf32x4::<3>(lanes, d)
     }
 }

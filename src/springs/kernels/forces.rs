@@ -148,6 +148,17 @@ struct Place<L> {
     velocity: [L; 3],
 }
 
+impl<L: Copy> Place<L> {
+    /// Velocities are not asked for.
+    #[inline(always)]
+    fn still(position: [L; 3]) -> Self {
+        Self {
+            position,
+            velocity: position,
+        }
+    }
+}
+
 /// A column of springs: what they are like, where they lead, and which lanes have one.
 #[derive(Clone, Copy)]
 struct Links<L> {
@@ -165,7 +176,7 @@ impl Tile<'_> {
         // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
         // set, and within the margins elsewhere.
         unsafe {
-            let here = self.places::<L, DAMPED>(|axis| L::load(axis.wrapping_add(node)));
+            let here = self.at::<L, DAMPED>(node as isize);
             let mut sums = Sums([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
             let (groups, rest) = runs.as_chunks::<GROUP>();
@@ -200,7 +211,7 @@ impl Tile<'_> {
                     half_tension: L::splat(run.half_tension),
                     damping: L::splat(damping),
                 },
-                there: self.beside::<L, DAMPED>(node, run.offset),
+                there: self.at::<L, DAMPED>(node as isize + run.offset as isize),
                 lanes: u32::from(run.lanes) >> lane,
             }
         }
@@ -220,14 +231,14 @@ impl Tile<'_> {
         let mut own = start.own as usize;
         // SAFETY: as in `runs`; gathers were checked to lead to nodes of the body.
         unsafe {
-            let here = self.places::<L, DAMPED>(|axis| L::load(axis.wrapping_add(node)));
+            let here = self.at::<L, DAMPED>(node as isize);
             for run in columns
                 .own_runs
                 .get_unchecked(start.own_runs as usize..end.own_runs as usize)
             {
                 let links = Links {
                     spring: self.spring::<L, DAMPED>(None, &mut own, lane),
-                    there: self.beside::<L, DAMPED>(node, run.offset),
+                    there: self.at::<L, DAMPED>(node as isize + run.offset as isize),
                     lanes: u32::from(run.lanes) >> lane,
                 };
                 sums.add::<1, DAMPED>(here, [links]);
@@ -236,7 +247,7 @@ impl Tile<'_> {
                 let header = columns.near.get_unchecked(near);
                 let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.places::<L, DAMPED>(|axis| L::gather_near(axis.wrapping_add(columns.window), indices));
+                let there = self.gathered_near::<L, DAMPED>(indices);
                 let links = Links {
                     spring,
                     there,
@@ -248,7 +259,7 @@ impl Tile<'_> {
                 let header = columns.far.get_unchecked(far);
                 let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
                 let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.places::<L, DAMPED>(|axis| L::gather(axis, indices));
+                let there = self.gathered::<L, DAMPED>(indices);
                 let links = Links {
                     spring,
                     there,
@@ -270,8 +281,8 @@ impl Tile<'_> {
             let lane = part * L::COUNT;
             // SAFETY: strays were checked to lead to nodes of the body.
             unsafe {
-                let here = self.places::<L, DAMPED>(|axis| L::gather(axis, batch.nodes.as_ptr().add(lane)));
-                let there = self.places::<L, DAMPED>(|axis| L::gather(axis, batch.neighbours.as_ptr().add(lane)));
+                let here = self.gathered::<L, DAMPED>(batch.nodes.as_ptr().add(lane));
+                let there = self.gathered::<L, DAMPED>(batch.neighbours.as_ptr().add(lane));
                 let stiffness = L::load(batch.stiffnesses.0.as_ptr().add(lane));
                 let rest_length = L::load(batch.rest_lengths.0.as_ptr().add(lane));
                 let spring = Spring {
@@ -308,27 +319,76 @@ impl Tile<'_> {
         }
     }
 
+    /// Sixteen nodes, or as many as `L` has lanes, from `node` on.
     #[inline(always)]
-    unsafe fn places<L: Lanes, const DAMPED: bool>(&self, fetch: impl Fn(*const f32) -> L) -> Place<L> {
-        let [x, y, z] = self.positions;
-        let position = [fetch(x), fetch(y), fetch(z)];
-        match self.velocities {
-            Some([x, y, z]) if DAMPED => Place {
-                position,
-                velocity: [fetch(x), fetch(y), fetch(z)],
-            },
-            _ => Place {
-                position,
-                velocity: position,
-            },
+    unsafe fn at<L: Lanes, const DAMPED: bool>(&self, node: isize) -> Place<L> {
+        // Written out here and below: a closure may be compiled on its own, without the kernel's instructions.
+        // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
+        unsafe {
+            let [x, y, z] = self.positions;
+            let position = [
+                L::load(x.wrapping_offset(node)),
+                L::load(y.wrapping_offset(node)),
+                L::load(z.wrapping_offset(node)),
+            ];
+            match self.velocities {
+                Some([x, y, z]) if DAMPED => Place {
+                    position,
+                    velocity: [
+                        L::load(x.wrapping_offset(node)),
+                        L::load(y.wrapping_offset(node)),
+                        L::load(z.wrapping_offset(node)),
+                    ],
+                },
+                _ => Place::still(position),
+            }
         }
     }
 
-    /// The nodes that lie this far from those from `node` on.
+    /// The nodes with these numbers.
     #[inline(always)]
-    unsafe fn beside<L: Lanes, const DAMPED: bool>(&self, node: usize, offset: i32) -> Place<L> {
-        // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
-        unsafe { self.places::<L, DAMPED>(|axis| L::load(axis.wrapping_offset(node as isize + offset as isize))) }
+    unsafe fn gathered<L: Lanes, const DAMPED: bool>(&self, indices: *const u32) -> Place<L> {
+        // SAFETY: the numbers were checked to be those of nodes.
+        unsafe {
+            let [x, y, z] = self.positions;
+            let position = [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)];
+            match self.velocities {
+                Some([x, y, z]) if DAMPED => Place {
+                    position,
+                    velocity: [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)],
+                },
+                _ => Place::still(position),
+            }
+        }
+    }
+
+    /// The nodes with these numbers, counted from the window.
+    #[inline(always)]
+    unsafe fn gathered_near<L: Lanes, const DAMPED: bool>(&self, indices: *const u16) -> Place<L> {
+        let window = self.columns.window;
+        // SAFETY: as in `gathered`.
+        unsafe {
+            let [x, y, z] = self.positions.map(|axis| axis.wrapping_add(window));
+            let position = [
+                L::gather_near(x, indices),
+                L::gather_near(y, indices),
+                L::gather_near(z, indices),
+            ];
+            match self.velocities {
+                Some(velocities) if DAMPED => {
+                    let [x, y, z] = velocities.map(|axis| axis.wrapping_add(window));
+                    Place {
+                        position,
+                        velocity: [
+                            L::gather_near(x, indices),
+                            L::gather_near(y, indices),
+                            L::gather_near(z, indices),
+                        ],
+                    }
+                }
+                _ => Place::still(position),
+            }
+        }
     }
 
     /// The parameters of a column; `own` counts those that bring their own.
