@@ -205,7 +205,10 @@ impl Pass<'_> {
                 forces[..nodes.len()].copy_from_slice(first);
             }
         } else {
-            let [vx, vy, vz] = written.velocities.each_ref().map(|axis| &**axis);
+            let [vx, vy, vz] = match self.first_velocities {
+                Some(velocities) => velocities.slices(nodes.clone()),
+                None => written.velocities.each_ref().map(|axis| &**axis),
+            };
             let [x, y, z] = written.next_positions.each_ref().map(|axis| &**axis);
             let motion = Motion {
                 positions: self.positions,
