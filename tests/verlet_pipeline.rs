@@ -3,7 +3,7 @@
 mod support;
 
 use glam::Vec3;
-use sinew::{Kernel, WorldDefinition};
+use sinew::WorldDefinition;
 use support::bodies::{FREE, Parts, Random, Scene};
 
 /// A sheet of `side` x `side` nodes, joined to all eight about them, with some long springs, pins and unlike masses.
@@ -38,11 +38,10 @@ fn sheet(side: usize, long_springs: usize, damping: f32, random: &mut Random) ->
     parts
 }
 
-fn world(substeps: u32, thread_count: u32, kernel: Kernel) -> WorldDefinition {
+fn world(substeps: u32, thread_count: u32) -> WorldDefinition {
     WorldDefinition {
         substeps,
         thread_count,
-        kernel,
         ..FREE
     }
 }
@@ -61,7 +60,7 @@ fn many_substeps_in_a_step_are_as_many_steps() {
     const H: f32 = 1.0 / 4096.0;
     for (side, long_springs, damping) in [(230, 0, 0.0), (230, 0, 1e-4), (200, 30, 0.0)] {
         let parts = sheet(side, long_springs, damping, &mut Random::new(81));
-        let mut one_by_one = moving(&parts, world(1, 1, Kernel::Best));
+        let mut one_by_one = moving(&parts, world(1, 1));
         let steps = [16, 1, 2, 3, 40, 21];
         let mut ends = Vec::new();
         for substeps in steps {
@@ -70,10 +69,10 @@ fn many_substeps_in_a_step_are_as_many_steps() {
         }
         for threads in [1, 2, 3] {
             for (substeps, (positions, velocities)) in [16, 40].into_iter().zip([&ends[0], &ends[4]]) {
-                let mut scene = moving(&parts, world(substeps, threads, Kernel::Best));
+                let mut scene = moving(&parts, world(substeps, threads));
                 if substeps == 40 {
                     // As many substeps before.
-                    scene = moving(&parts, world(62, threads, Kernel::Best));
+                    scene = moving(&parts, world(62, threads));
                     scene.step(62.0 * H);
                 } else {
                     scene.step(substeps as f32 * H);

@@ -177,12 +177,7 @@ impl Vectors {
 
     /// All of them, in order.
     pub fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
-        self.of(0..self.len())
-    }
-
-    /// Those of some nodes, in order.
-    pub fn of(&self, nodes: Range<usize>) -> impl Iterator<Item = Vec3> + '_ {
-        let [x, y, z] = self.slices(nodes);
+        let [x, y, z] = self.axes();
         x.iter().zip(y).zip(z).map(|((&x, &y), &z)| Vec3::new(x, y, z))
     }
 

@@ -8,7 +8,7 @@
 use std::array::from_fn;
 
 use super::attempt::StepRequest;
-use super::kick::{Kick, Survey};
+use super::kick::Survey;
 use super::substep::{Part, Pass, Written};
 use crate::body::{Body, InverseMasses, NodeDamping, Pin, Vectors, View};
 use crate::springs::{ChosenKernel, Springs, TILE, TileForces, tile_count, tile_nodes};
@@ -189,16 +189,7 @@ impl Common<'_> {
             masses: self.masses,
             request: self.request,
             part,
-            kick: Kick {
-                duration: part.duration,
-                substep: part.substep,
-                half: part.half,
-                gravity: self.request.gravity,
-                fall: part.fall,
-                inverse_masses: self.inverse_masses,
-                applied: None,
-                damping: self.damping,
-            },
+            kick: part.kick(self.request.gravity, self.inverse_masses, self.damping),
             positions,
             first_velocities: None,
             first_forces: None,

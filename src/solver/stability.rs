@@ -43,16 +43,18 @@ impl Rates {
         let directed = sums.along.largest_eigenvalue_beyond(self.stiffest - across);
         self.stiffest = self.stiffest.max(directed + across);
         self.most_damped = sums.damping.largest_eigenvalue_beyond(self.most_damped);
-        // Springs beyond the range of `f32` allow no substep at all.
-        if !(sums.anywhere.stiffest.is_finite() && sums.anywhere.most_damped.is_finite()) {
-            self.stiffest = f32::INFINITY;
-        }
+        self.forbid_unless_finite(sums.anywhere);
     }
 
     /// Takes in a node's rates.
     fn take_rates(&mut self, rates: Self) {
         self.stiffest = self.stiffest.max(rates.stiffest);
         self.most_damped = self.most_damped.max(rates.most_damped);
+        self.forbid_unless_finite(rates);
+    }
+
+    /// Springs beyond the range of `f32` allow no substep at all.
+    fn forbid_unless_finite(&mut self, rates: Self) {
         if !(rates.stiffest.is_finite() && rates.most_damped.is_finite()) {
             self.stiffest = f32::INFINITY;
         }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::{Body, InverseMasses, Pin, Vectors, View};
+use crate::body::{Body, InverseMasses, NodeDamping, Pin, Vectors, View};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -64,6 +64,25 @@ impl Part {
         }
     }
 
+    /// The kick, without forces from outside.
+    pub fn kick<'a>(
+        &self,
+        gravity: Vec3,
+        inverse_masses: InverseMasses<'a>,
+        damping: Option<&'a NodeDamping>,
+    ) -> Kick<'a> {
+        Kick {
+            duration: self.duration,
+            substep: self.substep,
+            half: self.half,
+            gravity,
+            fall: self.fall,
+            inverse_masses,
+            applied: None,
+            damping,
+        }
+    }
+
     /// The kick that closes the last step becomes part of this one.
     pub fn join(&mut self, closing: &ClosingKick) {
         self.before = Before::CurrentOpen;
@@ -101,14 +120,8 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
     let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
     let state = body.state.substep();
     let kick = Kick {
-        duration: part.duration,
-        substep: part.substep,
-        half: part.half,
-        gravity: request.gravity,
-        fall: part.fall,
-        inverse_masses,
         applied: body.applied.as_ref().filter(|_| body.forces_applied),
-        damping: body.damping.as_ref(),
+        ..part.kick(request.gravity, inverse_masses, body.damping.as_ref())
     };
     let tiles = tile_count(node_count);
     if part.before == Before::Open

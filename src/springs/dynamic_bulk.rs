@@ -210,9 +210,8 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
     }
 
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
-        let storage = self;
         self.kernel.run_with_eights(Rows {
-            storage,
+            storage: self,
             tile,
             motion,
             forces,

@@ -1,5 +1,4 @@
 //! Data that tiles change, cut so that each has a part of its own.
-#![allow(dead_code, reason = "solvers choose what they need")]
 
 use std::marker::PhantomData;
 
