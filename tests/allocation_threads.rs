@@ -1,44 +1,24 @@
 //! A step allocates nothing on any of its threads. Alone in its program: everything that is asked for is counted.
 #![allow(unsafe_code)]
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "support/counting.rs"]
+mod counting;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use counting::Counting;
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Error, Values, World, WorldDefinition};
 
-/// Counts what all threads ask for.
-struct Counting;
-
 static ASKED: AtomicU64 = AtomicU64::new(0);
 
+/// What all threads ask for.
 fn count() {
     ASKED.fetch_add(1, Ordering::Relaxed);
 }
 
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the same contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the same contract.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the same contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: Counting = Counting(count);
 
 fn asked(call: impl FnOnce()) -> u64 {
     let before = ASKED.load(Ordering::Relaxed);
