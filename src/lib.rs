@@ -8,6 +8,8 @@ mod error;
 mod memory;
 pub mod mesh;
 mod picture;
+#[cfg(test)]
+mod random;
 pub mod raster;
 mod slots;
 mod solver;

@@ -2,31 +2,9 @@ use glam::Quat;
 
 use super::*;
 use crate::mesh::Mesh;
+use crate::random::Random;
 
 type Body = (Vec<Vec3>, Vec<[u32; 2]>);
-
-/// Numbers below `limit`, the same on every run.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % limit
-    }
-
-    fn share(&mut self) -> f32 {
-        self.below(1 << 24) as f32 / (1 << 24) as f32
-    }
-
-    fn shuffle<T>(&mut self, values: &mut [T]) {
-        for i in (1..values.len()).rev() {
-            values.swap(i, self.below(i + 1));
-        }
-    }
-}
 
 /// A lattice in rows along x, every node joined to all around it.
 fn lattice(size: [u32; 3]) -> Body {
@@ -149,7 +127,7 @@ fn an_organ_is_no_worse_than_as_given_however_it_is_mixed() {
 fn random_points_come_in_an_order_that_keeps_neighbours_near() {
     let mut random = Random(3);
     let positions: Vec<Vec3> = (0..20_000)
-        .map(|_| Vec3::new(random.share(), random.share(), random.share()))
+        .map(|_| Vec3::new(random.unit(), random.unit(), random.unit()))
         .collect();
     // Along x only those within the radius are compared.
     let mut by_x = identity(positions.len());
@@ -182,7 +160,7 @@ fn the_order_does_not_depend_on_the_run() {
 fn nasty() -> Vec<(&'static str, Body)> {
     let count = 3000;
     let mut random = Random(11);
-    let mut point = |scale: f32| Vec3::new(random.share(), random.share(), random.share()) * scale;
+    let mut point = |scale: f32| Vec3::new(random.unit(), random.unit(), random.unit()) * scale;
     let somewhere: Vec<Vec3> = (0..count).map(|_| point(1.0)).collect();
     let on_a_line: Vec<Vec3> = (0..count)
         .map(|i| Vec3::new((i * 7 % count) as f32, 0.0, 0.0))

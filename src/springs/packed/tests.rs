@@ -5,30 +5,10 @@ use glam::{DVec3, Vec3};
 
 use super::{Packed, Rounding};
 use crate::body::{Spring, Vectors};
+use crate::random::Random;
 use crate::springs::{Kernel, Link, Motion, Springs, TileForces, tile_count, tile_nodes};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
-
-/// A fixed generator.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % limit
-    }
-
-    fn unit(&mut self) -> f32 {
-        self.below(1 << 24) as f32 / (1 << 24) as f32
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-    }
-}
 
 /// Springs between nodes, by their lower and their higher node.
 type Pairs = BTreeMap<[u32; 2], Spring>;
