@@ -386,6 +386,16 @@ typedef struct sinew_body_def {
    * 0.
    */
   uint32_t reserved;
+  /**
+   * IMPLICIT: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
+   * default: 2.
+   */
+  uint32_t order;
+  /**
+   * IMPLICIT: how often the equation of a step may be multiplied out while it is solved, each about as long as a substep
+   * of VERLET; 0, the default: 1000.
+   */
+  uint32_t iterations;
 } sinew_body_def;
 
 /**
@@ -468,6 +478,26 @@ typedef struct sinew_storage_report {
    */
   size_t bytes_reserved;
 } sinew_storage_report;
+
+/**
+ * How a body's solver took the last step.
+ */
+typedef struct sinew_solver_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * IMPLICIT: how often the equations of the step were multiplied out; 0 for other solvers.
+   */
+  uint32_t iterations;
+  /**
+   * IMPLICIT: how far nodes may be from where the step's equation has them, root mean square by mass, m; above what
+   * rounding allows only where `iterations` of the definition were not enough. What a shorter step would change is not in
+   * it.
+   */
+  float error;
+} sinew_solver_report;
 
 /**
  * What a tool is. Filled by sinew_tool_def_init; used only during sinew_tool_create.
@@ -815,7 +845,7 @@ sinew_status sinew_body_def_init(struct sinew_body_def *def, size_t struct_size)
 /**
  * Creates a body; copies what `def` points to.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a solver other than VERLET), SINEW_STATUS_CAPACITY
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (NEWTON), SINEW_STATUS_CAPACITY
  * (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
@@ -1018,6 +1048,18 @@ sinew_status sinew_body_get_energy(const struct sinew_world *world,
 sinew_status sinew_body_get_storage_report(const struct sinew_world *world,
                                            struct sinew_body_id body,
                                            struct sinew_storage_report *out);
+
+/**
+ * Writes how a body's solver took the last step. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_body_get_solver_report(const struct sinew_world *world,
+                                          struct sinew_body_id body,
+                                          struct sinew_solver_report *out);
 
 /**
  * Fills `def` with the defaults. `struct_size` is sizeof(sinew_tool_def).

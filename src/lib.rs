@@ -19,7 +19,7 @@ mod world;
 
 pub use body::{Body, BodyDefinition, Solver, Storage, Values};
 pub use contact::{Detection, Pose, Shape, ToolDefinition};
-pub use diagnostics::{Energy, StorageReport};
+pub use diagnostics::{Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
 pub use picture::PictureDefinition;
 pub use springs::Kernel;

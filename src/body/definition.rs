@@ -60,6 +60,9 @@ pub enum Solver {
     Newton,
 }
 
+/// The most iterations of a step.
+const MOST_ITERATIONS: u32 = 1_000_000;
+
 /// What a body is made of. Plain data, used only during [`World::create_body`](crate::World::create_body).
 #[derive(Clone, Copy, Debug)]
 pub struct BodyDefinition<'a> {
@@ -91,6 +94,10 @@ pub struct BodyDefinition<'a> {
     pub springs_per_node: u32,
     /// How the body is moved.
     pub solver: Solver,
+    /// [`Solver::Implicit`], [`Solver::Newton`]: 1, implicit Euler; 2, the second backward difference formula; 0: 2.
+    pub order: u32,
+    /// [`Solver::Implicit`]: the most products with the matrix of its equation in a step; 0: 1000.
+    pub iterations: u32,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -110,6 +117,8 @@ impl Default for BodyDefinition<'_> {
             storage: Storage::Packed,
             springs_per_node: 0,
             solver: Solver::Verlet,
+            order: 0,
+            iterations: 0,
         }
     }
 }
@@ -210,9 +219,18 @@ impl BodyDefinition<'_> {
     }
 
     fn check_offered(&self) -> Result<()> {
-        if self.solver != Solver::Verlet {
+        if self.order > 2 {
+            return Err(Error::invalid(format!("order is {}: must be 0, 1 or 2", self.order)));
+        }
+        if self.iterations > MOST_ITERATIONS {
+            return Err(Error::invalid(format!(
+                "iterations is {}: must be at most {MOST_ITERATIONS}",
+                self.iterations
+            )));
+        }
+        if self.solver == Solver::Newton {
             return Err(Error::Unsupported(format!(
-                "solver is {:?}: this version offers Verlet alone",
+                "solver is {:?}: this version does not offer it",
                 self.solver
             )));
         }

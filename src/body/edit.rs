@@ -75,6 +75,9 @@ impl Body {
             }
         }
         self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+        }
         Ok(())
     }
 
@@ -89,7 +92,7 @@ impl Body {
             self.pins.insert(own)?;
             self.inverse_masses[own as usize] = 0.0;
             self.set_velocity(node, Vec3::ZERO);
-            self.carry.stability = Stability::UNKNOWN;
+            self.forget_matrix();
         }
         Ok(())
     }
@@ -111,7 +114,7 @@ impl Body {
             close(self);
             self.pins.remove(own);
             self.inverse_masses[own as usize] = 1.0 / mass;
-            self.carry.stability = Stability::UNKNOWN;
+            self.forget_matrix();
         }
         Ok(())
     }
@@ -172,6 +175,9 @@ impl Body {
             error => error,
         })?;
         self.forces_current = false;
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
+        }
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         let stability = self.carry.stability;
         self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
@@ -193,6 +199,9 @@ impl Body {
         let link = link.ok_or_else(|| not_joined(a, b))?;
         self.springs.remove(own_a, own_b)?;
         self.forces_current = false;
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
+        }
         let other = Link {
             neighbour: own_a,
             ..link
@@ -203,6 +212,14 @@ impl Body {
             self.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
+    }
+
+    /// Other nodes move now.
+    fn forget_matrix(&mut self) {
+        self.carry.stability = Stability::UNKNOWN;
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
+        }
     }
 
     /// Keeps the velocities at the time of the positions as they are after a spring has come (sign -1) or gone (1), given

@@ -50,6 +50,9 @@ impl Body {
             hasher.write_floats(&[closing.substep]);
             hasher.write_floats(&closing.gravity.to_array());
         }
+        if let Some(implicit) = &self.implicit {
+            implicit.hash(hasher);
+        }
         for bits in self.carry.gravity.bits() {
             hasher.write_u64(bits);
         }

@@ -22,11 +22,11 @@ pub(crate) use origin::Bounds;
 pub(crate) use vectors::{MARGIN, Vectors, View};
 
 use crate::contact::Contacts;
-use crate::diagnostics::{Energy, StorageReport};
+use crate::diagnostics::{Energy, SolverReport, StorageReport};
 use crate::error::Result;
 use crate::memory;
-use crate::solver::{Carry, GravityKicks, Stability, Survey};
-use crate::springs::{ChosenKernel, Springs, store, tile_count};
+use crate::solver::{Carry, GravityKicks, Implicit, Stability, Survey};
+use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::threads::Team;
 use order::NodeOrder;
 use origin::shift_towards;
@@ -53,7 +53,7 @@ pub struct Body {
     pub(crate) pins: Pins,
     /// What a substep found in each tile.
     pub(crate) surveys: Vec<Survey>,
-    /// The box about the nodes of each tile when they were last published, in its own coordinates.
+    /// The box about the nodes of each tile when they were last published or put, in its own coordinates.
     boxes: Vec<Bounds>,
     surface: Vec<[u32; 3]>,
     pub(crate) state: State,
@@ -61,6 +61,8 @@ pub struct Body {
     pub(crate) origin: DVec3,
     /// Velocities at the time of the positions, for bodies whose springs have damping.
     pub(crate) predicted_velocities: Option<Vectors>,
+    /// For bodies that are moved implicitly.
+    pub(crate) implicit: Option<Box<Implicit>>,
     /// Forces from outside for the next step, N; kept from the first force on.
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
@@ -139,6 +141,7 @@ impl Body {
             surface,
             state: State::new(node_count)?,
             origin: DVec3::ZERO,
+            implicit: None,
             applied: None,
             contacts: None,
             carry: Carry {
@@ -154,6 +157,10 @@ impl Body {
             published: Published::new(node_count)?,
         };
         body.place(definition.positions);
+        if definition.solver == Solver::Implicit {
+            let implicit = Implicit::new(body.state.positions(), definition.order, definition.iterations)?;
+            body.implicit = Some(Box::new(implicit));
+        }
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
         }
@@ -209,6 +216,13 @@ impl Body {
         }
     }
 
+    /// How its solver took the last step.
+    pub fn solver_report(&self) -> SolverReport {
+        self.implicit
+            .as_ref()
+            .map_or_else(SolverReport::default, |implicit| implicit.report)
+    }
+
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
         match &mut self.contacts {
             Some(contacts) => contacts.reserve(tools)?,
@@ -220,6 +234,12 @@ impl Body {
         Ok(())
     }
 
+    /// How far it reaches along an axis, m.
+    pub(crate) fn extent(&self) -> f32 {
+        let bounds = self.boxes.iter().fold(Bounds::EMPTY, Bounds::and);
+        (bounds.max - bounds.min).max_element()
+    }
+
     /// Puts the nodes at these places, in the caller's coordinates.
     fn place(&mut self, positions: &[Vec3]) {
         self.origin = shift_towards(Bounds::of(positions.iter().copied()));
@@ -228,9 +248,17 @@ impl Body {
             let own = self.order.own(node) as usize;
             local.set(own, (position.as_dvec3() - self.origin).as_vec3());
         }
+        let (kernel, local) = (self.kernel, self.state.positions());
+        for (tile, bounds) in self.boxes.iter_mut().enumerate() {
+            *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
+        }
         self.published.positions_mut().copy_from_slice(positions);
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+            implicit.forget_matrix();
+        }
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
         }
@@ -240,7 +268,10 @@ impl Body {
     pub(crate) fn commit(&mut self, substeps: u32, carry: Carry, team: &Team) {
         self.state.commit();
         self.carry = carry;
-        self.forces_current = carry.closing.is_none();
+        self.forces_current = carry.closing.is_none() && self.implicit.is_none();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.commit();
+        }
         self.published.forget_velocities();
         for pin in self.pins.iter_mut() {
             pin.force = (pin.force_sum / f64::from(substeps)).as_vec3();
@@ -256,6 +287,9 @@ impl Body {
 
     /// Prepares again what an attempted step that is not committed has changed.
     pub(crate) fn put_back(&mut self) {
+        if let Some(implicit) = &mut self.implicit {
+            implicit.put_back();
+        }
         if let (Some(damping), Some(closing)) = (&mut self.damping, &self.carry.closing) {
             damping.prepare(closing.substep);
         }

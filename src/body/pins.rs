@@ -21,6 +21,8 @@ pub(crate) struct Pin {
     pub travel: Vec3,
     /// The sum of the forces of the step in progress.
     pub force_sum: DVec3,
+    /// What holds it with the nodes where an implicit step has them, N.
+    pub solved: Vec3,
 }
 
 /// The pins of a body, in the order of their nodes.
@@ -80,6 +82,7 @@ impl Pins {
                 goal: Vec3::ZERO,
                 travel: Vec3::ZERO,
                 force_sum: DVec3::ZERO,
+                solved: Vec3::ZERO,
             };
             let tiles = node as usize / TILE + 1;
             self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?;

@@ -116,6 +116,11 @@ impl State {
         self.latest = self.next();
     }
 
+    /// The positions that the substep in progress has written.
+    pub fn next_positions(&self) -> &Vectors {
+        &self.positions[self.next()]
+    }
+
     /// The newest positions and velocities of the step in progress.
     pub fn newest(&self) -> (&Vectors, &Vectors) {
         (&self.positions[self.latest], &self.velocities[1 - self.settled])
@@ -125,6 +130,12 @@ impl State {
     pub fn newest_is_finite(&self) -> bool {
         let (positions, velocities) = self.newest();
         positions.largest_length().is_finite() && velocities.largest_length().is_finite()
+    }
+
+    /// Whether the positions and velocities that the substep in progress has written, and their squares, are finite.
+    pub fn next_is_finite(&self) -> bool {
+        let velocities = &self.velocities[1 - self.settled];
+        self.next_positions().largest_length().is_finite() && velocities.largest_length().is_finite()
     }
 
     /// Makes the step in progress the current state.

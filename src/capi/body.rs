@@ -1,5 +1,7 @@
 //! Bodies.
 
+use std::mem::offset_of;
+
 use glam::Vec3;
 
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
@@ -90,6 +92,12 @@ pub struct sinew_body_def {
     pub solver: u32,
     /// 0.
     pub reserved: u32,
+    /// IMPLICIT: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
+    /// default: 2.
+    pub order: u32,
+    /// IMPLICIT: how often the equation of a step may be multiplied out while it is solved, each about as long as a substep
+    /// of VERLET; 0, the default: 1000.
+    pub iterations: u32,
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
@@ -135,9 +143,23 @@ pub struct sinew_storage_report {
     pub bytes_reserved: usize,
 }
 
+/// How a body's solver took the last step.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_solver_report {
+    /// Set by the caller.
+    pub struct_size: usize,
+    /// IMPLICIT: how often the equations of the step were multiplied out; 0 for other solvers.
+    pub iterations: u32,
+    /// IMPLICIT: how far nodes may be from where the step's equation has them, root mean square by mass, m; above what
+    /// rounding allows only where `iterations` of the definition were not enough. What a shorter step would change is not in
+    /// it.
+    pub error: f32,
+}
+
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_body_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[offset_of!(Self, order), size_of::<Self>()];
     const NAME: &'static str = "sinew_body_def";
 }
 
@@ -151,6 +173,12 @@ unsafe impl Versioned for sinew_energy {
 unsafe impl Versioned for sinew_storage_report {
     const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "sinew_storage_report";
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_solver_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_solver_report";
 }
 
 impl sinew_body_id {
@@ -198,6 +226,8 @@ impl sinew_body_def {
             springs_per_node: 0,
             solver: SINEW_SOLVER_VERLET,
             reserved: 0,
+            order: 0,
+            iterations: 0,
         }
     }
 
@@ -242,6 +272,8 @@ impl sinew_body_def {
                     SINEW_SOLVER_NEWTON => Solver::Newton,
                     unknown => return Err(Error::invalid(format!("solver is {unknown}: no SINEW_SOLVER_..."))),
                 },
+                order: self.order,
+                iterations: self.iterations,
             })
         }
     }
@@ -297,7 +329,7 @@ pub unsafe extern "C" fn sinew_body_def_init(def: *mut sinew_body_def, struct_si
 
 /// Creates a body; copies what `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a solver other than VERLET), SINEW_STATUS_CAPACITY
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (NEWTON), SINEW_STATUS_CAPACITY
 /// (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
@@ -629,6 +661,32 @@ pub unsafe extern "C" fn sinew_body_get_storage_report(
                 spring_count: report.spring_count,
                 bytes_used: report.bytes_used,
                 bytes_reserved: report.bytes_reserved,
+            });
+            Ok(())
+        })
+    }
+}
+
+/// Writes how a body's solver took the last step. `out->struct_size` is set by the caller.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_solver_report(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut sinew_solver_report,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let report = body.solver_report();
+            memory::report("out", out)?.fill(sinew_solver_report {
+                struct_size: size_of::<sinew_solver_report>(),
+                iterations: report.iterations,
+                error: report.error,
             });
             Ok(())
         })

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::closing::ClosingKick;
 use super::gravity::GravityKicks;
+use super::implicit;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
@@ -60,6 +61,9 @@ pub(crate) enum Outcome {
 
 /// Takes a step of `body` without making it current.
 pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+    if body.implicit.is_some() {
+        return attempt_implicitly(body, request, team);
+    }
     let known = body.carry.stability;
     let is_worth_estimating = || {
         let substeps = request.dt / (RESERVE * known.limit_anywhere());
@@ -90,6 +94,34 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         },
         Ok((substeps, taken)) if request.tolerance == 0.0 => finish(body, substeps, taken, 0.0),
         Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry, team),
+    }
+}
+
+/// Takes a step that is stable however long it is.
+fn attempt_implicitly(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+    let start = body.carry;
+    let asked = request.substeps.max(1);
+    let (substeps, taken) = implicit::run(body, request, asked, middle(asked), start, team);
+    if request.tolerance == 0.0 || request.substeps > 0 {
+        finish(body, substeps, taken, 0.0)
+    } else {
+        run_to_tolerance(body, request, substeps, start, taken.carry, team)
+    }
+}
+
+/// Takes the step in so many parts, as the body's solver does.
+fn run(
+    body: &mut Body,
+    request: &StepRequest,
+    substeps: u32,
+    middle: u32,
+    start: Carry,
+    team: &Team,
+) -> Result<Taken, TooLong> {
+    if body.implicit.is_some() {
+        Ok(implicit::run(body, request, substeps, middle, start, team).1)
+    } else {
+        verlet::run(body, request, substeps, middle, start, team)
     }
 }
 
@@ -144,7 +176,7 @@ fn run_to_tolerance(
             return Outcome::Unstable { stable_substep, error };
         }
         // What was not stable after all may be so with twice the substeps.
-        let Ok(finer) = verlet::run(body, request, substeps, middle, start, team) else {
+        let Ok(finer) = run(body, request, substeps, middle, start, team) else {
             continue;
         };
         carry = finer.carry;

@@ -3,6 +3,7 @@
 mod attempt;
 mod closing;
 mod gravity;
+mod implicit;
 mod kick;
 mod pipeline;
 mod stability;
@@ -12,5 +13,6 @@ mod verlet;
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
 pub(crate) use closing::{close, make_up_for, mean_force, show_closed};
 pub(crate) use gravity::GravityKicks;
+pub(crate) use implicit::Implicit;
 pub(crate) use kick::Survey;
 pub(crate) use stability::Stability;

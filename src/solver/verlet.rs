@@ -218,7 +218,7 @@ fn opening(body: &mut Body, request: &StepRequest, substep: f32, carry: &mut Car
 }
 
 /// Starts the step over, from what is current.
-fn begin(body: &mut Body, request: &StepRequest) {
+pub(super) fn begin(body: &mut Body, request: &StepRequest) {
     body.state.begin();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);

@@ -1,6 +1,6 @@
 //! Where a spring points, and how long it is.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::Link;
 
@@ -37,4 +37,43 @@ pub(crate) fn pull(node: usize, link: &Link, offset: Vec3, velocity: Option<Vec3
     let (length, direction) = separation(node, link.neighbour as usize, offset);
     let rate = velocity.map_or(0.0, |velocity| velocity.dot(direction));
     direction * (link.stiffness * (length - link.rest_length) + link.damping * rate)
+}
+
+/// How forces change as nodes move, as far as springs do not say it themselves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tangent {
+    /// The least stiffness across a spring, N/m: 0, and no spring pushes its ends sideways however it is pressed, so that
+    /// the sum of all is positive semidefinite; -infinity: as it is.
+    pub floor: f32,
+    /// What a way counts as a velocity along damped springs, 1/s.
+    pub rate: f32,
+}
+
+impl Tangent {
+    pub const NONE: Self = Self { floor: 0.0, rate: 0.0 };
+
+    /// The direction of a spring of `node`, and its matrix `x n n^T + y I` as x and y, with x without what y has, N/m.
+    #[inline(always)]
+    pub fn of(&self, node: usize, link: &Link, way: Vec3) -> (Vec3, Vec2) {
+        let (length, direction) = separation(node, link.neighbour as usize, way);
+        let slack = if link.rest_length == 0.0 {
+            1.0
+        } else {
+            1.0 - link.rest_length / length
+        };
+        // Where the ends coincide there is no side to be pushed to.
+        let floor = if length > 0.0 { self.floor } else { 0.0 };
+        let across = (link.stiffness * slack).max(floor);
+        (
+            direction,
+            Vec2::new(link.stiffness - across + link.damping * self.rate, across),
+        )
+    }
+
+    /// How the force of a spring on `node` changes where its other end goes `difference` further than the node, N.
+    #[inline(always)]
+    pub fn change(&self, node: usize, link: &Link, way: Vec3, difference: Vec3) -> Vec3 {
+        let (direction, matrix) = self.of(node, link, way);
+        direction * (matrix.x * direction.dot(difference)) + difference * matrix.y
+    }
 }

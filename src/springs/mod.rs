@@ -14,9 +14,11 @@ mod tile;
 
 use std::fmt::Debug;
 
+use glam::Vec3;
+
 pub use kernels::Kernel;
 pub(crate) use kernels::{ChosenKernel, Loops, Range, prefetch};
-pub(crate) use law::{pull, separation};
+pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
 pub(crate) use packed::Rounding;
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
@@ -95,6 +97,35 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// Writes the spring forces on the nodes of `tile`, in newtons; with velocities also the damping along springs.
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces);
+
+    /// Writes how the spring forces on the nodes of `tile` change, N, where the nodes go from `positions` by `ways`, in the
+    /// first order.
+    fn changes(&self, tile: usize, positions: &Vectors, ways: &Vectors, tangent: Tangent, changes: &mut TileForces) {
+        let nodes = tile_nodes(tile, positions.len());
+        for node in nodes.clone() {
+            let (position, way) = (positions.get(node), ways.get(node));
+            let mut sum = Vec3::ZERO;
+            self.visit(node, &mut |link| {
+                let neighbour = link.neighbour as usize;
+                let offset = positions.get(neighbour) - position;
+                sum += tangent.change(node, &link, offset, ways.get(neighbour) - way);
+            });
+            changes.set(node - nodes.start, sum);
+        }
+    }
+
+    /// Half the energy of all links of the nodes of `tile`, J: of a spring between two tiles each has a half.
+    fn half_energy(&self, tile: usize, positions: &Vectors) -> f64 {
+        let mut sum = 0.0;
+        for node in tile_nodes(tile, positions.len()) {
+            self.visit(node, &mut |link| {
+                let way = positions.get(link.neighbour as usize) - positions.get(node);
+                let stretch = separation(node, link.neighbour as usize, way).0 - link.rest_length;
+                sum += 0.25 * f64::from(link.stiffness * stretch * stretch);
+            });
+        }
+        sum
+    }
 
     /// Adds a spring between two nodes of the body; refused where the pair has one already. Its damping counts only where
     /// springs are damped. Changes nothing where it fails.

@@ -168,7 +168,8 @@ static void body_definitions(void)
     BODY(INVALID, "solver", def.solver = 3);
     BODY(INVALID, "solver", def.solver = UINT32_MAX);
     BODY(CAPACITY, "springs_per_node", def.storage = SINEW_STORAGE_FAST_LINK; def.springs_per_node = 1);
-    BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_IMPLICIT);
+    BODY(INVALID, "order", def.order = 3);
+    BODY(INVALID, "iterations", def.iterations = 1000001);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_NEWTON);
 
     BODY(INVALID, "positions", def.positions = NULL);
@@ -324,8 +325,10 @@ static void body_reports(void)
     REFUSES_NO_BODY(sinew_body_destroy(world, body));
     REFUSES_NO_BODY(sinew_body_get_energy(world, body, &out.energy));
     REFUSES_NO_BODY(sinew_body_get_storage_report(world, body, &out.storage));
+    REFUSES_NO_BODY(sinew_body_get_solver_report(world, body, &out.solver));
     REFUSED(INVALID, "out", sinew_body_get_energy(the.world, the.body, NULL));
     REFUSED(INVALID, "out", sinew_body_get_storage_report(the.world, the.body, NULL));
+    REFUSED(INVALID, "out", sinew_body_get_solver_report(the.world, the.body, NULL));
     REFUSES_RESULT_SIZES(sinew_energy, sizeof(contract_energy), energy,
                          sinew_body_get_energy(the.world, the.body, &out.energy));
     REFUSES_RESULT_SIZES(sinew_storage_report, sizeof(contract_storage_report), storage,

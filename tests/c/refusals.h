@@ -40,6 +40,7 @@ static struct outputs {
     sinew_step_report step;
     sinew_energy energy;
     sinew_storage_report storage;
+    sinew_solver_report solver;
     sinew_mesh *mesh;
     sinew_mesh_view mesh_view;
     sinew_picture_def picture_def;
@@ -264,6 +265,7 @@ static inline void set_up(void)
     untouched.step.struct_size = sizeof untouched.step;
     untouched.energy.struct_size = sizeof untouched.energy;
     untouched.storage.struct_size = sizeof untouched.storage;
+    untouched.solver.struct_size = sizeof untouched.solver;
     untouched.mesh_view.struct_size = sizeof untouched.mesh_view;
     memcpy(&out, &untouched, sizeof out);
 }

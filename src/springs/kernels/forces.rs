@@ -1,18 +1,20 @@
-//! The spring forces on the nodes of a tile, as many nodes at a time as the processor has lanes.
+//! The spring forces on the nodes of a tile, and other sums over springs, as many nodes at a time as the processor has lanes.
 //!
 //! The force of a spring is `(k - k L0 / L) d` for the way d of length L to its other end: a quarter fewer operations than
 //! `k (L - L0) / L d`, and what it rounds is less than what positions are rounded by. Both ends compute it in the same way,
 //! with opposite signs: no momentum is lost to rounding but where forces are added up.
+
+use std::marker::PhantomData;
 
 use glam::Vec3;
 
 use super::columns::{Columns, Ends, LANES, Material, Run};
 use super::lanes::Lanes;
 use super::prefetch::prefetch;
+use super::quantities::{Change, Force, HalfEnergy, Quantity, Spring, Ways, difference};
 use super::{ChosenKernel, WithLanes};
 use crate::body::{Vectors, View};
-use crate::springs::law::separation;
-use crate::springs::{Link, Motion, TileForces};
+use crate::springs::{Link, Motion, Tangent, TileForces};
 
 impl Columns {
     /// Writes the forces on the nodes of the tile, N.
@@ -23,23 +25,66 @@ impl Columns {
             soon,
         } = motion;
         let velocities = velocities.filter(|_| self.damped);
+        let tile = self.tile(materials, positions, velocities, soon, Tangent::NONE);
+        match velocities {
+            None => tile.add_up::<Force<false>>(kernel, forces),
+            Some(_) => tile.add_up::<Force<true>>(kernel, forces),
+        }
+    }
+
+    /// Writes how the forces on the nodes of the tile change, N, where nodes go from `positions` by `ways`.
+    pub fn changes(
+        &self,
+        kernel: ChosenKernel,
+        materials: &[Material],
+        positions: View,
+        ways: &Vectors,
+        tangent: Tangent,
+        changes: &mut TileForces,
+    ) {
+        let tile = self.tile(materials, positions, Some(ways), [&[]; 6], tangent);
+        if self.damped && tangent.rate > 0.0 {
+            tile.add_up::<Change<true>>(kernel, changes);
+        } else {
+            tile.add_up::<Change<false>>(kernel, changes);
+        }
+    }
+
+    /// Half the energy of all links of the tile, J.
+    pub fn half_energy(&self, kernel: ChosenKernel, materials: &[Material], positions: View) -> f64 {
+        let mut energies = TileForces::ZERO;
+        let tile = self.tile(materials, positions, None, [&[]; 6], Tangent::NONE);
+        tile.add_up::<HalfEnergy>(kernel, &mut energies);
+        let [of_nodes, ..] = energies.axes();
+        of_nodes[..self.count].iter().copied().map(f64::from).sum()
+    }
+
+    fn tile<'a>(
+        &'a self,
+        materials: &'a [Material],
+        positions: View<'a>,
+        seconds: Option<&'a Vectors>,
+        soon: [&'a [f32]; 6],
+        tangent: Tangent,
+    ) -> Tile<'a> {
         // What the kernel reads without a check was checked against this.
         assert!(positions.covers(&self.reads));
-        assert!(velocities.is_none_or(|velocities| velocities.len() == self.node_count));
-        let tile = Tile {
+        assert!(seconds.is_none_or(|seconds| seconds.len() == self.node_count));
+        Tile {
             columns: self,
             materials,
             positions: positions.places(),
-            velocities: velocities.map(|velocities| velocities.view().places()),
+            seconds: seconds.map(|seconds| seconds.view().places()),
             soon: soon.map(|wanted| wanted.as_ptr()),
-        };
-        let careful = Careful {
-            columns: self,
-            materials,
-            positions,
-            velocities,
-        };
-        kernel.run_with_lanes(TileLinks { tile, careful, forces });
+            tangent,
+            careful: Careful {
+                columns: self,
+                materials,
+                positions,
+                seconds,
+                tangent,
+            },
+        }
     }
 }
 
@@ -47,11 +92,11 @@ impl Columns {
 /// ahead for other work.
 const GROUP: usize = 4;
 
-/// The forces on a tile, for a kernel to compute.
-struct TileLinks<'a> {
+/// The sums of a tile's nodes, for a kernel to add up.
+struct TileLinks<'a, Q> {
     tile: Tile<'a>,
-    careful: Careful<'a>,
-    forces: &'a mut TileForces,
+    sums: &'a mut TileForces,
+    quantity: PhantomData<Q>,
 }
 
 /// What the kernel reads.
@@ -60,31 +105,30 @@ struct Tile<'a> {
     materials: &'a [Material],
     /// Where the coordinates of node 0 would be: what the columns read is there.
     positions: [*const f32; 3],
-    velocities: Option<[*const f32; 3]>,
+    seconds: Option<[*const f32; 3]>,
     /// What is wanted next, block by block.
     soon: [*const f32; 6],
+    tangent: Tangent,
+    careful: Careful<'a>,
 }
 
-impl WithLanes for TileLinks<'_> {
+impl Tile<'_> {
+    fn add_up<Q: Quantity>(self, kernel: ChosenKernel, sums: &mut TileForces) {
+        kernel.run_with_lanes(TileLinks::<Q> {
+            tile: self,
+            sums,
+            quantity: PhantomData,
+        });
+    }
+}
+
+impl<Q: Quantity> WithLanes for TileLinks<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        // SAFETY: the same contract.
-        unsafe {
-            if self.tile.velocities.is_some() {
-                self.sum::<L, true>();
-            } else {
-                self.sum::<L, false>();
-            }
-        }
-    }
-}
-
-impl TileLinks<'_> {
-    #[inline(always)]
-    unsafe fn sum<L: Lanes, const DAMPED: bool>(self) {
-        let Self { tile, careful, forces } = self;
+        let Self { tile, sums: forces, .. } = self;
+        let careful = &tile.careful;
         let columns = tile.columns;
         let parts = LANES / L::COUNT;
         // Loop by loop, so that each has few addresses to keep. A grid needs no more than the first.
@@ -99,10 +143,10 @@ impl TileLinks<'_> {
                 }
                 for part in 0..parts {
                     let place = block * LANES + part * L::COUNT;
-                    let sums = tile.runs::<L, DAMPED>(start, end, place);
+                    let sums = tile.runs::<L, Q>(start, end, place);
                     sums.store(axes, place);
                     if runs_alone && sums.any_nan() {
-                        axes = careful.nodes(place, L::COUNT, forces);
+                        axes = careful.nodes::<Q>(place, L::COUNT, forces);
                     }
                 }
                 start = end;
@@ -112,17 +156,17 @@ impl TileLinks<'_> {
                 for (block, &end) in columns.blocks.iter().enumerate() {
                     for part in 0..parts {
                         let place = block * LANES + part * L::COUNT;
-                        let sums = tile.others::<L, DAMPED>(start, end, place, Sums::load(axes, place));
+                        let sums = tile.others::<L, Q>(start, end, place, Sums::load(axes, place));
                         sums.store(axes, place);
                         if sums.any_nan() {
-                            axes = careful.nodes(place, L::COUNT, forces);
+                            axes = careful.nodes::<Q>(place, L::COUNT, forces);
                         }
                     }
                     start = end;
                 }
             }
             for batch in 0..columns.strays.batch_count() {
-                tile.strays::<L, DAMPED>(batch, &careful, forces);
+                tile.strays::<L, Q>(batch, forces);
             }
         }
     }
@@ -132,29 +176,20 @@ impl TileLinks<'_> {
 #[derive(Clone, Copy)]
 struct Sums<L>([L; 3]);
 
-/// Parameters of some springs side by side.
-#[derive(Clone, Copy)]
-struct Spring<L> {
-    stiffness: L,
-    /// Half the stiffness times the rest length.
-    half_tension: L,
-    damping: L,
-}
-
-/// Where some nodes are, and how fast, side by side.
+/// Where some nodes are, and their second vectors, side by side.
 #[derive(Clone, Copy)]
 struct Place<L> {
     position: [L; 3],
-    velocity: [L; 3],
+    second: [L; 3],
 }
 
 impl<L: Copy> Place<L> {
-    /// Velocities are not asked for.
+    /// Second vectors are not asked for.
     #[inline(always)]
     fn still(position: [L; 3]) -> Self {
         Self {
             position,
-            velocity: position,
+            second: position,
         }
     }
 }
@@ -170,26 +205,26 @@ struct Links<L> {
 impl Tile<'_> {
     /// The runs of the nodes of a block, or of a part of it, as wide as `L`, whose springs share their parameters.
     #[inline(always)]
-    unsafe fn runs<L: Lanes, const DAMPED: bool>(&self, start: Ends, end: Ends, place: usize) -> Sums<L> {
+    unsafe fn runs<L: Lanes, Q: Quantity>(&self, start: Ends, end: Ends, place: usize) -> Sums<L> {
         let columns = self.columns;
         let (node, lane) = (columns.first + place, place % LANES);
         // SAFETY: blocks end within the margins; columns were checked to lead to nodes of the body where their lanes are
         // set, and within the margins elsewhere.
         unsafe {
-            let here = self.at::<L, DAMPED>(node as isize);
+            let here = self.at::<L, Q>(node as isize);
             let mut sums = Sums([L::splat(0.0); 3]);
             let runs = columns.runs.get_unchecked(start.runs as usize..end.runs as usize);
             let (groups, rest) = runs.as_chunks::<GROUP>();
             for group in groups {
                 // Written out: a closure may be compiled on its own, without the kernel's instructions.
-                let mut links = [self.run::<L, DAMPED>(&group[0], node, lane); GROUP];
+                let mut links = [self.run::<L, Q>(&group[0], node, lane); GROUP];
                 for (links, run) in links.iter_mut().zip(group).skip(1) {
-                    *links = self.run::<L, DAMPED>(run, node, lane);
+                    *links = self.run::<L, Q>(run, node, lane);
                 }
-                sums.add::<GROUP, DAMPED>(here, links);
+                sums.add::<GROUP, Q>(here, links, &self.tangent);
             }
             for run in rest {
-                sums.add::<1, DAMPED>(here, [self.run::<L, DAMPED>(run, node, lane)]);
+                sums.add::<1, Q>(here, [self.run::<L, Q>(run, node, lane)], &self.tangent);
             }
             sums
         }
@@ -197,11 +232,11 @@ impl Tile<'_> {
 
     /// A run from the nodes from `node` on.
     #[inline(always)]
-    unsafe fn run<L: Lanes, const DAMPED: bool>(&self, run: &Run, node: usize, lane: usize) -> Links<L> {
-        let damping = if DAMPED {
-            self.materials[usize::from(run.material)].damping
+    unsafe fn run<L: Lanes, Q: Quantity>(&self, run: &Run, node: usize, lane: usize) -> Links<L> {
+        let material = if Q::DAMPED || Q::RESTING {
+            self.materials[usize::from(run.material)]
         } else {
-            0.0
+            Material::default()
         };
         // SAFETY: as in `runs`.
         unsafe {
@@ -209,9 +244,10 @@ impl Tile<'_> {
                 spring: Spring {
                     stiffness: L::splat(run.stiffness),
                     half_tension: L::splat(run.half_tension),
-                    damping: L::splat(damping),
+                    rest_length: L::splat(material.rest_length),
+                    damping: L::splat(material.damping),
                 },
-                there: self.at::<L, DAMPED>(node as isize + run.offset as isize),
+                there: self.at::<L, Q>(node as isize + run.offset as isize),
                 lanes: u32::from(run.lanes) >> lane,
             }
         }
@@ -219,53 +255,47 @@ impl Tile<'_> {
 
     /// All other columns of the same nodes, added to `sums`.
     #[inline(always)]
-    unsafe fn others<L: Lanes, const DAMPED: bool>(
-        &self,
-        start: Ends,
-        end: Ends,
-        place: usize,
-        mut sums: Sums<L>,
-    ) -> Sums<L> {
+    unsafe fn others<L: Lanes, Q: Quantity>(&self, start: Ends, end: Ends, place: usize, mut sums: Sums<L>) -> Sums<L> {
         let columns = self.columns;
         let (node, lane) = (columns.first + place, place % LANES);
         let mut own = start.own as usize;
         // SAFETY: as in `runs`; gathers were checked to lead to nodes of the body.
         unsafe {
-            let here = self.at::<L, DAMPED>(node as isize);
+            let here = self.at::<L, Q>(node as isize);
             for run in columns
                 .own_runs
                 .get_unchecked(start.own_runs as usize..end.own_runs as usize)
             {
                 let links = Links {
-                    spring: self.spring::<L, DAMPED>(None, &mut own, lane),
-                    there: self.at::<L, DAMPED>(node as isize + run.offset as isize),
+                    spring: self.spring::<L, Q>(None, &mut own, lane),
+                    there: self.at::<L, Q>(node as isize + run.offset as isize),
                     lanes: u32::from(run.lanes) >> lane,
                 };
-                sums.add::<1, DAMPED>(here, [links]);
+                sums.add::<1, Q>(here, [links], &self.tangent);
             }
             for near in start.near as usize..end.near as usize {
                 let header = columns.near.get_unchecked(near);
                 let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
-                let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.gathered_near::<L, DAMPED>(indices);
+                let spring = self.spring::<L, Q>(header.material(), &mut own, lane);
+                let there = self.gathered_near::<L, Q>(indices);
                 let links = Links {
                     spring,
                     there,
                     lanes: u32::from(header.lanes) >> lane,
                 };
-                sums.add::<1, DAMPED>(here, [links]);
+                sums.add::<1, Q>(here, [links], &self.tangent);
             }
             for far in start.far as usize..end.far as usize {
                 let header = columns.far.get_unchecked(far);
                 let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
-                let spring = self.spring::<L, DAMPED>(header.material(), &mut own, lane);
-                let there = self.gathered::<L, DAMPED>(indices);
+                let spring = self.spring::<L, Q>(header.material(), &mut own, lane);
+                let there = self.gathered::<L, Q>(indices);
                 let links = Links {
                     spring,
                     there,
                     lanes: u32::from(header.lanes) >> lane,
                 };
-                sums.add::<1, DAMPED>(here, [links]);
+                sums.add::<1, Q>(here, [links], &self.tangent);
             }
             sums
         }
@@ -273,7 +303,7 @@ impl Tile<'_> {
 
     /// Sixteen strays.
     #[inline(always)]
-    unsafe fn strays<L: Lanes, const DAMPED: bool>(&self, batch: usize, careful: &Careful, forces: &mut TileForces) {
+    unsafe fn strays<L: Lanes, Q: Quantity>(&self, batch: usize, forces: &mut TileForces) {
         let batch = self.columns.strays.batch(batch);
         let mut found = [[0.0_f32; LANES]; 3];
         let mut coincide = false;
@@ -281,13 +311,14 @@ impl Tile<'_> {
             let lane = part * L::COUNT;
             // SAFETY: strays were checked to lead to nodes of the body.
             unsafe {
-                let here = self.gathered::<L, DAMPED>(batch.nodes.as_ptr().add(lane));
-                let there = self.gathered::<L, DAMPED>(batch.neighbours.as_ptr().add(lane));
+                let here = self.gathered::<L, Q>(batch.nodes.as_ptr().add(lane));
+                let there = self.gathered::<L, Q>(batch.neighbours.as_ptr().add(lane));
                 let stiffness = L::load(batch.stiffnesses.0.as_ptr().add(lane));
                 let rest_length = L::load(batch.rest_lengths.0.as_ptr().add(lane));
                 let spring = Spring {
                     stiffness,
                     half_tension: half_tension(stiffness, rest_length),
+                    rest_length,
                     damping: L::load(batch.dampings.0.as_ptr().add(lane)),
                 };
                 let mut sums = Sums([L::splat(0.0); 3]);
@@ -296,7 +327,7 @@ impl Tile<'_> {
                     there,
                     lanes: u32::MAX,
                 };
-                sums.add::<1, DAMPED>(here, [links]);
+                sums.add::<1, Q>(here, [links], &self.tangent);
                 coincide |= sums.any_nan();
                 for (sum, found) in sums.0.into_iter().zip(&mut found) {
                     sum.store(found.as_mut_ptr().add(lane));
@@ -312,7 +343,7 @@ impl Tile<'_> {
                     rest_length: batch.rest_lengths.0[lane],
                     damping: batch.dampings.0[lane],
                 };
-                force = careful.link(batch.nodes[lane] as usize, &link);
+                force = self.careful.link::<Q>(batch.nodes[lane] as usize, &link);
             }
             let place = usize::from(place);
             forces.set(place, forces.get(place) + force);
@@ -321,7 +352,7 @@ impl Tile<'_> {
 
     /// Sixteen nodes, or as many as `L` has lanes, from `node` on.
     #[inline(always)]
-    unsafe fn at<L: Lanes, const DAMPED: bool>(&self, node: isize) -> Place<L> {
+    unsafe fn at<L: Lanes, Q: Quantity>(&self, node: isize) -> Place<L> {
         // Written out here and below: a closure may be compiled on its own, without the kernel's instructions.
         // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
         unsafe {
@@ -331,10 +362,10 @@ impl Tile<'_> {
                 L::load(y.wrapping_offset(node)),
                 L::load(z.wrapping_offset(node)),
             ];
-            match self.velocities {
-                Some([x, y, z]) if DAMPED => Place {
+            match self.seconds {
+                Some([x, y, z]) if Q::SECOND => Place {
                     position,
-                    velocity: [
+                    second: [
                         L::load(x.wrapping_offset(node)),
                         L::load(y.wrapping_offset(node)),
                         L::load(z.wrapping_offset(node)),
@@ -347,15 +378,15 @@ impl Tile<'_> {
 
     /// The nodes with these numbers.
     #[inline(always)]
-    unsafe fn gathered<L: Lanes, const DAMPED: bool>(&self, indices: *const u32) -> Place<L> {
+    unsafe fn gathered<L: Lanes, Q: Quantity>(&self, indices: *const u32) -> Place<L> {
         // SAFETY: the numbers were checked to be those of nodes.
         unsafe {
             let [x, y, z] = self.positions;
             let position = [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)];
-            match self.velocities {
-                Some([x, y, z]) if DAMPED => Place {
+            match self.seconds {
+                Some([x, y, z]) if Q::SECOND => Place {
                     position,
-                    velocity: [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)],
+                    second: [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)],
                 },
                 _ => Place::still(position),
             }
@@ -364,7 +395,7 @@ impl Tile<'_> {
 
     /// The nodes with these numbers, counted from the window.
     #[inline(always)]
-    unsafe fn gathered_near<L: Lanes, const DAMPED: bool>(&self, indices: *const u16) -> Place<L> {
+    unsafe fn gathered_near<L: Lanes, Q: Quantity>(&self, indices: *const u16) -> Place<L> {
         let window = self.columns.window;
         // SAFETY: as in `gathered`.
         unsafe {
@@ -374,12 +405,12 @@ impl Tile<'_> {
                 L::gather_near(y, indices),
                 L::gather_near(z, indices),
             ];
-            match self.velocities {
-                Some(velocities) if DAMPED => {
-                    let [x, y, z] = velocities.map(|axis| axis.wrapping_add(window));
+            match self.seconds {
+                Some(seconds) if Q::SECOND => {
+                    let [x, y, z] = seconds.map(|axis| axis.wrapping_add(window));
                     Place {
                         position,
-                        velocity: [
+                        second: [
                             L::gather_near(x, indices),
                             L::gather_near(y, indices),
                             L::gather_near(z, indices),
@@ -393,12 +424,7 @@ impl Tile<'_> {
 
     /// The parameters of a column; `own` counts those that bring their own.
     #[inline(always)]
-    unsafe fn spring<L: Lanes, const DAMPED: bool>(
-        &self,
-        material: Option<usize>,
-        own: &mut usize,
-        lane: usize,
-    ) -> Spring<L> {
+    unsafe fn spring<L: Lanes, Q: Quantity>(&self, material: Option<usize>, own: &mut usize, lane: usize) -> Spring<L> {
         // SAFETY: every column that brings its own parameters has a place in their lists.
         unsafe {
             if let Some(material) = material {
@@ -406,6 +432,7 @@ impl Tile<'_> {
                 return Spring {
                     stiffness: L::splat(material.stiffness),
                     half_tension: L::splat(material.half_tension()),
+                    rest_length: L::splat(material.rest_length),
                     damping: L::splat(material.damping),
                 };
             }
@@ -419,7 +446,8 @@ impl Tile<'_> {
             let spring = Spring {
                 stiffness,
                 half_tension: half_tension(stiffness, rest_length),
-                damping: if DAMPED {
+                rest_length,
+                damping: if Q::DAMPED {
                     L::load(columns.own_dampings.get_unchecked(*own).0.as_ptr().add(lane))
                 } else {
                     rest_length
@@ -454,37 +482,20 @@ impl<L: Lanes> Sums<L> {
         unsafe { x.any_nan() || y.any_nan() || z.any_nan() }
     }
 
-    /// Adds the forces of `N` columns of springs from `here` on.
+    /// Adds what `N` columns of springs add up to from `here` on.
     #[inline(always)]
-    unsafe fn add<const N: usize, const DAMPED: bool>(&mut self, here: Place<L>, links: [Links<L>; N]) {
+    unsafe fn add<const N: usize, Q: Quantity>(&mut self, here: Place<L>, links: [Links<L>; N], tangent: &Tangent) {
         // SAFETY: the same contract.
         unsafe {
-            let ways = links.map(|links| difference(links.there.position, here.position));
-            let squares = ways.map(|way| dot(way, way));
-            let stiffnesses = links.map(|links| links.spring.stiffness);
-            let half_tensions = links.map(|links| links.spring.half_tension);
-            let (mut factors, inverses) = L::pulls(squares, stiffnesses, half_tensions);
-            if DAMPED {
-                for n in 0..N {
-                    let rate = dot(ways[n], difference(links[n].there.velocity, here.velocity));
-                    let rate = rate.multiply(inverses[n]).multiply(inverses[n]);
-                    factors[n] = rate.multiply_add(links[n].spring.damping, factors[n]);
-                }
-            }
-            for n in 0..N {
-                let factor = factors[n].where_set(links[n].lanes);
-                for (sum, way) in self.0.iter_mut().zip(ways[n]) {
-                    *sum = way.multiply_add(factor, *sum);
-                }
-            }
+            let ways = Ways {
+                ways: links.map(|links| difference(links.there.position, here.position)),
+                differences: links.map(|links| difference(links.there.second, here.second)),
+                springs: links.map(|links| links.spring),
+                lanes: links.map(|links| links.lanes),
+            };
+            Q::add(&mut self.0, ways, tangent);
         }
     }
-}
-
-#[inline(always)]
-unsafe fn difference<L: Lanes>([ax, ay, az]: [L; 3], [bx, by, bz]: [L; 3]) -> [L; 3] {
-    // SAFETY: the same contract.
-    unsafe { [ax.subtract(bx), ay.subtract(by), az.subtract(bz)] }
 }
 
 #[inline(always)]
@@ -493,44 +504,38 @@ unsafe fn half_tension<L: Lanes>(stiffness: L, rest_length: L) -> L {
     unsafe { stiffness.multiply(L::splat(0.5)).multiply(rest_length) }
 }
 
-#[inline(always)]
-unsafe fn dot<L: Lanes>([ax, ay, az]: [L; 3], [bx, by, bz]: [L; 3]) -> L {
-    // SAFETY: the same contract.
-    unsafe { az.multiply_add(bz, ay.multiply_add(by, ax.multiply(bx))) }
-}
-
-/// The same forces where nodes coincide, and a spring between them has no direction of its own.
+/// The same sums where nodes coincide, and a spring between them has no direction of its own.
 struct Careful<'a> {
     columns: &'a Columns,
     materials: &'a [Material],
     positions: View<'a>,
-    velocities: Option<&'a Vectors>,
+    seconds: Option<&'a Vectors>,
+    tangent: Tangent,
 }
 
 impl Careful<'_> {
-    /// The columns of `count` nodes from `place` on: where the forces are kept.
+    /// The columns of `count` nodes from `place` on: where the sums are kept.
     #[cold]
     #[inline(never)]
-    fn nodes(&self, place: usize, count: usize, forces: &mut TileForces) -> [*mut f32; 3] {
+    fn nodes<Q: Quantity>(&self, place: usize, count: usize, sums: &mut TileForces) -> [*mut f32; 3] {
         for place in place..(place + count).min(self.columns.count) {
             let node = self.columns.first + place;
-            let mut force = Vec3::ZERO;
+            let mut sum = Vec3::ZERO;
             self.columns
-                .visit_columns(node, self.materials, &mut |link| force += self.link(node, &link));
-            forces.set(place, force);
+                .visit_columns(node, self.materials, &mut |link| sum += self.link::<Q>(node, &link));
+            sums.set(place, sum);
         }
-        forces.axes_mut().map(|axis| axis.as_mut_ptr())
+        sums.axes_mut().map(|axis| axis.as_mut_ptr())
     }
 
-    /// The force of one spring.
+    /// What one spring adds.
     #[cold]
-    fn link(&self, node: usize, link: &Link) -> Vec3 {
+    fn link<Q: Quantity>(&self, node: usize, link: &Link) -> Vec3 {
         let neighbour = link.neighbour as usize;
         let way = self.positions.get(neighbour) - self.positions.get(node);
-        let (length, direction) = separation(node, neighbour, way);
-        let rate = self.velocities.map_or(0.0, |velocities| {
-            direction.dot(velocities.get(neighbour) - velocities.get(node))
-        });
-        direction * (link.stiffness * (length - link.rest_length) + link.damping * rate)
+        let difference = self
+            .seconds
+            .map_or(Vec3::ZERO, |seconds| seconds.get(neighbour) - seconds.get(node));
+        Q::of_link(node, link, way, difference, &self.tangent)
     }
 }

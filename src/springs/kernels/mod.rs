@@ -13,6 +13,7 @@ mod lanes;
 mod neon;
 mod portable;
 mod prefetch;
+mod quantities;
 mod range;
 mod strays;
 

@@ -18,8 +18,8 @@ use pack::{Loose, NO_KIND, pack};
 
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
-use super::{Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes};
-use crate::body::Spring;
+use super::{Link, Motion, Springs, TILE, Tangent, TileForces, already_joined, not_joined, tile_count, tile_nodes};
+use crate::body::{Spring, Vectors};
 use crate::error::Result;
 use crate::memory;
 
@@ -196,6 +196,18 @@ impl Springs for Packed {
         self.tiles[tile]
             .columns
             .forces(self.kernel, &self.materials, motion, forces);
+    }
+
+    fn changes(&self, tile: usize, positions: &Vectors, ways: &Vectors, tangent: Tangent, changes: &mut TileForces) {
+        self.tiles[tile]
+            .columns
+            .changes(self.kernel, &self.materials, positions.view(), ways, tangent, changes);
+    }
+
+    fn half_energy(&self, tile: usize, positions: &Vectors) -> f64 {
+        self.tiles[tile]
+            .columns
+            .half_energy(self.kernel, &self.materials, positions.view())
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {

@@ -1,0 +1,129 @@
+//! The 3x3 blocks of the matrix on its diagonal, one for each node, and their inverses: the fine level of the preconditioner.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use crate::body::Vectors;
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
+use crate::threads::{Team, Tiles};
+
+/// A symmetric matrix as xx, yy, zz, yz, zx, xy.
+type Symmetric = [f32; 6];
+
+/// The blocks of a body.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    /// The springs' part of each node.
+    stiffness: Vec<Symmetric>,
+    /// The inverses along each entry; 0 for what is pinned.
+    inverse: [Vec<f32>; 6],
+}
+
+impl Blocks {
+    pub fn new(node_count: usize) -> Result<Self> {
+        let entry = || memory::filled(0.0, node_count);
+        Ok(Self {
+            stiffness: memory::filled([0.0; 6], node_count)?,
+            inverse: [entry()?, entry()?, entry()?, entry()?, entry()?, entry()?],
+        })
+    }
+
+    /// Takes in the springs at these positions.
+    pub fn gather(&mut self, springs: &dyn Springs, positions: &Vectors, tangent: Tangent, team: &Team) {
+        let node_count = positions.len();
+        let written = Tiles::new(&mut self.stiffness, TILE);
+        team.pass(tile_count(node_count), written, |tile, blocks| {
+            for (node, block) in tile_nodes(tile, node_count).zip(blocks) {
+                *block = block_of(node, springs, positions, tangent);
+            }
+        });
+    }
+
+    /// All that it was made of.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        self.stiffness.iter().for_each(|block| hasher.write_floats(block));
+    }
+
+    /// Makes the inverses, with this inertia of each node, N/m; 0: it is pinned.
+    pub fn invert(&mut self, inertia: &[f32], team: &Team) {
+        let stiffness = &self.stiffness;
+        let count = stiffness.len();
+        let written = self.inverse.each_mut().map(|entry| Tiles::new(entry, TILE));
+        team.pass(tile_count(count), written, |tile, mut inverse| {
+            for (place, node) in tile_nodes(tile, count).enumerate() {
+                let entries = inverse_of(stiffness[node], inertia[node]);
+                for (to, entry) in inverse.iter_mut().zip(entries) {
+                    to[place] = entry;
+                }
+            }
+        });
+    }
+
+    /// The entries of the inverses of some nodes.
+    #[inline(always)]
+    pub fn of(&self, nodes: Range<usize>) -> [&[f32]; 6] {
+        self.inverse.each_ref().map(|entry| &entry[nodes.clone()])
+    }
+}
+
+fn block_of(node: usize, springs: &dyn Springs, positions: &Vectors, tangent: Tangent) -> Symmetric {
+    let position = positions.get(node);
+    let mut block = [0.0; 6];
+    springs.visit(node, &mut |link| {
+        let way = positions.get(link.neighbour as usize) - position;
+        let (n, matrix) = tangent.of(node, &link, way);
+        let scaled: Vec3 = n * matrix.x;
+        block[0] += scaled.x * n.x + matrix.y;
+        block[1] += scaled.y * n.y + matrix.y;
+        block[2] += scaled.z * n.z + matrix.y;
+        block[3] += scaled.y * n.z;
+        block[4] += scaled.z * n.x;
+        block[5] += scaled.x * n.y;
+    });
+    block
+}
+
+/// The inverse of a block with this inertia: in `f64`, because it may be nearly singular.
+fn inverse_of(block: Symmetric, inertia: f32) -> Symmetric {
+    if inertia == 0.0 {
+        return [0.0; 6];
+    }
+    let [xx, yy, zz, yz, zx, xy] = block.map(f64::from);
+    // What rounds to a singular matrix is kept from being one.
+    let inertia = f64::from(inertia) + 1e-7 * (xx + yy + zz);
+    let [xx, yy, zz] = [xx, yy, zz].map(|entry| entry + inertia);
+    let minors = [
+        yy * zz - yz * yz,
+        xx * zz - zx * zx,
+        xx * yy - xy * xy,
+        zx * xy - xx * yz,
+        xy * yz - yy * zx,
+        yz * zx - zz * xy,
+    ];
+    let determinant = xx * minors[0] + xy * minors[5] + zx * minors[4];
+    let inverse = minors.map(|minor| (minor / determinant) as f32);
+    if inverse.iter().all(|entry| entry.is_finite()) {
+        inverse
+    } else {
+        [0.0; 6]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_times_its_inverse_is_one() {
+        let (block, inertia) = ([3.0, 2.0, 5.0, 0.5, -0.25, 1.0], 0.125);
+        let [a, b, c, d, e, f] = inverse_of(block, inertia);
+        let [xx, yy, zz, yz, zx, xy] = block;
+        let matrix = glam::Mat3::from_cols_array(&[xx + inertia, xy, zx, xy, yy + inertia, yz, zx, yz, zz + inertia]);
+        let product = matrix * glam::Mat3::from_cols_array(&[a, f, e, f, b, d, e, d, c]);
+        assert!(product.abs_diff_eq(glam::Mat3::IDENTITY, 1e-6), "{product}");
+    }
+}

@@ -1,0 +1,378 @@
+//! The coarse level: a few dozen clusters of nodes, each with the affine motions it can make as a whole.
+//!
+//! What a conjugate gradient is slow at is what reaches across the body; what a cluster does as a whole is found here at
+//! once, by a small dense matrix (aggregation, as in Vanek, Mandel, Brezina 1996, without smoothing). Its inverse may be that
+//! of an older state of the body: then it is a worse preconditioner, and still one.
+
+use glam::{Mat3, Vec3};
+
+use crate::body::Vectors;
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::{Loops, Springs, TILE, Tangent};
+
+/// Nodes that always belong to one cluster together: as many as are worked on side by side.
+const BLOCK: usize = 16;
+
+/// The most clusters, and the fewest nodes that are worth one.
+const CLUSTERS: usize = 16;
+const NODES: usize = 64;
+
+/// Functions of a cluster: 1 and three coordinates.
+const FUNCTIONS: usize = 4;
+
+/// Numbers of a cluster: each of its functions along each axis.
+pub(super) const MOTIONS: usize = 3 * FUNCTIONS;
+
+/// The coarse level of a body.
+#[derive(Debug)]
+pub(super) struct Coarse {
+    /// The cluster of each sixteen nodes.
+    clusters: Vec<u16>,
+    count: usize,
+    /// Where each node is in its cluster, in units of the cluster's size.
+    places: Vectors,
+    /// 1 for a node that is free to move.
+    free: Vec<f32>,
+    /// The springs' part of the matrix.
+    stiffness: Vec<f64>,
+    factor: Vec<f64>,
+    /// Its inverse.
+    inverse: Vec<f32>,
+    /// What the last residual comes to, and its solution.
+    pub loads: Vec<f32>,
+    pub motions: Vec<f32>,
+}
+
+impl Coarse {
+    /// Clusters of nodes at these positions.
+    pub fn new(positions: &Vectors) -> Result<Self> {
+        let node_count = positions.len();
+        let blocks = node_count.div_ceil(BLOCK);
+        let count = (node_count / NODES).clamp(1, CLUSTERS);
+        let mut centres = memory::reserved(blocks)?;
+        for block in 0..blocks {
+            let nodes = block * BLOCK..node_count.min((block + 1) * BLOCK);
+            let size = nodes.len() as f32;
+            centres.push(nodes.map(|node| positions.get(node)).sum::<Vec3>() / size);
+        }
+        let mut order: Vec<u32> = memory::reserved(blocks)?;
+        order.extend(0..blocks as u32);
+        let mut clusters = memory::filled(0, blocks)?;
+        let mut next = 0;
+        split(&centres, &mut order, count, &mut next, &mut clusters);
+        let size = count * MOTIONS;
+        Ok(Self {
+            clusters,
+            count,
+            places: Vectors::zeros(node_count)?,
+            free: memory::filled(0.0, node_count)?,
+            stiffness: memory::filled(0.0, size * size)?,
+            factor: memory::filled(0.0, size * size)?,
+            inverse: memory::filled(0.0, size * size)?,
+            loads: memory::filled(0.0, size)?,
+            motions: memory::filled(0.0, size)?,
+        })
+    }
+
+    /// How many numbers describe a motion of all clusters.
+    pub fn size(&self) -> usize {
+        self.count * MOTIONS
+    }
+
+    /// Takes in the springs at these positions, and which nodes move.
+    pub fn gather(&mut self, springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors, tangent: Tangent) {
+        let node_count = positions.len();
+        let mut centres = [(Vec3::ZERO, 0.0_f32); CLUSTERS];
+        for node in 0..node_count {
+            self.free[node] = if inverse_masses[node] > 0.0 { 1.0 } else { 0.0 };
+            let centre = &mut centres[usize::from(self.clusters[node / BLOCK])];
+            centre.0 += positions.get(node);
+            centre.1 += 1.0;
+        }
+        let mut sizes = [f32::MIN_POSITIVE; CLUSTERS];
+        for node in 0..node_count {
+            let cluster = usize::from(self.clusters[node / BLOCK]);
+            let place = positions.get(node) - centres[cluster].0 / centres[cluster].1;
+            sizes[cluster] = sizes[cluster].max(place.abs().max_element());
+            self.places.set(node, place);
+        }
+        for node in 0..node_count {
+            let size = sizes[usize::from(self.clusters[node / BLOCK])];
+            self.places.set(node, self.places.get(node) * (self.free[node] / size));
+        }
+        self.stiffness.fill(0.0);
+        for node in 0..node_count {
+            if self.free[node] == 0.0 {
+                continue;
+            }
+            springs.visit(node, &mut |link| {
+                let neighbour = link.neighbour as usize;
+                if neighbour > node || self.free[neighbour] == 0.0 {
+                    let way = positions.get(neighbour) - positions.get(node);
+                    let (direction, matrix) = tangent.of(node, &link, way);
+                    let matrix = outer(direction) * matrix.x + Mat3::from_diagonal(Vec3::splat(matrix.y));
+                    self.add(node, neighbour, &matrix);
+                }
+            });
+        }
+    }
+
+    /// All that it was made of.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        self.stiffness
+            .iter()
+            .for_each(|entry| hasher.write_u64(entry.to_bits()));
+        self.places
+            .iter()
+            .for_each(|place| hasher.write_floats(&place.to_array()));
+    }
+
+    /// Adds a spring between two nodes.
+    fn add(&mut self, a: usize, b: usize, matrix: &Mat3) {
+        let functions = |node: usize| {
+            let place = self.places.get(node);
+            [self.free[node], place.x, place.y, place.z]
+        };
+        let [of_a, of_b] = [functions(a), functions(b)];
+        let [cluster_a, cluster_b] = [a, b].map(|node| usize::from(self.clusters[node / BLOCK]));
+        let rows = if cluster_a == cluster_b {
+            [
+                (cluster_a, std::array::from_fn(|f| of_a[f] - of_b[f])),
+                (cluster_a, [0.0; FUNCTIONS]),
+            ]
+        } else {
+            [(cluster_a, of_a), (cluster_b, of_b.map(|value| -value))]
+        };
+        let size = self.size();
+        for (row_cluster, row_values) in rows {
+            for (column_cluster, column_values) in rows {
+                for (row, &value) in row_values.iter().enumerate() {
+                    for (column, &other) in column_values.iter().enumerate() {
+                        let factor = value * other;
+                        if factor == 0.0 {
+                            continue;
+                        }
+                        for axis in 0..3 {
+                            let place =
+                                (row_cluster * MOTIONS + 3 * row + axis) * size + column_cluster * MOTIONS + 3 * column;
+                            for (entry, term) in self.stiffness[place..place + 3]
+                                .iter_mut()
+                                .zip(matrix.col(axis).to_array())
+                            {
+                                *entry += f64::from(factor * term);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Makes the inverse, with this inertia of each node, N/m. Where it has none, the level does nothing.
+    pub fn invert(&mut self, inertia: &[f32]) {
+        let size = self.size();
+        self.factor.copy_from_slice(&self.stiffness);
+        for (node, &inertia) in inertia.iter().enumerate() {
+            let place = self.places.get(node);
+            let values = [self.free[node], place.x, place.y, place.z];
+            let first = usize::from(self.clusters[node / BLOCK]) * MOTIONS;
+            for row in 0..FUNCTIONS {
+                for column in 0..FUNCTIONS {
+                    let value = f64::from(values[row] * values[column] * inertia) * f64::from(self.free[node]);
+                    for axis in 0..3 {
+                        self.factor[(first + 3 * row + axis) * size + first + 3 * column + axis] += value;
+                    }
+                }
+            }
+        }
+        for row in 0..size {
+            // What no node takes part in does not move.
+            let diagonal = &mut self.factor[row * size + row];
+            *diagonal = if *diagonal > 0.0 { *diagonal * (1.0 + 1e-7) } else { 1.0 };
+        }
+        if invert(&mut self.factor, size) {
+            for (to, &from) in self.inverse.iter_mut().zip(&self.factor) {
+                *to = from as f32;
+            }
+        } else {
+            self.inverse.fill(0.0);
+        }
+    }
+
+    /// Solves for `loads`: the work done, `loads . motions`.
+    pub fn solve(&mut self, kernel: crate::springs::ChosenKernel) -> f64 {
+        let work: f64 = kernel.run(Solve {
+            inverse: &self.inverse,
+            loads: &self.loads,
+            motions: &mut self.motions,
+        });
+        work
+    }
+
+    /// What forces on the nodes of a tile come to for each cluster: added to `loads`.
+    #[inline(always)]
+    pub fn restrict(&self, tile: usize, forces: [&[f32]; 3], loads: &mut [f32]) {
+        let first = tile * TILE;
+        let count = forces[0].len();
+        let [x, y, z] = self.places.slices(first..first + count);
+        let free = &self.free[first..first + count];
+        let functions = [free, x, y, z];
+        let clusters = &self.clusters[first / BLOCK..];
+        let whole = count / BLOCK;
+        let mut block = 0;
+        while block < whole {
+            // Blocks of one cluster, one after another.
+            let cluster = clusters[block];
+            let end = whole.min(block + clusters[block..].iter().take_while(|&&other| other == cluster).count());
+            let loads = &mut loads[usize::from(cluster) * MOTIONS..][..MOTIONS];
+            for (axis, forces) in forces.iter().enumerate() {
+                let [mut ones, mut xs, mut ys, mut zs] = [[0.0_f32; BLOCK]; FUNCTIONS];
+                for block in block..end {
+                    let forces = lanes(forces, block);
+                    add_products(&mut ones, forces, lanes(free, block));
+                    add_products(&mut xs, forces, lanes(x, block));
+                    add_products(&mut ys, forces, lanes(y, block));
+                    add_products(&mut zs, forces, lanes(z, block));
+                }
+                for (function, sums) in [ones, xs, ys, zs].into_iter().enumerate() {
+                    loads[3 * function + axis] += sums.into_iter().sum::<f32>();
+                }
+            }
+            block = end;
+        }
+        for place in whole * BLOCK..count {
+            let loads = &mut loads[usize::from(clusters[whole]) * MOTIONS..][..MOTIONS];
+            for (axis, forces) in forces.iter().enumerate() {
+                for (function, values) in functions.iter().enumerate() {
+                    loads[3 * function + axis] += forces[place] * values[place];
+                }
+            }
+        }
+    }
+
+    /// Adds what the clusters' motions are for the nodes of a tile.
+    #[inline(always)]
+    pub fn prolong(&self, tile: usize, ways: &mut [&mut [f32]; 3]) {
+        let first = tile * TILE;
+        let count = ways[0].len();
+        let [x, y, z] = self.places.slices(first..first + count);
+        let free = &self.free[first..first + count];
+        let motions_of =
+            |block: usize| &self.motions[usize::from(self.clusters[first / BLOCK + block]) * MOTIONS..][..MOTIONS];
+        for (axis, ways) in ways.iter_mut().enumerate() {
+            let (blocks, rest) = ways.as_chunks_mut::<BLOCK>();
+            let whole = blocks.len();
+            for (block, ways) in blocks.iter_mut().enumerate() {
+                let motions = motions_of(block);
+                let (free, x, y, z) = (lanes(free, block), lanes(x, block), lanes(y, block), lanes(z, block));
+                for lane in 0..BLOCK {
+                    ways[lane] += motions[axis] * free[lane]
+                        + motions[3 + axis] * x[lane]
+                        + motions[6 + axis] * y[lane]
+                        + motions[9 + axis] * z[lane];
+                }
+            }
+            for (way, place) in rest.iter_mut().zip(whole * BLOCK..) {
+                let motions = motions_of(whole);
+                *way += motions[axis] * free[place]
+                    + motions[3 + axis] * x[place]
+                    + motions[6 + axis] * y[place]
+                    + motions[9 + axis] * z[place];
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_products(sums: &mut [f32; BLOCK], a: &[f32; BLOCK], b: &[f32; BLOCK]) {
+    for lane in 0..BLOCK {
+        sums[lane] += a[lane] * b[lane];
+    }
+}
+
+/// Sixteen of them.
+#[inline(always)]
+fn lanes(values: &[f32], block: usize) -> &[f32; BLOCK] {
+    &values.as_chunks::<BLOCK>().0[block]
+}
+
+fn outer(vector: Vec3) -> Mat3 {
+    Mat3::from_cols(vector * vector.x, vector * vector.y, vector * vector.z)
+}
+
+/// Gives each block a cluster: halves of the blocks along the longest axis, and so on.
+fn split(centres: &[Vec3], order: &mut [u32], count: usize, next: &mut u16, clusters: &mut [u16]) {
+    if count <= 1 || order.len() <= 1 {
+        order.iter().for_each(|&block| clusters[block as usize] = *next);
+        *next += 1;
+        return;
+    }
+    let bounds = crate::body::Bounds::of(order.iter().map(|&block| centres[block as usize]));
+    let extent = bounds.max - bounds.min;
+    let axis = extent.max_position();
+    order.sort_unstable_by(|&a, &b| {
+        centres[a as usize][axis]
+            .total_cmp(&centres[b as usize][axis])
+            .then(a.cmp(&b))
+    });
+    let left = count / 2;
+    let (low, high) = order.split_at_mut(order.len() * left / count);
+    split(centres, low, left, next, clusters);
+    split(centres, high, count - left, next, clusters);
+}
+
+/// Replaces a symmetric positive definite matrix by its inverse; false where it is not one.
+fn invert(matrix: &mut [f64], size: usize) -> bool {
+    // Gauss-Jordan in place, without pivots.
+    for pivot in 0..size {
+        let value = matrix[pivot * size + pivot];
+        if !(value > 0.0 && value.is_finite()) {
+            return false;
+        }
+        let inverse = 1.0 / value;
+        let (above, rest) = matrix.split_at_mut(pivot * size);
+        let (row, below) = rest.split_at_mut(size);
+        row[pivot] = 1.0;
+        row.iter_mut().for_each(|entry| *entry *= inverse);
+        for other in above.chunks_exact_mut(size).chain(below.chunks_exact_mut(size)) {
+            let factor = other[pivot];
+            if factor == 0.0 {
+                continue;
+            }
+            other[pivot] = 0.0;
+            for (entry, &pivoted) in other.iter_mut().zip(&*row) {
+                *entry -= factor * pivoted;
+            }
+        }
+    }
+    true
+}
+
+/// The inverse times the loads.
+struct Solve<'a> {
+    inverse: &'a [f32],
+    loads: &'a [f32],
+    motions: &'a mut [f32],
+}
+
+impl Loops for Solve<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let size = self.loads.len();
+        self.motions.fill(0.0);
+        for (row, &load) in self.inverse.chunks_exact(size).zip(self.loads) {
+            for (motion, &entry) in self.motions.iter_mut().zip(row) {
+                *motion += load * entry;
+            }
+        }
+        self.loads
+            .iter()
+            .zip(&*self.motions)
+            .map(|(&load, &motion)| f64::from(load) * f64::from(motion))
+            .sum()
+    }
+}

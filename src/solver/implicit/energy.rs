@@ -1,0 +1,193 @@
+//! What a step does to the energy: an implicit step loses some and gains none, unless its equation was not solved.
+
+use super::gradient::Partial;
+use super::step::Substep;
+use super::{End, Implicit};
+use crate::body::{Body, Vectors};
+use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
+
+/// What rounding may add, as a fraction of the energies involved.
+const ROUNDING: f64 = 1e-5;
+
+/// What was lost may come back, as far as it is no more than this part of the energy there is.
+const CREDIT: f64 = 0.1;
+
+/// The energy before a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Before {
+    /// Kinetic and elastic, J; the pins are already where the step leads them.
+    energy: f64,
+    credit: f64,
+}
+
+impl Substep<'_> {
+    /// The energy before the step.
+    pub(super) fn energy_before(&self, body: &mut Body, implicit: &mut Implicit) -> Before {
+        let history = implicit.last(self.is_first);
+        let credit = history.credit;
+        let travels = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
+        if let Some(energy) = history.energy
+            && !travels
+        {
+            return Before { energy, credit };
+        }
+        let state = body.state.substep();
+        let velocities = if self.is_first {
+            state.first_velocities
+        } else {
+            &*state.velocities
+        };
+        let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, body.kernel);
+        let mut energy = elastic(&*body.springs, state.positions, &mut implicit.partials, self.team);
+        if travels {
+            let moved = &mut implicit.products;
+            moved.copy_from(state.positions);
+            for pin in body.pins.iter() {
+                moved.set(pin.node as usize, self.lead(pin));
+            }
+            energy = energy.max(elastic(&*body.springs, moved, &mut implicit.partials, self.team));
+        }
+        Before {
+            energy: kinetic + energy,
+            credit,
+        }
+    }
+
+    /// Compares the energy after the step with what there was and what was put in.
+    pub(super) fn account(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+        let state = body.state.substep();
+        let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
+        let elastic = elastic(&*body.springs, state.next_positions, &mut implicit.partials, self.team);
+        let next = 1 - implicit.settled;
+        let work = self.work(body, &implicit.histories[next].ways);
+        let after = kinetic + elastic;
+        let allowed = before.energy + work + before.credit;
+        let rounding = ROUNDING * (before.energy + after + work.abs());
+        if !after.is_finite() {
+            return End::NotFinite;
+        }
+        let history = &mut implicit.histories[next];
+        history.energy = Some(after);
+        history.credit = (allowed - after).clamp(0.0, CREDIT * (after + work.abs()));
+        if after <= allowed + rounding {
+            End::Fine
+        } else {
+            End::Gained
+        }
+    }
+
+    /// Takes off what was gained: first of the velocities; where that is not enough, nothing moves but the pins.
+    pub(super) fn slow_down(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+        let next = 1 - implicit.settled;
+        let known = implicit.histories[next].energy.filter(|energy| energy.is_finite());
+        let state = body.state.substep();
+        let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
+        let work = self.work(body, &implicit.histories[next].ways);
+        let state = body.state.substep();
+        let history = &mut implicit.histories[next];
+        if let Some(energy) = known
+            && kinetic.is_finite()
+            && energy - kinetic <= before.energy + work
+        {
+            let factor = ((before.energy + work - (energy - kinetic)) / kinetic)
+                .clamp(0.0, 1.0)
+                .sqrt() as f32;
+            scale(state.velocities, factor);
+            history.energy = Some(energy - kinetic * (1.0 - f64::from(factor * factor)));
+        } else {
+            state.next_positions.copy_from(state.positions);
+            for pin in body.pins.iter() {
+                state.next_positions.set(pin.node as usize, self.lead(pin));
+            }
+            state.velocities.clear();
+            history.energy = None;
+        }
+        history.ways.clear();
+        history.gains.clear();
+        history.step = 0.0;
+        history.credit = 0.0;
+        End::Fine
+    }
+
+    /// What gravity and forces from outside did on these ways, J.
+    fn work(&self, body: &Body, ways: &Vectors) -> f64 {
+        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+        let mut work = 0.0;
+        for (axis, ways) in ways.axes().into_iter().enumerate() {
+            let gravity = self.request.gravity[axis];
+            let masses = body.masses.iter().zip(&body.inverse_masses);
+            let weighted: f64 = masses
+                .zip(ways)
+                .filter(|((_, inverse_mass), _)| **inverse_mass > 0.0)
+                .map(|((&mass, _), &way)| f64::from(mass) * f64::from(way))
+                .sum();
+            work += f64::from(gravity) * weighted;
+            if let Some(applied) = applied {
+                let products = applied.axes()[axis].iter().zip(ways);
+                work += products
+                    .map(|(&force, &way)| f64::from(force) * f64::from(way))
+                    .sum::<f64>();
+            }
+        }
+        work
+    }
+}
+
+fn scale(vectors: &mut Vectors, factor: f32) {
+    for axis in vectors.axes_mut() {
+        axis.iter_mut().for_each(|value| *value *= factor);
+    }
+}
+
+fn elastic(springs: &dyn Springs, positions: &Vectors, partials: &mut [Partial], team: &Team) -> f64 {
+    team.pass(tile_count(positions.len()), Items::new(partials), |tile, partial| {
+        partial.first = springs.half_energy(tile, positions);
+    });
+    partials.iter().map(|partial| partial.first).sum()
+}
+
+fn kinetic(velocities: &Vectors, masses: &[f32], inverse_masses: &[f32], kernel: ChosenKernel) -> f64 {
+    (0..tile_count(masses.len()))
+        .map(|tile| {
+            let nodes = tile_nodes(tile, masses.len());
+            kernel.run(Kinetic {
+                velocities: velocities.slices(nodes.clone()),
+                masses: &masses[nodes.clone()],
+                inverse_masses: &inverse_masses[nodes],
+            })
+        })
+        .sum()
+}
+
+struct Kinetic<'a> {
+    velocities: [&'a [f32]; 3],
+    masses: &'a [f32],
+    inverse_masses: &'a [f32],
+}
+
+impl Loops for Kinetic<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let count = self.masses.len();
+        let [x, y, z] = self.velocities.map(|axis| &axis[..count]);
+        let inverse_masses = &self.inverse_masses[..count];
+        let mut sum = 0.0;
+        for node in 0..count {
+            let square = [x[node], y[node], z[node]]
+                .map(f64::from)
+                .iter()
+                .map(|v| v * v)
+                .sum::<f64>();
+            let mass = if inverse_masses[node] > 0.0 {
+                f64::from(self.masses[node])
+            } else {
+                0.0
+            };
+            sum += mass * square;
+        }
+        0.5 * sum
+    }
+}

@@ -1,0 +1,244 @@
+//! IMPLICIT: one solved equation per step, stable at any step.
+//!
+//! A step of length h goes from the positions x and velocities v to those at its end, where
+//! `v1 = w + t a(x1, v1)` and `x1 = x + y + s`, with `s = t² a`. For implicit Euler (order 1) t = h, w = v, y = h v. For the second
+//! backward difference formula (order 2; Curtiss, Hirschfelder 1952) with steps h after h' and q = h/h': t = h (1 + q)/(1 + 2q),
+//! w = v + c (v - v'), y = c (x - x') + t w, c = q²/(1 + 2q). Both are `M s / t² = f(x + y + s)`, and differ in y, w and t alone.
+//!
+//! The unknown is s, what forces do within the step, not the position: the velocity is w + s/t, and nothing that is small is
+//! found as a difference of what is large.
+
+mod blocks;
+mod coarse;
+mod contact;
+mod energy;
+mod estimate;
+mod gradient;
+mod step;
+
+pub(super) use step::run;
+
+use crate::body::Vectors;
+use crate::diagnostics::{SolverReport, StateHasher};
+use crate::error::Result;
+use crate::memory;
+use crate::springs::tile_count;
+use blocks::Blocks;
+use coarse::Coarse;
+use estimate::{Spectrum, Ways};
+use gradient::Partial;
+
+/// What the last step leaves to the next, for order 2.
+#[derive(Debug)]
+pub(crate) struct History {
+    /// How far each node went, m.
+    pub ways: Vectors,
+    /// How its velocity changed, m/s.
+    pub gains: Vectors,
+    /// s; 0: there is none.
+    pub step: f32,
+    /// Kinetic and elastic energy at its end, J, where they are known.
+    pub energy: Option<f64>,
+    /// What was lost not long ago, and may come back: the energy of a step's formula is not quite this one.
+    pub credit: f64,
+}
+
+/// How a substep ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Fine,
+    /// With more energy than was put in.
+    Gained,
+    /// So near a tool that it is to be taken in shorter parts.
+    Near,
+    NotFinite,
+}
+
+impl History {
+    fn new(node_count: usize) -> Result<Self> {
+        Ok(Self {
+            ways: Vectors::zeros(node_count)?,
+            gains: Vectors::zeros(node_count)?,
+            step: 0.0,
+            energy: None,
+            credit: 0.0,
+        })
+    }
+}
+
+/// What is known of the preconditioner from the steps before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Experience {
+    /// The smallest eigenvalue of the preconditioned matrix.
+    smallest: f64,
+    /// Products that the first solution with the preconditioner took.
+    fresh_products: u32,
+    /// Whether it has become so much worse that it is to be made again.
+    worn: bool,
+}
+
+/// What a body that is moved implicitly has beside its state.
+#[derive(Debug)]
+pub(crate) struct Implicit {
+    /// 1 or 2.
+    order: u32,
+    /// The most products with the matrix in a step.
+    budget: u32,
+    histories: [History; 2],
+    /// Which of them belongs to the current state.
+    settled: usize,
+    /// s: what forces do within the step, m.
+    pushes: Vectors,
+    /// What is added to it by one solution of the linearised equation, m.
+    corrections: Vectors,
+    residuals: Vectors,
+    searches: Vectors,
+    /// The matrix times the search direction, and what the preconditioner makes of the residual.
+    products: Vectors,
+    preconditioned: Vectors,
+    /// N/m; 0 for what is pinned.
+    inertia: Vec<f32>,
+    /// What `inertia` was made for: t, s; 0: nothing.
+    prepared: f32,
+    blocks: Blocks,
+    coarse: Coarse,
+    /// The loads of the clusters from each tile.
+    loads: Vec<f32>,
+    partials: Vec<Partial>,
+    spectrum: Spectrum,
+    ways: Ways,
+    /// Whether the preconditioner is to be made again, from the current state: then what it is now means nothing.
+    stale: bool,
+    /// Whether that was so when the step in progress began.
+    was_stale: bool,
+    /// That of the step in progress, and that of the current state.
+    memory: Experience,
+    kept: Experience,
+    /// How the last step was taken.
+    pub report: SolverReport,
+}
+
+impl Experience {
+    const NONE: Self = Self {
+        smallest: 1.0,
+        fresh_products: 0,
+        worn: false,
+    };
+}
+
+impl Implicit {
+    /// For nodes at these positions; order and budget are 0 for the default.
+    pub fn new(positions: &Vectors, order: u32, budget: u32) -> Result<Self> {
+        /// More than a body that is to be stepped while somebody waits can need.
+        const BUDGET: u32 = 1000;
+        let budget = if budget == 0 { BUDGET } else { budget };
+        let node_count = positions.len();
+        let vectors = || Vectors::zeros(node_count);
+        let coarse = Coarse::new(positions)?;
+        Ok(Self {
+            order: if order == 0 { 2 } else { order },
+            budget,
+            histories: [History::new(node_count)?, History::new(node_count)?],
+            settled: 0,
+            pushes: vectors()?,
+            corrections: vectors()?,
+            residuals: vectors()?,
+            searches: vectors()?,
+            products: vectors()?,
+            preconditioned: vectors()?,
+            inertia: memory::filled(0.0, node_count)?,
+            prepared: 0.0,
+            blocks: Blocks::new(node_count)?,
+            loads: memory::filled(0.0, coarse.size() * tile_count(node_count))?,
+            coarse,
+            partials: memory::filled(Partial::default(), tile_count(node_count))?,
+            spectrum: Spectrum::new()?,
+            ways: Ways::new(budget.clamp(1, BUDGET))?,
+            stale: true,
+            was_stale: true,
+            memory: Experience::NONE,
+            kept: Experience::NONE,
+            report: SolverReport::default(),
+        })
+    }
+
+    /// Makes what the step in progress leaves to the next that of the current state.
+    pub fn commit(&mut self) {
+        self.settled = 1 - self.settled;
+        self.kept = self.memory;
+        self.kept.smallest = self.spectrum.known_smallest();
+        self.stale |= self.kept.worn;
+    }
+
+    /// Begins a step anew, from the current state.
+    fn begin(&mut self) {
+        self.memory = self.kept;
+        self.spectrum.assume(self.kept.smallest);
+    }
+
+    /// The step in progress is not to be.
+    pub fn put_back(&mut self) {
+        self.stale = self.was_stale;
+    }
+
+    /// Notes how many products a solution took.
+    fn wear(&mut self, products: u32) {
+        let fresh = &mut self.memory.fresh_products;
+        if *fresh == 0 {
+            *fresh = products;
+        } else if products > 2 * *fresh + 8 {
+            self.memory.worn = true;
+        }
+    }
+
+    /// Nodes have been put elsewhere or given other velocities.
+    pub fn forget_history(&mut self) {
+        self.histories[self.settled].step = 0.0;
+        self.forget_energy();
+    }
+
+    /// Springs or pins have changed.
+    pub fn forget_matrix(&mut self) {
+        self.stale = true;
+        self.forget_energy();
+    }
+
+    /// What the next step depends on beside the state.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        let History {
+            ways,
+            gains,
+            step,
+            energy,
+            credit,
+        } = &self.histories[self.settled];
+        for vector in ways.iter().chain(gains.iter()) {
+            hasher.write_floats(&vector.to_array());
+        }
+        hasher.write_floats(&[*step]);
+        hasher.write_u64(energy.unwrap_or(f64::NAN).to_bits());
+        hasher.write_u64(credit.to_bits());
+        hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
+        hasher.write_u64(u64::from(self.stale));
+        if !self.stale {
+            hasher.write_u64(self.kept.smallest.to_bits());
+            hasher.write_u64(u64::from(self.kept.fresh_products));
+            self.blocks.hash(hasher);
+            self.coarse.hash(hasher);
+        }
+    }
+
+    /// The energy is not what it was when the last step ended.
+    pub fn forget_energy(&mut self) {
+        self.histories[self.settled].energy = None;
+    }
+
+    /// What the step before the next substep left.
+    fn last(&self, is_first: bool) -> &History {
+        &self.histories[self.place(is_first)]
+    }
+
+    fn place(&self, is_first: bool) -> usize {
+        if is_first { self.settled } else { 1 - self.settled }
+    }
+}

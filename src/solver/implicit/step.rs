@@ -1,0 +1,706 @@
+//! A step of IMPLICIT: where it aims, Newton's iterations, and what is made of their result.
+
+use glam::Vec3;
+
+use super::energy::Before;
+use super::gradient::{Goal, Partial, add_products, total};
+use super::{End, Experience, Implicit, contact};
+use crate::body::{Body, Pin, Vectors};
+use crate::diagnostics::SolverReport;
+use crate::solver::attempt::{Carry, StepRequest};
+use crate::solver::kick::{Survey, look};
+use crate::solver::verlet::{Taken, begin};
+use crate::springs::{ChosenKernel, Loops, Motion, Tangent, TileForces, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
+
+/// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
+const LARGEST_RATIO: f64 = 2.0;
+
+/// The error left, as a fraction of what forces add to the motion that was expected.
+const RELATIVE: f64 = 0.05;
+
+/// The error that is always left, as a fraction of the body's extent: what the rounding of positions makes of forces.
+const ROUNDING: f64 = 5e-7;
+
+/// Linearised equations solved in a step at most.
+const NEWTON: u32 = 40;
+
+/// How one step is made from what was before.
+#[derive(Clone, Copy, Debug)]
+struct Formula {
+    /// t, s.
+    time: f64,
+    /// c: what part of the last way and of the last gain goes on.
+    carried: f64,
+    /// What part of the last gain is expected to be what forces give.
+    expected: f64,
+}
+
+impl Formula {
+    fn new(order: u32, step: f64, last_step: f64) -> Self {
+        let ratio = if last_step > 0.0 { step / last_step } else { 0.0 };
+        if order == 1 || ratio == 0.0 || ratio > LARGEST_RATIO {
+            Self {
+                time: step,
+                carried: 0.0,
+                expected: if ratio > LARGEST_RATIO { 0.0 } else { ratio },
+            }
+        } else {
+            let carried = ratio * ratio / (1.0 + 2.0 * ratio);
+            Self {
+                time: step * (1.0 + ratio) / (1.0 + 2.0 * ratio),
+                carried,
+                expected: ratio - carried,
+            }
+        }
+    }
+}
+
+/// How often a step that has gained energy is taken again in four times as many parts.
+const CUTS: u32 = 4;
+
+/// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
+/// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
+/// down. How many parts were taken, and what came of them.
+pub(in crate::solver) fn run(
+    body: &mut Body,
+    request: &StepRequest,
+    substeps: u32,
+    middle: u32,
+    start: Carry,
+    team: &Team,
+) -> (u32, Taken) {
+    let mut end = End::NotFinite;
+    let mut parts = 1;
+    if let Some(mut implicit) = body.implicit.take() {
+        implicit.report = SolverReport::default();
+        implicit.was_stale = implicit.stale;
+        let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
+            .ceil()
+            .max(1.0);
+        let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
+        if contact::is_near(body) {
+            parts = short;
+        }
+        let mut cuts = 0;
+        loop {
+            let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
+            end = run_in_parts(body, &mut implicit, request, whole, cuts == CUTS, team);
+            match end {
+                End::Fine => break,
+                End::Near => parts = parts.max(short),
+                End::Gained | End::NotFinite if cuts == CUTS => break,
+                End::Gained | End::NotFinite => {
+                    cuts += 1;
+                    parts = parts.saturating_mul(4);
+                }
+            }
+        }
+        body.implicit = Some(implicit);
+    }
+    let taken = Taken {
+        carry: start,
+        finite: end == End::Fine,
+    };
+    (substeps.saturating_mul(parts), taken)
+}
+
+fn run_in_parts(
+    body: &mut Body,
+    implicit: &mut Implicit,
+    request: &StepRequest,
+    [substeps, middle]: [u32; 2],
+    is_last_resort: bool,
+    team: &Team,
+) -> End {
+    begin(body, request);
+    implicit.begin();
+    let step = f64::from(request.dt) / f64::from(substeps);
+    for index in 0..substeps {
+        let substep = Substep {
+            request,
+            step,
+            start: f64::from(index) / f64::from(substeps),
+            end: f64::from(index + 1) / f64::from(substeps),
+            is_first: index == 0,
+            formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
+            team,
+        };
+        let end = substep.take_safely(body, implicit, is_last_resort);
+        if end != End::Fine {
+            return end;
+        }
+        body.state.advance();
+        if index + 1 == middle
+            && let Some(coarse) = &mut body.coarse
+        {
+            coarse.pass_middle(body.state.newest().0);
+        }
+    }
+    End::Fine
+}
+
+/// One solved equation.
+#[derive(Clone, Copy)]
+pub(super) struct Substep<'a> {
+    pub request: &'a StepRequest<'a>,
+    /// s
+    pub step: f64,
+    /// Fractions of the step asked for.
+    pub start: f64,
+    pub end: f64,
+    pub is_first: bool,
+    formula: Formula,
+    pub team: &'a Team<'a>,
+}
+
+impl Substep<'_> {
+    /// Takes it, with order 1 where that of order 2 gains energy; as a last resort what was gained is taken off again.
+    fn take_safely(self, body: &mut Body, implicit: &mut Implicit, is_last_resort: bool) -> End {
+        let before = self.energy_before(body, implicit);
+        let mut end = self.take(body, implicit, before);
+        // What a later substep began with has been written over: then the whole step is taken again.
+        let has_history = self.formula.carried != 0.0 || self.formula.expected != 0.0;
+        if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first {
+            let euler = Self {
+                formula: Formula::new(1, self.step, 0.0),
+                ..self
+            };
+            end = euler.take(body, implicit, before);
+        }
+        if matches!(end, End::Gained | End::NotFinite) && is_last_resort {
+            end = self.slow_down(body, implicit, before);
+        }
+        end
+    }
+
+    fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+        self.prepare(body, implicit);
+        self.aim(body, implicit);
+        self.minimise(body, implicit);
+        if !self.finish(body, implicit) {
+            return End::NotFinite;
+        }
+        match self.account(body, implicit, before) {
+            End::Fine => self.meet(body, implicit),
+            end => end,
+        }
+    }
+
+    /// Where a pinned node is at the end of the step.
+    pub fn lead(&self, pin: &Pin) -> Vec3 {
+        pin.goal - pin.travel * (1.0 - self.end) as f32
+    }
+
+    /// The tangent of the springs for this step.
+    fn tangent(&self) -> Tangent {
+        Tangent {
+            floor: 0.0,
+            rate: (1.0 / self.formula.time) as f32,
+        }
+    }
+
+    /// Makes inertia and preconditioner those of this step.
+    fn prepare(&self, body: &Body, implicit: &mut Implicit) {
+        let positions = body.state.newest().0;
+        if implicit.stale {
+            implicit
+                .blocks
+                .gather(&*body.springs, positions, self.tangent(), self.team);
+            implicit
+                .coarse
+                .gather(&*body.springs, &body.inverse_masses, positions, self.tangent());
+        }
+        let time = self.formula.time as f32;
+        if time != implicit.prepared || implicit.stale {
+            let per_mass = 1.0 / (self.formula.time * self.formula.time);
+            for (node, inertia) in implicit.inertia.iter_mut().enumerate() {
+                let rate = body
+                    .damping
+                    .as_ref()
+                    .map_or(0.0, |damping| f64::from(damping.rates()[node]));
+                let mass = f64::from(body.masses[node]);
+                let per_mass = per_mass + rate / self.formula.time;
+                *inertia = if body.inverse_masses[node] > 0.0 {
+                    ((mass * per_mass) as f32).min(f32::MAX)
+                } else {
+                    0.0
+                };
+            }
+            implicit.blocks.invert(&implicit.inertia, self.team);
+            implicit.coarse.invert(&implicit.inertia);
+            implicit.prepared = time;
+        }
+        if implicit.stale {
+            implicit.stale = false;
+            implicit.memory = Experience::NONE;
+            implicit.spectrum.assume(1.0);
+        }
+    }
+
+    /// Puts the velocities where they would be without forces, and expects of forces what they did before.
+    fn aim(&self, body: &mut Body, implicit: &mut Implicit) {
+        let node_count = body.node_count();
+        let state = body.state.substep();
+        let first = self.is_first.then_some(state.first_velocities);
+        let gains = &implicit.histories[implicit.place(self.is_first)].gains;
+        let (carried, expected) = (
+            self.formula.carried as f32,
+            (self.formula.expected * self.formula.time) as f32,
+        );
+        let written = (
+            state.velocities.tiles_mut(),
+            implicit.pushes.tiles_mut(),
+            body.pins.tiles_mut(),
+        );
+        let (kernel, dt) = (body.kernel, self.request.dt);
+        self.team.pass(
+            tile_count(node_count),
+            written,
+            |tile, (mut velocities, mut pushes, pins)| {
+                let nodes = tile_nodes(tile, node_count);
+                if let Some(first) = first {
+                    for (to, from) in velocities.iter_mut().zip(first.slices(nodes.clone())) {
+                        to.copy_from_slice(from);
+                    }
+                }
+                kernel.run(Aim {
+                    carried,
+                    expected,
+                    gains: gains.slices(nodes.clone()),
+                    velocities: &mut velocities,
+                    pushes: &mut pushes,
+                });
+                for pin in pins {
+                    let place = pin.node as usize - nodes.start;
+                    let velocity = pin.travel / dt;
+                    for (axis, value) in velocities.iter_mut().zip(velocity.to_array()) {
+                        axis[place] = value;
+                    }
+                    for axis in &mut pushes {
+                        axis[place] = 0.0;
+                    }
+                }
+            },
+        );
+    }
+
+    /// Puts the nodes where `pushes` has them.
+    fn place(&self, body: &mut Body, implicit: &Implicit) {
+        let node_count = body.node_count();
+        let state = body.state.substep();
+        let history = implicit.last(self.is_first);
+        let time = self.formula.time as f32;
+        let carried = self.formula.carried as f32;
+        let (positions, velocities) = (state.positions, &*state.velocities);
+        let predicted = body.predicted_velocities.as_mut().map(Vectors::tiles_mut);
+        let written = (state.next_positions.tiles_mut(), predicted, body.pins.tiles_mut());
+        let (kernel, left) = (body.kernel, (1.0 - self.end) as f32);
+        self.team
+            .pass(tile_count(node_count), written, |tile, (mut next, predicted, pins)| {
+                let nodes = tile_nodes(tile, node_count);
+                kernel.run(Place {
+                    carried,
+                    time,
+                    positions: positions.slices(nodes.clone()),
+                    velocities: velocities.slices(nodes.clone()),
+                    ways: history.ways.slices(nodes.clone()),
+                    pushes: implicit.pushes.slices(nodes.clone()),
+                    next: &mut next,
+                });
+                if let Some(mut predicted) = predicted {
+                    kernel.run(Predict {
+                        time,
+                        velocities: velocities.slices(nodes.clone()),
+                        pushes: implicit.pushes.slices(nodes.clone()),
+                        predicted: &mut predicted,
+                    });
+                }
+                for pin in pins {
+                    let position = pin.goal - pin.travel * left;
+                    let place = pin.node as usize - nodes.start;
+                    for (axis, value) in next.iter_mut().zip(position.to_array()) {
+                        axis[place] = value;
+                    }
+                }
+            });
+    }
+
+    /// What the equation lacks with the nodes where they are: its product with the last correction, J.
+    fn residual(&self, body: &mut Body, implicit: &mut Implicit) -> f64 {
+        let node_count = body.node_count();
+        let state = body.state.substep();
+        let (positions, velocities) = (&*state.next_positions, &*state.velocities);
+        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+        let rates = body.damping.as_ref().map(|damping| damping.rates());
+        let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
+        let damped = body.predicted_velocities.as_ref();
+        let (pushes, corrections, inertia) = (&implicit.pushes, &implicit.corrections, &implicit.inertia);
+        let gravity = self.request.gravity;
+        let written = (
+            implicit.residuals.tiles_mut(),
+            Items::new(&mut implicit.partials),
+            body.pins.tiles_mut(),
+        );
+        self.team.pass(
+            tile_count(node_count),
+            written,
+            |tile, (mut residuals, partial, pins)| {
+                let nodes = tile_nodes(tile, node_count);
+                let mut forces = TileForces::ZERO;
+                springs.forces(tile, &Motion::at(positions, damped), &mut forces);
+                for pin in &mut *pins {
+                    let node = pin.node as usize;
+                    pin.solved = -(forces.get(node - nodes.start) + gravity * masses[node]);
+                }
+                kernel.run(Residual {
+                    gravity,
+                    forces: &forces,
+                    applied: applied.map(|applied| applied.slices(nodes.clone())),
+                    masses: &masses[nodes.clone()],
+                    rates: rates.map(|rates| &rates[nodes.clone()]),
+                    inertia: &inertia[nodes.clone()],
+                    velocities: velocities.slices(nodes.clone()),
+                    pushes: pushes.slices(nodes.clone()),
+                    residuals: &mut residuals,
+                });
+                for pin in &*pins {
+                    for axis in &mut residuals {
+                        axis[pin.node as usize - nodes.start] = 0.0;
+                    }
+                }
+                *partial = kernel.run(Slope {
+                    residuals: residuals.map(|axis| &*axis),
+                    corrections: corrections.slices(nodes),
+                });
+            },
+        );
+        implicit.partials.iter().map(|partial| partial.first).sum()
+    }
+
+    /// Newton's iterations.
+    fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
+        let all_inertia: f64 = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
+        let smallest = match self.request.tolerance {
+            0.0 => ROUNDING * f64::from(body.extent()),
+            tolerance => 0.1 * f64::from(tolerance),
+        };
+        let absolute = smallest * smallest * all_inertia;
+        let mut products = 0;
+        let mut size = 0.0;
+        let mut error = f64::INFINITY;
+        self.place(body, implicit);
+        self.residual(body, implicit);
+        for iteration in 0..NEWTON {
+            implicit.corrections.clear();
+            let square = implicit.precondition(body, 0.0, self.team).first;
+            let remaining = square / implicit.spectrum.known_smallest();
+            let is_stuck = remaining > 0.5 * error && (iteration > 2 || remaining < 100.0 * absolute);
+            error = remaining;
+            let budget = implicit.budget.saturating_sub(products);
+            if error <= absolute.max(RELATIVE * RELATIVE * size) || is_stuck || budget == 0 || !error.is_finite() {
+                break;
+            }
+            let goal = Goal {
+                budget,
+                absolute,
+                relative: RELATIVE * RELATIVE,
+                size,
+            };
+            let positions = body.state.next_positions();
+            let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
+            products += solved.products;
+            implicit.wear(solved.products);
+            size = f64::max(size, solved.size);
+            self.go(body, implicit, solved.work);
+            // The correction itself was no more than what may be left.
+            if solved.size <= absolute.max(RELATIVE * RELATIVE * size) {
+                error = solved.error.max(solved.size * RELATIVE);
+                break;
+            }
+        }
+        implicit.report.iterations += products;
+        let error = (error / all_inertia).sqrt() as f32;
+        implicit.report.error = implicit.report.error.max(error);
+    }
+
+    /// Goes along the correction, as far as the forces do not turn against it.
+    fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) {
+        let mut gone = 1.0;
+        add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
+        for _ in 0..12 {
+            self.place(body, implicit);
+            let slope = self.residual(body, implicit);
+            if slope >= -0.5 * work {
+                return;
+            }
+            // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
+            let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
+            let next = gone * f64::clamp(part, 0.1, 0.7);
+            add(
+                &mut implicit.pushes,
+                &implicit.corrections,
+                (next - gone) as f32,
+                body.kernel,
+                self.team,
+            );
+            gone = next;
+        }
+        self.place(body, implicit);
+        self.residual(body, implicit);
+    }
+
+    /// Makes velocities and history of what was found; whether all is finite.
+    fn finish(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
+        let node_count = body.node_count();
+        let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
+        let time = self.formula.time as f32;
+        let carried = self.formula.carried as f32;
+        let [settled, other] = &mut implicit.histories;
+        let (settled, next) = if implicit.settled == 0 {
+            (&*settled, other)
+        } else {
+            (&*other, settled)
+        };
+        let from = self.is_first.then_some(settled);
+        next.step = self.step as f32;
+        let state = body.state.substep();
+        let positions = &*state.next_positions;
+        let pushes = &implicit.pushes;
+        let written = (
+            state.velocities.tiles_mut(),
+            next.ways.tiles_mut(),
+            next.gains.tiles_mut(),
+            body.pins.tiles_mut(),
+            Items::new(&mut body.surveys),
+        );
+        self.team.pass(
+            tile_count(node_count),
+            written,
+            |tile, (mut velocities, mut ways, mut gains, pins, survey)| {
+                let nodes = tile_nodes(tile, node_count);
+                if let Some(from) = from {
+                    for (to, from) in ways.iter_mut().zip(from.ways.slices(nodes.clone())) {
+                        to.copy_from_slice(from);
+                    }
+                    for (to, from) in gains.iter_mut().zip(from.gains.slices(nodes.clone())) {
+                        to.copy_from_slice(from);
+                    }
+                }
+                kernel.run(Finish {
+                    carried,
+                    time,
+                    pushes: pushes.slices(nodes.clone()),
+                    velocities: &mut velocities,
+                    ways: &mut ways,
+                    gains: &mut gains,
+                });
+                for pin in pins {
+                    let place = pin.node as usize - nodes.start;
+                    let velocity = pin.travel / dt;
+                    for axis in 0..3 {
+                        velocities[axis][place] = velocity[axis];
+                        ways[axis][place] = pin.travel[axis] * part;
+                        gains[axis][place] = 0.0;
+                    }
+                    pin.force_sum += pin.solved.as_dvec3();
+                }
+                let velocities = velocities.map(|axis| &*axis);
+                *survey = look(kernel, velocities, Some(positions.slices(nodes)));
+            },
+        );
+        body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and).finite
+    }
+}
+
+/// Adds `factor` times the one to the other.
+fn add(to: &mut Vectors, from: &Vectors, factor: f32, kernel: ChosenKernel, team: &Team) {
+    let node_count = from.len();
+    team.pass(tile_count(node_count), to.tiles_mut(), |tile, to| {
+        let from = from.slices(tile_nodes(tile, node_count));
+        kernel.run(Add { factor, from, to });
+    });
+}
+
+struct Add<'a> {
+    factor: f32,
+    from: [&'a [f32]; 3],
+    to: [&'a mut [f32]; 3],
+}
+
+impl Loops for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (to, from) in self.to.into_iter().zip(self.from) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to += self.factor * from;
+            }
+        }
+    }
+}
+
+struct Aim<'a, 'b> {
+    carried: f32,
+    expected: f32,
+    gains: [&'a [f32]; 3],
+    velocities: &'b mut [&'a mut [f32]; 3],
+    pushes: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Aim<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for ((velocities, pushes), gains) in self.velocities.iter_mut().zip(self.pushes).zip(self.gains) {
+            for ((velocity, push), gain) in velocities.iter_mut().zip(pushes.iter_mut()).zip(gains) {
+                *velocity += self.carried * gain;
+                *push = self.expected * gain;
+            }
+        }
+    }
+}
+
+struct Place<'a, 'b> {
+    carried: f32,
+    time: f32,
+    positions: [&'a [f32]; 3],
+    velocities: [&'a [f32]; 3],
+    ways: [&'a [f32]; 3],
+    pushes: [&'a [f32]; 3],
+    next: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Place<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (axis, next) in self.next.iter_mut().enumerate() {
+            let count = next.len();
+            let (positions, velocities) = (&self.positions[axis][..count], &self.velocities[axis][..count]);
+            let (ways, pushes) = (&self.ways[axis][..count], &self.pushes[axis][..count]);
+            for place in 0..count {
+                let way = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
+                next[place] = positions[place] + way;
+            }
+        }
+    }
+}
+
+struct Predict<'a, 'b> {
+    time: f32,
+    velocities: [&'a [f32]; 3],
+    pushes: [&'a [f32]; 3],
+    predicted: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Predict<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let per_time = 1.0 / self.time;
+        for (axis, predicted) in self.predicted.iter_mut().enumerate() {
+            for ((predicted, velocity), push) in predicted.iter_mut().zip(self.velocities[axis]).zip(self.pushes[axis])
+            {
+                *predicted = velocity + push * per_time;
+            }
+        }
+    }
+}
+
+struct Residual<'a, 'b> {
+    gravity: Vec3,
+    forces: &'a TileForces,
+    applied: Option<[&'a [f32]; 3]>,
+    masses: &'a [f32],
+    /// Of damping, 1/s.
+    rates: Option<&'a [f32]>,
+    inertia: &'a [f32],
+    velocities: [&'a [f32]; 3],
+    pushes: [&'a [f32]; 3],
+    residuals: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Residual<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.masses.len();
+        let inertia = &self.inertia[..count];
+        for (axis, residuals) in self.residuals.iter_mut().enumerate() {
+            let residuals = &mut residuals[..count];
+            let (forces, pushes) = (&self.forces.axes()[axis][..count], &self.pushes[axis][..count]);
+            let gravity = self.gravity[axis];
+            for place in 0..count {
+                residuals[place] = forces[place] + self.masses[place] * gravity - inertia[place] * pushes[place];
+            }
+            if let Some(applied) = self.applied {
+                for (residual, applied) in residuals.iter_mut().zip(applied[axis]) {
+                    *residual += applied;
+                }
+            }
+            if let Some(rates) = self.rates {
+                let velocities = &self.velocities[axis][..count];
+                for place in 0..count {
+                    residuals[place] -= rates[place] * self.masses[place] * velocities[place];
+                }
+            }
+        }
+    }
+}
+
+struct Slope<'a> {
+    residuals: [&'a [f32]; 3],
+    corrections: [&'a [f32]; 3],
+}
+
+impl Loops for Slope<'_> {
+    type Output = Partial;
+
+    #[inline(always)]
+    fn run(self) -> Partial {
+        let mut sums = [0.0; 16];
+        for (residuals, corrections) in self.residuals.into_iter().zip(self.corrections) {
+            add_products(&mut sums, residuals, corrections);
+        }
+        Partial {
+            first: total(sums),
+            second: 0.0,
+        }
+    }
+}
+
+struct Finish<'a, 'b> {
+    carried: f32,
+    time: f32,
+    pushes: [&'a [f32]; 3],
+    velocities: &'b mut [&'a mut [f32]; 3],
+    ways: &'b mut [&'a mut [f32]; 3],
+    gains: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Finish<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let per_time = 1.0 / self.time;
+        for axis in 0..3 {
+            let pushes = self.pushes[axis];
+            let count = pushes.len();
+            let velocities = &mut self.velocities[axis][..count];
+            let (ways, gains) = (&mut self.ways[axis][..count], &mut self.gains[axis][..count]);
+            for place in 0..count {
+                ways[place] = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
+                let given = pushes[place] * per_time;
+                velocities[place] += given;
+                gains[place] = self.carried * gains[place] + given;
+            }
+        }
+    }
+}
