@@ -15,6 +15,7 @@ pub const STORAGES: [Storage; 4] = [
 pub const STEPS: [f32; 6] = [1e-5, 1e-4, 1e-3, 1.0 / 60.0, 0.1, 1.0];
 
 /// How much of a case is tried.
+#[allow(dead_code, reason = "each program takes one")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tier {
     /// In `cargo test`: fewer steps, and of the storages one for each step.

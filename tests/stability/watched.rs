@@ -332,7 +332,7 @@ impl Watched {
         }
         self.steps += 1;
         let name = format!("step {} of {dt} s", self.steps);
-        let is_hashed = self.steps <= STEPS_HASHED || self.steps % STEPS_HASHED == 0;
+        let is_hashed = self.steps <= STEPS_HASHED || self.steps.is_multiple_of(STEPS_HASHED);
         let mut before = is_hashed.then(|| hashes(&self.scenes));
         let mut outcomes = step_all(&mut self.scenes, dt);
         if matches!(outcomes[0], Err(Error::Unstable { .. })) && before.is_none() {
