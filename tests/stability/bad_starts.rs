@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::setup::{Outcome, Setup, at_most, fault};
+use super::setup::{Outcome, Setup, Tier, at_most, fault};
 use super::watched::{Watched, momentum};
 use crate::support::bodies::{Parts, Random};
 
@@ -69,8 +69,12 @@ pub fn scattered_large(setup: &Setup) -> Outcome {
     let parts = block(20);
     let positions = scatter(&parts);
     let mut watched = Watched::new(setup, &parts, Vec3::ZERO)?;
+    if setup.tier == Tier::Quick && setup.step > 0.05 {
+        // Hundreds of substeps of 150 000 springs in `f64`.
+        watched = watched.without_ledger();
+    }
     watched.change(|body| body.set_positions(&positions));
-    watched.run(setup.step, setup.steps(0.05, 1, setup.pick(4, 40)))?;
+    watched.run(setup.step, setup.steps(0.05, 1, setup.pick(2, 40)))?;
     Ok(watched.figures())
 }
 

@@ -221,7 +221,7 @@ fn crush(setup: &Setup, gap: f32) -> Result<Crushed, super::setup::Stop> {
         };
         (side, watched.change_worlds(|world| world.create_tool(&tool)))
     });
-    let steps = setup.steps(0.1, 1, setup.pick(500, 2000));
+    let steps = setup.steps(0.1, 1, setup.pick(150, 2000));
     let mut most = 0.0_f64;
     let mut thinnest = f32::INFINITY;
     let mut worked = 0.0;
