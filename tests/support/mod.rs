@@ -16,6 +16,32 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Where what the tests and benches have to tell is written.
+pub fn report_folder() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report")
+}
+
+/// Writes a section of `pending.md`, the list of what is not there yet; those of other tests stay.
+pub fn report_pending(title: &str, lines: &[String]) {
+    let folder = report_folder();
+    let path = folder.join("pending.md");
+    let head = format!("# {title}\n");
+    let said = std::fs::read_to_string(&path).unwrap_or_default();
+    let others = said
+        .split_inclusive('\n')
+        .scan(false, |ours, line| {
+            if line.starts_with("# ") {
+                *ours = line == head;
+            }
+            Some((!*ours).then_some(line))
+        })
+        .flatten();
+    let text: String = others.map(str::to_owned).chain([head.clone(), "\n".into()]).collect();
+    let list: String = lines.iter().map(|line| format!("- {line}\n")).collect();
+    std::fs::create_dir_all(&folder).expect("a folder for reports");
+    std::fs::write(&path, format!("{text}{list}\n")).expect("a report");
+}
+
 /// Says past the test harness's capture, so that it is seen, what was not tested.
 pub fn skip(what: &str) {
     let _ = writeln!(std::io::stderr(), "SKIPPED: {what}");

@@ -46,11 +46,30 @@ impl Reference {
             let (a, b) = (a as usize, b as usize);
             let offset = self.positions[b] - self.positions[a];
             let length = offset.length();
-            let force = offset * (stiffness * (length - rest_length) / length);
+            let force = if length > 0.0 {
+                offset * (stiffness * (length - rest_length) / length)
+            } else {
+                // Along x, from the node with the lower number to the other.
+                DVec3::X
+                    * if a < b {
+                        -stiffness * rest_length
+                    } else {
+                        stiffness * rest_length
+                    }
+            };
             forces[a] += force;
             forces[b] -= force;
         }
         forces
+    }
+
+    /// Of the springs, J.
+    pub fn elastic(&self) -> f64 {
+        let energy = |&([a, b], stiffness, rest_length): &Spring| {
+            let length = self.positions[a as usize].distance(self.positions[b as usize]);
+            0.5 * stiffness * (length - rest_length).powi(2)
+        };
+        self.springs.iter().map(energy).sum()
     }
 
     pub fn accelerations(&self) -> Vec<DVec3> {

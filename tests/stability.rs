@@ -1,0 +1,98 @@
+//! The table of stability, a part of it: each case with each solver at each step, and one of the storages for each step.
+//! `cargo bench --bench stability` takes all of it.
+
+#[path = "stability/mod.rs"]
+mod cases;
+mod support;
+
+use cases::{CASES, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
+use sinew::Solver;
+
+/// Tries a line of the table; what is not as it should be is told together.
+fn check(name: &str) {
+    let place = CASES
+        .iter()
+        .position(|case| case.name == name)
+        .expect("a line of the table");
+    let case = &CASES[place];
+    let mut wrong = Vec::new();
+    for solver in SOLVERS {
+        for (index, step) in STEPS.into_iter().enumerate() {
+            let setup = Setup {
+                solver,
+                storage: STORAGES[(place + index) % STORAGES.len()],
+                step,
+                tier: Tier::Quick,
+            };
+            let verdict = Verdict::of(case, &setup);
+            if !verdict.is_expected(&setup) {
+                wrong.push(format!("{setup:?}: {verdict}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{name}\n{}", wrong.join("\n"));
+}
+
+macro_rules! lines {
+    ($($test:ident: $name:literal,)*) => {
+        $(#[test] fn $test() { check($name); })*
+
+        #[test]
+        fn every_line_of_the_table_is_tried() {
+            let tried = [$($name),*];
+            for case in &CASES {
+                assert!(tried.contains(&case.name), "{}", case.name);
+            }
+        }
+    };
+}
+
+lines! {
+    scattered: "scattered at random",
+    flattened: "flattened to a plane",
+    collapsed: "collapsed to a point",
+    scattered_large: "scattered, 9261 nodes",
+    coincident: "nodes in one place, springs without length",
+    stiffness_in_a_chain: "stiffness 1 : 1e6 in a chain",
+    stiffness_in_a_block: "stiffness 1 : 1e6 in a block",
+    masses: "masses 1 : 1e6",
+    above_the_limit: "a step far above the limit",
+    rotated: "started rotated",
+    reordered: "tetrahedra reordered",
+    inverted: "tetrahedra inverted",
+    far_from_the_origin: "10 km from the origin",
+    pin_let_go: "a pin stretched and let go",
+    pin_jumps: "a pin moved 100 cells in a step",
+    crushed: "crushed between two tools",
+    pushed: "1e6 N on a node for a step",
+    springs_removed: "springs removed in motion",
+    changing_steps: "steps of changing length",
+    a_million_steps: "a million steps",
+}
+
+/// What is not there yet, for the report: a solver that is offered takes part, and its line goes.
+#[test]
+fn what_is_pending_is_told() {
+    let setup = |solver| Setup {
+        solver,
+        storage: STORAGES[0],
+        step: 1e-3,
+        tier: Tier::Quick,
+    };
+    let case = CASES
+        .iter()
+        .find(|case| case.name == "tetrahedra inverted")
+        .expect("a case");
+    let mut lines = Vec::new();
+    for solver in SOLVERS {
+        if let Err(Stop::Unsupported(why)) = Verdict::of(case, &setup(solver)).outcome {
+            assert_ne!(solver, Solver::Verlet);
+            lines.push(format!("every case with {solver:?}: {why}"));
+        }
+    }
+    for (name, what) in PENDING {
+        assert!(CASES.iter().any(|case| case.name == name), "{name}");
+        lines.push(format!("{name}: {what}"));
+    }
+    support::report_pending("Stability", &lines);
+}
