@@ -98,6 +98,9 @@ pub struct BodyDefinition<'a> {
     pub order: u32,
     /// [`Solver::Implicit`]: the most products with the matrix of its equation in a step; 0: 1000.
     pub iterations: u32,
+    /// [`Solver::Implicit`]: what may be missing of the solution of a step's equation, as a part of what forces change in the
+    /// step; from 1e-6 to 1; 0: 0.01.
+    pub accuracy: f32,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -119,6 +122,7 @@ impl Default for BodyDefinition<'_> {
             solver: Solver::Verlet,
             order: 0,
             iterations: 0,
+            accuracy: 0.0,
         }
     }
 }
@@ -221,6 +225,12 @@ impl BodyDefinition<'_> {
     fn check_offered(&self) -> Result<()> {
         if self.order > 2 {
             return Err(Error::invalid(format!("order is {}: must be 0, 1 or 2", self.order)));
+        }
+        if self.accuracy != 0.0 && !(1e-6..=1.0).contains(&self.accuracy) {
+            return Err(Error::invalid(format!(
+                "accuracy is {}: must be 0, or from 1e-6 to 1",
+                self.accuracy
+            )));
         }
         if self.iterations > MOST_ITERATIONS {
             return Err(Error::invalid(format!(

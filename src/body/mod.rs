@@ -158,7 +158,12 @@ impl Body {
         };
         body.place(definition.positions);
         if definition.solver == Solver::Implicit {
-            let implicit = Implicit::new(body.state.positions(), definition.order, definition.iterations)?;
+            let implicit = Implicit::new(
+                body.state.positions(),
+                definition.order,
+                definition.iterations,
+                definition.accuracy,
+            )?;
             body.implicit = Some(Box::new(implicit));
         }
         if needs.tools > 0 {

@@ -98,6 +98,11 @@ pub struct sinew_body_def {
     /// IMPLICIT: how often the equation of a step may be multiplied out while it is solved, each about as long as a substep
     /// of VERLET; 0, the default: 1000.
     pub iterations: u32,
+    /// IMPLICIT: what may be missing of the solution of a step's equation, as a part of what forces change in the step; from
+    /// 1e-6 to 1; 0, the default: 0.01.
+    pub accuracy: f32,
+    /// 0.
+    pub reserved1: u32,
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
@@ -228,6 +233,8 @@ impl sinew_body_def {
             reserved: 0,
             order: 0,
             iterations: 0,
+            accuracy: 0.0,
+            reserved1: 0,
         }
     }
 
@@ -237,6 +244,7 @@ impl sinew_body_def {
     /// Every array is NULL or has as many entries as the definition states.
     unsafe fn definition<'a>(&self) -> Result<BodyDefinition<'a>> {
         memory::reserved("reserved", self.reserved)?;
+        memory::reserved("reserved1", self.reserved1)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -274,6 +282,7 @@ impl sinew_body_def {
                 },
                 order: self.order,
                 iterations: self.iterations,
+                accuracy: self.accuracy,
             })
         }
     }

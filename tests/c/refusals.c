@@ -170,6 +170,12 @@ static void body_definitions(void)
     BODY(CAPACITY, "springs_per_node", def.storage = SINEW_STORAGE_FAST_LINK; def.springs_per_node = 1);
     BODY(INVALID, "order", def.order = 3);
     BODY(INVALID, "iterations", def.iterations = 1000001);
+    BODY(INVALID, "accuracy", def.accuracy = 1e-7f);
+    BODY(INVALID, "accuracy", def.accuracy = -0.1f);
+    BODY(INVALID, "accuracy", def.accuracy = 2.0f);
+    BODY(INVALID, "reserved1", def.reserved1 = 1);
+    for (i = 0; i < NOT_FINITE; i++)
+        BODY(INVALID, "accuracy", def.accuracy = bad[i]);
     BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_NEWTON);
 
     BODY(INVALID, "positions", def.positions = NULL);

@@ -63,6 +63,18 @@ impl Blocks {
         });
     }
 
+    /// The squared norm of inertia, J, of what is off where the forces are those of coordinates that are off by `distance`.
+    pub fn noise(&self, inertia: &[f32], distance: f64) -> f64 {
+        let of_nodes = self.stiffness.iter().zip(inertia).map(|(block, &inertia)| {
+            let stiffness = f64::from(block[0] + block[1] + block[2]) / 3.0;
+            let inertia = f64::from(inertia);
+            // Where springs are weak against inertia they hardly move a node.
+            let share = stiffness / (stiffness + inertia);
+            if inertia > 0.0 { inertia * share * share } else { 0.0 }
+        });
+        of_nodes.sum::<f64>() * distance * distance
+    }
+
     /// The entries of the inverses of some nodes.
     #[inline(always)]
     pub fn of(&self, nodes: Range<usize>) -> [&[f32]; 6] {

@@ -8,7 +8,7 @@ use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// What rounding may add, as a fraction of the energies involved.
-const ROUNDING: f64 = 1e-5;
+const ROUNDING: f64 = 1e-6;
 
 /// What was lost may come back, as far as it is no more than this part of the energy there is.
 const CREDIT: f64 = 0.1;

@@ -55,21 +55,17 @@ impl Implicit {
         team: &Team,
     ) -> Solved {
         self.spectrum.begin();
-        self.ways.begin();
         let mut square = square;
         let mut solved = Solved {
             products: 0,
             work: 0.0,
             size: 0.0,
-            error: square / self.spectrum.known_smallest(),
+            error: square * self.spectrum.factor(),
             indefinite: false,
         };
         self.search(body, 0.0, team);
         while solved.products < goal.budget && square > 0.0 {
-            let Partial {
-                first: curvature,
-                second: reach,
-            } = self.multiply(body, positions, tangent, team);
+            let curvature = self.multiply(body, positions, tangent, team);
             solved.products += 1;
             if !(curvature > 0.0 && curvature.is_finite()) {
                 solved.indefinite = true;
@@ -86,15 +82,13 @@ impl Implicit {
             solved.work += length * square;
             square = sums.first;
             solved.size = sums.second;
-            self.ways.take(length * reach.sqrt());
             let allowed = goal.absolute.max(goal.relative * f64::max(goal.size, solved.size));
-            let remaining = self.ways.remaining();
-            // What is known of the smallest eigenvalue may be old.
-            let mut bound = square / self.spectrum.known_smallest();
-            if bound <= allowed {
-                bound = square / self.spectrum.smallest();
+            solved.error = square * self.spectrum.factor();
+            if solved.error <= allowed {
+                // What is known of the smallest eigenvalue may be old.
+                self.spectrum.smallest();
+                solved.error = square * self.spectrum.factor();
             }
-            solved.error = bound.min(remaining * remaining);
             if solved.error <= allowed {
                 break;
             }
@@ -104,8 +98,8 @@ impl Implicit {
         solved
     }
 
-    /// The matrix times the search direction: the product of both, and the squared norm of inertia of the direction.
-    fn multiply(&mut self, body: &Body, positions: &Vectors, tangent: Tangent, team: &Team) -> Partial {
+    /// The matrix times the search direction: the product of both.
+    fn multiply(&mut self, body: &Body, positions: &Vectors, tangent: Tangent, team: &Team) -> f64 {
         let node_count = positions.len();
         let (searches, inertia) = (&self.searches, &self.inertia);
         let written = (self.products.tiles_mut(), Items::new(&mut self.partials));
@@ -113,7 +107,7 @@ impl Implicit {
             let nodes = tile_nodes(tile, node_count);
             let mut changes = TileForces::ZERO;
             body.springs.changes(tile, positions, searches, tangent, &mut changes);
-            *partial = body.kernel.run(Product {
+            partial.first = body.kernel.run(Product {
                 inertia: &inertia[nodes.clone()],
                 searches: searches.slices(nodes.clone()),
                 changes: &changes,
@@ -121,10 +115,7 @@ impl Implicit {
             });
             hold(&body.pins, tile, nodes.start, &mut products);
         });
-        self.partials.iter().fold(Partial::default(), |sums, partial| Partial {
-            first: sums.first + partial.first,
-            second: sums.second + partial.second,
-        })
+        self.partials.iter().map(|partial| partial.first).sum()
     }
 
     /// Goes `length` along the search direction, and applies the preconditioner to what remains of the residual: the product
@@ -247,12 +238,12 @@ struct Product<'a, 'b> {
 }
 
 impl Loops for Product<'_, '_> {
-    type Output = Partial;
+    type Output = f64;
 
     #[inline(always)]
-    fn run(self) -> Partial {
+    fn run(self) -> f64 {
         let count = self.inertia.len();
-        let (mut sums, mut reaches) = ([0.0; 16], [0.0; 16]);
+        let mut sums = [0.0; 16];
         for (axis, products) in self.products.iter_mut().enumerate() {
             let searches = &self.searches[axis][..count];
             let changes = &self.changes.axes()[axis][..count];
@@ -261,12 +252,8 @@ impl Loops for Product<'_, '_> {
                 products[place] = self.inertia[place] * searches[place] - changes[place];
             }
             add_products(&mut sums, products, searches);
-            add_squares(&mut reaches, self.inertia, searches);
         }
-        Partial {
-            first: total(sums),
-            second: total(reaches),
-        }
+        total(sums)
     }
 }
 

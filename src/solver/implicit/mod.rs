@@ -14,6 +14,7 @@ mod contact;
 mod energy;
 mod estimate;
 mod gradient;
+mod rigid;
 mod step;
 
 pub(super) use step::run;
@@ -25,7 +26,7 @@ use crate::memory;
 use crate::springs::tile_count;
 use blocks::Blocks;
 use coarse::Coarse;
-use estimate::{Spectrum, Ways};
+use estimate::Spectrum;
 use gradient::Partial;
 
 /// What the last step leaves to the next, for order 2.
@@ -84,6 +85,8 @@ pub(crate) struct Implicit {
     order: u32,
     /// The most products with the matrix in a step.
     budget: u32,
+    /// The part of a step's correction that may be missing.
+    accuracy: f32,
     histories: [History; 2],
     /// Which of them belongs to the current state.
     settled: usize,
@@ -98,6 +101,8 @@ pub(crate) struct Implicit {
     preconditioned: Vectors,
     /// N/m; 0 for what is pinned.
     inertia: Vec<f32>,
+    /// The squared norm of inertia of what is off by rounding alone, J.
+    noise: f64,
     /// What `inertia` was made for: t, s; 0: nothing.
     prepared: f32,
     blocks: Blocks,
@@ -106,7 +111,6 @@ pub(crate) struct Implicit {
     loads: Vec<f32>,
     partials: Vec<Partial>,
     spectrum: Spectrum,
-    ways: Ways,
     /// Whether the preconditioner is to be made again, from the current state: then what it is now means nothing.
     stale: bool,
     /// Whether that was so when the step in progress began.
@@ -127,8 +131,10 @@ impl Experience {
 }
 
 impl Implicit {
-    /// For nodes at these positions; order and budget are 0 for the default.
-    pub fn new(positions: &Vectors, order: u32, budget: u32) -> Result<Self> {
+    /// For nodes at these positions; what is 0 is as by default.
+    pub fn new(positions: &Vectors, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
+        /// A fraction of what a step of a length worth taking is off by itself.
+        const ACCURACY: f32 = 0.01;
         /// More than a body that is to be stepped while somebody waits can need.
         const BUDGET: u32 = 1000;
         let budget = if budget == 0 { BUDGET } else { budget };
@@ -138,6 +144,7 @@ impl Implicit {
         Ok(Self {
             order: if order == 0 { 2 } else { order },
             budget,
+            accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
             histories: [History::new(node_count)?, History::new(node_count)?],
             settled: 0,
             pushes: vectors()?,
@@ -147,13 +154,13 @@ impl Implicit {
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, node_count)?,
+            noise: 0.0,
             prepared: 0.0,
             blocks: Blocks::new(node_count)?,
             loads: memory::filled(0.0, coarse.size() * tile_count(node_count))?,
             coarse,
             partials: memory::filled(Partial::default(), tile_count(node_count))?,
             spectrum: Spectrum::new()?,
-            ways: Ways::new(budget.clamp(1, BUDGET))?,
             stale: true,
             was_stale: true,
             memory: Experience::NONE,
@@ -215,7 +222,7 @@ impl Implicit {
         for vector in ways.iter().chain(gains.iter()) {
             hasher.write_floats(&vector.to_array());
         }
-        hasher.write_floats(&[*step]);
+        hasher.write_floats(&[*step, self.accuracy]);
         hasher.write_u64(energy.unwrap_or(f64::NAN).to_bits());
         hasher.write_u64(credit.to_bits());
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));

@@ -16,11 +16,8 @@ use crate::threads::{Items, Team};
 /// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
 const LARGEST_RATIO: f64 = 2.0;
 
-/// The error left, as a fraction of what forces add to the motion that was expected.
-const RELATIVE: f64 = 0.05;
-
-/// The error that is always left, as a fraction of the body's extent: what the rounding of positions makes of forces.
-const ROUNDING: f64 = 5e-7;
+/// What rounding makes of a coordinate, as a fraction of the body's extent.
+const ROUNDING: f64 = 1e-7;
 
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 40;
@@ -229,6 +226,8 @@ impl Substep<'_> {
             }
             implicit.blocks.invert(&implicit.inertia, self.team);
             implicit.coarse.invert(&implicit.inertia);
+            let rounding = ROUNDING * f64::from(body.extent());
+            implicit.noise = implicit.blocks.noise(&implicit.inertia, rounding);
             implicit.prepared = time;
         }
         if implicit.stale {
@@ -381,11 +380,11 @@ impl Substep<'_> {
     /// Newton's iterations.
     fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
         let all_inertia: f64 = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
-        let smallest = match self.request.tolerance {
-            0.0 => ROUNDING * f64::from(body.extent()),
-            tolerance => 0.1 * f64::from(tolerance),
-        };
-        let absolute = smallest * smallest * all_inertia;
+        let absolute = f64::max(
+            (0.1 * f64::from(self.request.tolerance)).powi(2) * all_inertia,
+            implicit.noise,
+        );
+        let relative = f64::from(implicit.accuracy).powi(2);
         let mut products = 0;
         let mut size = 0.0;
         let mut error = f64::INFINITY;
@@ -394,17 +393,18 @@ impl Substep<'_> {
         for iteration in 0..NEWTON {
             implicit.corrections.clear();
             let square = implicit.precondition(body, 0.0, self.team).first;
-            let remaining = square / implicit.spectrum.known_smallest();
-            let is_stuck = remaining > 0.5 * error && (iteration > 2 || remaining < 100.0 * absolute);
+            implicit.spectrum.begin();
+            let remaining = square * implicit.spectrum.factor();
+            let is_stuck = iteration > 2 && remaining > 0.5 * error;
             error = remaining;
             let budget = implicit.budget.saturating_sub(products);
-            if error <= absolute.max(RELATIVE * RELATIVE * size) || is_stuck || budget == 0 || !error.is_finite() {
+            if error <= absolute.max(relative * size) || is_stuck || budget == 0 || !error.is_finite() {
                 break;
             }
             let goal = Goal {
                 budget,
                 absolute,
-                relative: RELATIVE * RELATIVE,
+                relative,
                 size,
             };
             let positions = body.state.next_positions();
@@ -414,10 +414,14 @@ impl Substep<'_> {
             size = f64::max(size, solved.size);
             self.go(body, implicit, solved.work);
             // The correction itself was no more than what may be left.
-            if solved.size <= absolute.max(RELATIVE * RELATIVE * size) {
-                error = solved.error.max(solved.size * RELATIVE);
+            if solved.size <= absolute.max(relative * size) {
+                error = solved.error;
                 break;
             }
+        }
+        if body.pins.iter().next().is_none() {
+            implicit.balance(body.state.next_positions());
+            self.place(body, implicit);
         }
         implicit.report.iterations += products;
         let error = (error / all_inertia).sqrt() as f32;

@@ -107,7 +107,9 @@ impl Lanes for Avx2Lanes {
             let x = _mm256_sub_ps(at_neighbours(px, links), _mm256_set1_ps(sight.here.x));
             let y = _mm256_sub_ps(at_neighbours(py, links), _mm256_set1_ps(sight.here.y));
             let z = _mm256_sub_ps(at_neighbours(pz, links), _mm256_set1_ps(sight.here.z));
-            let square = _mm256_fmadd_ps(z, z, _mm256_fmadd_ps(y, y, _mm256_mul_ps(x, x)));
+            // Rounded as one link alone is, so that both ends of a spring pull alike wherever they are kept.
+            let [xx, yy, zz] = [_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z)];
+            let square = _mm256_add_ps(_mm256_add_ps(xx, yy), zz);
             let length = _mm256_sqrt_ps(square);
             let tension = _mm256_mul_ps(stiffnesses, _mm256_sub_ps(length, rest_lengths));
             let pull = _mm256_div_ps(tension, length);

@@ -1,0 +1,45 @@
+//! A body without pins moves as a whole as outer forces have it, however well its equation was solved: what is left of the
+//! residual is given no sum and no torque.
+
+use glam::{DMat3, DVec3};
+
+use super::Implicit;
+use crate::body::Vectors;
+
+impl Implicit {
+    /// Adds to the pushes the shift and the turn that take the sum and the torque off the residual of nodes at `positions`.
+    pub(super) fn balance(&mut self, positions: &Vectors) {
+        let (mut mass, mut centre, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        let nodes = || self.inertia.iter().zip(positions.iter()).zip(self.residuals.iter());
+        for ((&inertia, position), residual) in nodes() {
+            let inertia = f64::from(inertia);
+            mass += inertia;
+            centre += position.as_dvec3() * inertia;
+            sum += residual.as_dvec3();
+        }
+        centre /= mass;
+        let (mut moments, mut torque) = (DMat3::ZERO, DVec3::ZERO);
+        for ((&inertia, position), residual) in nodes() {
+            let arm = position.as_dvec3() - centre;
+            let outer = DMat3::from_cols(arm * arm.x, arm * arm.y, arm * arm.z);
+            let square = DMat3::from_diagonal(DVec3::splat(arm.length_squared()));
+            moments += (square - outer) * f64::from(inertia);
+            torque += arm.cross(residual.as_dvec3());
+        }
+        let shift = sum / mass;
+        // A body without extent across its axis does not turn about it.
+        let largest = moments.x_axis.x.max(moments.y_axis.y).max(moments.z_axis.z);
+        let turn = (moments + DMat3::from_diagonal(DVec3::splat(1e-9 * largest))).inverse() * torque;
+        for node in 0..positions.len() {
+            let arm = positions.get(node).as_dvec3() - centre;
+            let way = if turn.is_finite() {
+                shift + turn.cross(arm)
+            } else {
+                shift
+            };
+            if way.is_finite() {
+                self.pushes.set(node, self.pushes.get(node) + way.as_vec3());
+            }
+        }
+    }
+}
