@@ -396,6 +396,15 @@ typedef struct sinew_body_def {
    * of VERLET; 0, the default: 1000.
    */
   uint32_t iterations;
+  /**
+   * IMPLICIT: what may be missing of the solution of a step's equation, as a part of what forces change in the step; from
+   * 1e-6 to 1; 0, the default: 0.01.
+   */
+  float accuracy;
+  /**
+   * 0.
+   */
+  uint32_t reserved1;
 } sinew_body_def;
 
 /**

@@ -162,6 +162,17 @@ impl Scene {
         self.world.body_mut(self.id).expect("the body")
     }
 
+    /// With the definition changed by `change`.
+    pub fn with(
+        parts: &Parts,
+        definition: WorldDefinition,
+        change: impl FnOnce(BodyDefinition) -> BodyDefinition,
+    ) -> Self {
+        let mut world = World::new(definition).expect("a world");
+        let id = world.create_body(&change(parts.definition())).expect("a body");
+        Self { world, id }
+    }
+
     /// Takes a step that must succeed.
     pub fn step(&mut self, dt: f32) -> StepReport {
         let report = self.world.step(dt).expect("a step");

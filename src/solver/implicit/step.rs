@@ -390,12 +390,19 @@ impl Substep<'_> {
         let mut error = f64::INFINITY;
         self.place(body, implicit);
         self.residual(body, implicit);
-        for iteration in 0..NEWTON {
+        let (mut gone, mut vain) = (0.0, 0);
+        for _ in 0..NEWTON {
             implicit.corrections.clear();
             let square = implicit.precondition(body, 0.0, self.team).first;
             implicit.spectrum.begin();
             let remaining = square * implicit.spectrum.factor();
-            let is_stuck = iteration > 2 && remaining > 0.5 * error;
+            // What rounding leaves is not improved by going all the way again.
+            vain = if gone == 1.0 && remaining > 0.5 * error {
+                vain + 1
+            } else {
+                0
+            };
+            let is_stuck = vain > 2;
             error = remaining;
             let budget = implicit.budget.saturating_sub(products);
             if error <= absolute.max(relative * size) || is_stuck || budget == 0 || !error.is_finite() {
@@ -412,7 +419,7 @@ impl Substep<'_> {
             products += solved.products;
             implicit.wear(solved.products);
             size = f64::max(size, solved.size);
-            self.go(body, implicit, solved.work);
+            gone = self.go(body, implicit, solved.work);
             // The correction itself was no more than what may be left.
             if solved.size <= absolute.max(relative * size) {
                 error = solved.error;
@@ -428,15 +435,15 @@ impl Substep<'_> {
         implicit.report.error = implicit.report.error.max(error);
     }
 
-    /// Goes along the correction, as far as the forces do not turn against it.
-    fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) {
+    /// Goes along the correction, as far as the forces do not turn against it: what part of it.
+    fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
         let mut gone = 1.0;
         add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
         for _ in 0..12 {
             self.place(body, implicit);
             let slope = self.residual(body, implicit);
             if slope >= -0.5 * work {
-                return;
+                return gone;
             }
             // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
             let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
@@ -452,6 +459,7 @@ impl Substep<'_> {
         }
         self.place(body, implicit);
         self.residual(body, implicit);
+        gone
     }
 
     /// Makes velocities and history of what was found; whether all is finite.

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use super::{Packed, Rounding};
 use crate::body::{Spring, Vectors};
 use crate::random::Random;
-use crate::springs::{Kernel, Link, Motion, Springs, TileForces, tile_count, tile_nodes};
+use crate::springs::{Kernel, Link, Motion, Springs, Tangent, TileForces, tile_count, tile_nodes};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
 
@@ -159,6 +159,79 @@ fn every_kernel_computes_the_forces() {
                 assert!(sum.length() <= 1e-7 * total.max(1e-30), "{name}, {kernel:?}: {sum}");
             }
             assert!(tried >= 1);
+        }
+    }
+}
+
+/// How the forces change in `f64`, with how large the terms are, and the energy.
+fn reference_change(pairs: &Pairs, positions: &Vectors, ways: &Vectors, tangent: Tangent) -> (Vec<(DVec3, f64)>, f64) {
+    let mut changes = vec![(DVec3::ZERO, 0.0); positions.len()];
+    let mut energy = 0.0;
+    for spring in pairs.values() {
+        let [a, b] = spring.nodes.map(|node| node as usize);
+        let [k, rest, damping] = [spring.stiffness, spring.rest_length, spring.damping].map(f64::from);
+        let way = positions.get(b).as_dvec3() - positions.get(a).as_dvec3();
+        let length = way.length();
+        let direction = if length == 0.0 { DVec3::X } else { way / length };
+        let floor = if length == 0.0 { 0.0 } else { f64::from(tangent.floor) };
+        let slack = if rest == 0.0 { 1.0 } else { 1.0 - rest / length };
+        let across = (k * slack).max(floor);
+        let along = k + damping * f64::from(tangent.rate);
+        let difference = ways.get(b).as_dvec3() - ways.get(a).as_dvec3();
+        let lengthening = direction * direction.dot(difference);
+        let change = lengthening * along + (difference - lengthening) * across;
+        energy += 0.5 * k * (length - rest).powi(2);
+        for (node, sign) in [(a, 1.0), (b, -1.0)] {
+            changes[node].0 += change * sign;
+            // What a rounded length does to the part across.
+            changes[node].1 += difference.length() * (along + across.abs() + k * (slack - 1.0).abs().min(1e6));
+        }
+    }
+    (changes, energy)
+}
+
+#[test]
+fn every_kernel_computes_changes_and_energy() {
+    for (damped, floor) in [
+        (false, 0.0),
+        (true, 0.0),
+        (false, f32::NEG_INFINITY),
+        (true, f32::NEG_INFINITY),
+    ] {
+        let tangent = Tangent { floor, rate: 3.0 };
+        for (name, count, pairs) in bodies(damped) {
+            let mut random = Random(5);
+            let mut positions = vectors(count, &mut random);
+            for node in (0..count.saturating_sub(60)).step_by(97) {
+                positions.set(node + 1, positions.get(node));
+            }
+            let ways = vectors(count, &mut random);
+            let (expected, energy) = reference_change(&pairs, &positions, &ways, tangent);
+            for kernel in KERNELS {
+                let Some(packed) = packed(kernel, count, &pairs) else {
+                    continue;
+                };
+                let (mut sum, mut found_energy) = (DVec3::ZERO, 0.0);
+                for tile in 0..tile_count(count) {
+                    let mut changes = TileForces::ZERO;
+                    packed.changes(tile, &positions, &ways, tangent, &mut changes);
+                    found_energy += packed.half_energy(tile, &positions);
+                    for (place, node) in tile_nodes(tile, count).enumerate() {
+                        let (found, (expected, size)) = (changes.get(place).as_dvec3(), expected[node]);
+                        assert!(
+                            (found - expected).length() <= 2e-6 * size,
+                            "{name}, {kernel:?}, {floor}, node {node}: {found} for {expected}"
+                        );
+                        sum += found;
+                    }
+                }
+                let total: f64 = expected.iter().map(|(_, size)| size).sum();
+                assert!(sum.length() <= 1e-7 * total.max(1e-30), "{name}, {kernel:?}: {sum}");
+                assert!(
+                    (found_energy - energy).abs() <= 1e-5 * energy,
+                    "{name}, {kernel:?}: {found_energy} J for {energy} J"
+                );
+            }
         }
     }
 }

@@ -1,0 +1,400 @@
+//! IMPLICIT against the exact solutions of its own formulas, order of convergence, falls, rest shapes, and what it reports.
+
+mod support;
+
+use glam::{DVec3, Vec3};
+use sinew::{BodyDefinition, Error, Solver, Storage, World, WorldDefinition};
+use support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+
+const STORAGES: [Storage; 4] = [
+    Storage::Packed,
+    Storage::Efficient,
+    Storage::FastLink,
+    Storage::DynamicBulk,
+];
+
+fn implicit(parts: &Parts, world: WorldDefinition, order: u32, accuracy: f32) -> Scene {
+    Scene::with(parts, world, |definition| BodyDefinition {
+        solver: Solver::Implicit,
+        order,
+        accuracy,
+        ..definition
+    })
+}
+
+/// Two masses, 1 and 3 kg, joined by a spring of 100 N/m, 0.1 m long, stretched by 0.05 m.
+fn two_masses() -> Parts {
+    let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X * 0.15], 1.0);
+    parts.join(0, 1, 100.0);
+    parts.masses[1] = 3.0;
+    parts.rest_lengths[0] = 0.1;
+    parts
+}
+
+const OMEGA_SQUARED: f64 = 100.0 / 0.75;
+
+/// How far the spring is stretched after each step, by the formula of this order in `f64`, begun with order 1.
+fn discrete(order: u32, h: f64, steps: usize) -> Vec<f64> {
+    let (mut q, mut v) = (0.05, 0.0);
+    let (mut last_q, mut last_v) = (q, v);
+    let mut stretches = Vec::new();
+    for step in 0..steps {
+        let (t, c) = if order == 2 && step > 0 {
+            (2.0 * h / 3.0, 1.0 / 3.0)
+        } else {
+            (h, 0.0)
+        };
+        // q1 = a + t v1, v1 = b - t w² q1.
+        let (a, b) = (q + c * (q - last_q), v + c * (v - last_v));
+        let next = (a + t * b) / (1.0 + t * t * OMEGA_SQUARED);
+        (last_q, last_v) = (q, v);
+        v = b - t * OMEGA_SQUARED * next;
+        q = next;
+        stretches.push(q);
+    }
+    stretches
+}
+
+fn stretch(scene: &Scene) -> f64 {
+    let x = scene.positions();
+    x[0].distance(x[1]) - 0.1
+}
+
+#[test]
+fn two_masses_follow_the_discrete_solution() {
+    for order in [1, 2] {
+        for h in [1e-4_f32, 1e-3, 1e-2, 0.1, 1.0] {
+            let mut scene = implicit(&two_masses(), FREE, order, 1e-6);
+            for (step, expected) in discrete(order, f64::from(h), 100).into_iter().enumerate() {
+                scene.step(h);
+                let error = (stretch(&scene) - expected).abs() / 0.05;
+                assert!(error < 1e-5, "order {order}, {h} s, step {step}: {error:.2e}");
+            }
+        }
+    }
+}
+
+/// The error of the stretch after a second, over the amplitude.
+fn error_after_a_second(order: u32, steps: usize) -> f64 {
+    let mut scene = implicit(&two_masses(), FREE, order, 1e-6);
+    scene.run((1.0 / steps as f64) as f32, steps);
+    let exact = 0.05 * OMEGA_SQUARED.sqrt().cos();
+    (stretch(&scene) - exact).abs() / 0.05
+}
+
+#[test]
+fn each_order_is_reached() {
+    for (order, steps) in [(1, 4000), (2, 1000)] {
+        let ratio = error_after_a_second(order, steps) / error_after_a_second(order, 2 * steps);
+        let expected = f64::from(1 << order);
+        assert!((ratio / expected - 1.0).abs() < 0.05, "order {order}: {ratio:.3}");
+    }
+}
+
+#[test]
+fn bodies_fall_alike_far_from_the_origin() {
+    for offset in [0.0, 1.0, 10.0] {
+        for (order, h, allowed) in [(1, 1e-4, 2e-4), (2, 1e-4, 3e-5), (2, 1e-2, 1e-3)] {
+            let mut parts = Parts::block([2, 2, 2], 0.05, 0.01, 100.0);
+            for position in &mut parts.positions {
+                *position += Vec3::X * offset;
+            }
+            let world = WorldDefinition {
+                gravity: Vec3::Y * -9.81,
+                ..FREE
+            };
+            let mut scene = implicit(&parts, world, order, 0.0);
+            let steps = (1.0 / h) as usize;
+            let start = scene.positions();
+            scene.run(h as f32, steps);
+            let fall = 0.5 * 9.81 * (steps as f64 * h).powi(2);
+            for (before, after) in start.iter().zip(scene.positions()) {
+                let error = ((before.y - after.y) / fall - 1.0).abs();
+                assert!(error < allowed, "{offset} m, order {order}, {h} s: {error:.2e}");
+            }
+            for velocity in scene.velocities() {
+                let error = (velocity.y / (-9.81 * steps as f64 * h) - 1.0).abs();
+                assert!(error < 1e-4, "{offset} m, order {order}, {h} s: velocity {error:.2e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nodes_reach_their_terminal_velocity_at_every_step() {
+    let mut parts = Parts::nodes(vec![Vec3::ZERO], 0.5);
+    parts.node_dampings[0] = 2.0;
+    let world = WorldDefinition {
+        gravity: Vec3::Y * -9.81,
+        ..FREE
+    };
+    for order in [1, 2] {
+        for h in [1e-3_f32, 1.0 / 60.0, 0.1, 1.0] {
+            let mut scene = implicit(&parts, world, order, 0.0);
+            scene.run(h, (6.0 / h) as usize + 20);
+            let error = (scene.velocities()[0].y / (-9.81 * 0.5 / 2.0) - 1.0).abs();
+            // Of what a step of little damping adds, rounding loses a part: about 1e-7 of the velocity.
+            let allowed = f64::max(1e-5, 3.6e-7 / (f64::from(h) * 2.0 / 0.5));
+            assert!(error < allowed, "order {order}, {h} s: {error:.2e}");
+        }
+    }
+}
+
+/// A chain of forty that hangs from a pin: each spring is stretched by the weight of all that is below it.
+#[test]
+fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
+    let (count, mass, stiffness) = (40, 0.01, 50.0);
+    let mut parts = Parts::chain(count + 1, Vec3::Y * -0.1, mass, stiffness);
+    parts.masses[0] = 0.0;
+    parts.node_dampings.fill(0.5);
+    let world = WorldDefinition {
+        gravity: Vec3::Y * -9.81,
+        ..FREE
+    };
+    let pull = f64::from(mass) * 9.81 / f64::from(stiffness);
+    let extension = pull * (count * (count + 1)) as f64 / 2.0;
+    for storage in STORAGES {
+        for (order, h, steps) in [(1, 1.0_f32, 400), (2, 0.1, 4000), (2, 1.0 / 60.0, 20_000)] {
+            let mut scene = Scene::with(&parts, world, |definition| BodyDefinition {
+                solver: Solver::Implicit,
+                order,
+                storage,
+                ..definition
+            });
+            scene.run(h, steps);
+            let tip = -scene.positions()[count].y - 0.1 * count as f64;
+            let error = (tip / extension - 1.0).abs();
+            assert!(error < 2e-5, "{storage:?}, order {order}, {h} s: {error:.2e}");
+        }
+    }
+}
+
+/// A block with one spring in five stiffer by `contrast`, clamped at one end.
+fn uneven_block(contrast: f32) -> Parts {
+    let mut parts = Parts::block([4, 3, 3], 0.05, 0.002, 20.0);
+    let mut random = Random::new(11);
+    for stiffness in &mut parts.stiffnesses {
+        if random.below(5) == 0 {
+            *stiffness *= contrast;
+        }
+    }
+    for (position, mass) in parts.positions.iter().zip(&mut parts.masses) {
+        if position.x < 0.01 {
+            *mass = 0.0;
+        }
+    }
+    parts
+}
+
+/// The first step of implicit Euler in `f64`: Newton's method with dense elimination, to the last digit.
+fn euler_step(parts: &Parts, gravity: DVec3, h: f64) -> Vec<DVec3> {
+    let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();
+    let free: Vec<usize> = (0..start.len()).filter(|&node| parts.masses[node] > 0.0).collect();
+    let place: Vec<Option<usize>> = (0..start.len())
+        .map(|node| free.iter().position(|&f| f == node))
+        .collect();
+    let size = 3 * free.len();
+    let mut now = start.clone();
+    for _ in 0..30 {
+        let mut matrix = vec![vec![0.0; size + 1]; size];
+        for (index, &node) in free.iter().enumerate() {
+            let inertia = f64::from(parts.masses[node]) / (h * h);
+            let lacking = gravity * f64::from(parts.masses[node]) - (now[node] - start[node]) * inertia;
+            for axis in 0..3 {
+                matrix[3 * index + axis][3 * index + axis] += inertia;
+                matrix[3 * index + axis][size] += lacking[axis];
+            }
+        }
+        for ((&[a, b], &k), &rest) in parts.springs.iter().zip(&parts.stiffnesses).zip(&parts.rest_lengths) {
+            let [a, b] = [a as usize, b as usize];
+            let (k, rest) = (f64::from(k), f64::from(rest));
+            let way = now[b] - now[a];
+            let (length, direction) = (way.length(), way.normalize());
+            let force = direction * (k * (length - rest));
+            let across = k * (1.0 - rest / length);
+            for (node, sign) in [(a, 1.0), (b, -1.0)] {
+                let Some(row) = place[node] else { continue };
+                for i in 0..3 {
+                    matrix[3 * row + i][size] += sign * force[i];
+                    for (other, other_sign) in [(a, 1.0), (b, -1.0)] {
+                        let Some(column) = place[other] else { continue };
+                        for j in 0..3 {
+                            let unit = if i == j { across } else { 0.0 };
+                            let entry = (k - across) * direction[i] * direction[j] + unit;
+                            matrix[3 * row + i][3 * column + j] += sign * other_sign * entry;
+                        }
+                    }
+                }
+            }
+        }
+        let correction = eliminate(matrix);
+        for (index, &node) in free.iter().enumerate() {
+            now[node] += DVec3::from_slice(&correction[3 * index..3 * index + 3]);
+        }
+        if correction.iter().all(|c| c.abs() < 1e-14) {
+            break;
+        }
+    }
+    now
+}
+
+/// Solves a system whose right-hand side is the last column.
+fn eliminate(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+    let size = rows.len();
+    for pivot in 0..size {
+        let best = (pivot..size).max_by(|&a, &b| rows[a][pivot].abs().total_cmp(&rows[b][pivot].abs()));
+        rows.swap(pivot, best.expect("rows"));
+        let (above, below) = rows.split_at_mut(pivot + 1);
+        let head = &above[pivot];
+        for row in below {
+            let factor = row[pivot] / head[pivot];
+            for (entry, value) in row[pivot..].iter_mut().zip(&head[pivot..]) {
+                *entry -= factor * value;
+            }
+        }
+    }
+    let mut solution = vec![0.0; size];
+    for row in (0..size).rev() {
+        let known: f64 = (row + 1..size).map(|column| rows[row][column] * solution[column]).sum();
+        solution[row] = (rows[row][size] - known) / rows[row][row];
+    }
+    solution
+}
+
+#[test]
+fn a_step_is_the_true_implicit_step_at_every_contrast() {
+    let gravity = Vec3::new(0.0, -9.81, 0.0);
+    let world = WorldDefinition { gravity, ..FREE };
+    for contrast in [1.0, 1e3, 1e6] {
+        let parts = uneven_block(contrast);
+        let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();
+        for h in [1e-3_f32, 1.0 / 60.0] {
+            let expected = euler_step(&parts, gravity.as_dvec3(), f64::from(h));
+            let moved = largest_difference(&expected, &start);
+            for storage in STORAGES {
+                let mut scene = Scene::with(&parts, world, |definition| BodyDefinition {
+                    solver: Solver::Implicit,
+                    order: 1,
+                    accuracy: 1e-3,
+                    iterations: 20_000,
+                    storage,
+                    ..definition
+                });
+                scene.step(h);
+                let error = largest_difference(&scene.positions(), &expected) / moved;
+                // Positions are rounded to 1e-8 m.
+                let allowed = 1e-2 + 3e-8 / moved;
+                assert!(
+                    error < allowed,
+                    "{storage:?}, 1 : {contrast}, {h} s: {error:.2e} of {moved:.2e} m"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_budget_is_kept_and_what_is_missing_reported() {
+    let world = WorldDefinition {
+        gravity: Vec3::Y * -9.81,
+        ..FREE
+    };
+    let parts = uneven_block(1e3);
+    let mut errors = Vec::new();
+    for iterations in [5, 50, 5000] {
+        let mut scene = Scene::with(&parts, world, |definition| BodyDefinition {
+            solver: Solver::Implicit,
+            order: 1,
+            iterations,
+            ..definition
+        });
+        let report = scene.step(1.0 / 60.0);
+        let solved = scene.body().solver_report();
+        assert!(solved.iterations <= iterations * report.substeps, "{solved:?}");
+        assert!(scene.is_finite() && solved.error.is_finite());
+        errors.push(solved.error);
+    }
+    assert!(errors[2] < 0.1 * errors[0], "{errors:?}");
+}
+
+#[test]
+fn a_change_of_topology_is_taken_in() {
+    let world = WorldDefinition {
+        gravity: Vec3::Y * -9.81,
+        ..FREE
+    };
+    for storage in STORAGES {
+        let mut parts = uneven_block(1.0);
+        parts.node_dampings.fill(0.05);
+        let mut changed = Scene::with(&parts, world, |definition| BodyDefinition {
+            solver: Solver::Implicit,
+            storage,
+            ..definition
+        });
+        changed.run(1.0 / 60.0, 30);
+        let gone: Vec<[u32; 2]> = parts.springs.iter().copied().step_by(9).collect();
+        for &[a, b] in &gone {
+            changed.body_mut().remove_spring(a, b).expect("a spring");
+        }
+        changed.body_mut().add_spring(0, 40, 30.0, Some(0.1)).expect("room");
+        changed.run(1.0 / 60.0, 900);
+        // A body that was made that way.
+        let kept = |index: usize| !gone.contains(&parts.springs[index]);
+        let mut other = parts.clone();
+        let all = 0..parts.springs.len();
+        other.springs = all.clone().filter(|&i| kept(i)).map(|i| parts.springs[i]).collect();
+        other.stiffnesses = all.clone().filter(|&i| kept(i)).map(|i| parts.stiffnesses[i]).collect();
+        other.rest_lengths = all.filter(|&i| kept(i)).map(|i| parts.rest_lengths[i]).collect();
+        other.springs.push([0, 40]);
+        other.stiffnesses.push(30.0);
+        other.rest_lengths.push(0.1);
+        let mut made = Scene::with(&other, world, |definition| BodyDefinition {
+            solver: Solver::Implicit,
+            storage,
+            ..definition
+        });
+        made.run(1.0 / 60.0, 930);
+        let difference = largest_difference(&changed.positions(), &made.positions()) / parts.size();
+        assert!(difference < 1e-4, "{storage:?}: {difference:.2e}");
+    }
+}
+
+#[test]
+fn what_is_out_of_range_is_refused() {
+    let parts = two_masses();
+    let mut world = World::new(FREE).expect("a world");
+    let plain = BodyDefinition {
+        solver: Solver::Implicit,
+        ..parts.definition()
+    };
+    for (name, definition) in [
+        ("order", BodyDefinition { order: 3, ..plain }),
+        ("accuracy", BodyDefinition { accuracy: 2.0, ..plain }),
+        (
+            "accuracy",
+            BodyDefinition {
+                accuracy: f32::NAN,
+                ..plain
+            },
+        ),
+        (
+            "accuracy",
+            BodyDefinition {
+                accuracy: -0.1,
+                ..plain
+            },
+        ),
+        (
+            "iterations",
+            BodyDefinition {
+                iterations: 2_000_000,
+                ..plain
+            },
+        ),
+    ] {
+        match world.create_body(&definition) {
+            Err(Error::InvalidArgument(message)) => assert!(message.contains(name), "{message}"),
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+}
