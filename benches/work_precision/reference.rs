@@ -1,0 +1,168 @@
+//! The true motion of a scene: leapfrog in `f64` at steps so short that half as many make no difference. Kept in
+//! `target/reference`, since it takes a while.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use xxhash_rust::xxh3::xxh3_64;
+
+use crate::exact::Exact;
+use crate::report::Report;
+use crate::scene::{DURATION, SAMPLES, SPAN, Scene};
+
+/// To be changed with what is computed here.
+const VERSION: u8 = 1;
+/// So many times as many steps as stability needs, at least.
+const FINER: f64 = 8.0;
+/// Steps, at least.
+const FEWEST: f64 = 25_000.0;
+
+/// Positions at each sample's time, m.
+pub type Motion = Vec<Vec<DVec3>>;
+
+pub struct Reference {
+    pub motion: Motion,
+    /// The longest step that leapfrog stands at the start, s.
+    pub stable_step: f64,
+    /// The error of this motion, as far as can be told from half as many steps, in the measure used for all others.
+    pub uncertainty: f64,
+    /// The largest at the samples' times, J.
+    pub kinetic_energy: f64,
+}
+
+impl Reference {
+    /// As it was kept, or computed now.
+    pub fn of(scene: &Scene, report: &Report) -> Self {
+        let path = path(scene);
+        if let Some(reference) = read(&path, scene) {
+            report.progress(&format!("{}: the reference is {}", scene.name, path.display()));
+            return reference;
+        }
+        let reference = Self::compute(scene, report);
+        if let Err(error) = write(&path, &reference) {
+            report.progress(&format!("the reference could not be kept: {error}"));
+        }
+        reference
+    }
+
+    fn compute(scene: &Scene, report: &Report) -> Self {
+        let exact = Exact::new(scene);
+        let stable_step = exact.stable_step(&scene.start());
+        let needed = (FINER * DURATION / stable_step).max(FEWEST);
+        let per_span = (needed / SAMPLES as f64 / 2.0).ceil() as usize;
+        report.progress(&format!(
+            "{}: the reference takes {} steps, its check half as many",
+            scene.name,
+            2 * per_span * SAMPLES
+        ));
+        let (coarse, _) = leapfrog(scene, &exact, per_span);
+        let (motion, kinetic_energy) = leapfrog(scene, &exact, 2 * per_span);
+        let start = scene.start();
+        Self {
+            // Of order 2: what is left is a third of the difference.
+            uncertainty: relative_error(&coarse, &motion, &start) / 3.0,
+            motion,
+            stable_step,
+            kinetic_energy,
+        }
+    }
+
+    /// RMS distance from this motion over nodes and samples, in RMS distances from the start.
+    pub fn error(&self, motion: &Motion, scene: &Scene) -> f64 {
+        relative_error(motion, &self.motion, &scene.start())
+    }
+}
+
+fn relative_error(motion: &Motion, reference: &Motion, start: &[DVec3]) -> f64 {
+    let mut off = 0.0;
+    let mut moved = 0.0;
+    for (positions, reference) in motion.iter().zip(reference) {
+        for ((position, reference), start) in positions.iter().zip(reference).zip(start) {
+            off += position.distance_squared(*reference);
+            moved += reference.distance_squared(*start);
+        }
+    }
+    (off / moved).sqrt()
+}
+
+/// The motion in so many steps from one sample to the next, and its largest kinetic energy.
+fn leapfrog(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64) {
+    let step = SPAN / steps_per_span as f64;
+    let half_kicks: Vec<f64> = (exact.masses.iter())
+        .map(|&mass| if mass > 0.0 { 0.5 * step / mass } else { 0.0 })
+        .collect();
+    let mut positions = scene.start();
+    let mut velocities = vec![DVec3::ZERO; positions.len()];
+    let mut forces = vec![DVec3::ZERO; positions.len()];
+    let mut motion = Vec::new();
+    let mut kinetic: f64 = 0.0;
+    exact.forces(&positions, &mut forces);
+    for _ in 0..SAMPLES {
+        for _ in 0..steps_per_span {
+            for node in 0..positions.len() {
+                velocities[node] += half_kicks[node] * forces[node];
+                positions[node] += step * velocities[node];
+            }
+            exact.forces(&positions, &mut forces);
+            for node in 0..positions.len() {
+                velocities[node] += half_kicks[node] * forces[node];
+            }
+        }
+        motion.push(positions.clone());
+        kinetic = kinetic.max(exact.energy(&positions, &velocities).kinetic);
+    }
+    (motion, kinetic)
+}
+
+fn path(scene: &Scene) -> PathBuf {
+    let mut bytes = vec![VERSION];
+    let mut add = |values: &[f32]| bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    scene.positions.iter().for_each(|position| add(&position.to_array()));
+    add(&scene.masses);
+    add(&scene.stiffnesses);
+    add(&scene.rest_lengths);
+    add(&scene.gravity.to_array());
+    add(&[DURATION as f32, SAMPLES as f32]);
+    bytes.extend(scene.springs.iter().flatten().flat_map(|node| node.to_le_bytes()));
+    let name = format!("{}-{:016x}.f64", scene.name, xxh3_64(&bytes));
+    Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .with_file_name("reference")
+        .join(name)
+}
+
+/// Three figures, then the positions.
+fn write(path: &Path, reference: &Reference) -> std::io::Result<()> {
+    let figures = [reference.stable_step, reference.uncertainty, reference.kinetic_energy];
+    let coordinates = reference
+        .motion
+        .iter()
+        .flatten()
+        .flat_map(|position| position.to_array());
+    let bytes: Vec<u8> = figures
+        .into_iter()
+        .chain(coordinates)
+        .flat_map(f64::to_le_bytes)
+        .collect();
+    std::fs::create_dir_all(path.parent().unwrap_or(path))?;
+    std::fs::write(path, bytes)
+}
+
+fn read(path: &Path, scene: &Scene) -> Option<Reference> {
+    let bytes = std::fs::read(path).ok()?;
+    let (numbers, _) = bytes.as_chunks::<8>();
+    let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    let (&[stable_step, uncertainty, kinetic_energy], coordinates) = numbers.split_first_chunk::<3>()?;
+    if coordinates.len() != 3 * SAMPLES * scene.node_count() {
+        return None;
+    }
+    let positions = |sample: &[f64]| sample.chunks_exact(3).map(DVec3::from_slice).collect();
+    Some(Reference {
+        motion: coordinates
+            .chunks_exact(3 * scene.node_count())
+            .map(positions)
+            .collect(),
+        stable_step,
+        uncertainty,
+        kinetic_energy,
+    })
+}
