@@ -106,9 +106,9 @@ fn main() -> ExitCode {
 fn check(options: &Options) -> Result<(), String> {
     let report = Report::new("work_precision");
     for name in &options.scenes {
-        // No baseline is expected to converge at these settings where stiffness differs by a thousand.
-        if *name != "contrast" {
-            let scene = scenes::scene(name);
+        // No baseline is expected to converge at these settings where stiffness differs by a thousand or slivers snap.
+        if !["contrast", "stomach"].contains(name) {
+            let scene = scenes::scene(name)?;
             check::run(&report, &scene, &Reference::of(&scene, &report))?;
         }
     }
@@ -121,11 +121,17 @@ fn run(options: &Options) -> Result<(), String> {
     let mut report = Report::new("work_precision");
     report.write(&introduction(options));
     for name in &options.scenes {
-        let scene = scenes::scene(name);
+        let scene = match scenes::scene(name) {
+            Ok(scene) => scene,
+            Err(reason) => {
+                report.not_offered(name, &reason);
+                continue;
+            }
+        };
         let reference = Reference::of(&scene, &report);
         report.write(&format!(
-            "\n## {name}\n\n{} {} nodes, {} springs; leapfrog stands steps of {:.4} ms. What is left of an error in the \
-             reference itself: {}.\n",
+            "\n## {name}\n\n{} {} nodes, {} springs; leapfrog stands steps of {:.4} ms. Half as many steps \
+             change the reference by {}.\n",
             scene.description,
             scene.node_count(),
             scene.springs.len(),
@@ -140,8 +146,8 @@ fn run(options: &Options) -> Result<(), String> {
             }
             sweeps.push(sweep);
         }
-        tables::write(&mut report, &scene, &sweeps);
-        rest::run(&mut report, &scene, options.threads, 3.0 * effort.patience);
+        tables::write(&mut report, &scene, &reference, &sweeps);
+        rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
     }
     for (scene, reason) in scenes::PENDING {
         report.not_offered(scene, &format!("pending: {reason}"));

@@ -21,18 +21,22 @@ pub struct Effort {
     pub runs: usize,
     /// A line goes no finer once a run would take longer, s.
     pub patience: f64,
+    /// Nothing is followed to its rest for longer, s.
+    pub patience_at_rest: f64,
 }
 
 impl Effort {
     pub const FULL: Self = Self {
         quick: false,
         runs: 3,
-        patience: 4.0,
+        patience: 3.0,
+        patience_at_rest: 8.0,
     };
     pub const QUICK: Self = Self {
         quick: true,
         runs: 1,
         patience: 0.4,
+        patience_at_rest: 0.5,
     };
 }
 

@@ -20,8 +20,14 @@ const MOST_FRAMES: usize = 600;
 const FEWEST_FRAMES: usize = 240;
 
 pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
-    let scene = scene.damped(DAMPING);
-    let (rest, left) = rest_shape(&scene, report);
+    let scene = scene.settling(DAMPING, scene.gravity_at_rest);
+    let Some((rest, left)) = rest_shape(&scene, report) else {
+        report.not_offered(
+            &format!("{} at rest", scene.name),
+            "its rest shape was not found in a minute",
+        );
+        return;
+    };
     let start = scene.start();
     let size = distance(&rest, &start);
     report.write(&format!(

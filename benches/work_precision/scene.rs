@@ -27,6 +27,8 @@ pub struct Scene {
     pub rest_lengths: Vec<f32>,
     /// m/s²
     pub gravity: Vec3,
+    /// As it comes to rest, m/s²: another where that has no single rest shape.
+    pub gravity_at_rest: Vec3,
     /// What damping against the world takes off velocities, 1/s.
     pub damping_rate: f32,
 }
@@ -77,14 +79,16 @@ impl Scene {
             springs,
             stiffnesses: stiffnesses.into_iter().map(|stiffness| stiffness as f32).collect(),
             gravity: (-9.81 * up).as_vec3(),
+            gravity_at_rest: (-9.81 * up).as_vec3(),
             damping_rate: 0.0,
         }
     }
 
-    /// The same with damping against the world, 1/s.
-    pub fn damped(&self, rate: f32) -> Self {
+    /// The same with damping against the world, 1/s, and this gravity.
+    pub fn settling(&self, rate: f32, gravity: Vec3) -> Self {
         Self {
             damping_rate: rate,
+            gravity,
             ..self.clone()
         }
     }

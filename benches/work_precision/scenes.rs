@@ -1,4 +1,4 @@
-//! The scenes: an organ of even and of uneven stiffness, a cloth, a cantilever.
+//! The scenes: an organ of even and of uneven stiffness, a real organ with slivers, a cloth, a cantilever.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use sinew::mesh::{Mesh, MeshFormat, load};
 use crate::random::Random;
 use crate::scene::Scene;
 
-pub const NAMES: [&str; 4] = ["organ", "contrast", "cloth", "cantilever"];
+pub const NAMES: [&str; 5] = ["organ", "stomach", "contrast", "cloth", "cantilever"];
 
 /// What CASES asks for and cannot be built yet; why.
 pub const PENDING: [(&str, &str); 2] = [
@@ -19,45 +19,52 @@ pub const PENDING: [(&str, &str); 2] = [
     ("nearly incompressible block", "bodies have no volume term yet"),
 ];
 
-/// The scene of this name.
-pub fn scene(name: &str) -> Scene {
+/// The scene of this name; or why it is not there.
+pub fn scene(name: &str) -> Result<Scene, String> {
     match name {
-        "organ" => organ(),
-        "contrast" => contrast(),
-        "cloth" => cloth(),
-        _ => cantilever(),
+        "organ" => Ok(organ()),
+        "stomach" => stomach(),
+        "contrast" => Ok(contrast()),
+        "cloth" => Ok(cloth()),
+        _ => Ok(cantilever()),
     }
 }
 
 /// kg/m³, of most soft tissue.
 const DENSITY: f64 = 1060.0;
 
-/// A stomach hung up by its top, which starts to sag under its own weight.
+/// A body of well-shaped tetrahedra, as many as the stomach has.
 fn organ() -> Scene {
+    let mesh = Mesh::organ(0.133, 0.0037).expect("an organ of this spacing");
+    hung("organ", "a body shaped like a liver, without slivers", &mesh)
+}
+
+/// A real mesh, with slivers.
+fn stomach() -> Result<Scene, String> {
+    const FILE: &str = "shared/meshes/stomach.msh";
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(1);
+    let mut files = above.map(|folder| folder.join(FILE));
+    let file = files
+        .find(|file| file.exists())
+        .ok_or_else(|| format!("there is no {FILE}"))?;
+    let loaded = load(&file, MeshFormat::Auto, 1e-3).map_err(|error| error.to_string())?;
+    Ok(hung("stomach", "a stomach, with slivers", &centred(loaded.mesh)))
+}
+
+/// A body hung up by one end of its longest axis, which starts to sag under its own weight.
+fn hung(name: &'static str, what: &str, mesh: &Mesh) -> Scene {
     const YOUNG: f64 = 5e3;
     const HELD: f64 = 0.03;
-    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(1);
-    let file = above
-        .map(|folder| folder.join("shared/meshes/stomach.msh"))
-        .find(|file| file.exists());
-    let (mesh, origin) = if let Some(file) = file {
-        let loaded = load(&file, MeshFormat::Auto, 1e-3).expect("a sound mesh");
-        (centred(loaded.mesh), "a stomach (stomach.msh)")
-    } else {
-        let mesh = Mesh::organ(0.133, 0.0037).expect("an organ of this spacing");
-        (mesh, "a body shaped like a liver, since stomach.msh is not there")
-    };
     let low = mesh.positions.iter().fold(Vec3::INFINITY, |low, p| low.min(*p));
     let high = mesh.positions.iter().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
     let extent = high - low;
     let long = (0..3).fold(0, |long, axis| if extent[axis] > extent[long] { axis } else { long });
-    let up = DVec3::AXES[long];
     let description = format!(
-        "The tetrahedra of {origin}, {:.0} mm long, E = 5 kPa by Van Gelder's springs, held by the upper 3 % and let go \
-         at its rest shape.",
+        "The tetrahedra of {what}, {:.0} mm long, E = 5 kPa by Van Gelder's springs, held by the upper 3 % and let go at \
+         its rest shape.",
         1e3 * extent[long]
     );
-    Scene::of_tetrahedra("organ", description, &mesh, [YOUNG, DENSITY], up, HELD)
+    Scene::of_tetrahedra(name, description, mesh, [YOUNG, DENSITY], DVec3::AXES[long], HELD)
 }
 
 /// The organ with one spring in five a thousand times as stiff.
@@ -121,6 +128,8 @@ fn cloth() -> Scene {
         springs,
         rest_lengths,
         gravity: Vec3::new(0.0, -9.81, 0.0),
+        // Swung down it wrinkles, each time in another way; in its plane there is one rest shape.
+        gravity_at_rest: Vec3::new(0.0, 0.0, 9.81),
         damping_rate: 0.0,
     }
 }
@@ -149,6 +158,7 @@ fn cantilever() -> Scene {
         stiffnesses: Vec::new(),
         rest_lengths: Vec::new(),
         gravity: Vec3::new(0.0, -9.81, 0.0),
+        gravity_at_rest: Vec3::new(0.0, -9.81, 0.0),
         damping_rate: 0.0,
     };
     for z in 0..nodes[2] {

@@ -3,6 +3,8 @@
 //!
 //! A mass term that fades leads from the start to the rest shape without leaps.
 
+use std::time::{Duration, Instant};
+
 use glam::DVec3;
 
 use crate::bisection;
@@ -17,35 +19,43 @@ use crate::simd::Record;
 /// The first of the pseudo time steps, s, and by how much they grow.
 const FIRST_STEP: f64 = 1.0 / 30.0;
 const GROWTH: f64 = 1.5;
+/// The pseudo time step at which inertia no longer counts, s.
+const LAST_STEP: f64 = 1e3;
+/// A Newton step that is too long to lengthen the time step, m.
+const FAR: f64 = 1e-2;
 /// At rest once a Newton step moves no node further, m.
 const AT_REST: f64 = 1e-10;
-const MOST_STEPS: usize = 400;
 const MOST_ITERATIONS: usize = 400;
+/// The search is given up after so long.
+const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Where the nodes are at rest, m; and the largest force that is left, in the largest weight of a node.
-pub fn rest_shape(scene: &Scene, report: &Report) -> (Vec<DVec3>, f64) {
+/// Where the nodes are at rest, m; and the largest force that is left, in the largest weight of a node. `None`: not found.
+pub fn rest_shape(scene: &Scene, report: &Report) -> Option<(Vec<DVec3>, f64)> {
+    let begin = Instant::now();
     let mut statics = Statics::new(scene);
     let mut step = FIRST_STEP;
-    let mut passed = 0;
-    for round in 0..MOST_STEPS {
-        let moved = statics.newton(step);
-        if step > 1e3 && moved < AT_REST {
-            break;
+    let mut moved = f64::INFINITY;
+    while step < LAST_STEP || moved > AT_REST {
+        if begin.elapsed() > PATIENCE {
+            return None;
         }
-        // Where a step did not get far, the time step stays as it is.
-        if moved < 1e-2 {
+        moved = statics.newton(step);
+        // Where a step went far, the time step stays as it is.
+        if moved < FAR {
             step *= GROWTH;
         }
-        if round >= passed + 20 {
-            passed = round;
-            report.progress(&format!("{}: towards rest: a step of {moved:.1e} m", scene.name));
-        }
     }
-    let weight = statics.exact.masses.iter().fold(0.0, |most: f64, &mass| most.max(mass)) * 9.81;
+    report.progress(&format!(
+        "{}: the rest shape took {:.1} s",
+        scene.name,
+        begin.elapsed().as_secs_f64()
+    ));
+    let weight =
+        statics.exact.masses.iter().fold(0.0, |most: f64, &mass| most.max(mass)) * f64::from(scene.gravity.length());
     let mut forces = vec![DVec3::ZERO; scene.node_count()];
     statics.exact.forces(&statics.positions, &mut forces);
     let left = forces.iter().fold(0.0, |most: f64, force| most.max(force.length())) / weight;
-    (statics.positions, left)
+    Some((statics.positions, left))
 }
 
 struct Statics {

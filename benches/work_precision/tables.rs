@@ -2,6 +2,7 @@
 
 use crate::contender::{Method, Setup};
 use crate::motion::{Point, Sweep};
+use crate::reference::Reference;
 use crate::report::{Report, Table, digits, milliseconds};
 use crate::scene::Scene;
 use crate::summary::{error_in, measured, time_for};
@@ -10,7 +11,7 @@ use crate::svg::{Series, plot};
 /// Frames per second.
 const FRAMES: f64 = 60.0;
 
-pub fn write(report: &mut Report, scene: &Scene, sweeps: &[Sweep]) {
+pub fn write(report: &mut Report, scene: &Scene, reference: &Reference, sweeps: &[Sweep]) {
     let series: Vec<Series> = sweeps.iter().map(series).collect();
     let title = format!("{}: work and precision", scene.name);
     let svg = plot(
@@ -20,7 +21,7 @@ pub fn write(report: &mut Report, scene: &Scene, sweeps: &[Sweep]) {
         &series,
     );
     report.plot(&format!("work_precision_{}.svg", scene.name), &title, svg);
-    report.table(&summary(sweeps));
+    report.table(&summary(reference, sweeps));
     report.table(&points(sweeps));
 }
 
@@ -50,7 +51,7 @@ fn series(sweep: &Sweep) -> Series {
 }
 
 /// What each family of lines needs and leaves.
-fn summary(sweeps: &[Sweep]) -> Table {
+fn summary(reference: &Reference, sweeps: &[Sweep]) -> Table {
     let mut table = Table::new(&[
         "solver, at its best",
         "s/s for 10 %",
@@ -67,7 +68,11 @@ fn summary(sweeps: &[Sweep]) -> Table {
         if lines.iter().all(|line| line.points.is_err()) {
             row.extend(vec!["not offered".to_owned(); 5]);
         } else {
-            let time = |error| time_for(&lines, error).map_or("never".into(), digits);
+            let time = |error| match time_for(&lines, error) {
+                _ if error < reference.uncertainty => "unresolved".into(),
+                None => "never".into(),
+                Some(seconds) => digits(seconds),
+            };
             let error = |milliseconds: f64| error_in(&lines, 1e-3 * milliseconds * FRAMES).map_or("-".into(), percent);
             row.extend([0.1, 0.01, 0.001].map(time));
             row.extend([1.0, 16.0].map(error));
