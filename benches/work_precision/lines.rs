@@ -21,7 +21,7 @@ const WORLD_STEPS: [u32; 5] = [2, 8, 32, 128, 312];
 const STEPS: [u32; 9] = [1, 2, 4, 8, 16, 32, 64, 128, 256];
 /// Substeps of a frame, 1/64 s.
 const XPBD_SUBSTEPS: [u32; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
-const PROJECTIVE_STEPS: [u32; 6] = [1, 2, 4, 8, 16, 32];
+const PROJECTIVE_STEPS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 const PROJECTIVE_ITERATIONS: [u32; 4] = [1, 3, 10, 30];
 
 /// All lines for a scene in which leapfrog stands steps of `stable_step`, s.

