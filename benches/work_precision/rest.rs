@@ -24,7 +24,7 @@ pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
     let Some((rest, left)) = rest_shape(&scene, report) else {
         report.not_offered(
             &format!("{} at rest", scene.name),
-            "its rest shape was not found in a minute",
+            "its rest shape was not found in 90 s",
         );
         return;
     };

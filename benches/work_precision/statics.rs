@@ -24,10 +24,10 @@ const LAST_STEP: f64 = 1e3;
 /// A Newton step that is too long to lengthen the time step, m.
 const FAR: f64 = 1e-2;
 /// At rest once a Newton step moves no node further, m.
-const AT_REST: f64 = 1e-10;
+const AT_REST: f64 = 1e-8;
 const MOST_ITERATIONS: usize = 400;
 /// The search is given up after so long.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(90);
 
 /// Where the nodes are at rest, m; and the largest force that is left, in the largest weight of a node. `None`: not found.
 pub fn rest_shape(scene: &Scene, report: &Report) -> Option<(Vec<DVec3>, f64)> {
