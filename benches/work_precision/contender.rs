@@ -66,6 +66,15 @@ impl Setup {
         self.span / f64::from(self.steps)
     }
 
+    /// In proportion to the time it takes, along a line.
+    pub fn work(&self) -> f64 {
+        match (self.method, self.substeps) {
+            // As many substeps as it takes, however many steps they are in.
+            (Method::Sinew(Solver::Verlet), 0) => 1.0,
+            (_, substeps) => f64::from(self.steps * substeps.max(1)),
+        }
+    }
+
     /// The time that counts, s: what one thread does by its own clock, which stands while other programs run.
     pub fn counted(&self, elapsed: Elapsed) -> f64 {
         if self.threads == 1 {

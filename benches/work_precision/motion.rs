@@ -75,7 +75,7 @@ pub fn sweep(scene: &Scene, reference: &Reference, line: Line, effort: Effort, r
     let mut points: Vec<Point> = Vec::new();
     let mut spent: Option<(f64, f64)> = None;
     for (index, &setup) in line.setups.iter().enumerate() {
-        let work = f64::from(setup.steps * setup.substeps.max(1));
+        let work = setup.work();
         let expected = spent.map(|(seconds, steps)| seconds * work / steps);
         if expected.is_some_and(|seconds| seconds > effort.patience) {
             break;
