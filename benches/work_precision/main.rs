@@ -2,7 +2,7 @@
 //! (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective Dynamics (Liu et al. 2013).
 //!
 //! `cargo bench --bench work_precision [-- --quick] [--only <scene>] [--threads <n>] [--check]` writes
-//! `target/report/work_precision.md` and diagrams beside it. The references are computed once and kept in
+//! `target/report/work_precision.md` and diagrams beside it. References and rest shapes are computed once and kept in
 //! `target/reference`.
 #![allow(clippy::print_stderr)]
 
@@ -13,6 +13,7 @@ mod cholesky;
 mod clock;
 mod contender;
 mod exact;
+mod kept;
 mod lines;
 #[path = "../storage/machine.rs"]
 mod machine;

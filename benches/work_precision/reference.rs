@@ -1,17 +1,13 @@
 //! The true motion of a scene: leapfrog in `f64` at steps so short that half as many make no difference. Kept in
 //! `target/reference`, since it takes a while.
 
-use std::path::{Path, PathBuf};
-
 use glam::DVec3;
-use xxhash_rust::xxh3::xxh3_64;
 
 use crate::exact::Exact;
+use crate::kept::kept;
 use crate::report::Report;
 use crate::scene::{DURATION, SAMPLES, SPAN, Scene};
 
-/// To be changed with what is computed here.
-const VERSION: u8 = 2;
 /// So many times as many steps as stability needs, at least.
 const FINER: f64 = 8.0;
 /// Steps, at least.
@@ -34,16 +30,32 @@ pub struct Reference {
 impl Reference {
     /// As it was kept, or computed now.
     pub fn of(scene: &Scene, report: &Report) -> Self {
-        let path = path(scene);
-        if let Some(reference) = read(&path, scene) {
-            report.progress(&format!("{}: the reference is {}", scene.name, path.display()));
-            return reference;
+        let size = 3 * SAMPLES * scene.node_count();
+        let numbers = kept(scene, "motion", 3 + size, report, || {
+            Some(Self::compute(scene, report).numbers())
+        });
+        Self::from_numbers(&numbers.expect("a motion can always be computed"), scene)
+    }
+
+    /// Three figures, then the positions.
+    fn numbers(&self) -> Vec<f64> {
+        let figures = [self.stable_step, self.uncertainty, self.kinetic_energy];
+        let coordinates = self.motion.iter().flatten().flat_map(|position| position.to_array());
+        figures.into_iter().chain(coordinates).collect()
+    }
+
+    fn from_numbers(numbers: &[f64], scene: &Scene) -> Self {
+        let (figures, coordinates) = numbers.split_at(3);
+        let positions = |sample: &[f64]| sample.chunks_exact(3).map(DVec3::from_slice).collect();
+        Self {
+            motion: coordinates
+                .chunks_exact(3 * scene.node_count())
+                .map(positions)
+                .collect(),
+            stable_step: figures[0],
+            uncertainty: figures[1],
+            kinetic_energy: figures[2],
         }
-        let reference = Self::compute(scene, report);
-        if let Err(error) = write(&path, &reference) {
-            report.progress(&format!("the reference could not be kept: {error}"));
-        }
-        reference
     }
 
     fn compute(scene: &Scene, report: &Report) -> Self {
@@ -112,57 +124,4 @@ fn leapfrog(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64
         kinetic = kinetic.max(exact.energy(&positions, &velocities).kinetic);
     }
     (motion, kinetic)
-}
-
-fn path(scene: &Scene) -> PathBuf {
-    let mut bytes = vec![VERSION];
-    let mut add = |values: &[f32]| bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-    scene.positions.iter().for_each(|position| add(&position.to_array()));
-    add(&scene.masses);
-    add(&scene.stiffnesses);
-    add(&scene.rest_lengths);
-    add(&scene.gravity.to_array());
-    add(&[DURATION as f32, SAMPLES as f32]);
-    bytes.extend(scene.springs.iter().flatten().flat_map(|node| node.to_le_bytes()));
-    let name = format!("{}-{:016x}.f64", scene.name, xxh3_64(&bytes));
-    Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .with_file_name("reference")
-        .join(name)
-}
-
-/// Three figures, then the positions.
-fn write(path: &Path, reference: &Reference) -> std::io::Result<()> {
-    let figures = [reference.stable_step, reference.uncertainty, reference.kinetic_energy];
-    let coordinates = reference
-        .motion
-        .iter()
-        .flatten()
-        .flat_map(|position| position.to_array());
-    let bytes: Vec<u8> = figures
-        .into_iter()
-        .chain(coordinates)
-        .flat_map(f64::to_le_bytes)
-        .collect();
-    std::fs::create_dir_all(path.parent().unwrap_or(path))?;
-    std::fs::write(path, bytes)
-}
-
-fn read(path: &Path, scene: &Scene) -> Option<Reference> {
-    let bytes = std::fs::read(path).ok()?;
-    let (numbers, _) = bytes.as_chunks::<8>();
-    let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-    let (&[stable_step, uncertainty, kinetic_energy], coordinates) = numbers.split_first_chunk::<3>()?;
-    if coordinates.len() != 3 * SAMPLES * scene.node_count() {
-        return None;
-    }
-    let positions = |sample: &[f64]| sample.chunks_exact(3).map(DVec3::from_slice).collect();
-    Some(Reference {
-        motion: coordinates
-            .chunks_exact(3 * scene.node_count())
-            .map(positions)
-            .collect(),
-        stable_step,
-        uncertainty,
-        kinetic_energy,
-    })
 }

@@ -11,6 +11,7 @@ use crate::bisection;
 use crate::cholesky::Factor;
 use crate::contender::record;
 use crate::exact::Exact;
+use crate::kept::kept;
 use crate::projective::system;
 use crate::report::Report;
 use crate::scene::Scene;
@@ -31,6 +32,16 @@ const PATIENCE: Duration = Duration::from_secs(90);
 
 /// Where the nodes are at rest, m; and the largest force that is left, in the largest weight of a node. `None`: not found.
 pub fn rest_shape(scene: &Scene, report: &Report) -> Option<(Vec<DVec3>, f64)> {
+    let numbers = kept(scene, "rest", 1 + 3 * scene.node_count(), report, || {
+        let (positions, left) = find(scene, report)?;
+        let coordinates = positions.iter().flat_map(|position| position.to_array());
+        Some([left].into_iter().chain(coordinates).collect())
+    })?;
+    let (left, coordinates) = numbers.split_first()?;
+    Some((coordinates.chunks_exact(3).map(DVec3::from_slice).collect(), *left))
+}
+
+fn find(scene: &Scene, report: &Report) -> Option<(Vec<DVec3>, f64)> {
     let begin = Instant::now();
     let mut statics = Statics::new(scene);
     let mut step = FIRST_STEP;
