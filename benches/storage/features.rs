@@ -4,9 +4,10 @@ use sinew::{BodyDefinition, Values};
 
 use crate::bodies::{Setup, Stepped};
 use crate::heap;
+use crate::random::Random;
 use crate::report::{Report, Table, count, digits, megabytes, milliseconds};
 use crate::rounds::{Contender, Effort, interleave};
-use crate::scenes::{MASS, Random, STIFFNESS, Scene};
+use crate::scenes::{MASS, STIFFNESS, Scene};
 
 const SUBSTEPS: u32 = 4;
 

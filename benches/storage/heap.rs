@@ -4,7 +4,7 @@
 use std::ffi::c_void;
 
 use crate::clock;
-use crate::scenes::Random;
+use crate::random::Random;
 
 /// A heap whose free blocks of one size lie scattered among others that are taken until this is dropped.
 pub struct Fragmented {

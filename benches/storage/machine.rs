@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::report::Report;
-
-pub fn describe(report: &mut Report, quick: bool) {
-    let mut text = String::from("# Storages\n\n");
+/// Processor, caches, instructions and load, as the points of a list.
+pub fn description() -> String {
+    let mut text = String::new();
     let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = processor
         .lines()
@@ -35,15 +34,7 @@ pub fn describe(report: &mut Report, quick: bool) {
         let load = load.split(' ').next().unwrap_or_default();
         let _ = writeln!(text, "- Load when this began: {load}.");
     }
-    text.push_str(
-        "- Times are the least over rounds in which all contenders of a size take turns: what disturbs makes them longer, \
-         never shorter. Ratios are medians of the ratios within rounds. What runs on one thread is measured in processor time of that thread, what runs on several on \
-         the wall's clock.\n",
-    );
-    if quick {
-        text.push_str("- A quick run: few sizes, few rounds.\n");
-    }
-    report.write(&text);
+    text
 }
 
 /// Of the first core.

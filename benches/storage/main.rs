@@ -12,6 +12,7 @@ mod heap;
 mod limits;
 mod machine;
 mod packed;
+mod random;
 mod report;
 mod rounds;
 mod scenes;
@@ -60,8 +61,8 @@ fn main() -> std::process::ExitCode {
         }
     };
     let effort = if options.quick { Effort::QUICK } else { Effort::FULL };
-    let mut report = Report::new();
-    machine::describe(&mut report, options.quick);
+    let mut report = Report::new("storage");
+    report.write(&introduction(options.quick));
     let library = fast_link::Library::compile();
     if let Err(reason) = &library {
         report.not_offered("fast link in C", reason);
@@ -86,4 +87,17 @@ fn main() -> std::process::ExitCode {
             std::process::ExitCode::FAILURE
         }
     }
+}
+
+fn introduction(quick: bool) -> String {
+    let mut text = format!("# Storages\n\n{}", machine::description());
+    text.push_str(
+        "- Times are the least over rounds in which all contenders of a size take turns: what disturbs makes them longer, \
+         never shorter. Ratios are medians of the ratios within rounds. What runs on one thread is measured in processor time of that thread, what runs on several on \
+         the wall's clock.\n",
+    );
+    if quick {
+        text.push_str("- A quick run: few sizes, few rounds.\n");
+    }
+    text
 }

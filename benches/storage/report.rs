@@ -1,4 +1,4 @@
-//! What comes of it all: `target/report/storage.md`, and lines on the way.
+//! What comes of it all: a file in `target/report`, and lines on the way.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub struct Report {
+    name: &'static str,
     start: Instant,
     text: String,
     not_offered: BTreeMap<String, String>,
@@ -14,8 +15,10 @@ pub struct Report {
 }
 
 impl Report {
-    pub fn new() -> Self {
+    /// To be `target/report/<name>.md`.
+    pub fn new(name: &'static str) -> Self {
         Self {
+            name,
             start: Instant::now(),
             text: String::new(),
             not_offered: BTreeMap::new(),
@@ -79,7 +82,7 @@ impl Report {
         for (file, svg) in &self.plots {
             std::fs::write(folder.join(file), svg)?;
         }
-        let path = folder.join("storage.md");
+        let path = folder.join(self.name).with_extension("md");
         std::fs::write(&path, &self.text)?;
         Ok(path)
     }

@@ -9,9 +9,10 @@ use crate::bodies::{Setup, Stepped};
 use crate::clock;
 use crate::fast_link::{FastLink, Library, Way};
 use crate::heap::{self, Fragmented};
+use crate::random::Random;
 use crate::report::{Report, Table, count, digits, megabytes, milliseconds};
 use crate::rounds::{Contender, Effort, Results, Samples, interleave};
-use crate::scenes::{Random, Scene};
+use crate::scenes::Scene;
 use crate::svg::{self, Series};
 
 const STORAGES: [(&str, Storage); 4] = [

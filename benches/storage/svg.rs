@@ -159,6 +159,7 @@ fn tick(value: f64) -> String {
         value if value >= 999_999.0 => format!("{:.0}M", value * 1e-6),
         value if value >= 999.0 => format!("{:.0}K", value * 1e-3),
         value if value >= 9.99 => format!("{value:.0}"),
+        value if value < 9.99e-4 => format!("{value:.0e}"),
         value => format!("{value:.6}")
             .trim_end_matches('0')
             .trim_end_matches('.')

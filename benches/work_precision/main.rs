@@ -1,0 +1,182 @@
+//! Work-precision diagrams: error against a converged reference, and the time for it, for sinew's solvers, the paper's Verlet
+//! (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective Dynamics (Liu et al. 2013).
+//!
+//! `cargo bench --bench work_precision [-- --quick] [--only <scene>] [--threads <n>] [--check]` writes
+//! `target/report/work_precision.md` and diagrams beside it. References and rest shapes are computed once and kept in
+//! `target/reference`.
+#![allow(clippy::print_stderr)]
+
+mod bisection;
+mod check;
+mod cholesky;
+#[path = "../storage/clock.rs"]
+mod clock;
+mod contender;
+mod exact;
+mod kept;
+mod lines;
+#[path = "../storage/machine.rs"]
+mod machine;
+mod motion;
+mod paper;
+mod projective;
+#[path = "../storage/random.rs"]
+#[allow(dead_code)] // the storage bench uses the rest
+mod random;
+mod reference;
+#[path = "../storage/report.rs"]
+#[allow(dead_code)] // the storage bench uses the rest
+mod report;
+mod rest;
+mod rows;
+mod scene;
+mod scenes;
+mod simd;
+mod statics;
+mod summary;
+#[path = "../storage/svg.rs"]
+mod svg;
+mod tables;
+mod tissue;
+mod xpbd;
+
+use std::process::ExitCode;
+
+use motion::Effort;
+use reference::Reference;
+use report::Report;
+
+/// What is asked for on the command line.
+struct Options {
+    quick: bool,
+    check: bool,
+    scenes: Vec<&'static str>,
+    threads: u32,
+}
+
+impl Options {
+    fn from_arguments() -> Result<Self, String> {
+        let mut options = Self {
+            quick: false,
+            check: false,
+            scenes: scenes::NAMES.to_vec(),
+            threads: 1,
+        };
+        let mut arguments = std::env::args().skip(1);
+        while let Some(argument) = arguments.next() {
+            match argument.as_str() {
+                // Given by cargo itself.
+                "--bench" => {}
+                "--quick" => options.quick = true,
+                "--check" => options.check = true,
+                "--only" => {
+                    let name = arguments.next().unwrap_or_default();
+                    options.scenes.retain(|scene| *scene == name);
+                    if options.scenes.is_empty() {
+                        return Err(format!("--only {name:?}: must be one of {:?}", scenes::NAMES));
+                    }
+                }
+                "--threads" => match arguments.next().map(|count| count.parse()) {
+                    Some(Ok(threads)) if threads > 0 => options.threads = threads,
+                    other => return Err(format!("--threads {other:?}: must be a number above 0")),
+                },
+                other => {
+                    return Err(format!(
+                        "{other}: there is --quick, --check, --only <scene> and --threads <n>"
+                    ));
+                }
+            }
+        }
+        Ok(options)
+    }
+}
+
+fn main() -> ExitCode {
+    let done =
+        Options::from_arguments().and_then(|options| if options.check { check(&options) } else { run(&options) });
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Shows that the baselines are right.
+fn check(options: &Options) -> Result<(), String> {
+    let report = Report::new("work_precision");
+    for name in &options.scenes {
+        // No baseline is expected to converge at these settings where stiffness differs by a thousand or slivers snap.
+        if !["contrast", "stomach"].contains(name) {
+            let scene = scenes::scene(name)?;
+            check::run(&report, &scene, &Reference::of(&scene, &report))?;
+        }
+    }
+    Ok(())
+}
+
+/// Measures everything.
+fn run(options: &Options) -> Result<(), String> {
+    let effort = if options.quick { Effort::QUICK } else { Effort::FULL };
+    let mut report = Report::new("work_precision");
+    report.write(&introduction(options));
+    for name in &options.scenes {
+        let scene = match scenes::scene(name) {
+            Ok(scene) => scene,
+            Err(reason) => {
+                report.not_offered(name, &reason);
+                continue;
+            }
+        };
+        let reference = Reference::of(&scene, &report);
+        report.write(&format!(
+            "\n## {name}\n\n{} {} nodes, {} springs; leapfrog stands steps of {:.4} ms. Half as many steps \
+             change the reference by {}.\n",
+            scene.description,
+            scene.node_count(),
+            scene.springs.len(),
+            1e3 * reference.stable_step,
+            tables::percent(reference.uncertainty)
+        ));
+        let mut sweeps = Vec::new();
+        for line in lines::lines(reference.stable_step, options.threads) {
+            let sweep = motion::sweep(&scene, &reference, line, effort, &report);
+            if let Err(reason) = &sweep.points {
+                report.not_offered(&sweep.line.name, reason);
+            }
+            sweeps.push(sweep);
+        }
+        tables::write(&mut report, &scene, &reference, &sweeps);
+        rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
+    }
+    for (scene, reason) in scenes::PENDING {
+        report.not_offered(scene, &format!("pending: {reason}"));
+    }
+    let path = report
+        .finish()
+        .map_err(|error| format!("the report could not be written: {error}"))?;
+    eprintln!("report: {}", path.display());
+    Ok(())
+}
+
+fn introduction(options: &Options) -> String {
+    let mut text = format!("# Work and precision\n\n{}", machine::description());
+    text.push_str(
+        "- Error: RMS over nodes and 8 sample times within 0.25 s of the distance to leapfrog in `f64`, over RMS of its \
+         motion. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
+         drift: at the end, in the largest kinetic energies.\n\
+         - Times are the best of up to four runs, in processor time of the thread. Preparing (laying out springs, \
+         colouring, factoring) is not in them and stands apart. A line ends where a run would take too long.\n",
+    );
+    if options.threads > 1 {
+        text.push_str(&format!(
+            "- sinew on {} threads and all times on the wall's clock; baselines run on one thread.\n",
+            options.threads
+        ));
+    }
+    if options.quick {
+        text.push_str("- A quick run: every second point, two runs each, no long ones.\n");
+    }
+    text
+}

@@ -1,0 +1,127 @@
+//! The true motion of a scene: leapfrog in `f64` at steps so short that half as many make no difference. Kept in
+//! `target/reference`, since it takes a while.
+
+use glam::DVec3;
+
+use crate::exact::Exact;
+use crate::kept::kept;
+use crate::report::Report;
+use crate::scene::{DURATION, SAMPLES, SPAN, Scene};
+
+/// So many times as many steps as stability needs, at least.
+const FINER: f64 = 8.0;
+/// Steps, at least.
+const FEWEST: f64 = 25_000.0;
+
+/// Positions at each sample's time, m.
+pub type Motion = Vec<Vec<DVec3>>;
+
+pub struct Reference {
+    pub motion: Motion,
+    /// The longest step that leapfrog stands at the start, s.
+    pub stable_step: f64,
+    /// How far the motion in half as many steps is from this one, in the measure used for all errors. Where it is not
+    /// tiny, elements snap through on the way and the motion depends on all that is rounded: no error below is told.
+    pub uncertainty: f64,
+    /// The largest at the samples' times, J.
+    pub kinetic_energy: f64,
+}
+
+impl Reference {
+    /// As it was kept, or computed now.
+    pub fn of(scene: &Scene, report: &Report) -> Self {
+        let size = 3 * SAMPLES * scene.node_count();
+        let numbers = kept(scene, "motion", 3 + size, report, || {
+            Some(Self::compute(scene, report).numbers())
+        });
+        Self::from_numbers(&numbers.expect("a motion can always be computed"), scene)
+    }
+
+    /// Three figures, then the positions.
+    fn numbers(&self) -> Vec<f64> {
+        let figures = [self.stable_step, self.uncertainty, self.kinetic_energy];
+        let coordinates = self.motion.iter().flatten().flat_map(|position| position.to_array());
+        figures.into_iter().chain(coordinates).collect()
+    }
+
+    fn from_numbers(numbers: &[f64], scene: &Scene) -> Self {
+        let (figures, coordinates) = numbers.split_at(3);
+        let positions = |sample: &[f64]| sample.chunks_exact(3).map(DVec3::from_slice).collect();
+        Self {
+            motion: coordinates
+                .chunks_exact(3 * scene.node_count())
+                .map(positions)
+                .collect(),
+            stable_step: figures[0],
+            uncertainty: figures[1],
+            kinetic_energy: figures[2],
+        }
+    }
+
+    fn compute(scene: &Scene, report: &Report) -> Self {
+        let exact = Exact::new(scene);
+        let stable_step = exact.stable_step(&scene.start());
+        let needed = (FINER * DURATION / stable_step).max(FEWEST);
+        let per_span = (needed / SAMPLES as f64 / 2.0).ceil() as usize;
+        report.progress(&format!(
+            "{}: the reference takes {} steps, its check half as many",
+            scene.name,
+            2 * per_span * SAMPLES
+        ));
+        let (coarse, _) = leapfrog(scene, &exact, per_span);
+        let (motion, kinetic_energy) = leapfrog(scene, &exact, 2 * per_span);
+        let start = scene.start();
+        Self {
+            uncertainty: relative_error(&coarse, &motion, &start),
+            motion,
+            stable_step,
+            kinetic_energy,
+        }
+    }
+
+    /// RMS distance from this motion over nodes and samples, in RMS distances from the start.
+    pub fn error(&self, motion: &Motion, scene: &Scene) -> f64 {
+        relative_error(motion, &self.motion, &scene.start())
+    }
+}
+
+fn relative_error(motion: &Motion, reference: &Motion, start: &[DVec3]) -> f64 {
+    let mut off = 0.0;
+    let mut moved = 0.0;
+    for (positions, reference) in motion.iter().zip(reference) {
+        for ((position, reference), start) in positions.iter().zip(reference).zip(start) {
+            off += position.distance_squared(*reference);
+            moved += reference.distance_squared(*start);
+        }
+    }
+    (off / moved).sqrt()
+}
+
+/// The motion in so many steps from one sample to the next, and its largest kinetic energy.
+fn leapfrog(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64) {
+    let step = SPAN / steps_per_span as f64;
+    let half_kicks: Vec<f64> = (exact.masses.iter())
+        .map(|&mass| if mass > 0.0 { 0.5 * step / mass } else { 0.0 })
+        .collect();
+    let mut positions = scene.start();
+    let mut velocities = vec![DVec3::ZERO; positions.len()];
+    let mut forces = vec![DVec3::ZERO; positions.len()];
+    let mut motion = Vec::new();
+    let mut kinetic: f64 = 0.0;
+    exact.forces(&positions, &mut forces);
+    for _ in 0..SAMPLES {
+        for _ in 0..steps_per_span {
+            for node in 0..positions.len() {
+                velocities[node] += half_kicks[node] * forces[node];
+                positions[node] += step * velocities[node];
+            }
+            exact.forces(&positions, &mut forces);
+            for node in 0..positions.len() {
+                velocities[node] += half_kicks[node] * forces[node];
+            }
+        }
+        motion.push(positions.clone());
+        kinetic = kinetic.max(exact.energy(&positions, &velocities).kinetic);
+    }
+    (motion, kinetic)
+}

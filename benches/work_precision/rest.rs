@@ -1,0 +1,144 @@
+//! How close each solver comes to the true rest shape, in frames of 1/60 s with damping against the world.
+
+use glam::DVec3;
+use sinew::Solver;
+
+use crate::clock;
+use crate::contender::{Method, Setup};
+use crate::report::{Report, Table, milliseconds};
+use crate::scene::Scene;
+use crate::statics::rest_shape;
+use crate::tables::{iterations, percent};
+
+/// 1/s
+const DAMPING: f32 = 5.0;
+const FRAME: f64 = 1.0 / 60.0;
+/// Looked at every so many frames, up to so many.
+const LOOK: usize = 30;
+const MOST_FRAMES: usize = 600;
+/// Nothing is at rest before.
+const FEWEST_FRAMES: usize = 240;
+
+pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
+    let scene = scene.settling(DAMPING, scene.gravity_at_rest);
+    let Some((rest, left)) = rest_shape(&scene, report) else {
+        report.not_offered(
+            &format!("{} at rest", scene.name),
+            "its rest shape was not found in 90 s",
+        );
+        return;
+    };
+    let start = scene.start();
+    let size = distance(&rest, &start);
+    report.write(&format!(
+        "\n### {}: at rest\n\nFrames of 1/60 s, damping of {DAMPING} /s, until the distance to the rest shape falls no \
+         further. The rest shape is {:.1} mm from the start (RMS); the largest force left in it is {left:.0e} of a \
+         node's weight. Distances are RMS, in those of the rest shape from the start.\n",
+        scene.name,
+        1e3 * size
+    ));
+    let mut table = Table::new(&[
+        "solver",
+        "h, ms",
+        "iterations",
+        "distance",
+        "ms per frame",
+        "frames",
+        "status",
+    ]);
+    for (name, setup) in setups(threads) {
+        let frames = settle(&scene, setup, &rest, size, patience);
+        let mut row = vec![name.to_owned()];
+        match frames {
+            Ok(settled) => row.extend([
+                milliseconds(settled.step),
+                iterations(&setup),
+                percent(settled.distance),
+                milliseconds(settled.per_frame),
+                settled.frames.to_string(),
+                settled.status,
+            ]),
+            Err(reason) => {
+                row.extend(vec!["-".to_owned(); 5]);
+                row.push(reason);
+            }
+        }
+        report.progress(&format!("{}: at rest: {}", scene.name, row.join(", ")));
+        table.row(row);
+    }
+    report.table(&table);
+}
+
+fn setups(threads: u32) -> Vec<(&'static str, Setup)> {
+    let setup = |method, steps, iterations| Setup {
+        method,
+        steps,
+        substeps: 0,
+        iterations,
+        span: FRAME,
+        threads,
+    };
+    let mut setups = vec![
+        ("VERLET, substeps chosen", setup(Method::Sinew(Solver::Verlet), 1, 0)),
+        ("IMPLICIT", setup(Method::Sinew(Solver::Implicit), 1, 0)),
+        ("NEWTON", setup(Method::Sinew(Solver::Newton), 1, 0)),
+    ];
+    setups.extend([16, 32, 64, 128].map(|substeps| ("XPBD, substeps", setup(Method::Xpbd, substeps, 0))));
+    setups.extend([1, 3, 10, 30].map(|iterations| ("Projective", setup(Method::Projective, 1, iterations))));
+    setups
+}
+
+struct Settled {
+    distance: f64,
+    /// s
+    per_frame: f64,
+    /// s
+    step: f64,
+    frames: usize,
+    status: String,
+}
+
+/// Runs until the distance falls no further, or patience ends; or says why it is not offered.
+fn settle(scene: &Scene, setup: Setup, rest: &[DVec3], size: f64, patience: f64) -> Result<Settled, String> {
+    let mut contender = setup.start(scene).map_err(|_| "not offered".to_owned())?;
+    contender.restart();
+    let mut seconds = 0.0;
+    let mut settled = Settled {
+        distance: 1.0,
+        per_frame: 0.0,
+        step: setup.step(),
+        frames: 0,
+        status: String::new(),
+    };
+    while settled.status.is_empty() {
+        let mut advanced = Ok(());
+        let elapsed = clock::time(|| advanced = contender.advance());
+        seconds += setup.counted(elapsed);
+        settled.frames += 1;
+        settled.per_frame = seconds / settled.frames as f64;
+        if let Some(substeps) = contender.substeps() {
+            settled.step = setup.span / f64::from(substeps.max(1));
+        }
+        let out_of_time = seconds > patience || settled.frames >= MOST_FRAMES;
+        if let Err(reason) = advanced {
+            settled.status = format!("failed: {reason}");
+        } else if settled.frames.is_multiple_of(LOOK) || out_of_time {
+            let before = settled.distance;
+            settled.distance = distance(&contender.read().positions, rest) / size;
+            if !settled.distance.is_finite() {
+                settled.status = "failed: not finite".into();
+            } else if settled.frames >= FEWEST_FRAMES && settled.distance > 0.95 * before {
+                settled.status = "at rest".into();
+            } else if out_of_time {
+                settled.status = "not yet at rest".into();
+            }
+        }
+    }
+    Ok(settled)
+}
+
+/// RMS, m.
+fn distance(positions: &[DVec3], others: &[DVec3]) -> f64 {
+    let squares: f64 = positions.iter().zip(others).map(|(a, b)| a.distance_squared(*b)).sum();
+    (squares / positions.len() as f64).sqrt()
+}

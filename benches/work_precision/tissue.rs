@@ -1,0 +1,95 @@
+//! sinew, through its public interface. The one place where a [`Setup`] becomes a definition.
+
+use sinew::{BodyDefinition, BodyId, Error, Solver, Values, World, WorldDefinition};
+
+use crate::contender::{Contender, Setup, State};
+use crate::scene::Scene;
+
+pub struct Tissue {
+    world: World,
+    body: BodyId,
+    start: Vec<glam::Vec3>,
+    steps: u32,
+    /// s
+    step: f32,
+    /// Taken in the last span.
+    substeps: u32,
+}
+
+impl Tissue {
+    pub fn new(scene: &Scene, solver: Solver, setup: Setup) -> Result<Self, String> {
+        let mut world = offered(World::new(WorldDefinition {
+            gravity: scene.gravity,
+            thread_count: setup.threads,
+            substeps: setup.substeps,
+            max_substeps: 1_000_000,
+            ..WorldDefinition::default()
+        }))?;
+        let dampings: Vec<f32> = scene.masses.iter().map(|mass| mass * scene.damping_rate).collect();
+        let definition = BodyDefinition {
+            positions: &scene.positions,
+            springs: Some(&scene.springs),
+            masses: Values::Each(&scene.masses),
+            stiffnesses: Values::Each(&scene.stiffnesses),
+            rest_lengths: Some(&scene.rest_lengths),
+            node_dampings: Values::Each(&dampings),
+            solver,
+            ..BodyDefinition::default()
+        };
+        let body = offered(world.create_body(&definition))?;
+        Ok(Self {
+            world,
+            body,
+            start: scene.positions.clone(),
+            steps: setup.steps,
+            step: setup.step() as f32,
+            substeps: 0,
+        })
+    }
+}
+
+impl Contender for Tissue {
+    fn restart(&mut self) {
+        let body = self.world.body_mut(self.body).expect("the world's body");
+        body.set_positions(&self.start).expect("the body's positions");
+        let still = vec![glam::Vec3::ZERO; self.start.len()];
+        body.set_velocities(&still).expect("a velocity for each node");
+    }
+
+    fn advance(&mut self) -> Result<(), String> {
+        self.substeps = 0;
+        for _ in 0..self.steps {
+            let report = self.world.step(self.step).map_err(|error| match error {
+                Error::Unstable { .. } => "refused: unstable".to_owned(),
+                error => error.to_string(),
+            })?;
+            if report.bodies_restored > 0 {
+                return Err("not finite, restored".into());
+            }
+            self.substeps += report.substeps;
+        }
+        Ok(())
+    }
+
+    fn substeps(&self) -> Option<u32> {
+        Some(self.substeps)
+    }
+
+    fn read(&mut self) -> State {
+        let body = self.world.body(self.body).expect("the world's body");
+        let exact = |vectors: &[glam::Vec3]| vectors.iter().map(|vector| vector.as_dvec3()).collect();
+        State {
+            positions: exact(body.positions()),
+            velocities: exact(body.velocities()),
+        }
+    }
+}
+
+/// What is not offered is an answer; whatever else fails is a mistake of this bench or of the library.
+fn offered<T>(result: sinew::Result<T>) -> Result<T, String> {
+    match result {
+        Ok(value) => Ok(value),
+        Err(Error::Unsupported(message)) => Err(message),
+        Err(error) => panic!("{error}"),
+    }
+}
