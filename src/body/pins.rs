@@ -25,6 +25,15 @@ pub(crate) struct Pin {
     pub solved: Vec3,
 }
 
+impl Pin {
+    /// Where it is at this fraction of the step in progress, in the body's coordinates.
+    #[inline]
+    pub fn place(&self, fraction: f64) -> Vec3 {
+        // From the end of the step, so that roundings do not add up.
+        self.goal - self.travel * (1.0 - fraction) as f32
+    }
+}
+
 /// The pins of a body, in the order of their nodes.
 #[derive(Debug, Default)]
 pub(crate) struct Pins {

@@ -278,9 +278,7 @@ impl Pass<'_> {
             let velocity = pin.travel / self.request.dt;
             set(&mut written.velocities, place, velocity);
             if self.part.drifts {
-                // From the start of the step, so that roundings do not add up.
-                let position = pin.goal - pin.travel * (1.0 - self.part.end) as f32;
-                set(&mut written.next_positions, place, position);
+                set(&mut written.next_positions, place, pin.place(self.part.end));
             }
         }
     }

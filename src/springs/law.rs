@@ -39,6 +39,13 @@ pub(crate) fn pull(node: usize, link: &Link, offset: Vec3, velocity: Option<Vec3
     direction * (link.stiffness * (length - link.rest_length) + link.damping * rate)
 }
 
+/// Half the energy of a spring of `node`, J: the other half is met at its other end.
+#[inline(always)]
+pub(crate) fn half_energy(node: usize, link: &Link, way: Vec3) -> f32 {
+    let stretch = separation(node, link.neighbour as usize, way).0 - link.rest_length;
+    0.25 * link.stiffness * stretch * stretch
+}
+
 /// How forces change as nodes move, as far as springs do not say it themselves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tangent {

@@ -18,6 +18,7 @@ use glam::Vec3;
 
 pub use kernels::Kernel;
 pub(crate) use kernels::{ChosenKernel, Loops, Range, prefetch};
+use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
 pub(crate) use packed::Rounding;
@@ -120,8 +121,7 @@ pub(crate) trait Springs: Debug + Send + Sync {
         for node in tile_nodes(tile, positions.len()) {
             self.visit(node, &mut |link| {
                 let way = positions.get(link.neighbour as usize) - positions.get(node);
-                let stretch = separation(node, link.neighbour as usize, way).0 - link.rest_length;
-                sum += 0.25 * f64::from(link.stiffness * stretch * stretch);
+                sum += f64::from(half_energy(node, &link, way));
             });
         }
         sum

@@ -6,11 +6,12 @@
 
 use glam::{Mat3, Vec3};
 
+use super::gradient::add_lanes;
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
-use crate::springs::{Loops, Springs, TILE, Tangent};
+use crate::springs::{ChosenKernel, Loops, Springs, TILE, Tangent};
 
 /// Nodes that always belong to one cluster together: as many as are worked on side by side.
 const BLOCK: usize = 16;
@@ -202,13 +203,12 @@ impl Coarse {
     }
 
     /// Solves for `loads`: the work done, `loads . motions`.
-    pub fn solve(&mut self, kernel: crate::springs::ChosenKernel) -> f64 {
-        let work: f64 = kernel.run(Solve {
+    pub fn solve(&mut self, kernel: ChosenKernel) -> f64 {
+        kernel.run(Solve {
             inverse: &self.inverse,
             loads: &self.loads,
             motions: &mut self.motions,
-        });
-        work
+        })
     }
 
     /// What forces on the nodes of a tile come to for each cluster: added to `loads`.
@@ -231,10 +231,10 @@ impl Coarse {
                 let [mut ones, mut xs, mut ys, mut zs] = [[0.0_f32; BLOCK]; FUNCTIONS];
                 for block in block..end {
                     let forces = lanes(forces, block);
-                    add_products(&mut ones, forces, lanes(free, block));
-                    add_products(&mut xs, forces, lanes(x, block));
-                    add_products(&mut ys, forces, lanes(y, block));
-                    add_products(&mut zs, forces, lanes(z, block));
+                    add_lanes(&mut ones, forces, lanes(free, block));
+                    add_lanes(&mut xs, forces, lanes(x, block));
+                    add_lanes(&mut ys, forces, lanes(y, block));
+                    add_lanes(&mut zs, forces, lanes(z, block));
                 }
                 for (function, sums) in [ones, xs, ys, zs].into_iter().enumerate() {
                     loads[3 * function + axis] += sums.into_iter().sum::<f32>();
@@ -282,13 +282,6 @@ impl Coarse {
                     + motions[9 + axis] * z[place];
             }
         }
-    }
-}
-
-#[inline(always)]
-fn add_products(sums: &mut [f32; BLOCK], a: &[f32; BLOCK], b: &[f32; BLOCK]) {
-    for lane in 0..BLOCK {
-        sums[lane] += a[lane] * b[lane];
     }
 }
 

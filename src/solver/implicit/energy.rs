@@ -44,7 +44,7 @@ impl Substep<'_> {
             let moved = &mut implicit.products;
             moved.copy_from(state.positions);
             for pin in body.pins.iter() {
-                moved.set(pin.node as usize, self.lead(pin));
+                moved.set(pin.node as usize, pin.place(self.end));
             }
             energy = energy.max(elastic(&*body.springs, moved, &mut implicit.partials, self.team));
         }
@@ -98,7 +98,7 @@ impl Substep<'_> {
         } else {
             state.next_positions.copy_from(state.positions);
             for pin in body.pins.iter() {
-                state.next_positions.set(pin.node as usize, self.lead(pin));
+                state.next_positions.set(pin.node as usize, pin.place(self.end));
             }
             state.velocities.clear();
             history.energy = None;

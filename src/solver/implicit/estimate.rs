@@ -123,17 +123,19 @@ impl Spectrum {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_smallest_eigenvalue_is_that_of_the_matrix() {
-        // Conjugate gradients on a diagonal matrix, all of whose eigenvalues the right-hand side has a part of.
-        let eigenvalues: Vec<f64> = (0..40).map(|i| 0.01 * 1.2_f64.powi(i)).collect();
-        let mut spectrum = Spectrum::new().expect("memory");
+    /// So many conjugate gradients on a diagonal matrix with these eigenvalues; `look` is shown the residual before each.
+    fn run(
+        spectrum: &mut Spectrum,
+        eigenvalues: &[f64],
+        right: Vec<f64>,
+        iterations: usize,
+        mut look: impl FnMut(usize, &Spectrum, &[f64]),
+    ) {
         spectrum.begin();
-        let mut residual = vec![1.0; eigenvalues.len()];
-        let mut search = residual.clone();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        for _ in 0..80 {
-            let product: Vec<f64> = search.iter().zip(&eigenvalues).map(|(s, e)| s * e).collect();
+        let (mut residual, mut search) = (right.clone(), right);
+        for iteration in 0..iterations {
+            look(iteration, spectrum, &residual);
+            let product: Vec<f64> = search.iter().zip(eigenvalues).map(|(s, e)| s * e).collect();
             let square = dot(&residual, &residual);
             let length = square / dot(&search, &product);
             for (r, p) in residual.iter_mut().zip(&product) {
@@ -145,6 +147,18 @@ mod tests {
                 *s = r + growth * *s;
             }
         }
+    }
+
+    fn dot(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    }
+
+    #[test]
+    fn the_smallest_eigenvalue_is_that_of_the_matrix() {
+        // All of whose eigenvalues the right-hand side has a part of.
+        let eigenvalues: Vec<f64> = (0..40).map(|i| 0.01 * 1.2_f64.powi(i)).collect();
+        let mut spectrum = Spectrum::new().expect("memory");
+        run(&mut spectrum, &eigenvalues, vec![1.0; 40], 80, |_, _, _| ());
         let found = spectrum.smallest();
         assert!((found - 0.01).abs() < 0.06 * 0.01, "{found}");
     }
@@ -155,29 +169,21 @@ mod tests {
         let eigenvalues: Vec<f64> = (0..40).map(|i| 0.01 * 1.3_f64.powi(i)).collect();
         let right: Vec<f64> = (0..40).map(|i| if i > 35 { 1000.0 } else { 1.0 }).collect();
         let mut spectrum = Spectrum::new().expect("memory");
-        spectrum.begin();
         spectrum.assume(0.01);
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (mut residual, mut search) = (right.clone(), right.clone());
-        for iteration in 0..36 {
-            let error: f64 = residual.iter().zip(&eigenvalues).map(|(r, e)| r * r / e).sum();
-            let square = dot(&residual, &residual);
-            let bound = square * spectrum.factor();
-            assert!(bound >= error, "{iteration}: {bound} is less than {error}");
-            assert!(
-                iteration < 8 || bound < 30.0 * error,
-                "{iteration}: {bound} is far more than {error}"
-            );
-            let product: Vec<f64> = search.iter().zip(&eigenvalues).map(|(s, e)| s * e).collect();
-            let length = square / dot(&search, &product);
-            for (r, p) in residual.iter_mut().zip(&product) {
-                *r -= length * p;
-            }
-            let growth = dot(&residual, &residual) / square;
-            spectrum.take(length, growth);
-            for (s, r) in search.iter_mut().zip(&residual) {
-                *s = r + growth * *s;
-            }
-        }
+        run(
+            &mut spectrum,
+            &eigenvalues,
+            right,
+            36,
+            |iteration, spectrum, residual| {
+                let error: f64 = residual.iter().zip(&eigenvalues).map(|(r, e)| r * r / e).sum();
+                let bound = dot(residual, residual) * spectrum.factor();
+                assert!(bound >= error, "{iteration}: {bound} is less than {error}");
+                assert!(
+                    iteration < 8 || bound < 30.0 * error,
+                    "{iteration}: {bound} is far more than {error}"
+                );
+            },
+        );
     }
 }

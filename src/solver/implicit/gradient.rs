@@ -38,13 +38,11 @@ pub(super) struct Solved {
     pub size: f64,
     /// The same of what is missing, as far as it is known.
     pub error: f64,
-    /// Whether the matrix was found not to be positive definite; what was found before that stands.
-    pub indefinite: bool,
 }
 
 impl Implicit {
     /// Solves the equation linearised at the newest positions of `body` for the residual: the correction.
-    /// The preconditioner has been applied to it, and `square` is the product of both.
+    /// The preconditioner has been applied to it, and `square` is the product of both; the spectrum has begun anew.
     pub(super) fn solve(
         &mut self,
         body: &Body,
@@ -54,28 +52,25 @@ impl Implicit {
         square: f64,
         team: &Team,
     ) -> Solved {
-        self.spectrum.begin();
         let mut square = square;
         let mut solved = Solved {
             products: 0,
             work: 0.0,
             size: 0.0,
             error: square * self.spectrum.factor(),
-            indefinite: false,
         };
         self.search(body, 0.0, team);
         while solved.products < goal.budget && square > 0.0 {
             let curvature = self.multiply(body, positions, tangent, team);
             solved.products += 1;
+            // Rounding may leave nothing to go along; what was found before that stands.
             if !(curvature > 0.0 && curvature.is_finite()) {
-                solved.indefinite = true;
                 break;
             }
             let length = square / curvature;
             let sums = self.precondition(body, length, team);
             let growth = sums.first / square;
             if !sums.first.is_finite() || growth < 0.0 {
-                solved.indefinite = true;
                 break;
             }
             self.spectrum.take(length, growth);
@@ -201,12 +196,17 @@ pub(super) fn add_products(sums: &mut [f32; 16], a: &[f32], b: &[f32]) {
     let (a, rest_a) = a.as_chunks::<16>();
     let (b, rest_b) = b.as_chunks::<16>();
     for (a, b) in a.iter().zip(b) {
-        for lane in 0..16 {
-            sums[lane] += a[lane] * b[lane];
-        }
+        add_lanes(sums, a, b);
     }
     for (lane, (a, b)) in rest_a.iter().zip(rest_b).enumerate() {
         sums[lane] += a * b;
+    }
+}
+
+#[inline(always)]
+pub(super) fn add_lanes(sums: &mut [f32; 16], a: &[f32; 16], b: &[f32; 16]) {
+    for lane in 0..16 {
+        sums[lane] += a[lane] * b[lane];
     }
 }
 

@@ -14,6 +14,7 @@ mod contact;
 mod energy;
 mod estimate;
 mod gradient;
+mod loops;
 mod rigid;
 mod step;
 
@@ -101,6 +102,8 @@ pub(crate) struct Implicit {
     preconditioned: Vectors,
     /// N/m; 0 for what is pinned.
     inertia: Vec<f32>,
+    /// The sum of all.
+    all_inertia: f64,
     /// The squared norm of inertia of what is off by rounding alone, J.
     noise: f64,
     /// What `inertia` was made for: t, s; 0: nothing.
@@ -154,6 +157,7 @@ impl Implicit {
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, node_count)?,
+            all_inertia: 0.0,
             noise: 0.0,
             prepared: 0.0,
             blocks: Blocks::new(node_count)?,
@@ -236,7 +240,7 @@ impl Implicit {
     }
 
     /// The energy is not what it was when the last step ended.
-    pub fn forget_energy(&mut self) {
+    fn forget_energy(&mut self) {
         self.histories[self.settled].energy = None;
     }
 

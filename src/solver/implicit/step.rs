@@ -1,16 +1,15 @@
 //! A step of IMPLICIT: where it aims, Newton's iterations, and what is made of their result.
 
-use glam::Vec3;
-
 use super::energy::Before;
-use super::gradient::{Goal, Partial, add_products, total};
+use super::gradient::Goal;
+use super::loops::{Add, Aim, Finish, Place, Predict, Residual, Slope};
 use super::{End, Experience, Implicit, contact};
-use crate::body::{Body, Pin, Vectors};
+use crate::body::{Body, Vectors};
 use crate::diagnostics::SolverReport;
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
 use crate::solver::verlet::{Taken, begin};
-use crate::springs::{ChosenKernel, Loops, Motion, Tangent, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Motion, Tangent, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
@@ -184,11 +183,6 @@ impl Substep<'_> {
         }
     }
 
-    /// Where a pinned node is at the end of the step.
-    pub fn lead(&self, pin: &Pin) -> Vec3 {
-        pin.goal - pin.travel * (1.0 - self.end) as f32
-    }
-
     /// The tangent of the springs for this step.
     fn tangent(&self) -> Tangent {
         Tangent {
@@ -224,6 +218,7 @@ impl Substep<'_> {
                     0.0
                 };
             }
+            implicit.all_inertia = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
             implicit.blocks.invert(&implicit.inertia, self.team);
             implicit.coarse.invert(&implicit.inertia);
             let rounding = ROUNDING * f64::from(body.extent());
@@ -294,7 +289,7 @@ impl Substep<'_> {
         let (positions, velocities) = (state.positions, &*state.velocities);
         let predicted = body.predicted_velocities.as_mut().map(Vectors::tiles_mut);
         let written = (state.next_positions.tiles_mut(), predicted, body.pins.tiles_mut());
-        let (kernel, left) = (body.kernel, (1.0 - self.end) as f32);
+        let (kernel, end) = (body.kernel, self.end);
         self.team
             .pass(tile_count(node_count), written, |tile, (mut next, predicted, pins)| {
                 let nodes = tile_nodes(tile, node_count);
@@ -316,7 +311,7 @@ impl Substep<'_> {
                     });
                 }
                 for pin in pins {
-                    let position = pin.goal - pin.travel * left;
+                    let position = pin.place(end);
                     let place = pin.node as usize - nodes.start;
                     for (axis, value) in next.iter_mut().zip(position.to_array()) {
                         axis[place] = value;
@@ -368,7 +363,7 @@ impl Substep<'_> {
                         axis[pin.node as usize - nodes.start] = 0.0;
                     }
                 }
-                *partial = kernel.run(Slope {
+                partial.first = kernel.run(Slope {
                     residuals: residuals.map(|axis| &*axis),
                     corrections: corrections.slices(nodes),
                 });
@@ -379,7 +374,7 @@ impl Substep<'_> {
 
     /// Newton's iterations.
     fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
-        let all_inertia: f64 = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
+        let all_inertia = implicit.all_inertia;
         let absolute = f64::max(
             (0.1 * f64::from(self.request.tolerance)).powi(2) * all_inertia,
             implicit.noise,
@@ -532,187 +527,4 @@ fn add(to: &mut Vectors, from: &Vectors, factor: f32, kernel: ChosenKernel, team
         let from = from.slices(tile_nodes(tile, node_count));
         kernel.run(Add { factor, from, to });
     });
-}
-
-struct Add<'a> {
-    factor: f32,
-    from: [&'a [f32]; 3],
-    to: [&'a mut [f32]; 3],
-}
-
-impl Loops for Add<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for (to, from) in self.to.into_iter().zip(self.from) {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to += self.factor * from;
-            }
-        }
-    }
-}
-
-struct Aim<'a, 'b> {
-    carried: f32,
-    expected: f32,
-    gains: [&'a [f32]; 3],
-    velocities: &'b mut [&'a mut [f32]; 3],
-    pushes: &'b mut [&'a mut [f32]; 3],
-}
-
-impl Loops for Aim<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for ((velocities, pushes), gains) in self.velocities.iter_mut().zip(self.pushes).zip(self.gains) {
-            for ((velocity, push), gain) in velocities.iter_mut().zip(pushes.iter_mut()).zip(gains) {
-                *velocity += self.carried * gain;
-                *push = self.expected * gain;
-            }
-        }
-    }
-}
-
-struct Place<'a, 'b> {
-    carried: f32,
-    time: f32,
-    positions: [&'a [f32]; 3],
-    velocities: [&'a [f32]; 3],
-    ways: [&'a [f32]; 3],
-    pushes: [&'a [f32]; 3],
-    next: &'b mut [&'a mut [f32]; 3],
-}
-
-impl Loops for Place<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for (axis, next) in self.next.iter_mut().enumerate() {
-            let count = next.len();
-            let (positions, velocities) = (&self.positions[axis][..count], &self.velocities[axis][..count]);
-            let (ways, pushes) = (&self.ways[axis][..count], &self.pushes[axis][..count]);
-            for place in 0..count {
-                let way = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
-                next[place] = positions[place] + way;
-            }
-        }
-    }
-}
-
-struct Predict<'a, 'b> {
-    time: f32,
-    velocities: [&'a [f32]; 3],
-    pushes: [&'a [f32]; 3],
-    predicted: &'b mut [&'a mut [f32]; 3],
-}
-
-impl Loops for Predict<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let per_time = 1.0 / self.time;
-        for (axis, predicted) in self.predicted.iter_mut().enumerate() {
-            for ((predicted, velocity), push) in predicted.iter_mut().zip(self.velocities[axis]).zip(self.pushes[axis])
-            {
-                *predicted = velocity + push * per_time;
-            }
-        }
-    }
-}
-
-struct Residual<'a, 'b> {
-    gravity: Vec3,
-    forces: &'a TileForces,
-    applied: Option<[&'a [f32]; 3]>,
-    masses: &'a [f32],
-    /// Of damping, 1/s.
-    rates: Option<&'a [f32]>,
-    inertia: &'a [f32],
-    velocities: [&'a [f32]; 3],
-    pushes: [&'a [f32]; 3],
-    residuals: &'b mut [&'a mut [f32]; 3],
-}
-
-impl Loops for Residual<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let count = self.masses.len();
-        let inertia = &self.inertia[..count];
-        for (axis, residuals) in self.residuals.iter_mut().enumerate() {
-            let residuals = &mut residuals[..count];
-            let (forces, pushes) = (&self.forces.axes()[axis][..count], &self.pushes[axis][..count]);
-            let gravity = self.gravity[axis];
-            for place in 0..count {
-                residuals[place] = forces[place] + self.masses[place] * gravity - inertia[place] * pushes[place];
-            }
-            if let Some(applied) = self.applied {
-                for (residual, applied) in residuals.iter_mut().zip(applied[axis]) {
-                    *residual += applied;
-                }
-            }
-            if let Some(rates) = self.rates {
-                let velocities = &self.velocities[axis][..count];
-                for place in 0..count {
-                    residuals[place] -= rates[place] * self.masses[place] * velocities[place];
-                }
-            }
-        }
-    }
-}
-
-struct Slope<'a> {
-    residuals: [&'a [f32]; 3],
-    corrections: [&'a [f32]; 3],
-}
-
-impl Loops for Slope<'_> {
-    type Output = Partial;
-
-    #[inline(always)]
-    fn run(self) -> Partial {
-        let mut sums = [0.0; 16];
-        for (residuals, corrections) in self.residuals.into_iter().zip(self.corrections) {
-            add_products(&mut sums, residuals, corrections);
-        }
-        Partial {
-            first: total(sums),
-            second: 0.0,
-        }
-    }
-}
-
-struct Finish<'a, 'b> {
-    carried: f32,
-    time: f32,
-    pushes: [&'a [f32]; 3],
-    velocities: &'b mut [&'a mut [f32]; 3],
-    ways: &'b mut [&'a mut [f32]; 3],
-    gains: &'b mut [&'a mut [f32]; 3],
-}
-
-impl Loops for Finish<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let per_time = 1.0 / self.time;
-        for axis in 0..3 {
-            let pushes = self.pushes[axis];
-            let count = pushes.len();
-            let velocities = &mut self.velocities[axis][..count];
-            let (ways, gains) = (&mut self.ways[axis][..count], &mut self.gains[axis][..count]);
-            for place in 0..count {
-                ways[place] = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
-                let given = pushes[place] * per_time;
-                velocities[place] += given;
-                gains[place] = self.carried * gains[place] + given;
-            }
-        }
-    }
 }

@@ -1,7 +1,7 @@
 //! What is added up over the springs of a node: forces, how they change, energy.
 
 use super::lanes::Lanes;
-use crate::springs::law::{pull, separation};
+use crate::springs::law::{half_energy, pull};
 use crate::springs::{Link, Tangent};
 
 use glam::Vec3;
@@ -157,9 +157,7 @@ impl Quantity for HalfEnergy {
     }
 
     fn of_link(node: usize, link: &Link, way: Vec3, _: Vec3, _: &Tangent) -> Vec3 {
-        let (length, _) = separation(node, link.neighbour as usize, way);
-        let stretch = length - link.rest_length;
-        Vec3::new(0.25 * link.stiffness * stretch * stretch, 0.0, 0.0)
+        Vec3::new(half_energy(node, link, way), 0.0, 0.0)
     }
 }
 

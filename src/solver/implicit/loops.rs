@@ -1,0 +1,193 @@
+//! The plain loops of a step over the nodes of a tile.
+
+use glam::Vec3;
+
+use super::gradient::{add_products, total};
+use crate::springs::{Loops, TileForces};
+
+/// `factor` times the one added to the other.
+pub(super) struct Add<'a> {
+    pub factor: f32,
+    pub from: [&'a [f32]; 3],
+    pub to: [&'a mut [f32]; 3],
+}
+
+impl Loops for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (to, from) in self.to.into_iter().zip(self.from) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to += self.factor * from;
+            }
+        }
+    }
+}
+
+/// Velocities without forces, and what forces are expected to do.
+pub(super) struct Aim<'a, 'b> {
+    pub carried: f32,
+    pub expected: f32,
+    pub gains: [&'a [f32]; 3],
+    pub velocities: &'b mut [&'a mut [f32]; 3],
+    pub pushes: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Aim<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for ((velocities, pushes), gains) in self.velocities.iter_mut().zip(self.pushes).zip(self.gains) {
+            for ((velocity, push), gain) in velocities.iter_mut().zip(pushes.iter_mut()).zip(gains) {
+                *velocity += self.carried * gain;
+                *push = self.expected * gain;
+            }
+        }
+    }
+}
+
+/// Where the nodes are with these pushes.
+pub(super) struct Place<'a, 'b> {
+    pub carried: f32,
+    pub time: f32,
+    pub positions: [&'a [f32]; 3],
+    pub velocities: [&'a [f32]; 3],
+    pub ways: [&'a [f32]; 3],
+    pub pushes: [&'a [f32]; 3],
+    pub next: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Place<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (axis, next) in self.next.iter_mut().enumerate() {
+            let count = next.len();
+            let (positions, velocities) = (&self.positions[axis][..count], &self.velocities[axis][..count]);
+            let (ways, pushes) = (&self.ways[axis][..count], &self.pushes[axis][..count]);
+            for place in 0..count {
+                let way = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
+                next[place] = positions[place] + way;
+            }
+        }
+    }
+}
+
+/// The velocities with these pushes.
+pub(super) struct Predict<'a, 'b> {
+    pub time: f32,
+    pub velocities: [&'a [f32]; 3],
+    pub pushes: [&'a [f32]; 3],
+    pub predicted: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Predict<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let per_time = 1.0 / self.time;
+        for (axis, predicted) in self.predicted.iter_mut().enumerate() {
+            for ((predicted, velocity), push) in predicted.iter_mut().zip(self.velocities[axis]).zip(self.pushes[axis])
+            {
+                *predicted = velocity + push * per_time;
+            }
+        }
+    }
+}
+
+/// What the equation lacks at each node, N.
+pub(super) struct Residual<'a, 'b> {
+    pub gravity: Vec3,
+    pub forces: &'a TileForces,
+    pub applied: Option<[&'a [f32]; 3]>,
+    pub masses: &'a [f32],
+    /// Of damping, 1/s.
+    pub rates: Option<&'a [f32]>,
+    pub inertia: &'a [f32],
+    pub velocities: [&'a [f32]; 3],
+    pub pushes: [&'a [f32]; 3],
+    pub residuals: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Residual<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.masses.len();
+        let inertia = &self.inertia[..count];
+        for (axis, residuals) in self.residuals.iter_mut().enumerate() {
+            let residuals = &mut residuals[..count];
+            let (forces, pushes) = (&self.forces.axes()[axis][..count], &self.pushes[axis][..count]);
+            let gravity = self.gravity[axis];
+            for place in 0..count {
+                residuals[place] = forces[place] + self.masses[place] * gravity - inertia[place] * pushes[place];
+            }
+            if let Some(applied) = self.applied {
+                for (residual, applied) in residuals.iter_mut().zip(applied[axis]) {
+                    *residual += applied;
+                }
+            }
+            if let Some(rates) = self.rates {
+                let velocities = &self.velocities[axis][..count];
+                for place in 0..count {
+                    residuals[place] -= rates[place] * self.masses[place] * velocities[place];
+                }
+            }
+        }
+    }
+}
+
+/// The product of residuals and corrections, J.
+pub(super) struct Slope<'a> {
+    pub residuals: [&'a [f32]; 3],
+    pub corrections: [&'a [f32]; 3],
+}
+
+impl Loops for Slope<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let mut sums = [0.0; 16];
+        for (residuals, corrections) in self.residuals.into_iter().zip(self.corrections) {
+            add_products(&mut sums, residuals, corrections);
+        }
+        total(sums)
+    }
+}
+
+/// Ways, velocities and gains at the end of a step.
+pub(super) struct Finish<'a, 'b> {
+    pub carried: f32,
+    pub time: f32,
+    pub pushes: [&'a [f32]; 3],
+    pub velocities: &'b mut [&'a mut [f32]; 3],
+    pub ways: &'b mut [&'a mut [f32]; 3],
+    pub gains: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Finish<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let per_time = 1.0 / self.time;
+        for axis in 0..3 {
+            let pushes = self.pushes[axis];
+            let count = pushes.len();
+            let velocities = &mut self.velocities[axis][..count];
+            let (ways, gains) = (&mut self.ways[axis][..count], &mut self.gains[axis][..count]);
+            for place in 0..count {
+                ways[place] = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
+                let given = pushes[place] * per_time;
+                velocities[place] += given;
+                gains[place] = self.carried * gains[place] + given;
+            }
+        }
+    }
+}
