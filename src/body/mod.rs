@@ -9,6 +9,7 @@ mod order;
 mod origin;
 mod pins;
 mod published;
+mod records;
 mod state;
 mod vectors;
 
@@ -19,7 +20,8 @@ pub(crate) use damping::{InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
-pub(crate) use vectors::{MARGIN, Vectors, View};
+pub(crate) use records::{Record, Records, WriteRecords};
+pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
 use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
@@ -57,6 +59,8 @@ pub struct Body {
     boxes: Vec<Bounds>,
     surface: Vec<[u32; 3]>,
     pub(crate) state: State,
+    /// The positions that forces are made of, for springs that gather them.
+    pub(crate) records: Option<Records>,
     /// Where the coordinates of the state begin.
     pub(crate) origin: DVec3,
     /// Velocities at the time of the positions, for bodies whose springs have damping.
@@ -125,6 +129,7 @@ impl Body {
         let mut body = Self {
             order,
             predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
+            records: springs.gathers().then(|| Records::zeros(node_count)).transpose()?,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
             springs,
             kernel: needs.kernel,
@@ -160,6 +165,7 @@ impl Body {
         if definition.solver == Solver::Implicit {
             let implicit = Implicit::new(
                 body.state.positions(),
+                body.records.is_some(),
                 definition.order,
                 definition.iterations,
                 definition.accuracy,

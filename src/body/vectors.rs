@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::records::{Record, Records};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::TILE;
@@ -54,21 +55,43 @@ pub(crate) struct View<'a> {
     axes: [&'a [f32]; 3],
     /// What would be the number of the node that the first belongs to.
     start: isize,
+    /// The same vectors from node 0 on, where they are there as records.
+    records: Option<&'a [Record]>,
+}
+
+/// Where the vectors of node 0 would be, whether or not they are there.
+#[derive(Clone, Copy)]
+pub(crate) struct Places {
+    pub axes: [*const f32; 3],
+    pub records: Option<*const Record>,
 }
 
 impl<'a> View<'a> {
     /// Vectors along each axis from the node of this number on.
     pub fn new(axes: [&'a [f32]; 3], start: isize) -> Self {
-        Self { axes, start }
+        Self {
+            axes,
+            start,
+            records: None,
+        }
     }
 
-    /// Whether all of these may be read.
-    pub fn covers(&self, nodes: &Range<isize>) -> bool {
+    /// With the same vectors as records.
+    pub fn with_records(self, records: Option<&'a Records>) -> Self {
+        Self {
+            records: records.map(Records::as_slice),
+            ..self
+        }
+    }
+
+    /// Whether all of these may be read, and all nodes of the body where they are records.
+    pub fn covers(&self, nodes: &Range<isize>, node_count: usize) -> bool {
         self.start <= nodes.start
             && self
                 .axes
                 .iter()
                 .all(|axis| nodes.end - self.start <= axis.len() as isize)
+            && self.records.is_none_or(|records| node_count <= records.len())
     }
 
     #[inline(always)]
@@ -83,10 +106,13 @@ impl<'a> View<'a> {
         self.axes.map(|axis| &axis[place(nodes.start)..place(nodes.end)])
     }
 
-    /// Where node 0 would be along each axis, whether or not it is there.
+    /// Where node 0 would be.
     #[inline(always)]
-    pub fn places(&self) -> [*const f32; 3] {
-        self.axes.map(|axis| axis.as_ptr().wrapping_offset(-self.start))
+    pub fn places(&self) -> Places {
+        Places {
+            axes: self.axes.map(|axis| axis.as_ptr().wrapping_offset(-self.start)),
+            records: self.records.map(<[Record]>::as_ptr),
+        }
     }
 }
 
@@ -153,6 +179,7 @@ impl Vectors {
         View {
             axes: self.axes.each_ref().map(|axis| &axis.values[axis.padded_places()]),
             start: -(MARGIN as isize),
+            records: None,
         }
     }
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::{Body, InverseMasses, NodeDamping, Pin, Vectors, View};
+use crate::body::{Body, InverseMasses, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -144,6 +144,10 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             closed.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
         });
     }
+    let forces_known = part.before == Before::Current && body.forces_current;
+    if let Some(records) = body.records.as_mut().filter(|_| !forces_known) {
+        write_records(body.kernel, state.positions, records, team);
+    }
     let pass = Pass {
         springs: &*body.springs,
         kernel: body.kernel,
@@ -151,10 +155,10 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         request,
         part,
         kick,
-        positions: state.positions.view(),
+        positions: state.positions.view().with_records(body.records.as_ref()),
         first_velocities: (part.before != Before::Open && part.before != Before::Closed)
             .then_some(state.first_velocities),
-        first_forces: (part.before == Before::Current && body.forces_current).then_some(state.first_forces),
+        first_forces: forces_known.then_some(state.first_forces),
         damped_velocities: match part.before {
             Before::Open => body.predicted_velocities.as_ref(),
             _ => body.springs.damped().then_some(state.first_velocities),
@@ -182,6 +186,15 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         },
     );
     body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and)
+}
+
+/// Makes records of vectors, for springs that gather them.
+pub(super) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &mut Records, team: &Team) {
+    let node_count = vectors.len();
+    team.pass(tile_count(node_count), records.tiles_mut(), |tile, records| {
+        let axes = vectors.slices(tile_nodes(tile, node_count));
+        kernel.run(WriteRecords { axes, records });
+    });
 }
 
 /// What all tiles of a substep read.

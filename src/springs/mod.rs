@@ -77,6 +77,15 @@ impl<'a> Motion<'a> {
     }
 }
 
+/// Where the nodes of a body are, and by which ways they go from there.
+#[derive(Clone, Copy)]
+pub(crate) struct Course<'a> {
+    pub node_count: usize,
+    pub positions: View<'a>,
+    pub ways: View<'a>,
+    pub tangent: Tangent,
+}
+
 /// How the springs of a body are kept. Every solver and every change of topology goes through this.
 pub(crate) trait Springs: Debug + Send + Sync {
     /// Whether springs may have damping: fixed when the body is made.
@@ -96,13 +105,23 @@ pub(crate) trait Springs: Debug + Send + Sync {
         None
     }
 
+    /// Whether neighbours are gathered so much that it pays to have positions as records too.
+    fn gathers(&self) -> bool {
+        false
+    }
+
     /// Writes the spring forces on the nodes of `tile`, in newtons; with velocities also the damping along springs.
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces);
 
-    /// Writes how the spring forces on the nodes of `tile` change, N, where the nodes go from `positions` by `ways`, in the
-    /// first order.
-    fn changes(&self, tile: usize, positions: &Vectors, ways: &Vectors, tangent: Tangent, changes: &mut TileForces) {
-        let nodes = tile_nodes(tile, positions.len());
+    /// Writes how the spring forces on the nodes of `tile` change, N, in the first order.
+    fn changes(&self, tile: usize, course: &Course, changes: &mut TileForces) {
+        let &Course {
+            node_count,
+            positions,
+            ways,
+            tangent,
+        } = course;
+        let nodes = tile_nodes(tile, node_count);
         for node in nodes.clone() {
             let (position, way) = (positions.get(node), ways.get(node));
             let mut sum = Vec3::ZERO;

@@ -14,6 +14,15 @@ use crate::threads::{Team, Tiles};
 /// A symmetric matrix as xx, yy, zz, yz, zx, xy.
 type Symmetric = [f32; 6];
 
+/// What rounding leaves, J.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Noise {
+    /// The squared norm of inertia of what nodes are off.
+    pub error: f64,
+    /// The product of the residual and what the preconditioner makes of it.
+    pub square: f64,
+}
+
 /// The blocks of a body.
 #[derive(Debug)]
 pub(super) struct Blocks {
@@ -63,16 +72,20 @@ impl Blocks {
         });
     }
 
-    /// The squared norm of inertia, J, of what is off where the forces are those of coordinates that are off by `distance`.
-    pub fn noise(&self, inertia: &[f32], distance: f64) -> f64 {
-        let of_nodes = self.stiffness.iter().zip(inertia).map(|(block, &inertia)| {
+    /// What rounding does to the residual where coordinates are off by `distance`.
+    pub fn noise(&self, inertia: &[f32], distance: f64) -> Noise {
+        let mut noise = Noise::default();
+        for (block, &inertia) in self.stiffness.iter().zip(inertia) {
             let stiffness = f64::from(block[0] + block[1] + block[2]) / 3.0;
             let inertia = f64::from(inertia);
-            // Where springs are weak against inertia they hardly move a node.
-            let share = stiffness / (stiffness + inertia);
-            if inertia > 0.0 { inertia * share * share } else { 0.0 }
-        });
-        of_nodes.sum::<f64>() * distance * distance
+            if inertia > 0.0 {
+                // Where springs are weak against inertia they hardly move a node.
+                let share = stiffness / (stiffness + inertia);
+                noise.error += inertia * share * share * distance * distance;
+                noise.square += stiffness * share * distance * distance;
+            }
+        }
+        noise
     }
 
     /// The entries of the inverses of some nodes.

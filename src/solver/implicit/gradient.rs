@@ -5,8 +5,8 @@
 
 use super::Implicit;
 use super::coarse::Coarse;
-use crate::body::{Body, Pins, Vectors};
-use crate::springs::{Loops, Tangent, TileForces, tile_count, tile_nodes};
+use crate::body::{Body, Pins, Records, Vectors, WriteRecords};
+use crate::springs::{Course, Loops, Tangent, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
 
 /// Sums over the nodes of a tile.
@@ -97,11 +97,17 @@ impl Implicit {
     fn multiply(&mut self, body: &Body, positions: &Vectors, tangent: Tangent, team: &Team) -> f64 {
         let node_count = positions.len();
         let (searches, inertia) = (&self.searches, &self.inertia);
+        let course = Course {
+            node_count,
+            positions: positions.view().with_records(body.records.as_ref()),
+            ways: searches.view().with_records(self.search_records.as_ref()),
+            tangent,
+        };
         let written = (self.products.tiles_mut(), Items::new(&mut self.partials));
         team.pass(tile_count(node_count), written, |tile, (mut products, partial)| {
             let nodes = tile_nodes(tile, node_count);
             let mut changes = TileForces::ZERO;
-            body.springs.changes(tile, positions, searches, tangent, &mut changes);
+            body.springs.changes(tile, &course, &mut changes);
             partial.first = body.kernel.run(Product {
                 inertia: &inertia[nodes.clone()],
                 searches: searches.slices(nodes.clone()),
@@ -164,20 +170,22 @@ impl Implicit {
     fn search(&mut self, body: &Body, growth: f64, team: &Team) {
         let node_count = self.inertia.len();
         let (coarse, preconditioned) = (&self.coarse, &self.preconditioned);
-        team.pass(
-            tile_count(node_count),
-            self.searches.tiles_mut(),
-            |tile, mut searches| {
-                body.kernel.run(Search {
-                    growth: growth as f32,
-                    preconditioned: preconditioned.slices(tile_nodes(tile, node_count)),
-                    searches: &mut searches,
-                    tile,
-                    coarse,
-                });
-                hold(&body.pins, tile, tile_nodes(tile, node_count).start, &mut searches);
-            },
-        );
+        let records = self.search_records.as_mut().map(Records::tiles_mut);
+        let written = (self.searches.tiles_mut(), records);
+        team.pass(tile_count(node_count), written, |tile, (mut searches, records)| {
+            body.kernel.run(Search {
+                growth: growth as f32,
+                preconditioned: preconditioned.slices(tile_nodes(tile, node_count)),
+                searches: &mut searches,
+                tile,
+                coarse,
+            });
+            hold(&body.pins, tile, tile_nodes(tile, node_count).start, &mut searches);
+            if let Some(records) = records {
+                let axes = searches.each_ref().map(|axis| &**axis);
+                body.kernel.run(WriteRecords { axes, records });
+            }
+        });
     }
 }
 

@@ -20,12 +20,12 @@ mod step;
 
 pub(super) use step::run;
 
-use crate::body::Vectors;
+use crate::body::{Records, Vectors};
 use crate::diagnostics::{SolverReport, StateHasher};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::tile_count;
-use blocks::Blocks;
+use blocks::{Blocks, Noise};
 use coarse::Coarse;
 use estimate::Spectrum;
 use gradient::Partial;
@@ -97,6 +97,8 @@ pub(crate) struct Implicit {
     corrections: Vectors,
     residuals: Vectors,
     searches: Vectors,
+    /// For springs that gather them.
+    search_records: Option<Records>,
     /// The matrix times the search direction, and what the preconditioner makes of the residual.
     products: Vectors,
     preconditioned: Vectors,
@@ -104,8 +106,7 @@ pub(crate) struct Implicit {
     inertia: Vec<f32>,
     /// The sum of all.
     all_inertia: f64,
-    /// The squared norm of inertia of what is off by rounding alone, J.
-    noise: f64,
+    noise: Noise,
     /// What `inertia` was made for: t, s; 0: nothing.
     prepared: f32,
     blocks: Blocks,
@@ -134,8 +135,8 @@ impl Experience {
 }
 
 impl Implicit {
-    /// For nodes at these positions; what is 0 is as by default.
-    pub fn new(positions: &Vectors, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
+    /// For nodes at these positions, whose springs gather them or not; what is 0 is as by default.
+    pub fn new(positions: &Vectors, gathers: bool, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
         /// A fraction of what a step of a length worth taking is off by itself.
         const ACCURACY: f32 = 0.01;
         /// More than a body that is to be stepped while somebody waits can need.
@@ -154,11 +155,12 @@ impl Implicit {
             corrections: vectors()?,
             residuals: vectors()?,
             searches: vectors()?,
+            search_records: gathers.then(|| Records::zeros(node_count)).transpose()?,
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, node_count)?,
             all_inertia: 0.0,
-            noise: 0.0,
+            noise: Noise::default(),
             prepared: 0.0,
             blocks: Blocks::new(node_count)?,
             loads: memory::filled(0.0, coarse.size() * tile_count(node_count))?,

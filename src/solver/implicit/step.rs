@@ -4,7 +4,7 @@ use super::energy::Before;
 use super::gradient::Goal;
 use super::loops::{Add, Aim, Finish, Place, Predict, Residual, Slope};
 use super::{End, Experience, Implicit, contact};
-use crate::body::{Body, Vectors};
+use crate::body::{Body, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
@@ -288,10 +288,18 @@ impl Substep<'_> {
         let carried = self.formula.carried as f32;
         let (positions, velocities) = (state.positions, &*state.velocities);
         let predicted = body.predicted_velocities.as_mut().map(Vectors::tiles_mut);
-        let written = (state.next_positions.tiles_mut(), predicted, body.pins.tiles_mut());
+        let records = body.records.as_mut().map(Records::tiles_mut);
+        let written = (
+            state.next_positions.tiles_mut(),
+            predicted,
+            body.pins.tiles_mut(),
+            records,
+        );
         let (kernel, end) = (body.kernel, self.end);
-        self.team
-            .pass(tile_count(node_count), written, |tile, (mut next, predicted, pins)| {
+        self.team.pass(
+            tile_count(node_count),
+            written,
+            |tile, (mut next, predicted, pins, records)| {
                 let nodes = tile_nodes(tile, node_count);
                 kernel.run(Place {
                     carried,
@@ -317,7 +325,12 @@ impl Substep<'_> {
                         axis[place] = value;
                     }
                 }
-            });
+                if let Some(records) = records {
+                    let axes = next.each_ref().map(|axis| &**axis);
+                    kernel.run(WriteRecords { axes, records });
+                }
+            },
+        );
     }
 
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
@@ -328,7 +341,10 @@ impl Substep<'_> {
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let rates = body.damping.as_ref().map(|damping| damping.rates());
         let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
-        let damped = body.predicted_velocities.as_ref();
+        let motion = Motion {
+            positions: positions.view().with_records(body.records.as_ref()),
+            ..Motion::at(positions, body.predicted_velocities.as_ref())
+        };
         let (pushes, corrections, inertia) = (&implicit.pushes, &implicit.corrections, &implicit.inertia);
         let gravity = self.request.gravity;
         let written = (
@@ -342,7 +358,7 @@ impl Substep<'_> {
             |tile, (mut residuals, partial, pins)| {
                 let nodes = tile_nodes(tile, node_count);
                 let mut forces = TileForces::ZERO;
-                springs.forces(tile, &Motion::at(positions, damped), &mut forces);
+                springs.forces(tile, &motion, &mut forces);
                 for pin in &mut *pins {
                     let node = pin.node as usize;
                     pin.solved = -(forces.get(node - nodes.start) + gravity * masses[node]);
@@ -377,7 +393,7 @@ impl Substep<'_> {
         let all_inertia = implicit.all_inertia;
         let absolute = f64::max(
             (0.1 * f64::from(self.request.tolerance)).powi(2) * all_inertia,
-            implicit.noise,
+            implicit.noise.error,
         );
         let relative = f64::from(implicit.accuracy).powi(2);
         let mut products = 0;
@@ -385,10 +401,15 @@ impl Substep<'_> {
         let mut error = f64::INFINITY;
         self.place(body, implicit);
         self.residual(body, implicit);
-        let (mut gone, mut vain) = (0.0, 0);
+        let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
         for _ in 0..NEWTON {
             implicit.corrections.clear();
             let square = implicit.precondition(body, 0.0, self.team).first;
+            // What a solution has left of it is rounding.
+            if gone == 1.0 && square <= implicit.noise.square {
+                error = solved_error.max(implicit.noise.error);
+                break;
+            }
             implicit.spectrum.begin();
             let remaining = square * implicit.spectrum.factor();
             // What rounding leaves is not improved by going all the way again.
@@ -414,6 +435,7 @@ impl Substep<'_> {
             products += solved.products;
             implicit.wear(solved.products);
             size = f64::max(size, solved.size);
+            solved_error = solved.error;
             gone = self.go(body, implicit, solved.work);
             // The correction itself was no more than what may be left.
             if solved.size <= absolute.max(relative * size) {

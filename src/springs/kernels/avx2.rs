@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use super::eights::{EightLinks, Sight};
 use super::lanes::Lanes;
+use crate::body::Record;
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx2Lanes(__m256);
@@ -51,6 +52,16 @@ impl Lanes for Avx2Lanes {
     #[inline(always)]
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
         unsafe { Self(eight(four_near(base, indices), four_near(base, indices.add(4)))) }
+    }
+
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) }
+    }
+
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) }
     }
 
     #[inline(always)]
@@ -137,6 +148,32 @@ impl Lanes for Avx2Lanes {
     #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_UNORD_Q>(self.0, self.0)) != 0 }
+    }
+}
+
+/// A record, which is aligned.
+#[inline(always)]
+pub(super) unsafe fn record(place: *const Record) -> __m128 {
+    // SAFETY: the caller promises the instructions and the record.
+    unsafe { _mm_load_ps(place.cast()) }
+}
+
+/// The numbers of eight records: four of them at a time in each half.
+#[inline(always)]
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx2Lanes; 3] {
+    // SAFETY: the caller promises the instructions and the records.
+    unsafe {
+        let a = eight(record(at(0)), record(at(4)));
+        let b = eight(record(at(1)), record(at(5)));
+        let c = eight(record(at(2)), record(at(6)));
+        let d = eight(record(at(3)), record(at(7)));
+        let (low_ab, high_ab) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (low_cd, high_cd) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
+            Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
+            Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+        ]
     }
 }
 

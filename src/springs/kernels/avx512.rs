@@ -5,9 +5,10 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
-use super::avx2::{Avx2Lanes, four_at, four_near};
+use super::avx2::{Avx2Lanes, four_at, four_near, record};
 use super::eights::{EightLinks, Sight};
 use super::lanes::Lanes;
+use crate::body::Record;
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx512Lanes(__m512);
@@ -55,6 +56,16 @@ impl Lanes for Avx512Lanes {
                 four_near(base, indices.add(12)),
             ))
         }
+    }
+
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) }
+    }
+
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) }
     }
 
     #[inline(always)]
@@ -115,6 +126,25 @@ impl Lanes for Avx512Lanes {
     #[inline(always)]
     unsafe fn any_nan(self) -> bool {
         unsafe { _mm512_cmp_ps_mask::<_CMP_UNORD_Q>(self.0, self.0) != 0 }
+    }
+}
+
+/// The numbers of sixteen records: four of them at a time in each quarter.
+#[inline(always)]
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx512Lanes; 3] {
+    // SAFETY: the caller promises the instructions and the records.
+    unsafe {
+        let a = sixteen(record(at(0)), record(at(4)), record(at(8)), record(at(12)));
+        let b = sixteen(record(at(1)), record(at(5)), record(at(9)), record(at(13)));
+        let c = sixteen(record(at(2)), record(at(6)), record(at(10)), record(at(14)));
+        let d = sixteen(record(at(3)), record(at(7)), record(at(11)), record(at(15)));
+        let (low_ab, high_ab) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (low_cd, high_cd) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            Avx512Lanes(_mm512_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
+            Avx512Lanes(_mm512_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
+            Avx512Lanes(_mm512_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+        ]
     }
 }
 

@@ -290,6 +290,11 @@ impl Columns {
         self.reads.end = self.reads.end.max(nodes.end);
     }
 
+    /// How many neighbours are gathered, of nodes without them too.
+    pub fn gathers(&self) -> usize {
+        LANES * (self.near.len() + self.far.len())
+    }
+
     /// The nodes whose positions forces are made of.
     pub fn reads(&self) -> Range<isize> {
         self.reads.clone()

@@ -13,8 +13,8 @@ use super::lanes::Lanes;
 use super::prefetch::prefetch;
 use super::quantities::{Change, Force, HalfEnergy, Quantity, Spring, Ways, difference};
 use super::{ChosenKernel, WithLanes};
-use crate::body::{Vectors, View};
-use crate::springs::{Link, Motion, Tangent, TileForces};
+use crate::body::{Places, Vectors, View};
+use crate::springs::{Course, Link, Motion, Tangent, TileForces};
 
 impl Columns {
     /// Writes the forces on the nodes of the tile, N.
@@ -24,7 +24,7 @@ impl Columns {
             velocities,
             soon,
         } = motion;
-        let velocities = velocities.filter(|_| self.damped);
+        let velocities = velocities.filter(|_| self.damped).map(Vectors::view);
         let tile = self.tile(materials, positions, velocities, soon, Tangent::NONE);
         match velocities {
             None => tile.add_up::<Force<false>>(kernel, forces),
@@ -32,17 +32,10 @@ impl Columns {
         }
     }
 
-    /// Writes how the forces on the nodes of the tile change, N, where nodes go from `positions` by `ways`.
-    pub fn changes(
-        &self,
-        kernel: ChosenKernel,
-        materials: &[Material],
-        positions: View,
-        ways: &Vectors,
-        tangent: Tangent,
-        changes: &mut TileForces,
-    ) {
-        let tile = self.tile(materials, positions, Some(ways), [&[]; 6], tangent);
+    /// Writes how the forces on the nodes of the tile change, N, in the first order.
+    pub fn changes(&self, kernel: ChosenKernel, materials: &[Material], course: &Course, changes: &mut TileForces) {
+        let tangent = course.tangent;
+        let tile = self.tile(materials, course.positions, Some(course.ways), [&[]; 6], tangent);
         if self.damped && tangent.rate > 0.0 {
             tile.add_up::<Change<true>>(kernel, changes);
         } else {
@@ -63,18 +56,18 @@ impl Columns {
         &'a self,
         materials: &'a [Material],
         positions: View<'a>,
-        seconds: Option<&'a Vectors>,
+        seconds: Option<View<'a>>,
         soon: [&'a [f32]; 6],
         tangent: Tangent,
     ) -> Tile<'a> {
         // What the kernel reads without a check was checked against this.
-        assert!(positions.covers(&self.reads));
-        assert!(seconds.is_none_or(|seconds| seconds.len() == self.node_count));
+        assert!(positions.covers(&self.reads, self.node_count));
+        assert!(seconds.is_none_or(|seconds| seconds.covers(&self.reads, self.node_count)));
         Tile {
             columns: self,
             materials,
             positions: positions.places(),
-            seconds: seconds.map(|seconds| seconds.view().places()),
+            seconds: seconds.map(|seconds| seconds.places()),
             soon: soon.map(|wanted| wanted.as_ptr()),
             tangent,
             careful: Careful {
@@ -103,9 +96,9 @@ struct TileLinks<'a, Q> {
 struct Tile<'a> {
     columns: &'a Columns,
     materials: &'a [Material],
-    /// Where the coordinates of node 0 would be: what the columns read is there.
-    positions: [*const f32; 3],
-    seconds: Option<[*const f32; 3]>,
+    /// What the columns read is there.
+    positions: Places,
+    seconds: Option<Places>,
     /// What is wanted next, block by block.
     soon: [*const f32; 6],
     tangent: Tangent,
@@ -356,14 +349,14 @@ impl Tile<'_> {
         // Written out here and below: a closure may be compiled on its own, without the kernel's instructions.
         // SAFETY: where a lane is set there is a node, and within the margins elsewhere.
         unsafe {
-            let [x, y, z] = self.positions;
+            let [x, y, z] = self.positions.axes;
             let position = [
                 L::load(x.wrapping_offset(node)),
                 L::load(y.wrapping_offset(node)),
                 L::load(z.wrapping_offset(node)),
             ];
             match self.seconds {
-                Some([x, y, z]) if Q::SECOND => Place {
+                Some(Places { axes: [x, y, z], .. }) if Q::SECOND => Place {
                     position,
                     second: [
                         L::load(x.wrapping_offset(node)),
@@ -381,12 +374,11 @@ impl Tile<'_> {
     unsafe fn gathered<L: Lanes, Q: Quantity>(&self, indices: *const u32) -> Place<L> {
         // SAFETY: the numbers were checked to be those of nodes.
         unsafe {
-            let [x, y, z] = self.positions;
-            let position = [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)];
+            let position = gather(self.positions, indices);
             match self.seconds {
-                Some([x, y, z]) if Q::SECOND => Place {
+                Some(seconds) if Q::SECOND => Place {
                     position,
-                    second: [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)],
+                    second: gather(seconds, indices),
                 },
                 _ => Place::still(position),
             }
@@ -399,24 +391,12 @@ impl Tile<'_> {
         let window = self.columns.window;
         // SAFETY: as in `gathered`.
         unsafe {
-            let [x, y, z] = self.positions.map(|axis| axis.wrapping_add(window));
-            let position = [
-                L::gather_near(x, indices),
-                L::gather_near(y, indices),
-                L::gather_near(z, indices),
-            ];
+            let position = gather_near(self.positions, window, indices);
             match self.seconds {
-                Some(seconds) if Q::SECOND => {
-                    let [x, y, z] = seconds.map(|axis| axis.wrapping_add(window));
-                    Place {
-                        position,
-                        second: [
-                            L::gather_near(x, indices),
-                            L::gather_near(y, indices),
-                            L::gather_near(z, indices),
-                        ],
-                    }
-                }
+                Some(seconds) if Q::SECOND => Place {
+                    position,
+                    second: gather_near(seconds, window, indices),
+                },
                 _ => Place::still(position),
             }
         }
@@ -498,6 +478,40 @@ impl<L: Lanes> Sums<L> {
     }
 }
 
+/// The vectors of the nodes with these numbers.
+#[inline(always)]
+unsafe fn gather<L: Lanes>(places: Places, indices: *const u32) -> [L; 3] {
+    // SAFETY: the numbers were checked to be those of nodes.
+    unsafe {
+        match places.records {
+            Some(records) => L::records(records, indices),
+            None => {
+                let [x, y, z] = places.axes;
+                [L::gather(x, indices), L::gather(y, indices), L::gather(z, indices)]
+            }
+        }
+    }
+}
+
+/// The vectors of the nodes with these numbers, counted from the window.
+#[inline(always)]
+unsafe fn gather_near<L: Lanes>(places: Places, window: usize, indices: *const u16) -> [L; 3] {
+    // SAFETY: the same.
+    unsafe {
+        match places.records {
+            Some(records) => L::records_near(records.wrapping_add(window), indices),
+            None => {
+                let [x, y, z] = places.axes.map(|axis| axis.wrapping_add(window));
+                [
+                    L::gather_near(x, indices),
+                    L::gather_near(y, indices),
+                    L::gather_near(z, indices),
+                ]
+            }
+        }
+    }
+}
+
 #[inline(always)]
 unsafe fn half_tension<L: Lanes>(stiffness: L, rest_length: L) -> L {
     // SAFETY: the same contract.
@@ -509,7 +523,7 @@ struct Careful<'a> {
     columns: &'a Columns,
     materials: &'a [Material],
     positions: View<'a>,
-    seconds: Option<&'a Vectors>,
+    seconds: Option<View<'a>>,
     tangent: Tangent,
 }
 

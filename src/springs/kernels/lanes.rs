@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::body::Record;
+
 use super::eights::{EightLinks, Sight, pull_one_by_one};
 
 /// A few `f32` side by side, and what the spring kernel does with them.
@@ -27,6 +29,12 @@ pub(super) trait Lanes: Copy {
 
     /// The same with small indices.
     unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self;
+
+    /// The three numbers of `base[indices[lane]]` for `COUNT` readable indices that lead to readable records.
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3];
+
+    /// The same with small indices.
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3];
 
     unsafe fn subtract(self, other: Self) -> Self;
 

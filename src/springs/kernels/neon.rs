@@ -3,6 +3,7 @@
 use std::arch::aarch64::*;
 
 use super::lanes::Lanes;
+use crate::body::Record;
 
 #[derive(Clone, Copy)]
 pub(super) struct NeonLanes(float32x4_t);
@@ -13,6 +14,22 @@ unsafe fn spread(mask: u32) -> uint32x4_t {
     const BITS: [u32; 4] = [1, 2, 4, 8];
     // SAFETY: every processor of this kind has the instructions; four numbers are read.
     unsafe { vtstq_u32(vdupq_n_u32(mask), vld1q_u32(BITS.as_ptr())) }
+}
+
+/// The numbers of four records.
+#[inline(always)]
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [NeonLanes; 3] {
+    // SAFETY: every processor of this kind has the instructions; the caller promises the records.
+    unsafe {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|lane| vld1q_f32(at(lane).cast()));
+        let (low_ac, high_ac) = (vzip1q_f32(a, c), vzip2q_f32(a, c));
+        let (low_bd, high_bd) = (vzip1q_f32(b, d), vzip2q_f32(b, d));
+        [
+            NeonLanes(vzip1q_f32(low_ac, low_bd)),
+            NeonLanes(vzip2q_f32(low_ac, low_bd)),
+            NeonLanes(vzip1q_f32(high_ac, high_bd)),
+        ]
+    }
 }
 
 // SAFETY of every block: every processor of this kind has the instructions, and the caller promises that what pointers lead
@@ -47,6 +64,16 @@ impl Lanes for NeonLanes {
         let values: [f32; 4] =
             std::array::from_fn(|lane| unsafe { *base.wrapping_add(usize::from(*indices.add(lane))) });
         Self(unsafe { vld1q_f32(values.as_ptr()) })
+    }
+
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) }
+    }
+
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) }
     }
 
     #[inline(always)]

@@ -3,6 +3,7 @@
 use std::array::from_fn;
 
 use super::lanes::Lanes;
+use crate::body::Record;
 
 #[derive(Clone, Copy)]
 pub(super) struct PortableLanes([f32; 4]);
@@ -41,6 +42,26 @@ impl Lanes for PortableLanes {
         Self(from_fn(|lane| unsafe {
             *base.wrapping_add(usize::from(*indices.add(lane)))
         }))
+    }
+
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        from_fn(|axis| {
+            Self(from_fn(|lane| unsafe {
+                (*base.wrapping_add(*indices.add(lane) as usize)).0[axis]
+            }))
+        })
+    }
+
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        from_fn(|axis| {
+            Self(from_fn(|lane| unsafe {
+                (*base.wrapping_add(usize::from(*indices.add(lane)))).0[axis]
+            }))
+        })
     }
 
     #[inline(always)]

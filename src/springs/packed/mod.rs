@@ -18,7 +18,7 @@ use pack::{Loose, NO_KIND, pack};
 
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
-use super::{Link, Motion, Springs, TILE, Tangent, TileForces, already_joined, not_joined, tile_count, tile_nodes};
+use super::{Course, Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes};
 use crate::body::{Spring, Vectors};
 use crate::error::Result;
 use crate::memory;
@@ -192,16 +192,22 @@ impl Springs for Packed {
         Some(self.tiles[tile].columns.reads())
     }
 
+    fn gathers(&self) -> bool {
+        let gathers: usize = self.tiles.iter().map(|tile| tile.columns.gathers()).sum();
+        // Making its record costs a node about what one gather saves.
+        gathers > self.node_count
+    }
+
     fn forces(&self, tile: usize, motion: &Motion, forces: &mut TileForces) {
         self.tiles[tile]
             .columns
             .forces(self.kernel, &self.materials, motion, forces);
     }
 
-    fn changes(&self, tile: usize, positions: &Vectors, ways: &Vectors, tangent: Tangent, changes: &mut TileForces) {
+    fn changes(&self, tile: usize, course: &Course, changes: &mut TileForces) {
         self.tiles[tile]
             .columns
-            .changes(self.kernel, &self.materials, positions.view(), ways, tangent, changes);
+            .changes(self.kernel, &self.materials, course, changes);
     }
 
     fn half_energy(&self, tile: usize, positions: &Vectors) -> f64 {

@@ -4,9 +4,9 @@ use std::collections::btree_map::Entry;
 use glam::{DVec3, Vec3};
 
 use super::{Packed, Rounding};
-use crate::body::{Spring, Vectors};
+use crate::body::{Records, Spring, Vectors, WriteRecords};
 use crate::random::Random;
-use crate::springs::{Kernel, Link, Motion, Springs, Tangent, TileForces, tile_count, tile_nodes};
+use crate::springs::{Course, Kernel, Link, Motion, Springs, Tangent, TileForces, tile_count, tile_nodes};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
 
@@ -93,11 +93,30 @@ fn packed(kernel: Kernel, count: usize, pairs: &Pairs) -> Option<Packed> {
     Some(packed.expect("memory"))
 }
 
+/// The same as records.
+fn records(vectors: &Vectors) -> Records {
+    let mut records = Records::zeros(vectors.len()).expect("memory");
+    let kernel = Kernel::Portable.choose().expect("a kernel for every processor");
+    kernel.run(WriteRecords {
+        axes: vectors.axes(),
+        records: records.as_mut_slice(),
+    });
+    records
+}
+
 fn forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
     let mut all = Vec::new();
+    let records = records(positions);
     for tile in 0..tile_count(positions.len()) {
         let mut forces = TileForces::ZERO;
         packed.forces(tile, &Motion::at(positions, velocities), &mut forces);
+        let motion = Motion {
+            positions: positions.view().with_records(Some(&records)),
+            ..Motion::at(positions, velocities)
+        };
+        let mut of_records = TileForces::ZERO;
+        packed.forces(tile, &motion, &mut of_records);
+        assert_eq!(forces.axes(), of_records.axes(), "from records");
         all.extend((0..tile_nodes(tile, positions.len()).len()).map(|place| forces.get(place)));
     }
     all
@@ -206,6 +225,18 @@ fn every_kernel_computes_changes_and_energy() {
                 positions.set(node + 1, positions.get(node));
             }
             let ways = vectors(count, &mut random);
+            let [position_records, way_records] = [&positions, &ways].map(records);
+            let course = Course {
+                node_count: count,
+                positions: positions.view(),
+                ways: ways.view(),
+                tangent,
+            };
+            let course_of_records = Course {
+                positions: positions.view().with_records(Some(&position_records)),
+                ways: ways.view().with_records(Some(&way_records)),
+                ..course
+            };
             let (expected, energy) = reference_change(&pairs, &positions, &ways, tangent);
             for kernel in KERNELS {
                 let Some(packed) = packed(kernel, count, &pairs) else {
@@ -214,8 +245,11 @@ fn every_kernel_computes_changes_and_energy() {
                 let (mut sum, mut found_energy) = (DVec3::ZERO, 0.0);
                 for tile in 0..tile_count(count) {
                     let mut changes = TileForces::ZERO;
-                    packed.changes(tile, &positions, &ways, tangent, &mut changes);
+                    packed.changes(tile, &course, &mut changes);
                     found_energy += packed.half_energy(tile, &positions);
+                    let mut of_records = TileForces::ZERO;
+                    packed.changes(tile, &course_of_records, &mut of_records);
+                    assert_eq!(changes.axes(), of_records.axes(), "{name}, {kernel:?}, from records");
                     for (place, node) in tile_nodes(tile, count).enumerate() {
                         let (found, (expected, size)) = (changes.get(place).as_dvec3(), expected[node]);
                         assert!(

@@ -1,0 +1,54 @@
+//! Vectors of nodes a second time, as records: three numbers that lie together are one load, not three.
+
+use crate::error::Result;
+use crate::memory;
+use crate::springs::{Loops, TILE};
+use crate::threads::Tiles;
+
+/// A vector, and a number to spare, so that it never lies across two cache lines.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Record(pub [f32; 4]);
+
+/// One record per node.
+#[derive(Debug)]
+pub(crate) struct Records(Vec<Record>);
+
+impl Records {
+    /// `count` of them, all zero.
+    pub fn zeros(count: usize) -> Result<Self> {
+        Ok(Self(memory::filled(Record::default(), count)?))
+    }
+
+    pub fn as_slice(&self) -> &[Record] {
+        &self.0
+    }
+
+    #[cfg(test)]
+    pub fn as_mut_slice(&mut self) -> &mut [Record] {
+        &mut self.0
+    }
+
+    pub fn tiles_mut(&mut self) -> Tiles<'_, Record> {
+        Tiles::new(&mut self.0, TILE)
+    }
+}
+
+/// Makes records of vectors.
+pub(crate) struct WriteRecords<'a> {
+    pub axes: [&'a [f32]; 3],
+    pub records: &'a mut [Record],
+}
+
+impl Loops for WriteRecords<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.records.len();
+        let [x, y, z] = self.axes.map(|axis| &axis[..count]);
+        for (node, record) in self.records.iter_mut().enumerate() {
+            *record = Record([x[node], y[node], z[node], 0.0]);
+        }
+    }
+}
