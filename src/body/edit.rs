@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::definition::{Spring, distance, expect_count, finite_vector, finite_vectors, not_negative};
 use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
-use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
+use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
@@ -180,7 +180,12 @@ impl Body {
         }
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         let stability = self.carry.stability;
-        self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        let positions = self.state.positions();
+        self.carry.stability = stability.joined(nodes, &*self.springs, masses, positions, &mut self.watched);
         Ok(())
     }
 

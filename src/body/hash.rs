@@ -46,6 +46,9 @@ impl Body {
             }
         }
         hasher.write_floats(&self.carry.stability.floats());
+        if self.carry.stability.limit().is_some() {
+            self.watched.floats().for_each(|limit| hasher.write_floats(&[limit]));
+        }
         if let Some(closing) = &self.carry.closing {
             hasher.write_floats(&[closing.substep]);
             hasher.write_floats(&closing.gravity.to_array());

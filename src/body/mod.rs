@@ -25,7 +25,7 @@ use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
 use crate::error::Result;
 use crate::memory;
-use crate::solver::{Carry, GravityKicks, Implicit, Stability, Survey};
+use crate::solver::{Carry, GravityKicks, Implicit, Masses, Stability, Survey, Watched};
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::threads::Team;
 use order::NodeOrder;
@@ -50,6 +50,7 @@ pub struct Body {
     /// That of every node that is not pinned, where they all have the same.
     pub(crate) uniform_inverse_mass: Option<f32>,
     pub(crate) damping: Option<NodeDamping>,
+    pub(crate) watched: Watched,
     pub(crate) pins: Pins,
     /// What a substep found in each tile.
     pub(crate) surveys: Vec<Survey>,
@@ -135,6 +136,7 @@ impl Body {
             masses,
             inverse_masses,
             damping,
+            watched: Watched::new(node_count)?,
             pins,
             surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
@@ -226,6 +228,28 @@ impl Body {
         self.implicit
             .as_ref()
             .map_or_else(SolverReport::default, |implicit| implicit.report)
+    }
+
+    /// The masses as the caller gave them.
+    pub(crate) fn masses(&self) -> Masses<'_> {
+        Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        }
+    }
+
+    /// Finds the nodes that set the longest stable substep.
+    pub(crate) fn watch(&mut self) {
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        self.watched.gather(&*self.springs, masses);
+    }
+
+    /// The longest stable substep with the nodes at these positions.
+    pub(crate) fn estimate(&self, positions: &Vectors) -> Stability {
+        Stability::estimate(&*self.springs, self.masses(), positions, &self.watched)
     }
 
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {

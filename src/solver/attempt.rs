@@ -69,8 +69,11 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         let substeps = request.dt / (RESERVE * known.limit_anywhere());
         request.substeps == 0 && known.is_coarse() && substeps > WORTH_ESTIMATING
     };
+    if known.limit().is_none() {
+        body.watch();
+    }
     let stability = if known.limit().is_none() || is_worth_estimating() {
-        Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions())
+        body.estimate(body.state.positions())
     } else {
         known
     };

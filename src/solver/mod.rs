@@ -9,10 +9,12 @@ mod pipeline;
 mod stability;
 mod substep;
 mod verlet;
+mod watched;
 
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
 pub(crate) use closing::{close, make_up_for, mean_force, show_closed};
 pub(crate) use gravity::GravityKicks;
 pub(crate) use implicit::Implicit;
 pub(crate) use kick::Survey;
-pub(crate) use stability::Stability;
+pub(crate) use stability::{Masses, Stability};
+pub(crate) use watched::Watched;

@@ -140,10 +140,10 @@ impl Step<'_> {
                 .stability
                 .holds_after(substep * diagonal(&carry.gravity.velocities))
             {
-                carry.stability = carry.stability.for_short(substep).unwrap_or_else(|| {
-                    let positions = body.state.newest().0;
-                    Stability::estimate(&*body.springs, &body.inverse_masses, positions)
-                });
+                carry.stability = carry
+                    .stability
+                    .for_short(substep)
+                    .unwrap_or_else(|| body.estimate(body.state.newest().0));
                 check(&carry.stability, substep)?;
             }
         }
