@@ -53,6 +53,10 @@ impl Body {
             hasher.write_floats(&[closing.substep]);
             hasher.write_floats(&closing.gravity.to_array());
         }
+        hasher.write_floats(&[self.carry.masses_for]);
+        for sliver in self.scaling.iter().flat_map(|scaling| scaling.slivers()) {
+            hasher.write_u64(u64::from(sliver.node));
+        }
         if let Some(implicit) = &self.implicit {
             implicit.hash(hasher);
         }

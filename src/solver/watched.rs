@@ -101,7 +101,9 @@ impl Watched {
         }
         if self.candidates.len() < self.most {
             let candidate = Candidate { limit, node };
-            let place = self.candidates.partition_point(|other| other.before(&candidate).is_lt());
+            let place = self
+                .candidates
+                .partition_point(|other| other.before(&candidate).is_lt());
             self.candidates.insert(place, candidate);
         } else {
             self.others = self.others.min(limit);
