@@ -195,7 +195,7 @@ fn fewer_substeps(body: &Body, request: &StepRequest, stability: &Stability) -> 
     let needed = substeps_needed(request, stability.limit()?);
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let scaling = body.scaling.as_ref()?;
-    scaling.fewer_substeps(request.dt, RESERVE, needed, masses, inverse_masses)
+    scaling.fewer_substeps(request.dt, needed, masses, inverse_masses)
 }
 
 /// The substep after which a step is looked at on its way: far from simple fractions of the step, where steps that have

@@ -13,6 +13,10 @@ use crate::springs::Springs;
 /// What is left of the substeps where mass is added, at most: for less the motion is not changed.
 const WORTH_ADDING: f64 = 0.75;
 
+/// The part of the longest stable substep that is used: more than where the limit is an estimate that motion can overtake,
+/// because this one holds wherever nodes go, and is reached only where all springs of a node point one way.
+const RESERVE: f64 = 0.9;
+
 /// Bodies that could not take steps so many times as long are not prepared for it.
 const WORTH_KEEPING: f64 = 1.125;
 
@@ -157,16 +161,9 @@ impl MassScaling {
     }
 
     /// In how few substeps a step of `dt` seconds can be taken, and for what substep masses are to be made; `None`: that
-    /// saves too little of the `needed` ones. Of the longest stable substep the part `reserve` is used.
-    pub fn fewer_substeps(
-        &self,
-        dt: f32,
-        reserve: f32,
-        needed: f64,
-        masses: &[f32],
-        inverse_masses: &[f32],
-    ) -> Option<(u32, f32)> {
-        let longest = f64::from(dt) / f64::from(reserve);
+    /// saves too little of the `needed` ones.
+    pub fn fewer_substeps(&self, dt: f32, needed: f64, masses: &[f32], inverse_masses: &[f32]) -> Option<(u32, f32)> {
+        let longest = f64::from(dt) / RESERVE;
         let fits = |substeps: u32| {
             let step = longest / f64::from(substeps);
             step <= self.complete_to && self.would_add(step, masses, inverse_masses) <= self.most
