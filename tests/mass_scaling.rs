@@ -409,8 +409,10 @@ fn pins_and_springs_that_come_and_go_change_what_is_needed() {
     }
     scene.run(FRAME, 1);
     assert!((added(&scene) / all - 1.0).abs() < 1e-5, "{} of {all}", added(&scene));
-    // A node that was none becomes one.
-    scene.body_mut().add_spring(0, 1, 1e5, None).unwrap_err();
+    // What is refused changes nothing.
+    let before = scene.world.state_hash();
+    assert!(scene.body_mut().add_spring(0, 1, 1e5, None).is_err());
+    assert_eq!(scene.world.state_hash(), before);
     let far = (parts.positions.len() / 2) as u32;
     scene
         .body_mut()
