@@ -61,7 +61,16 @@ fn measure(
     name: BenchmarkId,
     body: &BodyDefinition,
 ) {
-    let mut world = world();
+    measure_in(world(), group, name, body);
+}
+
+/// Steps this world, empty before, with this body.
+fn measure_in(
+    mut world: World,
+    group: &mut criterion::BenchmarkGroup<'_, criterion::measurement::WallTime>,
+    name: BenchmarkId,
+    body: &BodyDefinition,
+) {
     let id = world.create_body(body).expect("a valid body");
     world.body_mut(id).and_then(|body| body.pin(0)).expect("a node");
     let springs = world.body(id).expect("a live body").storage_report().spring_count;
@@ -112,6 +121,12 @@ fn features(criterion: &mut Criterion) {
         ..plain
     };
     measure(&mut group, BenchmarkId::new("spring damping", 10_000), &spring_damping);
+    // Neither is in need of mass.
+    for (name, mass_scaling) in [("substeps chosen", 0.0), ("mass scaling, not needed", 0.001)] {
+        let world = World::new(WorldDefinition::default()).expect("a valid definition");
+        let body = BodyDefinition { mass_scaling, ..plain };
+        measure_in(world, &mut group, BenchmarkId::new(name, 10_000), &body);
+    }
     group.finish();
 }
 

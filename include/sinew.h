@@ -405,6 +405,17 @@ typedef struct sinew_body_def {
    * 0.
    */
   uint32_t reserved1;
+  /**
+   * VERLET: what part of the body's mass may be added, in all, to the nodes whose springs would make substeps short, as
+   * those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
+   * more, and no more than they need; never where the world's substeps are fixed or a tolerance is asked for. It is
+   * inertia alone: weight, and the force on a pin, stay as they are. See sinew_solver_report.
+   */
+  float mass_scaling;
+  /**
+   * 0.
+   */
+  uint32_t reserved2;
 } sinew_body_def;
 
 /**
@@ -449,7 +460,7 @@ typedef struct sinew_energy {
    */
   size_t struct_size;
   /**
-   * Of the nodes that are free to move.
+   * Of the nodes that are free to move, with what mass_scaling adds to them.
    */
   double kinetic;
   /**
@@ -506,6 +517,10 @@ typedef struct sinew_solver_report {
    * it.
    */
   float error;
+  /**
+   * VERLET: by how much mass_scaling makes nodes heavier in all, kg.
+   */
+  double added_mass;
 } sinew_solver_report;
 
 /**

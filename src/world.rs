@@ -407,7 +407,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
             Some(Outcome::Done { substeps, carry, error }) => {
                 report.substeps = report.substeps.max(substeps);
                 report.error_estimate = report.error_estimate.max(error);
-                carry.stability.limit()
+                carry.limit()
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);
@@ -415,7 +415,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
             }
             Some(Outcome::NotFinite) | None => {
                 report.bodies_restored += 1;
-                body.carry.stability.limit()
+                body.carry.limit()
             }
         };
         report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));

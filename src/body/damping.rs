@@ -5,6 +5,7 @@
 
 use crate::error::Result;
 use crate::memory;
+use crate::solver::{MassScaling, Sliver};
 
 /// What half a substep does to each node's velocity; kept only by bodies that have node damping.
 #[derive(Debug)]
@@ -31,6 +32,14 @@ impl NodeDamping {
 
     pub fn rates(&self) -> &[f32] {
         &self.rates
+    }
+
+    /// Gives a node another rate, 1/s; the factors have to be prepared again then.
+    pub fn set_rate(&mut self, node: usize, rate: f32) {
+        if self.rates[node] != rate {
+            self.rates[node] = rate;
+            self.substep = f32::NAN;
+        }
     }
 
     /// Makes the factors those of half of `substep`.
@@ -63,10 +72,21 @@ pub(crate) enum InverseMasses<'a> {
     Each(&'a [f32]),
 }
 
-impl<'a> InverseMasses<'a> {
-    /// `uniform` where there is such a one, else `each`.
-    pub fn of(uniform: Option<f32>, each: &'a [f32]) -> Self {
-        uniform.map_or(Self::Each(each), Self::Uniform)
+/// How nodes resist a force.
+#[derive(Clone, Copy)]
+pub(crate) struct Inertia<'a> {
+    pub inverse_masses: InverseMasses<'a>,
+    /// The nodes that gravity pulls less than in proportion, in their order.
+    pub heavier: &'a [Sliver],
+}
+
+impl<'a> Inertia<'a> {
+    /// With the inverse mass `uniform` where there is such a one, else with `each`.
+    pub fn of(uniform: Option<f32>, each: &'a [f32], scaling: Option<&'a MassScaling>) -> Self {
+        Self {
+            inverse_masses: uniform.map_or(InverseMasses::Each(each), InverseMasses::Uniform),
+            heavier: scaling.map_or(&[], MassScaling::heavier),
+        }
     }
 }
 

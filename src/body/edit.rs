@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::definition::{Spring, distance, expect_count, finite_vector, finite_vectors, not_negative};
 use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
-use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
+use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
@@ -92,6 +92,7 @@ impl Body {
             self.pins.insert(own)?;
             self.inverse_masses[own as usize] = 0.0;
             self.set_velocity(node, Vec3::ZERO);
+            self.scale_masses(self.carry.masses_for);
             self.forget_matrix();
         }
         Ok(())
@@ -114,6 +115,7 @@ impl Body {
             close(self);
             self.pins.remove(own);
             self.inverse_masses[own as usize] = 1.0 / mass;
+            self.scale_masses(self.carry.masses_for);
             self.forget_matrix();
         }
         Ok(())
@@ -163,6 +165,9 @@ impl Body {
             }
         };
         not_negative("rest_length", rest_length)?;
+        if let Some(scaling) = &mut self.scaling {
+            scaling.reserve(nodes.len())?;
+        }
         let spring = Spring {
             nodes,
             stiffness,
@@ -179,8 +184,14 @@ impl Body {
             implicit.forget_matrix();
         }
         self.make_up_for_spring(Link::ends(&spring), -1.0);
+        self.scale_for_springs(nodes);
         let stability = self.carry.stability;
-        self.carry.stability = stability.joined(nodes, &*self.springs, &self.inverse_masses, self.state.positions());
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        let positions = self.state.positions();
+        self.carry.stability = stability.joined(nodes, &*self.springs, masses, positions, &mut self.watched);
         Ok(())
     }
 
@@ -207,6 +218,13 @@ impl Body {
             ..link
         };
         self.make_up_for_spring([link, other], 1.0);
+        if self
+            .scaling
+            .as_ref()
+            .is_some_and(|scaling| scaling.concerns([own_a, own_b]))
+        {
+            self.scale_for_springs([own_a, own_b]);
+        }
         // What was stable still is; nothing limits what has no springs.
         if self.springs.spring_count() == 0 {
             self.carry.stability = Stability::UNKNOWN;
@@ -233,6 +251,21 @@ impl Body {
             let [here, there] = [node, link.neighbour].map(|node| self.state.positions().get(node as usize));
             make_up_for(self, node, pull(node as usize, &link, there - here, None) * sign);
         }
+    }
+
+    /// Sees that other springs may ask for other masses of these nodes.
+    fn scale_for_springs(&mut self, nodes: [u32; 2]) {
+        if self.carry.masses_for > 0.0 {
+            // What closes the step is made with the masses that it was taken with.
+            close(self);
+        }
+        if let Some(scaling) = &mut self.scaling {
+            let rates = self.damping.as_ref().map(|damping| damping.rates());
+            for node in nodes {
+                scaling.change(node, &*self.springs, &self.masses, rates);
+            }
+        }
+        self.scale_masses(self.carry.masses_for);
     }
 
     fn set_velocity(&mut self, node: u32, velocity: Vec3) {

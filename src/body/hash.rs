@@ -46,9 +46,16 @@ impl Body {
             }
         }
         hasher.write_floats(&self.carry.stability.floats());
+        if self.carry.stability.limit().is_some() {
+            self.watched.floats().for_each(|limit| hasher.write_floats(&[limit]));
+        }
         if let Some(closing) = &self.carry.closing {
             hasher.write_floats(&[closing.substep]);
             hasher.write_floats(&closing.gravity.to_array());
+        }
+        hasher.write_floats(&[self.carry.masses_for]);
+        for sliver in self.scaling.iter().flat_map(|scaling| scaling.slivers()) {
+            hasher.write_u64(u64::from(sliver.node));
         }
         if let Some(implicit) = &self.implicit {
             implicit.hash(hasher);

@@ -16,7 +16,7 @@ mod vectors;
 use glam::{DVec3, Vec3};
 
 pub(crate) use coarse::CoarseStep;
-pub(crate) use damping::{InverseMasses, Mobility, NodeDamping};
+pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
@@ -27,7 +27,7 @@ use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
 use crate::error::Result;
 use crate::memory;
-use crate::solver::{Carry, GravityKicks, Implicit, Stability, Survey};
+use crate::solver::{Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched};
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::threads::Team;
 use order::NodeOrder;
@@ -47,11 +47,14 @@ pub struct Body {
     pub(crate) kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
     pub(crate) masses: Vec<f32>,
-    /// 1/kg, 0 for nodes that are pinned.
+    /// 1/kg, with what mass scaling adds; 0 for nodes that are pinned.
     pub(crate) inverse_masses: Vec<f32>,
     /// That of every node that is not pinned, where they all have the same.
     pub(crate) uniform_inverse_mass: Option<f32>,
     pub(crate) damping: Option<NodeDamping>,
+    pub(crate) watched: Watched,
+    /// For bodies that some added mass lets take longer substeps.
+    pub(crate) scaling: Option<Box<MassScaling>>,
     pub(crate) pins: Pins,
     /// What a substep found in each tile.
     pub(crate) surveys: Vec<Survey>,
@@ -140,6 +143,8 @@ impl Body {
             masses,
             inverse_masses,
             damping,
+            watched: Watched::new(node_count)?,
+            scaling: None,
             pins,
             surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
@@ -156,6 +161,7 @@ impl Body {
                     max: Vec3::ZERO,
                 }),
                 closing: None,
+                masses_for: 0.0,
             },
             forces_current: false,
             forces_applied: false,
@@ -171,6 +177,11 @@ impl Body {
                 definition.accuracy,
             )?;
             body.implicit = Some(Box::new(implicit));
+        }
+        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
+            let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
+            let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
+            body.scaling = scaling.map(Box::new);
         }
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
@@ -229,9 +240,53 @@ impl Body {
 
     /// How its solver took the last step.
     pub fn solver_report(&self) -> SolverReport {
-        self.implicit
-            .as_ref()
-            .map_or_else(SolverReport::default, |implicit| implicit.report)
+        let report = self.implicit.as_ref().map(|implicit| implicit.report);
+        SolverReport {
+            added_mass: self.scaling.as_ref().map_or(0.0, |scaling| scaling.added_mass()),
+            ..report.unwrap_or_default()
+        }
+    }
+
+    /// The masses as the caller gave them.
+    pub(crate) fn masses(&self) -> Masses<'_> {
+        Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        }
+    }
+
+    /// Finds the nodes that set the longest stable substep.
+    pub(crate) fn watch(&mut self) {
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        self.watched.gather(&*self.springs, masses);
+    }
+
+    /// The longest stable substep with the nodes at these positions.
+    pub(crate) fn estimate(&self, positions: &Vectors) -> Stability {
+        Stability::estimate(&*self.springs, self.masses(), positions, &self.watched)
+    }
+
+    /// Makes the nodes that need it heavy enough for substeps of `step` seconds; 0: masses as they are.
+    pub(crate) fn use_masses_for(&mut self, step: f32) {
+        if self.scaling.as_ref().is_some_and(|scaling| scaling.step() != step) {
+            self.scale_masses(step);
+        }
+    }
+
+    /// The same, after springs or pins have changed too.
+    pub(crate) fn scale_masses(&mut self, step: f32) {
+        if let Some(scaling) = &mut self.scaling {
+            let heavier = Heavier {
+                masses: &self.masses,
+                inverse_masses: &mut self.inverse_masses,
+                uniform_inverse_mass: &mut self.uniform_inverse_mass,
+                damping: self.damping.as_mut(),
+            };
+            scaling.apply(step, heavier);
+        }
     }
 
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
@@ -301,6 +356,7 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.put_back();
         }
+        self.use_masses_for(self.carry.masses_for);
         if let (Some(damping), Some(closing)) = (&mut self.damping, &self.carry.closing) {
             damping.prepare(closing.substep);
         }

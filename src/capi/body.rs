@@ -103,6 +103,13 @@ pub struct sinew_body_def {
     pub accuracy: f32,
     /// 0.
     pub reserved1: u32,
+    /// VERLET: what part of the body's mass may be added, in all, to the nodes whose springs would make substeps short, as
+    /// those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
+    /// more, and no more than they need; never where the world's substeps are fixed or a tolerance is asked for. It is
+    /// inertia alone: weight, and the force on a pin, stay as they are. See sinew_solver_report.
+    pub mass_scaling: f32,
+    /// 0.
+    pub reserved2: u32,
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
@@ -124,7 +131,7 @@ pub struct sinew_vec3_view {
 pub struct sinew_energy {
     /// Set by the caller.
     pub struct_size: usize,
-    /// Of the nodes that are free to move.
+    /// Of the nodes that are free to move, with what mass_scaling adds to them.
     pub kinetic: f64,
     /// Springs and every other inner term.
     pub elastic: f64,
@@ -160,11 +167,17 @@ pub struct sinew_solver_report {
     /// rounding allows only where `iterations` of the definition were not enough. What a shorter step would change is not in
     /// it.
     pub error: f32,
+    /// VERLET: by how much mass_scaling makes nodes heavier in all, kg.
+    pub added_mass: f64,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_body_def {
-    const SIZES: &'static [usize] = &[offset_of!(Self, order), size_of::<Self>()];
+    const SIZES: &'static [usize] = &[
+        offset_of!(Self, order),
+        offset_of!(Self, mass_scaling),
+        size_of::<Self>(),
+    ];
     const NAME: &'static str = "sinew_body_def";
 }
 
@@ -182,7 +195,7 @@ unsafe impl Versioned for sinew_storage_report {
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_solver_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[offset_of!(Self, added_mass), size_of::<Self>()];
     const NAME: &'static str = "sinew_solver_report";
 }
 
@@ -235,6 +248,8 @@ impl sinew_body_def {
             iterations: 0,
             accuracy: 0.0,
             reserved1: 0,
+            mass_scaling: BodyDefinition::default().mass_scaling,
+            reserved2: 0,
         }
     }
 
@@ -245,6 +260,7 @@ impl sinew_body_def {
     unsafe fn definition<'a>(&self) -> Result<BodyDefinition<'a>> {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
+        memory::reserved("reserved2", self.reserved2)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -283,6 +299,7 @@ impl sinew_body_def {
                 order: self.order,
                 iterations: self.iterations,
                 accuracy: self.accuracy,
+                mass_scaling: self.mass_scaling,
             })
         }
     }
@@ -696,6 +713,7 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 struct_size: size_of::<sinew_solver_report>(),
                 iterations: report.iterations,
                 error: report.error,
+                added_mass: report.added_mass,
             });
             Ok(())
         })

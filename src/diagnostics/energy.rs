@@ -7,7 +7,7 @@ use crate::body::Body;
 /// Energy in joules, at the time of the positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of the nodes that are free to move.
+    /// Of the nodes that are free to move, with what mass scaling adds to them.
     pub kinetic: f64,
     /// Of the springs.
     pub elastic: f64,
@@ -20,11 +20,14 @@ impl Energy {
         let mut energy = Self::default();
         let (positions, velocities) = (body.state.positions(), body.velocities());
         let gravity = gravity.as_dvec3();
+        let mut heavier = body.scaling.iter().flat_map(|scaling| scaling.heavier()).peekable();
         for node in 0..body.node_count() {
             let mass = f64::from(body.masses[node]);
             let position = positions.get(node).as_dvec3();
+            let added = heavier.next_if(|sliver| sliver.node as usize == node);
             if body.inverse_masses[node] > 0.0 {
-                energy.kinetic += 0.5 * mass * velocities[body.callers(node)].as_dvec3().length_squared();
+                let inertia = mass + added.map_or(0.0, |sliver| f64::from(sliver.added));
+                energy.kinetic += 0.5 * inertia * velocities[body.callers(node)].as_dvec3().length_squared();
             }
             energy.gravitational -= mass * gravity.dot(position + body.origin);
             body.springs.visit(node, &mut |link| {

@@ -27,4 +27,7 @@ pub struct SolverReport {
     /// How far nodes may be from where the step's equation has them, root mean square by mass, m; 0 for bodies that are moved
     /// explicitly. What a shorter step would change is not in it.
     pub error: f32,
+    /// By how much mass scaling makes nodes heavier in all, kg; see
+    /// [`BodyDefinition::mass_scaling`](crate::BodyDefinition::mass_scaling).
+    pub added_mass: f64,
 }

@@ -41,6 +41,19 @@ pub(crate) struct Carry {
     pub gravity: GravityKicks,
     /// What the velocities lack to be those at the time of the positions.
     pub closing: Option<ClosingKick>,
+    /// The substep that masses are made for, s; 0: they are as they are, and `stability` is that of the current positions.
+    pub masses_for: f32,
+}
+
+impl Carry {
+    /// The longest stable substep with the masses in use, s, where it is known.
+    pub fn limit(&self) -> Option<f32> {
+        if self.masses_for > 0.0 {
+            Some(self.masses_for)
+        } else {
+            self.stability.limit()
+        }
+    }
 }
 
 /// How an attempted step ended. Nothing is current before [`Body::commit`].
@@ -65,12 +78,18 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         return attempt_implicitly(body, request, team);
     }
     let known = body.carry.stability;
+    let are_scaled = body.carry.masses_for > 0.0;
     let is_worth_estimating = || {
         let substeps = request.dt / (RESERVE * known.limit_anywhere());
-        request.substeps == 0 && known.is_coarse() && substeps > WORTH_ESTIMATING
+        request.substeps == 0 && !are_scaled && known.is_coarse() && substeps > WORTH_ESTIMATING
     };
-    let stability = if known.limit().is_none() || is_worth_estimating() {
-        Stability::estimate(&*body.springs, &body.inverse_masses, body.state.positions())
+    if known.limit().is_none() {
+        body.watch();
+    }
+    // While masses are made for the substep, the estimate is one of earlier positions: it still says what is saved.
+    let is_earlier = are_scaled && fewer_substeps(body, request, &known).is_none();
+    let stability = if known.limit().is_none() || is_earlier || is_worth_estimating() {
+        body.estimate(body.state.positions())
     } else {
         known
     };
@@ -79,7 +98,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         ..body.carry
     };
     if request.substeps > 0 {
-        return match verlet::run(body, request, request.substeps, 0, start, team) {
+        return match verlet::run(body, request, request.substeps, 0, start, 0.0, team) {
             Ok(taken) => finish(body, request.substeps, taken, 0.0),
             Err(too_long) => Outcome::Unstable {
                 stable_substep: too_long.stable_substep,
@@ -121,7 +140,7 @@ fn run(
     if body.implicit.is_some() {
         Ok(implicit::run(body, request, substeps, middle, start, team).1)
     } else {
-        verlet::run(body, request, substeps, middle, start, team)
+        verlet::run(body, request, substeps, middle, start, 0.0, team)
     }
 }
 
@@ -132,17 +151,51 @@ fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team)
         if attempt == ATTEMPTS {
             stable_substep = start.stability.limit_anywhere();
         }
-        let needed = (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil();
+        let stability = start.stability.shortened_to(stable_substep);
+        if let Some((substeps, masses_for)) = fewer_substeps(body, request, &stability) {
+            if substeps > request.max_substeps {
+                break;
+            }
+            let taken = verlet::run(
+                body,
+                request,
+                substeps,
+                middle(substeps),
+                Carry { stability, ..start },
+                masses_for,
+                team,
+            )?;
+            return Ok((substeps, taken));
+        }
+        let needed = substeps_needed(request, stable_substep);
         if needed > f64::from(request.max_substeps) {
             break;
         }
         let substeps = needed.max(1.0) as u32;
-        match verlet::run(body, request, substeps, middle(substeps), start, team) {
+        match verlet::run(body, request, substeps, middle(substeps), start, 0.0, team) {
             Ok(taken) => return Ok((substeps, taken)),
             Err(found) => stable_substep = stable_substep.min(found.stable_substep),
         }
     }
     Err(TooLong { stable_substep })
+}
+
+/// How many substeps a step takes of which the longest stable one is this long, s.
+fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
+    (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil()
+}
+
+/// In how few substeps the step can be taken with some mass added, and for what substep, s; `None`: it is not to be, or saves
+/// too little.
+fn fewer_substeps(body: &Body, request: &StepRequest, stability: &Stability) -> Option<(u32, f32)> {
+    // What a tolerance is about would not show what added mass changes.
+    if request.substeps > 0 || request.tolerance > 0.0 {
+        return None;
+    }
+    let needed = substeps_needed(request, stability.limit()?);
+    let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
+    let scaling = body.scaling.as_ref()?;
+    scaling.fewer_substeps(request.dt, needed, masses, inverse_masses)
 }
 
 /// The substep after which a step is looked at on its way: far from simple fractions of the step, where steps that have

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::gravity::GravityKicks;
 use super::kick::{Kick, Survey, TileKick, look};
-use crate::body::{Body, InverseMasses, NodeDamping, Pin, Vectors};
+use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors};
 use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -36,14 +36,14 @@ impl ClosingKick {
     }
 
     /// It as a kick of nodes with these masses; the factors of damping were prepared for its substep.
-    fn kick<'a>(&self, fall: Vec3, inverse_masses: InverseMasses<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
+    fn kick<'a>(&self, fall: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
         Kick {
             duration: 0.5 * self.substep,
             substep: self.substep,
             half: true,
             gravity: self.gravity,
             fall,
-            inverse_masses,
+            inertia,
             applied: None,
             damping,
         }
@@ -100,12 +100,12 @@ pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut 
     if let Some(damping) = &mut body.damping {
         damping.prepare(closing.substep);
     }
-    let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
+    let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
     let closed = Closed {
         springs: &*body.springs,
         kernel: body.kernel,
-        kick: closing.kick(gravity.next(closing.fall()), inverse_masses, body.damping.as_ref()),
+        kick: closing.kick(gravity.next(closing.fall()), inertia, body.damping.as_ref()),
         positions: state.positions,
         velocities: state.first_velocities,
     };
@@ -162,12 +162,12 @@ type See<'a> = dyn FnMut(Range<usize>, [&[f32]; 3]) + 'a;
 /// Shows the velocities of `body` at the time of its positions, tile by tile; whether they are finite. Where they are not,
 /// the rest is not shown.
 pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> bool {
-    let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
+    let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let fall = { body.carry.gravity }.next(closing.fall());
     let closed = Closed {
         springs: &*body.springs,
         kernel: body.kernel,
-        kick: closing.kick(fall, inverse_masses, body.damping.as_ref()),
+        kick: closing.kick(fall, inertia, body.damping.as_ref()),
         positions: body.state.positions(),
         velocities: body.state.velocities(),
     };

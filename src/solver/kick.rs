@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::body::{Bounds, InverseMasses, NodeDamping, Vectors};
+use crate::body::{Bounds, Inertia, InverseMasses, NodeDamping, Vectors};
 use crate::springs::{ChosenKernel, Loops, TileForces};
 
 /// One kick of a body.
@@ -22,10 +22,30 @@ pub(super) struct Kick<'a> {
     pub gravity: Vec3,
     /// What gravity gives to a node without damping in this kick, m/s.
     pub fall: Vec3,
-    pub inverse_masses: InverseMasses<'a>,
+    pub inertia: Inertia<'a>,
     /// Forces from outside, N.
     pub applied: Option<&'a Vectors>,
     pub damping: Option<&'a NodeDamping>,
+}
+
+impl Kick<'_> {
+    /// Takes from the forces on nodes that have been made heavier what gravity will give them too much.
+    fn lighten(&self, nodes: &Range<usize>, forces: &mut TileForces) {
+        let heavier = self.inertia.heavier;
+        let gravity = match self.damping {
+            None => self.fall / self.duration,
+            Some(_) => self.gravity,
+        };
+        let first = heavier.partition_point(|sliver| (sliver.node as usize) < nodes.start);
+        for sliver in &heavier[first..] {
+            let node = sliver.node as usize;
+            if node >= nodes.end {
+                break;
+            }
+            let place = node - nodes.start;
+            forces.set(place, forces.get(place) - gravity * sliver.added);
+        }
+    }
 }
 
 /// A kick for the nodes of one tile, and the drift that follows it.
@@ -63,6 +83,7 @@ impl Loops for TileKick<'_, '_> {
                 }
             }
         }
+        kick.lighten(&nodes, forces);
         let mut drift = drift.map(|drift| (drift.positions, drift.next_positions));
         for (axis, velocities) in velocities.into_iter().enumerate() {
             let axis = Axis {
@@ -99,7 +120,7 @@ impl Axis<'_> {
     fn run(self) {
         let kick = self.kick;
         let (duration, gravity, fall) = (kick.duration, self.gravity, self.fall);
-        match (kick.damping, kick.inverse_masses) {
+        match (kick.damping, kick.inertia.inverse_masses) {
             (None, InverseMasses::Uniform(inverse_mass)) => {
                 self.each(|_, force, velocity| velocity + (force * inverse_mass * duration + fall));
             }

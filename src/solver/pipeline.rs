@@ -10,7 +10,7 @@ use std::array::from_fn;
 use super::attempt::StepRequest;
 use super::kick::Survey;
 use super::substep::{Part, Pass, Written};
-use crate::body::{Body, InverseMasses, NodeDamping, Pin, Vectors, View};
+use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors, View};
 use crate::springs::{ChosenKernel, Springs, TILE, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Ragged, Team};
 
@@ -177,7 +177,7 @@ struct Common<'a> {
     masses: &'a [f32],
     request: &'a StepRequest<'a>,
     parts: &'a [Part],
-    inverse_masses: InverseMasses<'a>,
+    inertia: Inertia<'a>,
     damping: Option<&'a NodeDamping>,
 }
 
@@ -189,7 +189,7 @@ impl Common<'_> {
             masses: self.masses,
             request: self.request,
             part,
-            kick: part.kick(self.request.gravity, self.inverse_masses, self.damping),
+            kick: part.kick(self.request.gravity, self.inertia, self.damping),
             positions,
             first_velocities: None,
             first_forces: None,
@@ -243,7 +243,7 @@ fn run_stretches(
         masses: &body.masses,
         request,
         parts,
-        inverse_masses: InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses),
+        inertia: Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref()),
         damping: body.damping.as_ref(),
     };
     let first_pins: [usize; MOST_STRETCHES] =

@@ -9,6 +9,7 @@
 
 use glam::Vec3;
 
+use super::watched::Watched;
 use crate::body::Vectors;
 use crate::springs::{Springs, separation};
 
@@ -16,58 +17,70 @@ use crate::springs::{Springs, separation};
 /// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
-/// What bounds a body's frequencies and its dampings.
+/// What bounds the frequencies and the dampings of a node and its springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Rates {
+pub(super) struct Rates {
     /// The highest frequency squared, 1/s².
-    stiffest: f32,
+    pub stiffest: f32,
     /// The highest rate of damping, 1/s.
-    most_damped: f32,
+    pub most_damped: f32,
 }
 
 impl Rates {
-    const ZERO: Self = Self {
+    pub const ZERO: Self = Self {
         stiffest: 0.0,
         most_damped: 0.0,
     };
 
-    /// The longest stable substep, s; infinity where there is no limit.
-    fn limit(self) -> f32 {
+    /// The longest stable substep, s; infinity where there is no limit. Springs beyond the range of `f32` allow no substep
+    /// at all.
+    pub fn limit(self) -> f32 {
         let damping = 0.5 * self.most_damped;
-        2.0 / ((self.stiffest + damping * damping).sqrt() + damping)
+        let limit = 2.0 / ((self.stiffest + damping * damping).sqrt() + damping);
+        if limit.is_nan() { 0.0 } else { limit }
     }
 
-    /// Takes a node in, as it is now.
-    fn take(&mut self, sums: &Sums) {
-        let across = sums.across;
-        let directed = sums.along.largest_eigenvalue_beyond(self.stiffest - across);
-        self.stiffest = self.stiffest.max(directed + across);
-        self.most_damped = sums.damping.largest_eigenvalue_beyond(self.most_damped);
-        self.forbid_unless_finite(sums.anywhere);
+    /// Those of a node wherever it and its neighbours are; `None`: it is pinned.
+    pub fn anywhere(node: usize, springs: &dyn Springs, masses: &Masses) -> Option<Self> {
+        let inverse_mass = masses.inverse(node);
+        let mut rates = Self::ZERO;
+        springs.visit(node, &mut |link| {
+            let inverse_mass = inverse_mass + masses.inverse(link.neighbour as usize);
+            rates.stiffest += link.stiffness * inverse_mass;
+            rates.most_damped += link.damping * inverse_mass;
+        });
+        (inverse_mass > 0.0).then_some(rates)
     }
+}
 
-    /// Takes in a node's rates.
-    fn take_rates(&mut self, rates: Self) {
-        self.stiffest = self.stiffest.max(rates.stiffest);
-        self.most_damped = self.most_damped.max(rates.most_damped);
-        self.forbid_unless_finite(rates);
-    }
+/// The masses of a body as they are, whatever is added to them.
+#[derive(Clone, Copy)]
+pub(crate) struct Masses<'a> {
+    /// kg
+    pub masses: &'a [f32],
+    /// 0 for nodes that are pinned.
+    pub inverse_masses: &'a [f32],
+}
 
-    /// Springs beyond the range of `f32` allow no substep at all.
-    fn forbid_unless_finite(&mut self, rates: Self) {
-        if !(rates.stiffest.is_finite() && rates.most_damped.is_finite()) {
-            self.stiffest = f32::INFINITY;
+impl Masses<'_> {
+    /// 1/kg, 0 for a node that is pinned.
+    #[inline(always)]
+    pub fn inverse(&self, node: usize) -> f32 {
+        if self.inverse_masses[node] > 0.0 {
+            1.0 / self.masses[node]
+        } else {
+            0.0
         }
     }
 }
 
-/// What is known about the longest stable substep of a body.
+/// What is known about the longest stable substep of a body, with its masses as they are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stability {
-    /// At the positions of the last estimate; `None`: not estimated since the body's masses or pins changed.
-    now: Option<Rates>,
-    /// Wherever the nodes are.
-    anywhere: Rates,
+    /// The limit at the positions of the last estimate, s; `None`: not estimated since the body's masses or pins changed.
+    now: Option<f32>,
+    /// The limit wherever the nodes are, s.
+    anywhere: f32,
     /// How far neighbours may still move against each other before the estimate is stale, m.
     reach: f32,
 }
@@ -75,18 +88,18 @@ pub(crate) struct Stability {
 impl Stability {
     pub const UNKNOWN: Self = Self {
         now: None,
-        anywhere: Rates::ZERO,
+        anywhere: 0.0,
         reach: 0.0,
     };
 
     /// The longest stable substep, s, where it is known.
     pub fn limit(&self) -> Option<f32> {
-        self.now.map(Rates::limit)
+        self.now
     }
 
     /// The longest substep that is stable wherever the nodes are, s, where `limit` is known.
     pub fn limit_anywhere(&self) -> f32 {
-        self.anywhere.limit()
+        self.anywhere
     }
 
     /// Whether the estimate still holds after neighbours have moved against each other by up to `travel` more.
@@ -106,7 +119,7 @@ impl Stability {
 
     /// The same estimate, where `substep` is so short that the nodes may be anywhere: an estimate that never gets stale.
     pub fn for_short(self, substep: f32) -> Option<Self> {
-        (self.now.is_some() && substep <= self.limit_anywhere()).then_some(Self {
+        (self.now.is_some() && substep <= self.anywhere).then_some(Self {
             now: Some(self.anywhere),
             reach: f32::INFINITY,
             ..self
@@ -115,63 +128,102 @@ impl Stability {
 
     /// Whether another estimate may allow longer substeps at the positions as they are now.
     pub fn is_coarse(&self) -> bool {
-        self.reach == f32::INFINITY && self.now.is_some_and(|rates| rates.limit().is_finite())
+        self.reach == f32::INFINITY && self.now.is_some_and(f32::is_finite)
     }
 
-    /// The longest stable substep at these positions, and how long that is true.
-    pub fn estimate(springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
-        let mut now = Rates::ZERO;
-        let mut anywhere = Rates::ZERO;
-        let mut reach = f32::INFINITY;
-        for node in 0..inverse_masses.len() {
-            if let Some(sums) = Sums::of(node, springs, inverse_masses, positions) {
-                now.take(&sums);
-                anywhere.take_rates(sums.anywhere);
-                // Nothing that moves can make a node matter whose springs are too weak even together.
-                if sums.may_exceed(&now) {
-                    reach = reach.min(sums.shortest);
+    /// The same, where the limit is found to be no longer than `limit`, s.
+    pub fn shortened_to(self, limit: f32) -> Self {
+        Self {
+            now: self.now.map(|now| now.min(limit)),
+            ..self
+        }
+    }
+
+    /// The longest stable substep at these positions, and how long that is true. `watched` are up to date.
+    ///
+    /// Where the watched nodes show a limit that no other node can go below, wherever it is, no other is looked at.
+    pub fn estimate(springs: &dyn Springs, masses: Masses, positions: &Vectors, watched: &Watched) -> Self {
+        let mut found = Found {
+            limit: f32::INFINITY,
+            shortest: f32::INFINITY,
+        };
+        for candidate in watched.candidates() {
+            if candidate.limit >= found.limit {
+                break;
+            }
+            if let Some(sums) = Sums::of(candidate.node as usize, springs, &masses, positions) {
+                found.take(&sums);
+            }
+        }
+        if watched.limit_of_others() < found.limit {
+            for node in 0..masses.masses.len() {
+                if let Some(sums) = Sums::of(node, springs, &masses, positions) {
+                    found.take(&sums);
                 }
             }
         }
         Self {
-            now: Some(now),
-            anywhere,
-            reach: TRAVEL_BEFORE_ESTIMATE * reach,
+            now: Some(found.limit),
+            anywhere: watched.limit(),
+            reach: TRAVEL_BEFORE_ESTIMATE * found.shortest,
         }
     }
 
     /// The same after these nodes got another spring: no other node has to be looked at.
-    pub fn joined(self, nodes: [u32; 2], springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Self {
-        let Some(mut now) = self.now else {
+    pub fn joined(
+        self,
+        nodes: [u32; 2],
+        springs: &dyn Springs,
+        masses: Masses,
+        positions: &Vectors,
+        watched: &mut Watched,
+    ) -> Self {
+        let Some(now) = self.now else {
             return self;
         };
-        let mut joined = self;
+        let mut found = Found {
+            limit: now,
+            shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
+        };
         for node in nodes {
-            let Some(sums) = Sums::of(node as usize, springs, inverse_masses, positions) else {
+            let Some(sums) = Sums::of(node as usize, springs, &masses, positions) else {
                 continue;
             };
-            joined.anywhere.take_rates(sums.anywhere);
+            watched.insert(node, sums.anywhere.limit());
             if self.is_coarse() {
-                now.take_rates(sums.anywhere);
-                continue;
-            }
-            now.take(&sums);
-            if sums.may_exceed(&now) {
-                joined.reach = joined.reach.min(TRAVEL_BEFORE_ESTIMATE * sums.shortest);
+                found.limit = found.limit.min(sums.anywhere.limit());
+            } else {
+                found.take(&sums);
             }
         }
-        joined.now = Some(now);
-        joined
+        Self {
+            now: Some(found.limit),
+            anywhere: watched.limit(),
+            reach: TRAVEL_BEFORE_ESTIMATE * found.shortest,
+        }
     }
 
     /// What the next step depends on.
-    pub fn floats(&self) -> [f32; 5] {
-        let now = self.now.unwrap_or(Rates {
-            stiffest: -1.0,
-            most_damped: -1.0,
-        });
-        let Rates { stiffest, most_damped } = self.anywhere;
-        [now.stiffest, now.most_damped, stiffest, most_damped, self.reach]
+    pub fn floats(&self) -> [f32; 3] {
+        [self.now.unwrap_or(-1.0), self.anywhere, self.reach]
+    }
+}
+
+/// What the nodes show that have been looked at.
+struct Found {
+    /// s
+    limit: f32,
+    /// The shortest length over which the matrix of a node changes that may set the limit, m.
+    shortest: f32,
+}
+
+impl Found {
+    /// Takes a node in. Nothing that moves can make a node matter whose springs are too weak even together.
+    fn take(&mut self, sums: &Sums) {
+        if sums.anywhere.limit() < self.limit {
+            self.limit = self.limit.min(sums.limit_below(self.limit));
+            self.shortest = self.shortest.min(sums.shortest);
+        }
     }
 }
 
@@ -191,8 +243,8 @@ struct Sums {
 
 impl Sums {
     /// `None`: the node is pinned.
-    fn of(node: usize, springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors) -> Option<Self> {
-        let inverse_mass = inverse_masses[node];
+    fn of(node: usize, springs: &dyn Springs, masses: &Masses, positions: &Vectors) -> Option<Self> {
+        let inverse_mass = masses.inverse(node);
         if inverse_mass == 0.0 {
             return None;
         }
@@ -207,7 +259,7 @@ impl Sums {
         springs.visit(node, &mut |link| {
             let neighbour = link.neighbour as usize;
             let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
-            let inverse_mass = inverse_mass + inverse_masses[neighbour];
+            let inverse_mass = inverse_mass + masses.inverse(neighbour);
             let stiffness = link.stiffness * inverse_mass;
             sums.anywhere.stiffest += stiffness;
             // Stretched to twice its rest length a spring is half as stiff across as along, and so on: only the rest
@@ -232,9 +284,20 @@ impl Sums {
         Some(sums)
     }
 
-    /// Whether the node can get rates beyond these by moving.
-    fn may_exceed(&self, rates: &Rates) -> bool {
-        self.anywhere.stiffest > rates.stiffest || self.anywhere.most_damped > rates.most_damped
+    /// The longest substep that is stable for the node where it is, s, or anything from `known` on where it is no shorter.
+    fn limit_below(&self, known: f32) -> f32 {
+        let bound = Rates {
+            stiffest: self.along.eigenvalue_bound() + self.across,
+            most_damped: self.damping.eigenvalue_bound(),
+        };
+        if bound.limit() >= known {
+            return known;
+        }
+        Rates {
+            stiffest: self.along.largest_eigenvalue() + self.across,
+            most_damped: self.damping.largest_eigenvalue(),
+        }
+        .limit()
     }
 }
 
@@ -255,21 +318,31 @@ impl Symmetric {
         self.off_diagonal += Vec3::new(scaled.y * vector.z, scaled.z * vector.x, scaled.x * vector.y);
     }
 
-    /// The larger of `known` and the largest eigenvalue; its exact value is computed only where a simple bound does
-    /// not rule it out (Smith 1961).
-    fn largest_eigenvalue_beyond(&self, known: f32) -> f32 {
-        let mean = self.diagonal.element_sum() / 3.0;
-        let deviation = self.diagonal - mean;
-        let p = ((deviation.length_squared() + 2.0 * self.off_diagonal.length_squared()) / 6.0).sqrt();
-        if mean + 2.0 * p <= known {
-            return known;
-        }
+    /// What the largest eigenvalue is at most.
+    fn eigenvalue_bound(&self) -> f32 {
+        self.mean() + 2.0 * self.spread()
+    }
+
+    /// A third of the sum of the eigenvalues.
+    fn mean(&self) -> f32 {
+        self.diagonal.element_sum() / 3.0
+    }
+
+    /// How far apart the eigenvalues are: none is further than twice that from their mean.
+    fn spread(&self) -> f32 {
+        let deviation = self.diagonal - self.mean();
+        ((deviation.length_squared() + 2.0 * self.off_diagonal.length_squared()) / 6.0).sqrt()
+    }
+
+    /// The largest eigenvalue (Smith 1961).
+    fn largest_eigenvalue(&self) -> f32 {
+        let (mean, p) = (self.mean(), self.spread());
         if p == 0.0 {
             return mean;
         }
-        let (d, o) = (deviation / p, self.off_diagonal / p);
+        let (d, o) = ((self.diagonal - mean) / p, self.off_diagonal / p);
         let determinant = d.x * (d.y * d.z - o.x * o.x) - o.z * (o.z * d.z - o.x * o.y) + o.y * (o.z * o.x - d.y * o.y);
         let cosine = (0.5 * determinant).clamp(-1.0, 1.0);
-        known.max(mean + 2.0 * p * libm::cosf(libm::acosf(cosine) / 3.0))
+        mean + 2.0 * p * libm::cosf(libm::acosf(cosine) / 3.0)
     }
 }

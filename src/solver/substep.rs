@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::{Body, InverseMasses, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
+use crate::body::{Body, Inertia, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -65,19 +65,14 @@ impl Part {
     }
 
     /// The kick, without forces from outside.
-    pub fn kick<'a>(
-        &self,
-        gravity: Vec3,
-        inverse_masses: InverseMasses<'a>,
-        damping: Option<&'a NodeDamping>,
-    ) -> Kick<'a> {
+    pub fn kick<'a>(&self, gravity: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
         Kick {
             duration: self.duration,
             substep: self.substep,
             half: self.half,
             gravity,
             fall: self.fall,
-            inverse_masses,
+            inertia,
             applied: None,
             damping,
         }
@@ -117,11 +112,11 @@ impl Part {
 /// they are led.
 pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, team: &Team) -> Survey {
     let node_count = body.node_count();
-    let inverse_masses = InverseMasses::of(body.uniform_inverse_mass, &body.inverse_masses);
+    let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
     let kick = Kick {
         applied: body.applied.as_ref().filter(|_| body.forces_applied),
-        ..part.kick(request.gravity, inverse_masses, body.damping.as_ref())
+        ..part.kick(request.gravity, inertia, body.damping.as_ref())
     };
     let tiles = tile_count(node_count);
     if part.before == Before::Open

@@ -33,22 +33,26 @@ pub(super) struct Taken {
     pub finite: bool,
 }
 
-/// Takes the step with exactly `substeps` substeps. After `middle` of them a world with a tolerance looks at it.
+/// Takes the step with exactly `substeps` substeps, with masses made for substeps of `masses_for` seconds; 0: as they are. After `middle` of them a world with a tolerance looks at it.
 pub(super) fn run(
     body: &mut Body,
     request: &StepRequest,
     substeps: u32,
     middle: u32,
     start: Carry,
+    masses_for: f32,
     team: &Team,
 ) -> Result<Taken, TooLong> {
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-    check(&start.stability, substep)?;
+    if masses_for == 0.0 {
+        check(&start.stability, substep)?;
+    }
     let mut step = Step {
         request,
         substeps,
         substep,
         middle,
+        masses_for,
         team,
         pipeline: None,
     };
@@ -77,6 +81,8 @@ struct Step<'a> {
     /// s
     substep: f32,
     middle: u32,
+    /// The substep that masses are made for, s; 0: they are as they are.
+    masses_for: f32,
     team: &'a Team<'a>,
     pipeline: Option<Plan>,
 }
@@ -95,7 +101,7 @@ impl Step<'_> {
         let mut finite = true;
         begin(body, request);
         let may_stay_open = may_stay_open(body);
-        let mut part = opening(body, request, substep, &mut carry, team);
+        let mut part = self.opening(body, &mut carry);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);
         }
@@ -115,7 +121,7 @@ impl Step<'_> {
             if let (2.., Some(plan)) = (depth, self.pipeline) {
                 let surveys = pipeline::run(body, request, parts, plan, team);
                 for survey in &surveys[..depth - 1] {
-                    if !carry.stability.holds_after(substep * diagonal(&survey.velocities)) {
+                    if !self.is_stable_after(&mut carry.stability, &survey.velocities) {
                         match carry.stability.for_short(substep) {
                             Some(anywhere) => carry.stability = anywhere,
                             None => return Ok(None),
@@ -136,14 +142,12 @@ impl Step<'_> {
             {
                 coarse.pass_middle(body.state.newest().0);
             }
-            if !carry
-                .stability
-                .holds_after(substep * diagonal(&carry.gravity.velocities))
-            {
-                carry.stability = carry.stability.for_short(substep).unwrap_or_else(|| {
-                    let positions = body.state.newest().0;
-                    Stability::estimate(&*body.springs, &body.inverse_masses, positions)
-                });
+            let velocities = carry.gravity.velocities;
+            if !self.is_stable_after(&mut carry.stability, &velocities) {
+                carry.stability = carry
+                    .stability
+                    .for_short(substep)
+                    .unwrap_or_else(|| body.estimate(body.state.newest().0));
                 check(&carry.stability, substep)?;
             }
         }
@@ -164,6 +168,38 @@ impl Step<'_> {
         Ok(Some(Taken { carry, finite }))
     }
 
+    /// Whether what is known of stability still holds after a substep with velocities in this box. Masses that were made for
+    /// the substep are enough wherever nodes go.
+    fn is_stable_after(&self, stability: &mut Stability, velocities: &Bounds) -> bool {
+        self.masses_for > 0.0 || stability.holds_after(self.substep * diagonal(velocities))
+    }
+
+    /// The first kick: the half that opens the step, together with the half that closes the last where that was left open.
+    fn opening(&self, body: &mut Body, carry: &mut Carry) -> Part {
+        let Self {
+            request, substep, team, ..
+        } = *self;
+        let mut part = Part::opening(substep);
+        let mut change = request.gravity.as_dvec3() * f64::from(part.duration);
+        let same_masses = carry.masses_for == self.masses_for;
+        body.use_masses_for(carry.masses_for);
+        match carry.closing.take() {
+            None => {}
+            Some(closing) if same_masses && closing.joins(body, substep, request.gravity) => {
+                part.join(&closing);
+                change += closing.fall();
+            }
+            Some(closing) => {
+                close_aside(body, &closing, &mut carry.gravity, team);
+                part.before = Before::Closed;
+            }
+        }
+        body.use_masses_for(self.masses_for);
+        carry.masses_for = self.masses_for;
+        part.fall = carry.gravity.next(change);
+        part
+    }
+
     /// How many substeps are taken next in one go: as many as a pipeline takes, in even parts, where the substep is stable
     /// wherever the nodes are, else as the motion is known to be stable for if it does not become twice as fast.
     fn depth(&self, index: u32, carry: &Carry) -> usize {
@@ -172,7 +208,7 @@ impl Step<'_> {
         };
         let left = (self.substeps - index) as usize;
         let depth = left.div_ceil(left.div_ceil(plan.depth));
-        if carry.stability.for_short(self.substep).is_some() {
+        if self.masses_for > 0.0 || carry.stability.for_short(self.substep).is_some() {
             return depth;
         }
         let travel = 2.0 * self.substep * diagonal(&carry.gravity.velocities);
@@ -196,25 +232,6 @@ fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, 
     } else {
         survey.finite
     }
-}
-
-/// The first kick of a step: the half that opens it, together with the half that closes the last where that was left open.
-fn opening(body: &mut Body, request: &StepRequest, substep: f32, carry: &mut Carry, team: &Team) -> Part {
-    let mut part = Part::opening(substep);
-    let mut change = request.gravity.as_dvec3() * f64::from(part.duration);
-    match carry.closing.take() {
-        None => {}
-        Some(closing) if closing.joins(body, substep, request.gravity) => {
-            part.join(&closing);
-            change += closing.fall();
-        }
-        Some(closing) => {
-            close_aside(body, &closing, &mut carry.gravity, team);
-            part.before = Before::Closed;
-        }
-    }
-    part.fall = carry.gravity.next(change);
-    part
 }
 
 /// Starts the step over, from what is current.

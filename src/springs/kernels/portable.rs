@@ -47,21 +47,15 @@ impl Lanes for PortableLanes {
     #[inline(always)]
     unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
         // SAFETY: the caller's promise.
-        from_fn(|axis| {
-            Self(from_fn(|lane| unsafe {
-                (*base.wrapping_add(*indices.add(lane) as usize)).0[axis]
-            }))
-        })
+        let record = |lane: usize| unsafe { *base.wrapping_add(*indices.add(lane) as usize) };
+        from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
     }
 
     #[inline(always)]
     unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
         // SAFETY: the caller's promise.
-        from_fn(|axis| {
-            Self(from_fn(|lane| unsafe {
-                (*base.wrapping_add(usize::from(*indices.add(lane)))).0[axis]
-            }))
-        })
+        let record = |lane: usize| unsafe { *base.wrapping_add(usize::from(*indices.add(lane))) };
+        from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
     }
 
     #[inline(always)]

@@ -1,0 +1,251 @@
+//! Selective mass scaling: the few nodes whose springs would make substeps short are made heavier, as explicit
+//! finite-element codes do (Belytschko, Liu, Moran 2000, section 6.2).
+//!
+//! With `q(x_i - x_j) <= 2 q(x_i) + 2 q(x_j)` for the form of every spring, leapfrog is stable for a substep `h` where
+//! each node has at least the mass `h (h S / 2 + C)`, with S and C the sums of its springs' stiffnesses and dampings:
+//! wherever the nodes are, so that nothing has to be estimated on the way. Inertia grows and weight does not.
+
+use crate::body::NodeDamping;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::Springs;
+
+/// What is left of the substeps where mass is added, at most: for less the motion is not changed.
+const WORTH_ADDING: f64 = 0.75;
+
+/// The part of the longest stable substep that is used: more than where the limit is an estimate that motion can overtake,
+/// because this one holds wherever nodes go, and is reached only where all springs of a node point one way.
+const RESERVE: f64 = 0.9;
+
+/// Bodies that could not take steps so many times as long are not prepared for it.
+const WORTH_KEEPING: f64 = 1.125;
+
+/// A node that may be made heavier.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sliver {
+    pub node: u32,
+    /// The sum over its springs, N/m.
+    stiffness: f32,
+    /// N s/m, along them.
+    damping: f32,
+    /// Its damping over its mass as it is, 1/s.
+    rate: f32,
+    /// By how much it is heavier now, kg.
+    pub added: f32,
+}
+
+impl Sliver {
+    /// The mass that makes a substep of `step` seconds stable, kg.
+    fn needs(&self, step: f64) -> f64 {
+        step * (0.5 * step * f64::from(self.stiffness) + f64::from(self.damping))
+    }
+
+    /// The longest substep that is stable with this mass, s.
+    fn longest_step(&self, mass: f64) -> f64 {
+        let damping = f64::from(self.damping);
+        2.0 * mass / (damping + (damping * damping + 2.0 * mass * f64::from(self.stiffness)).sqrt())
+    }
+
+    /// Takes the sums over its springs anew.
+    fn add_up(&mut self, springs: &dyn Springs) {
+        (self.stiffness, self.damping) = (0.0, 0.0);
+        springs.visit(self.node as usize, &mut |link| {
+            self.stiffness += link.stiffness;
+            self.damping += link.damping;
+        });
+    }
+}
+
+/// What of a body becomes heavier.
+pub(crate) struct Heavier<'a> {
+    pub masses: &'a [f32],
+    /// 0 for nodes that are pinned.
+    pub inverse_masses: &'a mut [f32],
+    pub uniform_inverse_mass: &'a mut Option<f32>,
+    pub damping: Option<&'a mut NodeDamping>,
+}
+
+/// The nodes of a body that may be made heavier.
+#[derive(Debug)]
+pub(crate) struct MassScaling {
+    /// kg, in all.
+    most: f64,
+    /// The inverse mass of every node as it is, where they all have the same.
+    uniform_inverse_mass: Option<f32>,
+    /// In the order of their nodes.
+    slivers: Vec<Sliver>,
+    /// No other node needs mass for shorter substeps, s.
+    complete_to: f64,
+    /// The substep that masses are made for, s; 0: they are as they are.
+    step: f32,
+}
+
+impl MassScaling {
+    /// Finds the nodes of a body that are to be made heavier where it takes the longest substeps that `fraction` of its mass
+    /// can make stable; `None`: that is no gain.
+    pub fn new(
+        springs: &dyn Springs,
+        masses: &[f32],
+        uniform_inverse_mass: Option<f32>,
+        damping: Option<&NodeDamping>,
+        fraction: f32,
+    ) -> Result<Option<Self>> {
+        let total: f64 = masses.iter().map(|&mass| f64::from(mass)).sum();
+        let most = f64::from(fraction) * total;
+        let mut nodes = memory::reserved(masses.len())?;
+        for (node, &mass) in (0..).zip(masses) {
+            let mut sliver = Sliver {
+                node,
+                stiffness: 0.0,
+                damping: 0.0,
+                rate: damping.map_or(0.0, |damping| damping.rates()[node as usize]),
+                added: 0.0,
+            };
+            if mass > 0.0 {
+                sliver.add_up(springs);
+                nodes.push((sliver.longest_step(f64::from(mass)), sliver));
+            }
+        }
+        nodes.sort_unstable_by(|(a, one), (b, other)| a.total_cmp(b).then(one.node.cmp(&other.node)));
+        let Some(&(first, _)) = nodes.first() else {
+            return Ok(None);
+        };
+        // What the nodes before need for the step that a node can do with.
+        let (mut stiffness, mut dampings, mut mass) = (0.0, 0.0, 0.0);
+        let mut count = 0;
+        let mut complete_to = first;
+        for &(step, sliver) in &nodes {
+            // A negated comparison, so that what is not a number ends it too.
+            if !(step * (0.5 * step * stiffness + dampings) - mass <= most && step < f64::INFINITY) {
+                break;
+            }
+            complete_to = step;
+            stiffness += f64::from(sliver.stiffness);
+            dampings += f64::from(sliver.damping);
+            mass += f64::from(masses[sliver.node as usize]);
+            count += 1;
+        }
+        if count == 0 || !(complete_to >= WORTH_KEEPING * first) {
+            return Ok(None);
+        }
+        let mut slivers = memory::reserved(count)?;
+        slivers.extend(nodes[..count].iter().map(|&(_, sliver)| sliver));
+        slivers.sort_unstable_by_key(|sliver| sliver.node);
+        Ok(Some(Self {
+            most,
+            uniform_inverse_mass,
+            slivers,
+            complete_to,
+            step: 0.0,
+        }))
+    }
+
+    /// The substep that masses are made for, s; 0: they are as they are.
+    pub fn step(&self) -> f32 {
+        self.step
+    }
+
+    /// What is added now, kg.
+    pub fn added_mass(&self) -> f64 {
+        self.slivers.iter().map(|sliver| f64::from(sliver.added)).sum()
+    }
+
+    /// All nodes that may be made heavier.
+    pub fn slivers(&self) -> &[Sliver] {
+        &self.slivers
+    }
+
+    /// Those of the nodes that may be heavier now.
+    pub fn heavier(&self) -> &[Sliver] {
+        if self.step > 0.0 { &self.slivers } else { &[] }
+    }
+
+    /// In how few substeps a step of `dt` seconds can be taken, and for what substep masses are to be made; `None`: that
+    /// saves too little of the `needed` ones.
+    pub fn fewer_substeps(&self, dt: f32, needed: f64, masses: &[f32], inverse_masses: &[f32]) -> Option<(u32, f32)> {
+        let longest = f64::from(dt) / RESERVE;
+        let fits = |substeps: u32| {
+            let step = longest / f64::from(substeps);
+            step <= self.complete_to && self.would_add(step, masses, inverse_masses) <= self.most
+        };
+        let worth = (WORTH_ADDING * needed).floor().min(f64::from(u32::MAX)) as u32;
+        if worth == 0 || !fits(worth) {
+            return None;
+        }
+        let (mut too_few, mut enough) = (0, worth);
+        while enough - too_few > 1 {
+            let middle = too_few + (enough - too_few) / 2;
+            if fits(middle) {
+                enough = middle;
+            } else {
+                too_few = middle;
+            }
+        }
+        Some((enough, (longest / f64::from(enough)) as f32))
+    }
+
+    /// What would be added for this substep, kg.
+    fn would_add(&self, step: f64, masses: &[f32], inverse_masses: &[f32]) -> f64 {
+        let free = self
+            .slivers
+            .iter()
+            .filter(|sliver| inverse_masses[sliver.node as usize] > 0.0);
+        free.map(|sliver| (sliver.needs(step) - f64::from(masses[sliver.node as usize])).max(0.0))
+            .sum()
+    }
+
+    /// Makes masses those for a substep of `step` seconds; 0: as they are.
+    pub fn apply(&mut self, step: f32, body: Heavier) {
+        self.step = step;
+        *body.uniform_inverse_mass = self.uniform_inverse_mass.filter(|_| step == 0.0);
+        let mut damping = body.damping;
+        for sliver in &mut self.slivers {
+            let node = sliver.node as usize;
+            let mass = body.masses[node];
+            sliver.added = 0.0;
+            if body.inverse_masses[node] > 0.0 {
+                let heavier = mass.max(sliver.needs(f64::from(step)) as f32);
+                sliver.added = heavier - mass;
+                body.inverse_masses[node] = 1.0 / heavier;
+                if let Some(damping) = &mut damping {
+                    damping.set_rate(node, sliver.rate * (mass / heavier));
+                }
+            }
+        }
+    }
+
+    /// Whether one of these nodes may be made heavier.
+    pub fn concerns(&self, nodes: [u32; 2]) -> bool {
+        nodes.into_iter().any(|node| self.find(node).is_ok())
+    }
+
+    /// Makes room for so many nodes more.
+    pub fn reserve(&mut self, nodes: usize) -> Result<()> {
+        Ok(self.slivers.try_reserve(nodes)?)
+    }
+
+    /// Sees that the springs of this node have changed; room for it has been made where they are more.
+    pub fn change(&mut self, node: u32, springs: &dyn Springs, masses: &[f32], rates: Option<&[f32]>) {
+        match self.find(node) {
+            Ok(place) => self.slivers[place].add_up(springs),
+            Err(place) => {
+                let mut sliver = Sliver {
+                    node,
+                    stiffness: 0.0,
+                    damping: 0.0,
+                    rate: rates.map_or(0.0, |rates| rates[node as usize]),
+                    added: 0.0,
+                };
+                sliver.add_up(springs);
+                let mass = f64::from(masses[node as usize]);
+                if mass > 0.0 && sliver.longest_step(mass) < self.complete_to {
+                    self.slivers.insert(place, sliver);
+                }
+            }
+        }
+    }
+
+    fn find(&self, node: u32) -> std::result::Result<usize, usize> {
+        self.slivers.binary_search_by_key(&node, |sliver| sliver.node)
+    }
+}

@@ -1,0 +1,118 @@
+//! The nodes that set the longest stable substep: of a mesh with slivers, a few in a hundred.
+//!
+//! How stiff the springs of a node can be together wherever it goes does not change as it moves. So those that can be
+//! stiffest are found once, and an estimate looks at them from the stiffest on until no other can matter.
+
+use super::stability::{Masses, Rates};
+use crate::error::Result;
+use crate::memory;
+use crate::springs::Springs;
+
+/// One node in so many is watched.
+const SHARE: usize = 16;
+
+/// A node, and the longest substep that is stable for it wherever it and its neighbours are, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    pub limit: f32,
+    pub node: u32,
+}
+
+impl Candidate {
+    fn before(&self, other: &Self) -> std::cmp::Ordering {
+        let limits = self.limit.total_cmp(&other.limit);
+        limits.then(self.node.cmp(&other.node))
+    }
+}
+
+/// The nodes of a body that come first if one of them becomes unstable.
+#[derive(Debug)]
+pub(crate) struct Watched {
+    /// Those with the shortest limits first. There is room for twice as many as are watched.
+    candidates: Vec<Candidate>,
+    most: usize,
+    /// What the limit of any other node is at least, s.
+    others: f32,
+}
+
+impl Watched {
+    /// Room for the watched nodes of a body; none are yet.
+    pub fn new(node_count: usize) -> Result<Self> {
+        let most = node_count.div_ceil(SHARE);
+        Ok(Self {
+            candidates: memory::reserved(2 * most)?,
+            most,
+            others: f32::INFINITY,
+        })
+    }
+
+    pub(super) fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+
+    /// The longest substep that is stable for all nodes wherever they are, s.
+    pub(super) fn limit(&self) -> f32 {
+        self.candidates.first().map_or(f32::INFINITY, |first| first.limit)
+    }
+
+    /// What the limit of any node that is not watched is at least, s.
+    pub(super) fn limit_of_others(&self) -> f32 {
+        self.others
+    }
+
+    /// Finds the nodes to be watched, after masses or pins have changed.
+    pub fn gather(&mut self, springs: &dyn Springs, masses: Masses) {
+        self.candidates.clear();
+        self.others = f32::INFINITY;
+        for node in 0..masses.masses.len() {
+            if let Some(rates) = Rates::anywhere(node, springs, &masses) {
+                let limit = rates.limit();
+                if limit < self.others {
+                    self.candidates.push(Candidate {
+                        limit,
+                        node: node as u32,
+                    });
+                }
+                if self.candidates.len() == 2 * self.most {
+                    self.keep_first();
+                }
+            }
+        }
+        self.keep_first();
+        self.candidates.sort_unstable_by(Candidate::before);
+    }
+
+    /// Keeps as many as are watched.
+    fn keep_first(&mut self) {
+        if self.candidates.len() > self.most {
+            self.candidates.select_nth_unstable_by(self.most, Candidate::before);
+            self.others = self.candidates[self.most].limit;
+            self.candidates.truncate(self.most);
+        }
+    }
+
+    /// Has a node that is not pinned among them, with this limit, if it belongs there.
+    pub(super) fn insert(&mut self, node: u32, limit: f32) {
+        self.candidates.retain(|candidate| candidate.node != node);
+        if self.candidates.len() == self.most
+            && let Some(last) = self.candidates.pop_if(|last| limit < last.limit)
+        {
+            self.others = self.others.min(last.limit);
+        }
+        if self.candidates.len() < self.most {
+            let candidate = Candidate { limit, node };
+            let place = self
+                .candidates
+                .partition_point(|other| other.before(&candidate).is_lt());
+            self.candidates.insert(place, candidate);
+        } else {
+            self.others = self.others.min(limit);
+        }
+    }
+
+    /// What the next step depends on.
+    pub fn floats(&self) -> impl Iterator<Item = f32> {
+        let limits = self.candidates.iter().map(|candidate| candidate.limit);
+        limits.chain([self.others])
+    }
+}
