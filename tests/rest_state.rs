@@ -58,7 +58,10 @@ fn a_chain_hangs_as_far_whatever_its_solver_and_storage() {
             // The pin carries all.
             let held = scene.body().pin_force(0).expect("a pin");
             let weight = 0.01 * 9.81 * count as f32;
-            assert!((held.y / weight - 1.0).abs() < 1e-5 && held.x.abs() < 1e-5 * weight, "{held}");
+            assert!(
+                (held.y / weight - 1.0).abs() < 1e-5 && held.x.abs() < 1e-5 * weight,
+                "{held}"
+            );
         }
     }
 }
@@ -150,8 +153,14 @@ fn bad_starts_fall_in_energy_to_where_no_force_is_left() {
         let before = scene.energy();
         let report = settle(&mut scene);
         let after = scene.energy();
-        assert!(after < before && report.energy_after < report.energy_before, "{name}: {report:?}");
-        assert!((report.energy_before / before - 1.0).abs() < 1e-4, "{name}: {before} J, {report:?}");
+        assert!(
+            after < before && report.energy_after < report.energy_before,
+            "{name}: {report:?}"
+        );
+        assert!(
+            (report.energy_before / before - 1.0).abs() < 1e-4,
+            "{name}: {before} J, {report:?}"
+        );
         // What rounding positions by 1e-8 m does to the forces of twenty springs of 20 N/m.
         assert!(report.residual < 4e-6, "{name}: {report:?}");
         let left = forces_left(&scene, &parts);
@@ -238,7 +247,10 @@ fn what_has_no_rest_or_is_not_found_is_refused_and_nothing_changes() {
     let mut scene = Scene::new(&hanging_chain(100), HANGING);
     scene.step(0.01);
     let hash = scene.world.state_hash();
-    let few = RestStateDefinition { iterations: 3, ..DEFAULT };
+    let few = RestStateDefinition {
+        iterations: 3,
+        ..DEFAULT
+    };
     let refused = scene.world.rest_state(scene.id, &few);
     assert!(matches!(refused, Err(Error::NotConverged(_))), "{refused:?}");
     for tolerance in [-1.0, f32::NAN, f32::INFINITY] {

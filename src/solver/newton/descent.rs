@@ -18,6 +18,10 @@ const PART: f64 = 0.01;
 /// The part of what the slope promises that a way must bring (Armijo 1966).
 const ENOUGH: f64 = 1e-4;
 
+/// Where a way brings more than this part of what was promised, the function bends less than the matrix says: it is worth
+/// going on.
+const MORE: f64 = 1.3;
+
 /// What rounding makes of a sum, as a part of its terms.
 const ROUNDING: f64 = 1e-13;
 
@@ -97,19 +101,17 @@ impl Descent {
             ..Found::default()
         };
         let mut shift = goal.shift;
-        // Iterations that do without the exact matrix: more each time it was found indefinite.
-        let (mut clamped, mut penalty) = (0_u32, 1_u32);
         let mut vain = 0;
         let mut farthest = 0.0_f64;
         while found.iterations < goal.iterations && found.products < goal.budget {
             found.iterations += 1;
             self.weigh();
-            let tangent = if clamped > 0 { Tangent::Clamped } else { Tangent::Exact };
-            clamped = clamped.saturating_sub(1);
-            if self.correct(tangent, shift, PART, goal, &mut found) {
-                clamped = penalty;
-                penalty = (2 * penalty).min(64);
-                self.correct(Tangent::Clamped, shift, PART, goal, &mut found);
+            if self.correct(Tangent::Exact, shift, goal, &mut found) {
+                // First along the direction that bends down, then by a matrix that has none.
+                let length = longest(&self.gradient.corrections);
+                self.slide(if found.error.is_finite() { found.error } else { length });
+                self.weigh();
+                self.correct(Tangent::Clamped, shift, goal, &mut found);
             }
             let promised = dot(&self.residuals, &self.gradient.corrections);
             let size = longest(&self.gradient.corrections);
@@ -121,7 +123,7 @@ impl Descent {
             }
             let (gone, gain) = self.go(promised);
             farthest = farthest.max(longest(&self.equation.ways));
-            if gain > 0.75 && gone == 1.0 {
+            if gain > 0.75 && gone >= 1.0 {
                 shift *= 0.1;
             } else if gain < 0.25 || gone < 0.5 {
                 shift = (4.0 * shift).max(goal.next_shift);
@@ -129,12 +131,16 @@ impl Descent {
             if shift < goal.least_shift.max(1e-3 * goal.next_shift) {
                 shift = goal.least_shift;
             }
-            vain = if gone > 0.0 && size < 0.5 * found.error { 0 } else { vain + 1 };
-            found.error = size;
+            vain = if gone > 0.0 && size < 0.5 * found.error {
+                0
+            } else {
+                vain + 1
+            };
+            found.error = size * gone.max(1.0);
             let held_back = shift * self.inertia_of_correction();
-            let is_short = size <= goal.absolute.max(goal.relative * farthest);
+            let is_short = found.error <= goal.absolute.max(goal.relative * farthest);
             let is_noise = size <= goal.rounding && vain >= 3;
-            if (is_short && gone == 1.0 || is_noise) && held_back <= 0.1 * promised {
+            if (is_short && gone >= 1.0 || is_noise) && held_back <= 0.1 * promised {
                 found.converged = true;
                 break;
             }
@@ -154,7 +160,9 @@ impl Descent {
         // Numbers that look random, so that no direction is at right angles to them.
         let mut seed = 1_u64;
         let mut number = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
         };
         let right = |node: usize| {
@@ -168,29 +176,41 @@ impl Descent {
         if !solved.is_negative {
             return false;
         }
+        self.slide(length)
+    }
+
+    /// Goes along the direction that was found to bend down, `length` m at first, and on as long as the function falls; whether it
+    /// did.
+    fn slide(&mut self, length: f64) -> bool {
         let searches = &self.gradient.searches;
-        let mut part = length / longest(searches);
-        for _ in 0..40 {
-            let ways = [part, -part].map(|part| (self.equation.change(&self.network, searches, part)[0], part));
-            let (change, part_gone) = if ways[0].0 <= ways[1].0 { ways[0] } else { ways[1] };
-            if change < 0.0 {
-                for (way, search) in self.equation.ways.iter_mut().zip(searches) {
-                    *way += *search * part_gone;
-                }
-                return true;
+        let change = |part: f64| self.equation.change(&self.network, searches, part)[0];
+        let first = length / longest(searches);
+        let mut part = if change(first) <= change(-first) { first } else { -first };
+        let mut lowest = change(part);
+        for _ in 0..30 {
+            let is_falling = lowest < 0.0;
+            let next = if is_falling { 2.0 * part } else { 0.5 * part };
+            let change = change(next);
+            if is_falling && !(change < lowest) {
+                break;
             }
-            part *= 0.5;
+            (part, lowest) = (next, change);
         }
-        false
+        if !(lowest < 0.0) {
+            return false;
+        }
+        for (way, search) in self.equation.ways.iter_mut().zip(searches) {
+            *way += *search * part;
+        }
+        true
     }
 
     /// Solves the linearised equation; whether its matrix was found indefinite.
-    fn correct(&mut self, tangent: Tangent, shift: f64, part: f64, goal: &Goal, found: &mut Found) -> bool {
+    fn correct(&mut self, tangent: Tangent, shift: f64, goal: &Goal, found: &mut Found) -> bool {
         self.equation
             .assemble(&self.network, Tangent::Clamped, shift, &mut self.factor);
         factor::factorise(&mut self.factor, &self.network);
-        self.equation
-            .assemble(&self.network, tangent, shift, &mut self.matrix);
+        self.equation.assemble(&self.network, tangent, shift, &mut self.matrix);
         let (equation, residuals) = (&self.equation, &self.residuals);
         let right = |node: usize| {
             if equation.is_free(node) {
@@ -202,7 +222,7 @@ impl Descent {
         let budget = goal.budget.saturating_sub(found.products);
         let solved = self
             .gradient
-            .solve(&self.network, [&self.matrix, &self.factor], right, part, budget);
+            .solve(&self.network, [&self.matrix, &self.factor], right, PART, budget);
         found.products += solved.products;
         solved.is_negative
     }
@@ -216,21 +236,49 @@ impl Descent {
             let [change, terms] = self.equation.change(&self.network, corrections, part);
             let is_noise = change.abs() <= ROUNDING * terms;
             if change <= -ENOUGH * part * promised || is_noise {
+                let gain = if is_noise {
+                    1.0
+                } else {
+                    -change / (part * (1.0 - 0.5 * part) * promised)
+                };
+                if gain > MORE && part == 1.0 {
+                    part = self.go_on(change);
+                }
                 for (way, correction) in self.equation.ways.iter_mut().zip(corrections) {
                     *way += *correction * part;
                 }
-                let gain = if is_noise { 1.0 } else { -change / (part * (1.0 - 0.5 * part) * promised) };
                 return (part, gain);
             }
             // Where a parabola through what is known is lowest.
             let lowest = 0.5 * part * promised / (promised + change / part);
-            part = if lowest.is_finite() { lowest.clamp(0.1 * part, 0.5 * part) } else { 0.1 * part };
+            part = if lowest.is_finite() {
+                lowest.clamp(0.1 * part, 0.5 * part)
+            } else {
+                0.1 * part
+            };
         }
         (0.0, 0.0)
     }
 
+    /// How far along the correction the function goes on falling, in powers of two.
+    fn go_on(&self, change: f64) -> f64 {
+        let (mut part, mut lowest) = (1.0, change);
+        for _ in 0..30 {
+            let [change, _] = self
+                .equation
+                .change(&self.network, &self.gradient.corrections, 2.0 * part);
+            if !(change < lowest) {
+                break;
+            }
+            (part, lowest) = (2.0 * part, change);
+        }
+        part
+    }
+
     fn inertia_of_correction(&self) -> f64 {
         let corrections = self.gradient.corrections.iter().zip(&self.equation.masses);
-        corrections.map(|(correction, mass)| mass * correction.length_squared()).sum()
+        corrections
+            .map(|(correction, mass)| mass * correction.length_squared())
+            .sum()
     }
 }

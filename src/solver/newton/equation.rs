@@ -186,7 +186,10 @@ impl Equation {
             .map(|(_, node, link)| 0.5 * stiffness(link) * (self.spring(node, link).length - rest_length(link)).powi(2))
             .sum();
         let loads = self.loads.iter().enumerate();
-        elastic - loads.map(|(node, load)| load.dot(self.position(node) + origin)).sum::<f64>()
+        elastic
+            - loads
+                .map(|(node, load)| load.dot(self.position(node) + origin))
+                .sum::<f64>()
     }
 
     #[inline(always)]
@@ -197,8 +200,8 @@ impl Equation {
         // Where both are at the same place it points along x, from the node with the lower number, which is the neighbour.
         let direction = if length > 0.0 { way / length } else { DVec3::NEG_X };
         let speed = if self.rate > 0.0 {
-            let velocity = self.drifts[neighbour] - self.drifts[node]
-                + (self.ways[neighbour] - self.ways[node]) * self.rate;
+            let velocity =
+                self.drifts[neighbour] - self.drifts[node] + (self.ways[neighbour] - self.ways[node]) * self.rate;
             velocity.dot(direction)
         } else {
             0.0

@@ -53,8 +53,8 @@ fn symmetric(block: DMat3) -> DMat3 {
     (block + block.transpose()) * 0.5
 }
 
-/// Solves the factor's equation.
-pub(super) fn solve(factor: &Matrix, network: &Network, right: &[DVec3], solution: &mut [DVec3]) {
+/// Solves the factor's equation; `sums` are for the work.
+pub(super) fn solve(factor: &Matrix, network: &Network, right: &[DVec3], solution: &mut [DVec3], sums: &mut [DVec3]) {
     for node in 0..network.node_count() {
         let mut sum = right[node];
         for place in network.row(node) {
@@ -62,13 +62,19 @@ pub(super) fn solve(factor: &Matrix, network: &Network, right: &[DVec3], solutio
         }
         solution[node] = factor.diagonal[node] * sum;
     }
-    // Beside the diagonal of (D + U)^T stands the transposed: what is found at a node is taken off its neighbours before they
-    // are final, all of which have lower numbers.
+    // The rows of (D + U)^T are columns: what is found at a node is added to its neighbours' sums, all of which have lower
+    // numbers.
+    sums.fill(DVec3::ZERO);
     for node in (0..network.node_count()).rev() {
+        let found = solution[node] - factor.diagonal[node] * sums[node];
+        solution[node] = found;
         for place in network.row(node) {
-            let neighbour = network.neighbour(place);
-            let taken = factor.beside[place].transpose() * solution[node];
-            solution[neighbour] -= factor.diagonal[neighbour] * taken;
+            let block = &factor.beside[place];
+            sums[network.neighbour(place)] += DVec3::new(
+                block.x_axis.dot(found),
+                block.y_axis.dot(found),
+                block.z_axis.dot(found),
+            );
         }
     }
 }

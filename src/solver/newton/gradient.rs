@@ -70,7 +70,13 @@ impl Gradient {
         let mut lately = [0.0; WINDOW];
         let (mut last_square, mut first_square) = (0.0, 0.0);
         loop {
-            factor::solve(factor, network, &self.residuals, &mut self.preconditioned);
+            factor::solve(
+                factor,
+                network,
+                &self.residuals,
+                &mut self.preconditioned,
+                &mut self.products,
+            );
             let square = dot(&self.residuals, &self.preconditioned);
             if solved.products == 0 {
                 first_square = square;
@@ -88,7 +94,12 @@ impl Gradient {
             }
             matrix.multiply(network, &self.searches, &mut self.products);
             let curvature = dot(&self.searches, &self.products);
-            let scale: f64 = self.searches.iter().zip(&matrix.diagonal).map(|(s, d)| s.dot(*d * *s).abs()).sum();
+            let scale: f64 = self
+                .searches
+                .iter()
+                .zip(&matrix.diagonal)
+                .map(|(s, d)| s.dot(*d * *s).abs())
+                .sum();
             solved.products += 1;
             solved.is_negative = curvature < -NEGATIVE * scale;
             if solved.is_negative || !(curvature > ROUNDING * scale) {
@@ -108,7 +119,11 @@ impl Gradient {
 pub(super) fn longest(vectors: &[DVec3]) -> f64 {
     let square = vectors.iter().fold(0.0, |most: f64, vector| {
         let square = vector.length_squared();
-        if square.is_finite() { most.max(square) } else { f64::INFINITY }
+        if square.is_finite() {
+            most.max(square)
+        } else {
+            f64::INFINITY
+        }
     });
     square.sqrt()
 }

@@ -49,11 +49,7 @@ pub struct RestStateReport {
 }
 
 /// Moves `body` to rest.
-pub(crate) fn rest_state(
-    body: &mut Body,
-    gravity: Vec3,
-    definition: &RestStateDefinition,
-) -> Result<RestStateReport> {
+pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
     if !(definition.tolerance >= 0.0 && definition.tolerance.is_finite()) {
         return Err(Error::invalid(format!(
             "tolerance is {}: must be at least 0 and finite",
@@ -122,7 +118,10 @@ fn set_up(descent: &mut Descent, body: &Body, gravity: Vec3) {
 
 /// How far the body reaches, where it lies in one place at least as far as its longest spring would, m.
 fn extent(descent: &Descent) -> f64 {
-    let lengths = descent.network.springs().map(|(_, _, link)| f64::from(link.rest_length));
+    let lengths = descent
+        .network
+        .springs()
+        .map(|(_, _, link)| f64::from(link.rest_length));
     lengths.fold(descent.equation.extent(), f64::max)
 }
 

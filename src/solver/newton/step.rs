@@ -78,8 +78,7 @@ impl Newton {
             let damping = dampings.map_or(0.0, |rates| f64::from(rates[node])) * mass;
             let position = state.positions.get(node);
             let exact = exact(position, self.remainders[aimed.from].get(node));
-            equation.anchors[node] =
-                exact + aimed.ways.get(node).as_dvec3() * aimed.carried + velocity * aimed.time;
+            equation.anchors[node] = exact + aimed.ways.get(node).as_dvec3() * aimed.carried + velocity * aimed.time;
             equation.ways[node] = pushes.get(node).as_dvec3();
             equation.masses[node] = mass;
             equation.inertia[node] = (mass * rate + damping) * rate;
