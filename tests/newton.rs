@@ -124,3 +124,106 @@ fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
         }
     }
 }
+
+#[test]
+fn springs_that_come_and_go_are_taken_in_and_need_no_memory_in_a_step() {
+    for storage in STORAGES {
+        let mut parts = uneven_block(1.0);
+        parts.node_dampings.fill(0.05);
+        let with = |parts: &Parts| {
+            Scene::with(parts, HANGING, |definition| BodyDefinition {
+                solver: Solver::Newton,
+                storage,
+                springs_per_node: 40,
+                ..definition
+            })
+        };
+        let mut changed = with(&parts);
+        changed.run(1.0 / 60.0, 30);
+        changed
+            .body_mut()
+            .remove_spring(parts.springs[7][0], parts.springs[7][1])
+            .expect("a spring");
+        for [a, b] in [[0, 40], [3, 50]] {
+            changed.body_mut().add_spring(a, b, 30.0, Some(0.1)).expect("room");
+        }
+        changed.run(1.0 / 60.0, 600);
+        parts.springs.remove(7);
+        parts.stiffnesses.remove(7);
+        parts.rest_lengths.remove(7);
+        for pair in [[0, 40], [3, 50]] {
+            parts.springs.push(pair);
+            parts.stiffnesses.push(30.0);
+            parts.rest_lengths.push(0.1);
+        }
+        let mut made = with(&parts);
+        made.run(1.0 / 60.0, 630);
+        let difference = largest_difference(&changed.positions(), &made.positions()) / parts.size();
+        assert!(difference < 1e-6, "{storage:?}: {difference:.2e}");
+    }
+}
+
+/// What rounds positions to `f32` is kept: a step of 10 us moves what is slower than half of a last place.
+#[test]
+fn slow_motion_is_not_lost_in_short_steps() {
+    let parts = Parts::nodes(vec![Vec3::X * 0.9], 1.0);
+    let mut scene = newton(&parts, FREE, 2, Storage::Packed);
+    let velocity = 1e-4_f32;
+    scene
+        .body_mut()
+        .set_velocities(&[Vec3::X * velocity])
+        .expect("a velocity");
+    let start = scene.positions()[0].x;
+    scene.run(1e-5, 10_000);
+    let gone = scene.positions()[0].x - start;
+    // A last place of 0.9 is 6e-8.
+    assert!((gone - 1e-5).abs() < 4e-8, "{gone:e}");
+}
+
+#[test]
+fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state() {
+    let parts = Parts::block([21, 21, 21], 0.01, 1e-4, 20.0);
+    let run = |thread_count: u32| {
+        let mut scene = newton(
+            &parts,
+            WorldDefinition {
+                thread_count,
+                ..HANGING
+            },
+            2,
+            Storage::Packed,
+        );
+        scene.body_mut().pin(0).expect("a node");
+        scene.run(1.0 / 60.0, 3);
+        scene.world.state_hash()
+    };
+    assert!(parts.positions.len() >= 8192, "large enough to be shared");
+    let alone = run(1);
+    assert_eq!(alone, run(2));
+    assert_eq!(alone, run(3));
+}
+
+#[test]
+fn damping_along_springs_takes_what_it_should() {
+    let mut parts = two_masses();
+    parts.spring_damping = 2.0;
+    let (h, steps) = (1e-4_f64, 1000);
+    let mut scene = newton(&parts, FREE, 2, Storage::Packed);
+    scene.run(h as f32, steps);
+    // m q'' + c q' + k q = 0 with the reduced mass.
+    let (decay, t) = (2.0 / 0.75 / 2.0, h * steps as f64);
+    let omega = (OMEGA_SQUARED - decay * decay).sqrt();
+    let exact = 0.05 * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin());
+    let x = scene.positions();
+    let error = (x[0].distance(x[1]) - 0.1 - exact).abs() / 0.05;
+    assert!(error < 1e-4, "{error:.2e}");
+    // A mesh turned and pulled, where directions change within a step.
+    let mut parts = uneven_block(1.0);
+    parts.spring_damping = 0.05;
+    let mut scene = newton(&parts, HANGING, 2, Storage::Packed);
+    for _ in 0..60 {
+        scene.step(1.0 / 60.0);
+        let report = scene.body().solver_report();
+        assert!(report.converged, "{report:?}");
+    }
+}

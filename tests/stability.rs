@@ -18,6 +18,13 @@ fn check(name: &str) {
     let mut wrong = Vec::new();
     for solver in SOLVERS {
         for (index, step) in STEPS.into_iter().enumerate() {
+            if std::env::var("ONLY_NEWTON").is_ok() && solver != Solver::Newton {
+                continue;
+            }
+            // NEWTON is slow: two of the steps for each line.
+            if solver == Solver::Newton && (place + index) % 3 != 0 {
+                continue;
+            }
             let setup = Setup {
                 solver,
                 storage: STORAGES[(place + index) % STORAGES.len()],

@@ -23,7 +23,9 @@ pub(super) use step::Aimed;
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
+use crate::springs::Springs;
 use descent::Descent;
+use step::exact;
 
 /// What a body that is moved by NEWTON has beside what IMPLICIT needs.
 #[derive(Debug)]
@@ -50,6 +52,23 @@ impl Newton {
     /// Positions are exactly what they are.
     pub fn forget_remainders(&mut self, place: usize) {
         self.remainders[place].clear();
+    }
+
+    /// The energy of the springs, J, with nodes at these positions and what they lack.
+    pub fn elastic(&self, springs: &dyn Springs, positions: &Vectors, place: usize) -> f64 {
+        let exact = |node: usize| exact(positions.get(node), self.remainders[place].get(node));
+        let mut sum = 0.0;
+        for node in 0..positions.len() {
+            let position = exact(node);
+            springs.visit(node, &mut |link| {
+                let neighbour = link.neighbour as usize;
+                if neighbour < node {
+                    let stretch = position.distance(exact(neighbour)) - f64::from(link.rest_length);
+                    sum += 0.5 * f64::from(link.stiffness) * stretch * stretch;
+                }
+            });
+        }
+        sum
     }
 
     /// What the next step depends on.

@@ -110,7 +110,7 @@ impl Newton {
 }
 
 /// A position with what it lacks, unless it has been put elsewhere since.
-fn exact(position: Vec3, remainder: Vec3) -> DVec3 {
+pub(super) fn exact(position: Vec3, remainder: Vec3) -> DVec3 {
     let exact = position.as_dvec3() + remainder.as_dvec3();
     if exact.as_vec3() == position {
         exact
