@@ -342,8 +342,9 @@ static void body_reports(void)
 
 static void rest_states(void)
 {
-    const sinew_rest_state_def good = {.struct_size = sizeof good};
+    sinew_rest_state_def good;
     int i;
+    MUST(sinew_rest_state_def_init(&good, sizeof good));
     REFUSED(INVALID, "def", sinew_rest_state_def_init(NULL, sizeof good));
     REFUSES_SIZES(sinew_rest_state_def, sizeof(sinew_rest_state_def), (void)0,
                   sinew_rest_state_def_init(&out.rest_def, size));
