@@ -99,7 +99,7 @@
 #define SINEW_SOLVER_IMPLICIT 1
 
 /**
- * The accurate reference: converged implicit steps, slow.
+ * The accurate reference: the equations of IMPLICIT, solved to the last digits that count; slow.
  */
 #define SINEW_SOLVER_NEWTON 2
 
@@ -387,18 +387,18 @@ typedef struct sinew_body_def {
    */
   uint32_t reserved;
   /**
-   * IMPLICIT: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
+   * IMPLICIT, NEWTON: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
    * default: 2.
    */
   uint32_t order;
   /**
-   * IMPLICIT: how often the equation of a step may be multiplied out while it is solved, each about as long as a substep
-   * of VERLET; 0, the default: 1000.
+   * IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
+   * long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
    */
   uint32_t iterations;
   /**
-   * IMPLICIT: what may be missing of the solution of a step's equation, as a part of what forces change in the step; from
-   * 1e-6 to 1; 0, the default: 0.01.
+   * IMPLICIT, NEWTON: what may be missing of the solution of a step's equation, as a part of what forces change in the step;
+   * from 1e-6 to 1; 0, the default: 0.01, or 1e-6 with NEWTON.
    */
   float accuracy;
   /**
@@ -508,20 +508,81 @@ typedef struct sinew_solver_report {
    */
   size_t struct_size;
   /**
-   * IMPLICIT: how often the equations of the step were multiplied out; 0 for other solvers.
+   * IMPLICIT, NEWTON: how often the equations of the step were multiplied out; 0 for VERLET.
    */
   uint32_t iterations;
   /**
-   * IMPLICIT: how far nodes may be from where the step's equation has them, root mean square by mass, m; above what
-   * rounding allows only where `iterations` of the definition were not enough. What a shorter step would change is not in
-   * it.
+   * How far nodes may be from where the step's equation has them, m. IMPLICIT: root mean square by mass; above what rounding
+   * allows only where `iterations` of the definition were not enough. NEWTON: the longest way of the last correction, of which
+   * about a hundredth is left. What a shorter step would change is not in it. 0 for VERLET.
    */
   float error;
   /**
    * VERLET: by how much mass_scaling makes nodes heavier in all, kg.
    */
   double added_mass;
+  /**
+   * IMPLICIT, NEWTON: linearised equations that were solved; 0 for VERLET.
+   */
+  uint32_t solves;
+  /**
+   * IMPLICIT, NEWTON: 1 where every equation was solved as far as the definition asks or rounding allows, else 0; 0 for VERLET.
+   */
+  uint32_t converged;
 } sinew_solver_report;
+
+/**
+ * How a state of rest is looked for. Filled by sinew_rest_state_def_init.
+ */
+typedef struct sinew_rest_state_def {
+  /**
+   * Set by sinew_rest_state_def_init.
+   */
+  size_t struct_size;
+  /**
+   * How far a node may be from where it is at rest, as far as that can be told, m; 0, the default: a millionth of the body's
+   * extent.
+   */
+  float tolerance;
+  /**
+   * The most products with the matrix of second derivatives; 0, the default: a million.
+   */
+  uint32_t iterations;
+} sinew_rest_state_def;
+
+/**
+ * How a state of rest was found.
+ */
+typedef struct sinew_rest_state_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Linearised equations that were solved.
+   */
+  uint32_t iterations;
+  /**
+   * Products with their matrices.
+   */
+  uint32_t products;
+  /**
+   * The largest force left on a node that is not pinned, before positions were rounded to float, N.
+   */
+  double residual;
+  /**
+   * How far a node may be from where it is at rest, before positions were rounded to float, m.
+   */
+  double error;
+  /**
+   * Of springs, gravity and forces, J, zero at the origin: before.
+   */
+  double energy_before;
+  /**
+   * After.
+   */
+  double energy_after;
+} sinew_rest_state_report;
 
 /**
  * What a tool is. Filled by sinew_tool_def_init; used only during sinew_tool_create.
@@ -745,7 +806,7 @@ typedef struct sinew_picture_def {
 #define SINEW_STATUS_OUT_OF_MEMORY 4
 
 /**
- * The step could not be taken: nothing moved, pending forces and poses stay pending.
+ * The step could not be taken, or the state of rest was not found: nothing moved, pending forces and poses stay pending.
  */
 #define SINEW_STATUS_UNSTABLE 5
 
@@ -869,7 +930,7 @@ sinew_status sinew_body_def_init(struct sinew_body_def *def, size_t struct_size)
 /**
  * Creates a body; copies what `def` points to.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (NEWTON), SINEW_STATUS_CAPACITY
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_CAPACITY
  * (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
@@ -1084,6 +1145,36 @@ sinew_status sinew_body_get_storage_report(const struct sinew_world *world,
 sinew_status sinew_body_get_solver_report(const struct sinew_world *world,
                                           struct sinew_body_id body,
                                           struct sinew_solver_report *out);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_rest_state_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_rest_state_def_init(struct sinew_rest_state_def *def, size_t struct_size);
+
+/**
+ * Moves the free nodes of a body, whatever its solver, to the nearest place downhill where it is at rest under gravity, its
+ * pins where they are, and the forces applied since the last step, which stay pending. Velocities become zero, and
+ * sinew_body_get_pin_force tells what holds the pins there. It is no step: it takes memory and may take seconds. Tools are not
+ * taken into account. How a part that no pin holds lies and is turned as a whole is as it happens to be. `def` is nullable: the
+ * defaults; `report` is nullable; `report->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a part that no pin holds is pulled by a net force, and so has no state of
+ * rest), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSTABLE (not found in the iterations allowed), SINEW_STATUS_OUT_OF_MEMORY; nothing
+ * has changed then.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `report` is NULL or
+ * writable for the size that it states.
+ */
+sinew_status sinew_body_rest_state(struct sinew_world *world,
+                                   struct sinew_body_id body,
+                                   const struct sinew_rest_state_def *def,
+                                   struct sinew_rest_state_report *report);
 
 /**
  * Fills `def` with the defaults. `struct_size` is sizeof(sinew_tool_def).

@@ -20,6 +20,8 @@ pub enum Error {
         /// How many substeps were allowed, or asked for.
         allowed: u32,
     },
+    /// What was looked for was not found in the iterations allowed: nothing changed.
+    NotConverged(String),
     /// Valid, but this build or this combination does not offer it.
     Unsupported(String),
     /// A file could not be read or written; the message names the file and the line or byte.
@@ -44,6 +46,7 @@ impl std::fmt::Display for Error {
             Error::InvalidArgument(message)
             | Error::StaleId(message)
             | Error::Capacity(message)
+            | Error::NotConverged(message)
             | Error::Unsupported(message)
             | Error::Io(message)
             | Error::Internal(message) => f.write_str(message),

@@ -22,6 +22,7 @@ pub use contact::{Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
 pub use picture::PictureDefinition;
+pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;
 pub use threads::RunTasks;
 pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};

@@ -7,7 +7,7 @@ use crate::contact::{Pose, Tool, ToolDefinition, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
-use crate::solver::{Outcome, StepRequest, attempt};
+use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, attempt, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
 
@@ -165,6 +165,21 @@ impl World {
     /// [`Error::StaleId`].
     pub fn body_mut(&mut self, body: BodyId) -> Result<&mut Body> {
         self.bodies.get_mut(body.0)
+    }
+
+    /// Moves the free nodes of a body, whatever its solver, to the nearest place downhill where it is at rest under gravity,
+    /// its pins where they are, and the forces applied since the last step, which stay pending. Velocities become zero and what
+    /// holds the pins is known. It is no step: it allocates and may take long. Tools are not taken into account.
+    ///
+    /// A part of a body that hangs on no pin is moved too where the forces on it cancel; how it lies and is turned as a whole is
+    /// then as it happens to be.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of its range, or a part that no pin holds is pulled by
+    /// a net force. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
+    pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
+        let gravity = self.definition.gravity;
+        rest_state(self.bodies.get_mut(body.0)?, gravity, definition)
     }
 
     /// All bodies.

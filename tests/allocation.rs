@@ -39,8 +39,9 @@ fn the_count_counts() {
 fn a_step_allocates_nothing() {
     steps_allocate_nothing(Storage::Packed, Solver::Verlet, &[0.0, 1e-4]);
     steps_allocate_nothing(Storage::Packed, Solver::Implicit, &[0.0, 1e-3]);
+    steps_allocate_nothing(Storage::Packed, Solver::Newton, &[0.0]);
     for storage in [Storage::Efficient, Storage::FastLink, Storage::DynamicBulk] {
-        for solver in [Solver::Verlet, Solver::Implicit] {
+        for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
             steps_allocate_nothing(storage, solver, &[0.0]);
         }
     }
@@ -89,7 +90,11 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
         }
         let body = world.body_mut(cloth).expect("a body");
         body.apply_force(5, Vec3::Y * 0.01).expect("a force");
-        let steps = if solver == Solver::Implicit { 8 } else { 40 };
+        let steps = match solver {
+            Solver::Verlet => 40,
+            Solver::Implicit => 8,
+            Solver::Newton => 3,
+        };
         for step in 0..steps {
             let turned = Quat::from_rotation_x(0.05 * step as f32);
             let place = Vec3::Y * (0.02 - 0.0005 * step as f32);
@@ -100,8 +105,8 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
                 "{storage:?}, {solver:?}, tolerance {tolerance}, step {step}"
             );
         }
-        if solver == Solver::Implicit {
-            // It refuses none.
+        if solver != Solver::Verlet {
+            // They refuse none.
             continue;
         }
         let refused = asked(|| assert!(matches!(world.step(1e6), Err(Error::Unstable { .. }))));

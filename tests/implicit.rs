@@ -4,7 +4,8 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::{BodyDefinition, Error, Solver, Storage, World, WorldDefinition};
-use support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+use support::bodies::{FREE, Parts, Scene, largest_difference};
+use support::euler::{euler_step, uneven_block};
 
 const STORAGES: [Storage; 4] = [
     Storage::Packed,
@@ -167,98 +168,6 @@ fn a_chain_hangs_as_far_at_every_step_in_every_storage() {
             assert!(error < 2e-5, "{storage:?}, order {order}, {h} s: {error:.2e}");
         }
     }
-}
-
-/// A block with one spring in five stiffer by `contrast`, clamped at one end.
-fn uneven_block(contrast: f32) -> Parts {
-    let mut parts = Parts::block([4, 3, 3], 0.05, 0.002, 20.0);
-    let mut random = Random::new(11);
-    for stiffness in &mut parts.stiffnesses {
-        if random.below(5) == 0 {
-            *stiffness *= contrast;
-        }
-    }
-    for (position, mass) in parts.positions.iter().zip(&mut parts.masses) {
-        if position.x < 0.01 {
-            *mass = 0.0;
-        }
-    }
-    parts
-}
-
-/// The first step of implicit Euler in `f64`: Newton's method with dense elimination, to the last digit.
-fn euler_step(parts: &Parts, gravity: DVec3, h: f64) -> Vec<DVec3> {
-    let start: Vec<DVec3> = parts.positions.iter().map(|p| p.as_dvec3()).collect();
-    let free: Vec<usize> = (0..start.len()).filter(|&node| parts.masses[node] > 0.0).collect();
-    let place: Vec<Option<usize>> = (0..start.len())
-        .map(|node| free.iter().position(|&f| f == node))
-        .collect();
-    let size = 3 * free.len();
-    let mut now = start.clone();
-    for _ in 0..30 {
-        let mut matrix = vec![vec![0.0; size + 1]; size];
-        for (index, &node) in free.iter().enumerate() {
-            let inertia = f64::from(parts.masses[node]) / (h * h);
-            let lacking = gravity * f64::from(parts.masses[node]) - (now[node] - start[node]) * inertia;
-            for axis in 0..3 {
-                matrix[3 * index + axis][3 * index + axis] += inertia;
-                matrix[3 * index + axis][size] += lacking[axis];
-            }
-        }
-        for ((&[a, b], &k), &rest) in parts.springs.iter().zip(&parts.stiffnesses).zip(&parts.rest_lengths) {
-            let [a, b] = [a as usize, b as usize];
-            let (k, rest) = (f64::from(k), f64::from(rest));
-            let way = now[b] - now[a];
-            let (length, direction) = (way.length(), way.normalize());
-            let force = direction * (k * (length - rest));
-            let across = k * (1.0 - rest / length);
-            for (node, sign) in [(a, 1.0), (b, -1.0)] {
-                let Some(row) = place[node] else { continue };
-                for i in 0..3 {
-                    matrix[3 * row + i][size] += sign * force[i];
-                    for (other, other_sign) in [(a, 1.0), (b, -1.0)] {
-                        let Some(column) = place[other] else { continue };
-                        for j in 0..3 {
-                            let unit = if i == j { across } else { 0.0 };
-                            let entry = (k - across) * direction[i] * direction[j] + unit;
-                            matrix[3 * row + i][3 * column + j] += sign * other_sign * entry;
-                        }
-                    }
-                }
-            }
-        }
-        let correction = eliminate(matrix);
-        for (index, &node) in free.iter().enumerate() {
-            now[node] += DVec3::from_slice(&correction[3 * index..3 * index + 3]);
-        }
-        if correction.iter().all(|c| c.abs() < 1e-14) {
-            break;
-        }
-    }
-    now
-}
-
-/// Solves a system whose right-hand side is the last column.
-fn eliminate(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
-    let size = rows.len();
-    for pivot in 0..size {
-        let best = (pivot..size).max_by(|&a, &b| rows[a][pivot].abs().total_cmp(&rows[b][pivot].abs()));
-        rows.swap(pivot, best.expect("rows"));
-        let (above, below) = rows.split_at_mut(pivot + 1);
-        let head = &above[pivot];
-        for row in below {
-            let factor = row[pivot] / head[pivot];
-            for (entry, value) in row[pivot..].iter_mut().zip(&head[pivot..]) {
-                *entry -= factor * value;
-            }
-        }
-    }
-    let mut solution = vec![0.0; size];
-    for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|column| rows[row][column] * solution[column]).sum();
-        solution[row] = (rows[row][size] - known) / rows[row][row];
-    }
-    solution
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! The table of stability, a part of it: each case with each solver at each step, and one of the storages for each step.
+//! The table of stability, a part of it: each case with each solver at each step (with NEWTON at one), and one of the storages
+//! for each step.
 //! `cargo bench --bench stability` takes all of it.
 
 #[path = "stability/mod.rs"]
@@ -18,6 +19,10 @@ fn check(name: &str) {
     let mut wrong = Vec::new();
     for solver in SOLVERS {
         for (index, step) in STEPS.into_iter().enumerate() {
+            // NEWTON is slow: one of the steps for each line.
+            if solver == Solver::Newton && (place + index) % STEPS.len() != 0 {
+                continue;
+            }
             let setup = Setup {
                 solver,
                 storage: STORAGES[(place + index) % STORAGES.len()],

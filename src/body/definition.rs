@@ -56,7 +56,7 @@ pub enum Solver {
     Verlet,
     /// Stable at any step.
     Implicit,
-    /// The accurate reference.
+    /// The accurate reference: the equations of [`Solver::Implicit`], solved exactly; slow.
     Newton,
 }
 
@@ -96,10 +96,11 @@ pub struct BodyDefinition<'a> {
     pub solver: Solver,
     /// [`Solver::Implicit`], [`Solver::Newton`]: 1, implicit Euler; 2, the second backward difference formula; 0: 2.
     pub order: u32,
-    /// [`Solver::Implicit`]: the most products with the matrix of its equation in a step; 0: 1000.
+    /// [`Solver::Implicit`], [`Solver::Newton`]: the most products with the matrix of its equation in a step; 0: 1000, or
+    /// 100 000 with [`Solver::Newton`].
     pub iterations: u32,
-    /// [`Solver::Implicit`]: what may be missing of the solution of a step's equation, as a part of what forces change in the
-    /// step; from 1e-6 to 1; 0: 0.01.
+    /// [`Solver::Implicit`], [`Solver::Newton`]: what may be missing of the solution of a step's equation, as a part of what forces
+    /// change in the step; from 1e-6 to 1; 0: 0.01, or 1e-6 with [`Solver::Newton`].
     pub accuracy: f32,
     /// [`Solver::Verlet`]: what part of the body's mass may be added, in all, to the nodes whose springs would make substeps
     /// short, as those of slivers are; from 0 to 1; 0: none.
@@ -181,7 +182,7 @@ impl BodyDefinition<'_> {
                 check_values("spring_damping", &self.spring_dampings, 0)?;
             }
         }
-        self.check_offered()
+        self.check_solver()
     }
 
     fn check_masses(&self) -> Result<()> {
@@ -230,7 +231,7 @@ impl BodyDefinition<'_> {
         }
     }
 
-    fn check_offered(&self) -> Result<()> {
+    fn check_solver(&self) -> Result<()> {
         if self.order > 2 {
             return Err(Error::invalid(format!("order is {}: must be 0, 1 or 2", self.order)));
         }
@@ -250,12 +251,6 @@ impl BodyDefinition<'_> {
             return Err(Error::invalid(format!(
                 "mass_scaling is {}: must be from 0 to 1",
                 self.mass_scaling
-            )));
-        }
-        if self.solver == Solver::Newton {
-            return Err(Error::Unsupported(format!(
-                "solver is {:?}: this version does not offer it",
-                self.solver
             )));
         }
         Ok(())

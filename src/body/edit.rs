@@ -174,6 +174,9 @@ impl Body {
             rest_length,
             damping: 0.0,
         };
+        if let Some(implicit) = &mut self.implicit {
+            implicit.make_room(self.springs.spring_count() + 1)?;
+        }
         // What is invalid is told in the caller's numbers.
         self.springs.add(&spring).map_err(|error| match error {
             Error::InvalidArgument(_) => already_joined(a, b),

@@ -27,7 +27,7 @@ use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
 use crate::error::Result;
 use crate::memory;
-use crate::solver::{Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched};
+use crate::solver::{Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched, close};
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::threads::Team;
 use order::NodeOrder;
@@ -168,16 +168,25 @@ impl Body {
             published: Published::new(node_count)?,
         };
         body.place(definition.positions);
-        if definition.solver == Solver::Implicit {
-            let implicit = Implicit::new(
-                body.state.positions(),
-                body.records.is_some(),
-                definition.order,
-                definition.iterations,
-                definition.accuracy,
-            )?;
-            body.implicit = Some(Box::new(implicit));
-        }
+        let BodyDefinition {
+            order,
+            iterations,
+            accuracy,
+            ..
+        } = *definition;
+        let positions = body.state.positions();
+        let gathers = body.records.is_some();
+        body.implicit = match definition.solver {
+            Solver::Verlet => None,
+            Solver::Implicit => Some(Box::new(Implicit::new(
+                positions, gathers, order, iterations, accuracy,
+            )?)),
+            Solver::Newton => {
+                let springs = body.springs.spring_count();
+                let implicit = Implicit::exact(positions, springs, order, iterations, accuracy)?;
+                Some(Box::new(implicit))
+            }
+        };
         if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
@@ -306,6 +315,40 @@ impl Body {
         (bounds.max - bounds.min).max_element()
     }
 
+    /// Puts the nodes at rest at these places, in its own coordinates and numbers, where this holds its pins.
+    pub(crate) fn rest_at(&mut self, place: impl Fn(usize) -> Vec3, held: impl Fn(usize) -> Vec3) {
+        close(self);
+        for node in 0..self.node_count() {
+            if self.inverse_masses[node] > 0.0 {
+                self.state.positions_mut().set(node, place(node));
+            }
+        }
+        self.state.velocities_mut().clear();
+        self.carry.gravity = GravityKicks::new(Bounds {
+            min: Vec3::ZERO,
+            max: Vec3::ZERO,
+        });
+        for pin in self.pins.iter_mut() {
+            pin.force = held(pin.node as usize);
+        }
+        self.forget_motion();
+        self.publish(&Team::alone());
+        self.follow();
+    }
+
+    /// Nothing is known any more of where the nodes were.
+    fn forget_motion(&mut self) {
+        self.forces_current = false;
+        self.carry.stability = Stability::UNKNOWN;
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+            implicit.forget_matrix();
+        }
+        if let Some(contacts) = &mut self.contacts {
+            contacts.forget();
+        }
+    }
+
     /// Puts the nodes at these places, in the caller's coordinates.
     fn place(&mut self, positions: &[Vec3]) {
         self.origin = shift_towards(Bounds::of(positions.iter().copied()));
@@ -319,15 +362,7 @@ impl Body {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
         }
         self.published.positions_mut().copy_from_slice(positions);
-        self.forces_current = false;
-        self.carry.stability = Stability::UNKNOWN;
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_history();
-            implicit.forget_matrix();
-        }
-        if let Some(contacts) = &mut self.contacts {
-            contacts.forget();
-        }
+        self.forget_motion();
     }
 
     /// Makes the step in progress, of `substeps` substeps, the current state.

@@ -35,7 +35,7 @@ pub const SINEW_STORAGE_DYNAMIC_BULK: u32 = 3;
 pub const SINEW_SOLVER_VERLET: u32 = 0;
 /// Stable at any step.
 pub const SINEW_SOLVER_IMPLICIT: u32 = 1;
-/// The accurate reference: converged implicit steps, slow.
+/// The accurate reference: the equations of IMPLICIT, solved to the last digits that count; slow.
 pub const SINEW_SOLVER_NEWTON: u32 = 2;
 
 /// What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
@@ -92,14 +92,14 @@ pub struct sinew_body_def {
     pub solver: u32,
     /// 0.
     pub reserved: u32,
-    /// IMPLICIT: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
+    /// IMPLICIT, NEWTON: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
     /// default: 2.
     pub order: u32,
-    /// IMPLICIT: how often the equation of a step may be multiplied out while it is solved, each about as long as a substep
-    /// of VERLET; 0, the default: 1000.
+    /// IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
+    /// long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
     pub iterations: u32,
-    /// IMPLICIT: what may be missing of the solution of a step's equation, as a part of what forces change in the step; from
-    /// 1e-6 to 1; 0, the default: 0.01.
+    /// IMPLICIT, NEWTON: what may be missing of the solution of a step's equation, as a part of what forces change in the step;
+    /// from 1e-6 to 1; 0, the default: 0.01, or 1e-6 with NEWTON.
     pub accuracy: f32,
     /// 0.
     pub reserved1: u32,
@@ -161,14 +161,18 @@ pub struct sinew_storage_report {
 pub struct sinew_solver_report {
     /// Set by the caller.
     pub struct_size: usize,
-    /// IMPLICIT: how often the equations of the step were multiplied out; 0 for other solvers.
+    /// IMPLICIT, NEWTON: how often the equations of the step were multiplied out; 0 for VERLET.
     pub iterations: u32,
-    /// IMPLICIT: how far nodes may be from where the step's equation has them, root mean square by mass, m; above what
-    /// rounding allows only where `iterations` of the definition were not enough. What a shorter step would change is not in
-    /// it.
+    /// How far nodes may be from where the step's equation has them, m. IMPLICIT: root mean square by mass; above what rounding
+    /// allows only where `iterations` of the definition were not enough. NEWTON: the longest way of the last correction, of which
+    /// about a hundredth is left. What a shorter step would change is not in it. 0 for VERLET.
     pub error: f32,
     /// VERLET: by how much mass_scaling makes nodes heavier in all, kg.
     pub added_mass: f64,
+    /// IMPLICIT, NEWTON: linearised equations that were solved; 0 for VERLET.
+    pub solves: u32,
+    /// IMPLICIT, NEWTON: 1 where every equation was solved as far as the definition asks or rounding allows, else 0; 0 for VERLET.
+    pub converged: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -200,7 +204,7 @@ unsafe impl Versioned for sinew_solver_report {
 }
 
 impl sinew_body_id {
-    fn id(self) -> BodyId {
+    pub(super) fn id(self) -> BodyId {
         BodyId(SlotId {
             index1: self.index1,
             generation: self.generation,
@@ -355,7 +359,7 @@ pub unsafe extern "C" fn sinew_body_def_init(def: *mut sinew_body_def, struct_si
 
 /// Creates a body; copies what `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (NEWTON), SINEW_STATUS_CAPACITY
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_CAPACITY
 /// (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
@@ -714,6 +718,8 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 iterations: report.iterations,
                 error: report.error,
                 added_mass: report.added_mass,
+                solves: report.solves,
+                converged: u32::from(report.converged),
             });
             Ok(())
         })

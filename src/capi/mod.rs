@@ -16,6 +16,8 @@ pub mod world;
 
 pub mod body;
 
+pub mod rest_state;
+
 pub mod tool;
 
 pub mod mesh;

@@ -19,7 +19,7 @@ pub const SINEW_STATUS_STALE_ID: sinew_status = 2;
 pub const SINEW_STATUS_CAPACITY: sinew_status = 3;
 /// Memory could not be reserved; nothing changed.
 pub const SINEW_STATUS_OUT_OF_MEMORY: sinew_status = 4;
-/// The step could not be taken: nothing moved, pending forces and poses stay pending.
+/// The step could not be taken, or the state of rest was not found: nothing moved, pending forces and poses stay pending.
 pub const SINEW_STATUS_UNSTABLE: sinew_status = 5;
 /// Valid, but this build or this combination does not offer it.
 pub const SINEW_STATUS_UNSUPPORTED: sinew_status = 6;
@@ -55,7 +55,7 @@ fn status_of(error: &Error) -> sinew_status {
         Error::StaleId(_) => SINEW_STATUS_STALE_ID,
         Error::Capacity(_) => SINEW_STATUS_CAPACITY,
         Error::OutOfMemory => SINEW_STATUS_OUT_OF_MEMORY,
-        Error::Unstable { .. } => SINEW_STATUS_UNSTABLE,
+        Error::Unstable { .. } | Error::NotConverged(_) => SINEW_STATUS_UNSTABLE,
         Error::Unsupported(_) => SINEW_STATUS_UNSUPPORTED,
         Error::Io(_) => SINEW_STATUS_IO,
         Error::Internal(_) => SINEW_STATUS_INTERNAL,

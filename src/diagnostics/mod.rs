@@ -22,12 +22,29 @@ pub struct StorageReport {
 /// How a body's solver took the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolverReport {
-    /// Products with the matrix of the step's equation; 0 for bodies that are moved explicitly.
+    /// Products with the matrices of the step's equations; 0 for bodies that are moved explicitly.
     pub iterations: u32,
-    /// How far nodes may be from where the step's equation has them, root mean square by mass, m; 0 for bodies that are moved
-    /// explicitly. What a shorter step would change is not in it.
+    /// How far nodes may be from where the step's equation has them, m; 0 for bodies that are moved explicitly.
+    /// [`Solver::Implicit`](crate::Solver::Implicit): root mean square by mass. [`Solver::Newton`](crate::Solver::Newton): the
+    /// longest way of the last correction, of which about a hundredth is left. What a shorter step would change is not in it.
     pub error: f32,
     /// By how much mass scaling makes nodes heavier in all, kg; see
     /// [`BodyDefinition::mass_scaling`](crate::BodyDefinition::mass_scaling).
     pub added_mass: f64,
+    /// Linearised equations solved; 0 for bodies that are moved explicitly.
+    pub solves: u32,
+    /// Whether every equation was solved as far as the definition asks, or as rounding allows; `false` for bodies that are moved
+    /// explicitly.
+    pub converged: bool,
+}
+
+impl SolverReport {
+    /// Before anything was solved.
+    pub(crate) const BEFORE: Self = Self {
+        iterations: 0,
+        error: 0.0,
+        added_mass: 0.0,
+        solves: 0,
+        converged: true,
+    };
 }

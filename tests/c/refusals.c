@@ -181,7 +181,6 @@ static void body_definitions(void)
     BODY(INVALID, "reserved2", def.reserved2 = 1);
     for (i = 0; i < NOT_FINITE; i++)
         BODY(INVALID, "mass_scaling", def.mass_scaling = bad[i]);
-    BODY(UNSUPPORTED, "solver", def.solver = SINEW_SOLVER_NEWTON);
 
     BODY(INVALID, "positions", def.positions = NULL);
     BODY(INVALID, "node_count", def.node_count = 0);
@@ -346,6 +345,27 @@ static void body_reports(void)
                          sinew_body_get_storage_report(the.world, the.body, &out.storage));
 }
 
+static void rest_states(void)
+{
+    sinew_rest_state_def good;
+    int i;
+    MUST(sinew_rest_state_def_init(&good, sizeof good));
+    REFUSED(INVALID, "def", sinew_rest_state_def_init(NULL, sizeof good));
+    REFUSES_SIZES(sinew_rest_state_def, sizeof(sinew_rest_state_def), (void)0,
+                  sinew_rest_state_def_init(&out.rest_def, size));
+    REFUSES_NO_BODY(sinew_body_rest_state(world, body, &good, &out.rest));
+    REFUSES_NO_BODY(sinew_body_rest_state(world, body, NULL, NULL));
+    REFUSES_SIZES(sinew_rest_state_def, sizeof(sinew_rest_state_def), sinew_rest_state_def def = good; def.struct_size = size,
+                  sinew_body_rest_state(the.world, the.body, &def, &out.rest));
+    REFUSES_RESULT_SIZES(sinew_rest_state_report, sizeof(sinew_rest_state_report), rest,
+                         sinew_body_rest_state(the.world, the.body, &good, &out.rest));
+    for (i = 0; i < OR_NEGATIVE; i++) {
+        sinew_rest_state_def def = good;
+        def.tolerance = bad[i];
+        REFUSED(INVALID, "tolerance", sinew_body_rest_state(the.world, the.body, &def, &out.rest));
+    }
+}
+
 /* ---- tools ---- */
 
 static sinew_tool_def good_tool(uint32_t shape)
@@ -460,6 +480,7 @@ int main(void)
     pins();
     springs();
     body_reports();
+    rest_states();
     tool_definitions_unspoiled();
     tool_definitions();
     tool_calls();

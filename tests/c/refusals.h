@@ -41,6 +41,8 @@ static struct outputs {
     sinew_energy energy;
     sinew_storage_report storage;
     sinew_solver_report solver;
+    sinew_rest_state_def rest_def;
+    sinew_rest_state_report rest;
     sinew_mesh *mesh;
     sinew_mesh_view mesh_view;
     sinew_picture_def picture_def;

@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "every test takes a part of it")]
 
 pub mod bodies;
+pub mod euler;
 pub mod reference;
 
 use std::io::Write;

@@ -1,6 +1,5 @@
 //! What a step does to the energy: an implicit step loses some and gains none, unless its equation was not solved.
 
-use super::gradient::Partial;
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::body::{Body, Vectors};
@@ -39,14 +38,15 @@ impl Substep<'_> {
             &*state.velocities
         };
         let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, body.kernel);
-        let mut energy = elastic(&*body.springs, state.positions, &mut implicit.partials, self.team);
+        let from = implicit.place(self.is_first);
+        let mut energy = implicit.elastic(&*body.springs, state.positions, from, self.team);
         if travels {
-            let moved = &mut implicit.products;
+            let moved = state.next_positions;
             moved.copy_from(state.positions);
             for pin in body.pins.iter() {
                 moved.set(pin.node as usize, pin.place(self.end));
             }
-            energy = energy.max(elastic(&*body.springs, moved, &mut implicit.partials, self.team));
+            energy = energy.max(implicit.elastic(&*body.springs, moved, from, self.team));
         }
         Before {
             energy: kinetic + energy,
@@ -58,8 +58,8 @@ impl Substep<'_> {
     pub(super) fn account(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
         let state = body.state.substep();
         let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
-        let elastic = elastic(&*body.springs, state.next_positions, &mut implicit.partials, self.team);
         let next = 1 - implicit.settled;
+        let elastic = implicit.elastic(&*body.springs, state.next_positions, next, self.team);
         let work = self.work(body, &implicit.histories[next].ways);
         let after = kinetic + elastic;
         let allowed = before.energy + work + before.credit;
@@ -140,11 +140,18 @@ fn scale(vectors: &mut Vectors, factor: f32) {
     }
 }
 
-fn elastic(springs: &dyn Springs, positions: &Vectors, partials: &mut [Partial], team: &Team) -> f64 {
-    team.pass(tile_count(positions.len()), Items::new(partials), |tile, partial| {
-        partial.first = springs.half_energy(tile, positions);
-    });
-    partials.iter().map(|partial| partial.first).sum()
+impl Implicit {
+    /// The energy of the springs with nodes at `positions`, which lack the remainders of this place where there are some.
+    fn elastic(&mut self, springs: &dyn Springs, positions: &Vectors, place: usize, team: &Team) -> f64 {
+        if let Some(newton) = &self.newton {
+            return newton.elastic(springs, positions, place);
+        }
+        let partials = Items::new(&mut self.partials);
+        team.pass(tile_count(positions.len()), partials, |tile, partial| {
+            partial.first = springs.half_energy(tile, positions);
+        });
+        self.partials.iter().map(|partial| partial.first).sum()
+    }
 }
 
 fn kinetic(velocities: &Vectors, masses: &[f32], inverse_masses: &[f32], kernel: ChosenKernel) -> f64 {

@@ -24,6 +24,7 @@ use crate::body::{Records, Vectors};
 use crate::diagnostics::{SolverReport, StateHasher};
 use crate::error::Result;
 use crate::memory;
+use crate::solver::newton::Newton;
 use crate::springs::tile_count;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
@@ -122,6 +123,8 @@ pub(crate) struct Implicit {
     /// That of the step in progress, and that of the current state.
     memory: Experience,
     kept: Experience,
+    /// Where the equations are solved exactly.
+    newton: Option<Newton>,
     /// How the last step was taken.
     pub report: SolverReport,
 }
@@ -171,8 +174,30 @@ impl Implicit {
             was_stale: true,
             memory: Experience::NONE,
             kept: Experience::NONE,
+            newton: None,
             report: SolverReport::default(),
         })
+    }
+
+    /// As [`Self::new`], with the equations solved exactly, for so many springs.
+    pub fn exact(positions: &Vectors, spring_count: usize, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
+        /// As good as nothing, and far above what rounding makes.
+        const ACCURACY: f32 = 1e-6;
+        /// For bodies of a million nodes.
+        const BUDGET: u32 = 100_000;
+        let budget = if budget == 0 { BUDGET } else { budget };
+        let accuracy = if accuracy == 0.0 { ACCURACY } else { accuracy };
+        Ok(Self {
+            newton: Some(Newton::new(positions.len(), spring_count)?),
+            ..Self::new(positions, false, order, budget, accuracy)?
+        })
+    }
+
+    /// Makes room for so many springs in all.
+    pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
+        self.newton
+            .as_mut()
+            .map_or(Ok(()), |newton| newton.make_room(spring_count))
     }
 
     /// Makes what the step in progress leaves to the next that of the current state.
@@ -207,6 +232,9 @@ impl Implicit {
     /// Nodes have been put elsewhere or given other velocities.
     pub fn forget_history(&mut self) {
         self.histories[self.settled].step = 0.0;
+        if let Some(newton) = &mut self.newton {
+            newton.forget_remainders(self.settled);
+        }
         self.forget_energy();
     }
 
@@ -232,6 +260,9 @@ impl Implicit {
         hasher.write_u64(energy.unwrap_or(f64::NAN).to_bits());
         hasher.write_u64(credit.to_bits());
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
+        if let Some(newton) = &self.newton {
+            newton.hash(self.settled, hasher);
+        }
         hasher.write_u64(u64::from(self.stale));
         if !self.stale {
             hasher.write_u64(self.kept.smallest.to_bits());

@@ -8,6 +8,7 @@ use crate::body::{Body, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
+use crate::solver::newton::{Aimed, Newton};
 use crate::solver::verlet::{Taken, begin};
 use crate::springs::{ChosenKernel, Motion, Tangent, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
@@ -69,7 +70,7 @@ pub(in crate::solver) fn run(
     let mut end = End::NotFinite;
     let mut parts = 1;
     if let Some(mut implicit) = body.implicit.take() {
-        implicit.report = SolverReport::default();
+        implicit.report = SolverReport::BEFORE;
         implicit.was_stale = implicit.stale;
         let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
@@ -171,9 +172,15 @@ impl Substep<'_> {
     }
 
     fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
-        self.prepare(body, implicit);
-        self.aim(body, implicit);
-        self.minimise(body, implicit);
+        if let Some(mut newton) = implicit.newton.take() {
+            self.aim(body, implicit);
+            self.solve_exactly(body, implicit, &mut newton);
+            implicit.newton = Some(newton);
+        } else {
+            self.prepare(body, implicit);
+            self.aim(body, implicit);
+            self.minimise(body, implicit);
+        }
         if !self.finish(body, implicit) {
             return End::NotFinite;
         }
@@ -388,6 +395,29 @@ impl Substep<'_> {
         implicit.partials.iter().map(|partial| partial.first).sum()
     }
 
+    /// Finds the pushes to the last digit that counts.
+    fn solve_exactly(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
+        let (from, to) = (implicit.place(self.is_first), 1 - implicit.settled);
+        let aimed = Aimed {
+            time: self.formula.time,
+            carried: self.formula.carried,
+            gravity: self.request.gravity,
+            end: self.end,
+            ways: &implicit.histories[from].ways,
+            from,
+            to,
+            budget: implicit.budget,
+            accuracy: f64::from(implicit.accuracy),
+            tolerance: f64::from(self.request.tolerance),
+        };
+        let found = newton.solve(body, &aimed, &mut implicit.pushes);
+        let report = &mut implicit.report;
+        report.iterations += found.products;
+        report.solves += found.iterations;
+        report.error = report.error.max(found.error as f32);
+        report.converged &= found.converged;
+    }
+
     /// Newton's iterations.
     fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
         let all_inertia = implicit.all_inertia;
@@ -432,6 +462,7 @@ impl Substep<'_> {
             };
             let positions = body.state.next_positions();
             let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
+            implicit.report.solves += 1;
             products += solved.products;
             implicit.wear(solved.products);
             size = f64::max(size, solved.size);
@@ -448,6 +479,7 @@ impl Substep<'_> {
             self.place(body, implicit);
         }
         implicit.report.iterations += products;
+        implicit.report.converged &= products < implicit.budget && error.is_finite();
         let error = (error / all_inertia).sqrt() as f32;
         implicit.report.error = implicit.report.error.max(error);
     }

@@ -1,0 +1,228 @@
+//! What is made as small as it can be: `Phi(s) = sum (c s² / 2 - b s) + E(x + s)`, with E the energy of the springs.
+//!
+//! In a step of time t, c is `m/t² + gamma/t`, and b all forces that do not depend on s; at rest c is 0. Damping along springs
+//! has such a function too as long as the directions of the springs are held: each iteration has its own.
+
+use glam::{DMat3, DVec3};
+
+use super::matrix::Matrix;
+use super::network::Network;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::Link;
+
+/// The function, and where on it we are.
+#[derive(Debug)]
+pub(super) struct Equation {
+    /// x: where nodes are without a way, m.
+    pub anchors: Vec<DVec3>,
+    /// s, m; 0 for nodes that are held.
+    pub ways: Vec<DVec3>,
+    /// c, N/m.
+    pub inertia: Vec<f64>,
+    /// b, N.
+    pub loads: Vec<DVec3>,
+    /// kg; 0 for nodes that are held.
+    pub masses: Vec<f64>,
+    /// Velocities without a way, m/s: for springs with damping alone.
+    pub drifts: Vec<DVec3>,
+    /// What a way counts as a velocity, 1/s; 0: nothing is damped.
+    pub rate: f64,
+}
+
+/// Which matrix is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tangent {
+    /// All second derivatives.
+    Exact,
+    /// Without what pressed springs do sideways: positive semidefinite.
+    Clamped,
+}
+
+/// A spring where it is.
+struct Spring {
+    way: DVec3,
+    length: f64,
+    direction: DVec3,
+    /// How fast it lengthens, m/s.
+    speed: f64,
+}
+
+impl Equation {
+    pub fn new(node_count: usize) -> Result<Self> {
+        let vectors = || memory::filled(DVec3::ZERO, node_count);
+        Ok(Self {
+            anchors: vectors()?,
+            ways: vectors()?,
+            inertia: memory::filled(0.0, node_count)?,
+            loads: vectors()?,
+            masses: memory::filled(0.0, node_count)?,
+            drifts: vectors()?,
+            rate: 0.0,
+        })
+    }
+
+    #[inline(always)]
+    pub fn is_free(&self, node: usize) -> bool {
+        self.masses[node] > 0.0
+    }
+
+    #[inline(always)]
+    pub fn position(&self, node: usize) -> DVec3 {
+        self.anchors[node] + self.ways[node]
+    }
+
+    /// How far all nodes reach along an axis, m.
+    pub fn extent(&self) -> f64 {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for node in 0..self.anchors.len() {
+            low = low.min(self.position(node));
+            high = high.max(self.position(node));
+        }
+        (high - low).max_element()
+    }
+
+    /// Minus the slope, N: what acts on each node, held ones too.
+    pub fn residuals(&self, network: &Network, residuals: &mut [DVec3]) {
+        for (node, residual) in residuals.iter_mut().enumerate() {
+            *residual = self.loads[node] - self.ways[node] * self.inertia[node];
+        }
+        for (_, node, link) in network.springs() {
+            let spring = self.spring(node, link);
+            let pull = stiffness(link) * (spring.length - rest_length(link)) + damping(link) * spring.speed;
+            let force = spring.direction * pull;
+            residuals[node] += force;
+            residuals[link.neighbour as usize] -= force;
+        }
+    }
+
+    /// How the function changes where the ways become longer by `part` of `corrections`, and the sum of what it changes by
+    /// at single nodes and springs, without sign: J. Differences are never those of sums.
+    pub fn change(&self, network: &Network, corrections: &[DVec3], part: f64) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        let mut add = |change: f64| {
+            sums[0] += change;
+            sums[1] += change.abs();
+        };
+        for (node, &correction) in corrections.iter().enumerate() {
+            let (way, inertia) = (correction * part, self.inertia[node]);
+            add(way.dot(self.ways[node] * inertia - self.loads[node]) + 0.5 * inertia * way.length_squared());
+        }
+        for (_, node, link) in network.springs() {
+            let neighbour = link.neighbour as usize;
+            let spring = self.spring(node, link);
+            let more = (corrections[neighbour] - corrections[node]) * part;
+            let then = spring.way + more;
+            let both = spring.length + then.length();
+            if both > 0.0 {
+                let longer = more.dot(spring.way + then) / both;
+                add(0.5 * stiffness(link) * longer * (both - 2.0 * rest_length(link)));
+            }
+            let along = more.dot(spring.direction);
+            add(0.5 * damping(link) * along * (2.0 * spring.speed + self.rate * along));
+        }
+        sums
+    }
+
+    /// The second derivatives, with `shift` (1/s²) times the mass added.
+    pub fn assemble(&self, network: &Network, tangent: Tangent, shift: f64, matrix: &mut Matrix) {
+        for (node, block) in matrix.diagonal.iter_mut().enumerate() {
+            *block = if self.is_free(node) {
+                DMat3::from_diagonal(DVec3::splat(self.inertia[node] + shift * self.masses[node]))
+            } else {
+                DMat3::IDENTITY
+            };
+        }
+        matrix.beside.resize(network.spring_count(), DMat3::ZERO);
+        for (place, node, link) in network.springs() {
+            let neighbour = link.neighbour as usize;
+            let block = self.stiffness_of(node, link, tangent);
+            for end in [node, neighbour] {
+                if self.is_free(end) {
+                    matrix.diagonal[end] += block;
+                }
+            }
+            let joins = self.is_free(node) && self.is_free(neighbour);
+            matrix.beside[place] = if joins { -block } else { DMat3::ZERO };
+        }
+    }
+
+    /// The matrix of a spring, `x n n^T + y I`.
+    fn stiffness_of(&self, node: usize, link: &Link, tangent: Tangent) -> DMat3 {
+        let Spring {
+            length,
+            direction,
+            speed,
+            ..
+        } = self.spring(node, link);
+        let (stiffness, rest_length) = (stiffness(link), rest_length(link));
+        let mut across = if rest_length == 0.0 {
+            stiffness
+        } else if length > 0.0 {
+            stiffness * (1.0 - rest_length / length)
+        } else {
+            // Where the ends coincide there is no side to be pushed to.
+            0.0
+        };
+        if length > 0.0 {
+            across += damping(link) * speed / length;
+        }
+        if tangent == Tangent::Clamped {
+            across = across.max(0.0);
+        }
+        let along = stiffness + damping(link) * self.rate - across;
+        let outer = DMat3::from_cols(
+            direction * direction.x,
+            direction * direction.y,
+            direction * direction.z,
+        );
+        outer * along + DMat3::from_diagonal(DVec3::splat(across))
+    }
+
+    /// The energy of the springs and of the loads, J, with the origin of coordinates at `origin`.
+    pub fn potential(&self, network: &Network, origin: DVec3) -> f64 {
+        let elastic: f64 = network
+            .springs()
+            .map(|(_, node, link)| 0.5 * stiffness(link) * (self.spring(node, link).length - rest_length(link)).powi(2))
+            .sum();
+        let loads = self.loads.iter().enumerate();
+        elastic
+            - loads
+                .map(|(node, load)| load.dot(self.position(node) + origin))
+                .sum::<f64>()
+    }
+
+    #[inline(always)]
+    fn spring(&self, node: usize, link: &Link) -> Spring {
+        let neighbour = link.neighbour as usize;
+        let way = self.position(neighbour) - self.position(node);
+        let length = way.length();
+        // Where both are at the same place it points along x, from the node with the lower number, which is the neighbour.
+        let direction = if length > 0.0 { way / length } else { DVec3::NEG_X };
+        let speed = if self.rate > 0.0 {
+            let velocity =
+                self.drifts[neighbour] - self.drifts[node] + (self.ways[neighbour] - self.ways[node]) * self.rate;
+            velocity.dot(direction)
+        } else {
+            0.0
+        };
+        Spring {
+            way,
+            length,
+            direction,
+            speed,
+        }
+    }
+}
+
+fn stiffness(link: &Link) -> f64 {
+    f64::from(link.stiffness)
+}
+
+fn rest_length(link: &Link) -> f64 {
+    f64::from(link.rest_length)
+}
+
+fn damping(link: &Link) -> f64 {
+    f64::from(link.damping)
+}

@@ -1,0 +1,80 @@
+//! NEWTON: the equations of IMPLICIT, solved to the last digits that count, in `f64`; and states of rest.
+//!
+//! A step is where a function of all ways is smallest (`equation.rs`): what a step of IMPLICIT is too, up to the hundredth part
+//! that it leaves. It is found downhill (`descent.rs`) by Newton's method with all second derivatives, by conjugate gradients with
+//! an incomplete factor of the matrix (`gradient.rs`, `factor.rs`), and is done when a correction is short in metres, not when
+//! a residual is small. A state of rest is where the function without inertia is smallest.
+//!
+//! What rounds positions to `f32` at the end of a step is kept and belongs to the next.
+
+mod descent;
+mod equation;
+mod factor;
+mod gradient;
+mod matrix;
+mod network;
+mod rest;
+mod step;
+
+pub(crate) use rest::rest_state;
+pub use rest::{RestStateDefinition, RestStateReport};
+pub(super) use step::Aimed;
+
+use crate::body::Vectors;
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::springs::Springs;
+use descent::Descent;
+use step::exact;
+
+/// What a body that is moved by NEWTON has beside what IMPLICIT needs.
+#[derive(Debug)]
+pub(crate) struct Newton {
+    descent: Descent,
+    /// What positions lack to be those that were found, m: of the current state and of the step in progress.
+    remainders: [Vectors; 2],
+}
+
+impl Newton {
+    /// For so many nodes and springs.
+    pub fn new(node_count: usize, spring_count: usize) -> Result<Self> {
+        Ok(Self {
+            descent: Descent::new(node_count, spring_count)?,
+            remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
+        })
+    }
+
+    /// Makes room for so many springs in all, so that a step needs no memory.
+    pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
+        self.descent.make_room(spring_count)
+    }
+
+    /// Positions are exactly what they are.
+    pub fn forget_remainders(&mut self, place: usize) {
+        self.remainders[place].clear();
+    }
+
+    /// The energy of the springs, J, with nodes at these positions and what they lack.
+    pub fn elastic(&self, springs: &dyn Springs, positions: &Vectors, place: usize) -> f64 {
+        let exact = |node: usize| exact(positions.get(node), self.remainders[place].get(node));
+        let mut sum = 0.0;
+        for node in 0..positions.len() {
+            let position = exact(node);
+            springs.visit(node, &mut |link| {
+                let neighbour = link.neighbour as usize;
+                if neighbour < node {
+                    let stretch = position.distance(exact(neighbour)) - f64::from(link.rest_length);
+                    sum += 0.5 * f64::from(link.stiffness) * stretch * stretch;
+                }
+            });
+        }
+        sum
+    }
+
+    /// What the next step depends on.
+    pub fn hash(&self, place: usize, hasher: &mut StateHasher) {
+        for vector in self.remainders[place].iter() {
+            hasher.write_floats(&vector.to_array());
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Where a body is at rest: the nearest place downhill where its potential energy is smallest.
+
+use glam::{DVec3, Vec3};
+
+use super::descent::{Descent, Found, Goal};
+use crate::body::Body;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// Linearised equations solved at most.
+const ITERATIONS: u32 = 10_000;
+
+/// Products where the definition does not say.
+const BUDGET: u32 = 1_000_000;
+
+/// How near the state of rest must be, as a part of the body's extent, where the definition does not say.
+const TOLERANCE: f64 = 1e-6;
+
+/// A part's forces that leave less than this part of themselves cancel.
+const CANCELS: f64 = 1e-5;
+
+/// Places where the function is level without being lowest that are left at most.
+const SADDLES: u32 = 50;
+
+/// How a state of rest is looked for; see [`World::rest_state`](crate::World::rest_state).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RestStateDefinition {
+    /// How far a node may be from where it is at rest, as far as that can be told, m; 0: a millionth of the body's extent.
+    pub tolerance: f32,
+    /// The most products with the matrix of second derivatives; 0: a million.
+    pub iterations: u32,
+}
+
+/// How a state of rest was found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RestStateReport {
+    /// Linearised equations that were solved.
+    pub iterations: u32,
+    /// Products with their matrices.
+    pub products: u32,
+    /// The largest force left on a node that is not pinned, before positions were rounded to `f32`, N.
+    pub residual: f64,
+    /// How far a node may be from where it is at rest, before positions were rounded to `f32`, m.
+    pub error: f64,
+    /// Of springs, gravity and forces, J, zero at the origin, before and after.
+    pub energy_before: f64,
+    /// After.
+    pub energy_after: f64,
+}
+
+/// Moves `body` to rest.
+pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
+    if !(definition.tolerance >= 0.0 && definition.tolerance.is_finite()) {
+        return Err(Error::invalid(format!(
+            "tolerance is {}: must be at least 0 and finite",
+            definition.tolerance
+        )));
+    }
+    let mut descent = Descent::new(body.node_count(), body.springs.spring_count())?;
+    descent.read(&*body.springs);
+    set_up(&mut descent, body, gravity);
+    let parts = Parts::new(&descent)?;
+    parts.check(&descent, body)?;
+    let origin = body.origin;
+    let energy_before = descent.equation.potential(&descent.network, origin);
+    let extent = extent(&descent);
+    let tolerance = match definition.tolerance {
+        0.0 => TOLERANCE * extent,
+        given => f64::from(given),
+    };
+    let budget = match definition.iterations {
+        0 => BUDGET,
+        given => given,
+    };
+    let found = settle(&mut descent, tolerance, extent, budget);
+    if !found.converged {
+        return Err(Error::NotConverged(format!(
+            "no state of rest was found with {} products, of {budget} allowed: the last correction was {:e} m long, {tolerance:e} m \
+             are asked for",
+            found.products, found.error
+        )));
+    }
+    descent.weigh();
+    let equation = &descent.equation;
+    let free = (0..body.node_count()).filter(|&node| equation.is_free(node));
+    let residual = free.map(|node| descent.residuals[node].length()).fold(0.0, f64::max);
+    let energy_after = equation.potential(&descent.network, origin);
+    if !(0..body.node_count()).all(|node| equation.position(node).as_vec3().length_squared().is_finite()) {
+        return Err(Error::NotConverged("the state of rest is too far away for f32".into()));
+    }
+    let held = |node: usize| -descent.residuals[node].as_vec3();
+    body.rest_at(|node| equation.position(node).as_vec3(), held);
+    Ok(RestStateReport {
+        iterations: found.iterations,
+        products: found.products,
+        residual,
+        error: found.error,
+        energy_before,
+        energy_after,
+    })
+}
+
+fn set_up(descent: &mut Descent, body: &Body, gravity: Vec3) {
+    let equation = &mut descent.equation;
+    let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+    for node in 0..body.node_count() {
+        let mass = f64::from(body.masses[node]);
+        equation.anchors[node] = body.state.positions().get(node).as_dvec3();
+        equation.loads[node] = gravity.as_dvec3() * mass;
+        if body.inverse_masses[node] > 0.0 {
+            equation.masses[node] = mass;
+            if let Some(applied) = applied {
+                equation.loads[node] += applied.get(node).as_dvec3();
+            }
+        }
+    }
+}
+
+/// How far the body reaches, where it lies in one place at least as far as its longest spring would, m.
+fn extent(descent: &Descent) -> f64 {
+    let lengths = descent
+        .network
+        .springs()
+        .map(|(_, _, link)| f64::from(link.rest_length));
+    lengths.fold(descent.equation.extent(), f64::max)
+}
+
+/// Goes down, and on from where it is level without being lowest.
+fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> Found {
+    descent.weigh();
+    let equation = &descent.equation;
+    let free = (0..descent.residuals.len()).filter(|&node| equation.is_free(node));
+    let fastest = free
+        .map(|node| descent.residuals[node].length() / equation.masses[node])
+        .fold(0.0, f64::max);
+    // A body that falls freely goes as far as it is long in such a time: nodes are held back by so much at first.
+    let mut shift = fastest / extent;
+    if !(shift > 0.0 && shift.is_finite()) {
+        shift = 1.0;
+    }
+    let mut found = Found::default();
+    for _ in 0..SADDLES {
+        let part = descent.run(&Goal {
+            absolute: tolerance,
+            relative: 0.0,
+            rounding: 1e-9 * extent,
+            iterations: ITERATIONS,
+            budget: budget.saturating_sub(found.products),
+            shift,
+            least_shift: 1e-10 * shift,
+            next_shift: shift,
+        });
+        found = Found {
+            iterations: found.iterations + part.iterations,
+            products: found.products + part.products,
+            ..part
+        };
+        let left = budget.saturating_sub(found.products);
+        if !found.converged || !descent.leave_saddle(1e-8 * shift, 0.01 * extent, &mut found, left) {
+            return found;
+        }
+        found.converged = false;
+    }
+    found
+}
+
+/// The parts of a body that springs hold together: for each node the lowest node of its part.
+struct Parts {
+    lowest: Vec<u32>,
+}
+
+impl Parts {
+    fn new(descent: &Descent) -> Result<Self> {
+        let node_count = descent.network.node_count();
+        let mut lowest = memory::reserved(node_count)?;
+        lowest.extend(0..node_count as u32);
+        let mut parts = Self { lowest };
+        for (_, node, link) in descent.network.springs() {
+            if link.stiffness > 0.0 {
+                let [a, b] = [node as u32, link.neighbour].map(|end| parts.find(end));
+                parts.lowest[a.max(b) as usize] = a.min(b);
+            }
+        }
+        for node in 0..node_count as u32 {
+            parts.lowest[node as usize] = parts.find(node);
+        }
+        Ok(parts)
+    }
+
+    fn find(&mut self, mut node: u32) -> u32 {
+        while self.lowest[node as usize] != node {
+            let above = self.lowest[node as usize];
+            self.lowest[node as usize] = self.lowest[above as usize];
+            node = above;
+        }
+        node
+    }
+
+    /// Refuses a part that nothing holds against the forces on it.
+    fn check(&self, descent: &Descent, body: &Body) -> Result<()> {
+        let equation = &descent.equation;
+        let mut sums = memory::filled((DVec3::ZERO, 0.0), self.lowest.len())?;
+        let mut is_held = memory::filled(false, self.lowest.len())?;
+        for (node, &part) in self.lowest.iter().enumerate() {
+            let (sum, size) = &mut sums[part as usize];
+            *sum += equation.loads[node];
+            *size += equation.loads[node].length();
+            is_held[part as usize] |= !equation.is_free(node);
+        }
+        for (part, (sum, size)) in sums.into_iter().enumerate() {
+            if !is_held[part] && sum.length() > CANCELS * size {
+                return Err(Error::invalid(format!(
+                    "there is no state of rest: nothing holds node {} and what it is joined to against {:e} N",
+                    body.callers(part),
+                    sum.length()
+                )));
+            }
+        }
+        Ok(())
+    }
+}

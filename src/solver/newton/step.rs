@@ -1,0 +1,120 @@
+//! A step of NEWTON: the equation made of the body, and the state made of its solution.
+
+use glam::{DVec3, Vec3};
+
+use super::Newton;
+use super::descent::{Found, Goal};
+use crate::body::{Body, Vectors};
+
+/// Linearised equations solved in a step at most.
+const ITERATIONS: u32 = 300;
+
+/// What rounding in `f64` may make of a position, and what storing it in `f32` does, as parts of the body's extent.
+const ROUNDING: f64 = 1e-12;
+const STORED: f64 = 6e-8;
+
+/// A step whose velocities are where they would be without forces.
+pub(in crate::solver) struct Aimed<'a> {
+    /// t, s.
+    pub time: f64,
+    /// c: the part of the last ways that goes on.
+    pub carried: f64,
+    pub gravity: Vec3,
+    /// Where the substep ends, as a fraction of the step asked for.
+    pub end: f64,
+    /// How far each node went in the last step.
+    pub ways: &'a Vectors,
+    /// Which remainders belong to the positions now, and to those at the end.
+    pub from: usize,
+    pub to: usize,
+    pub budget: u32,
+    pub accuracy: f64,
+    /// m; 0: none.
+    pub tolerance: f64,
+}
+
+impl Newton {
+    /// Solves the step's equation, from the pushes that are expected; leaves the positions at its end and the pushes that lead
+    /// there.
+    pub(in crate::solver) fn solve(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) -> Found {
+        self.descent.read(&*body.springs);
+        self.set_up(body, aimed, pushes);
+        let extent = self.descent.equation.extent();
+        let rate = 1.0 / aimed.time;
+        let found = self.descent.run(&Goal {
+            absolute: (ROUNDING * extent).max(0.1 * aimed.tolerance),
+            relative: aimed.accuracy,
+            rounding: STORED * extent,
+            iterations: ITERATIONS,
+            budget: aimed.budget,
+            shift: 0.0,
+            least_shift: 0.0,
+            next_shift: rate * rate,
+        });
+        self.descent.weigh();
+        self.take_over(body, aimed, pushes);
+        found
+    }
+
+    fn set_up(&mut self, body: &mut Body, aimed: &Aimed, pushes: &Vectors) {
+        let equation = &mut self.descent.equation;
+        let rate = 1.0 / aimed.time;
+        let gravity = aimed.gravity.as_dvec3();
+        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+        let dampings = body.damping.as_ref().map(|damping| damping.rates());
+        let state = body.state.substep();
+        equation.rate = if body.springs.damped() { rate } else { 0.0 };
+        for node in 0..body.masses.len() {
+            let velocity = state.velocities.get(node).as_dvec3();
+            let mass = f64::from(body.masses[node]);
+            equation.drifts[node] = velocity;
+            equation.loads[node] = gravity * mass;
+            equation.ways[node] = DVec3::ZERO;
+            equation.masses[node] = 0.0;
+            equation.inertia[node] = 0.0;
+            if body.inverse_masses[node] == 0.0 {
+                continue;
+            }
+            let damping = dampings.map_or(0.0, |rates| f64::from(rates[node])) * mass;
+            let position = state.positions.get(node);
+            let exact = exact(position, self.remainders[aimed.from].get(node));
+            equation.anchors[node] = exact + aimed.ways.get(node).as_dvec3() * aimed.carried + velocity * aimed.time;
+            equation.ways[node] = pushes.get(node).as_dvec3();
+            equation.masses[node] = mass;
+            equation.inertia[node] = (mass * rate + damping) * rate;
+            equation.loads[node] -= velocity * damping;
+            if let Some(applied) = applied {
+                equation.loads[node] += applied.get(node).as_dvec3();
+            }
+        }
+        for pin in body.pins.iter() {
+            equation.anchors[pin.node as usize] = pin.place(aimed.end).as_dvec3();
+        }
+    }
+
+    fn take_over(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) {
+        let equation = &self.descent.equation;
+        let next_positions = body.state.substep().next_positions;
+        let remainders = &mut self.remainders[aimed.to];
+        for node in 0..next_positions.len() {
+            let exact = equation.position(node);
+            let position = exact.as_vec3();
+            next_positions.set(node, position);
+            remainders.set(node, (exact - position.as_dvec3()).as_vec3());
+            pushes.set(node, equation.ways[node].as_vec3());
+        }
+        for pin in body.pins.iter_mut() {
+            pin.solved = -self.descent.residuals[pin.node as usize].as_vec3();
+        }
+    }
+}
+
+/// A position with what it lacks, unless it has been put elsewhere since.
+pub(super) fn exact(position: Vec3, remainder: Vec3) -> DVec3 {
+    let exact = position.as_dvec3() + remainder.as_dvec3();
+    if exact.as_vec3() == position {
+        exact
+    } else {
+        position.as_dvec3()
+    }
+}
