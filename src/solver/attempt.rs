@@ -147,8 +147,9 @@ fn run(
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
 fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = start.stability.limit().unwrap_or(f32::INFINITY);
+    let is_fast = is_too_fast_for_estimates(body, request, &start);
     for attempt in 0..=ATTEMPTS {
-        if attempt == ATTEMPTS {
+        if attempt == ATTEMPTS || is_fast {
             stable_substep = start.stability.limit_anywhere();
         }
         let stability = start.stability.shortened_to(stable_substep);
@@ -178,6 +179,23 @@ fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team)
         }
     }
     Err(TooLong { stable_substep })
+}
+
+/// Whether the body moves so fast that shorter substeps, which are stable wherever its nodes are, cost less than to estimate
+/// again and again what longer ones are stable for.
+fn is_too_fast_for_estimates(body: &Body, request: &StepRequest, start: &Carry) -> bool {
+    let stability = &start.stability;
+    let Some(limit) = stability.limit() else {
+        return false;
+    };
+    // A few watched nodes cost nothing.
+    if body.watched.limit_of_others() >= limit || stability.is_coarse() {
+        return false;
+    }
+    let travel = request.dt * verlet::diagonal(&start.gravity.velocities);
+    let estimates = 1.0 / stability.substeps_of(travel);
+    let more = substeps_needed(request, stability.limit_anywhere()) - substeps_needed(request, limit);
+    f64::from(WORTH_ESTIMATING * estimates) > more
 }
 
 /// How many substeps a step takes of which the longest stable one is this long, s.

@@ -136,7 +136,7 @@ impl Axis<'_> {
                 let damped = move |place: usize, acceleration: f32, velocity: f32| {
                     let (loss, gain) = (loss[place], gain[place]);
                     let both = whole - share * loss;
-                    velocity + ((acceleration + gravity) * (gain * both) - velocity * (loss * both))
+                    still_or(velocity + ((acceleration + gravity) * (gain * both) - velocity * (loss * both)))
                 };
                 match inverse_masses {
                     InverseMasses::Uniform(inverse_mass) => {
@@ -174,6 +174,15 @@ impl Axis<'_> {
             }
         }
     }
+}
+
+/// A velocity, or 0 where its square would be no normal number: nothing moves by it, and processors take many times as long
+/// for what they make of it.
+#[inline(always)]
+fn still_or(velocity: f32) -> f32 {
+    /// m/s: 2^-63.
+    const SLOWEST: f32 = 1.0842022e-19;
+    if velocity.abs() < SLOWEST { 0.0 } else { velocity }
 }
 
 /// What there is to know of a tile after a kick.

@@ -415,15 +415,16 @@ impl Substep<'_> {
     /// Newton's iterations.
     fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
         let all_inertia = implicit.all_inertia;
-        let absolute = f64::max(
-            (0.1 * f64::from(self.request.tolerance)).powi(2) * all_inertia,
-            implicit.noise.error,
-        );
+        // What each of n equations lacks of its ways goes into the velocity too, and grows as n² by the step's end.
+        let part = self.end - self.start;
+        let tolerated = 0.1 * f64::from(self.request.tolerance) * part * part;
+        let absolute = f64::max(tolerated.powi(2) * all_inertia, implicit.noise.error);
         let relative = f64::from(implicit.accuracy).powi(2);
         let whole_budget = self.budget(implicit);
         let mut products = 0;
         let mut size = 0.0;
         let mut error = f64::INFINITY;
+        let is_held = body.pins.iter().next().is_some();
         self.place(body, implicit);
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
@@ -462,8 +463,9 @@ impl Substep<'_> {
             implicit.wear(solved.products);
             size = f64::max(size, solved.size);
             solved_error = solved.error;
-            // Where the correction itself is no more than what may be left, there is no need to look at what it led to.
-            if solved.size <= absolute {
+            // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
+            // nothing holds is to keep its momentum.
+            if solved.size <= absolute && is_held {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
                 error = solved.error;
@@ -475,7 +477,7 @@ impl Substep<'_> {
                 break;
             }
         }
-        if body.pins.iter().next().is_none() {
+        if !is_held {
             implicit.balance(body.state.next_positions());
             self.place(body, implicit);
         }
