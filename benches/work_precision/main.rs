@@ -31,13 +31,14 @@ mod rest;
 mod rows;
 mod scene;
 mod scenes;
+mod settling;
 mod simd;
-mod statics;
 mod summary;
 #[path = "../storage/svg.rs"]
 mod svg;
 mod tables;
 mod tissue;
+mod tolerance;
 mod xpbd;
 
 use std::process::ExitCode;
@@ -149,7 +150,15 @@ fn run(options: &Options) -> Result<(), String> {
         }
         tables::write(&mut report, &scene, &reference, &sweeps);
         rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
+        tolerance::run(
+            &mut report,
+            &scene,
+            &reference,
+            options.threads,
+            effort.patience_at_rest,
+        );
     }
+    settling::run(&mut report);
     for (scene, reason) in scenes::PENDING {
         report.not_offered(scene, &format!("pending: {reason}"));
     }
@@ -164,10 +173,12 @@ fn introduction(options: &Options) -> String {
     let mut text = format!("# Work and precision\n\n{}", machine::description());
     text.push_str(
         "- Error: RMS over nodes and 8 sample times within 0.25 s of the distance to leapfrog in `f64`, over RMS of its \
-         motion. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
+         motion. Force error: of the force on all pins together, in the RMS of that force. Volume error: of the \
+         tetrahedra's volume, in that at the start. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
          drift: at the end, in the largest kinetic energies.\n\
          - Times are the best of up to four runs, in processor time of the thread. Preparing (laying out springs, \
-         colouring, factoring) is not in them and stands apart. A line ends where a run would take too long.\n",
+         colouring, factoring) is not in them and stands apart. What takes too long is stopped, or not begun, and listed as \
+         too slow, with the time it is expected to take.\n",
     );
     if options.threads > 1 {
         text.push_str(&format!(
