@@ -14,9 +14,9 @@ pub struct Line {
 }
 
 /// Multiples of the steps that stability needs.
-const FINER: [f64; 6] = [1.0, 1.5, 2.0, 4.0, 8.0, 16.0];
+const FINER: [f64; 4] = [1.0, 1.5, 2.0, 4.0];
 /// World steps of a span, 1/64 s each to 0.1 ms.
-const WORLD_STEPS: [u32; 5] = [2, 8, 32, 128, 312];
+const WORLD_STEPS: [u32; 3] = [2, 32, 312];
 /// Parts of the mass that may be added, in frames of 1/64 s; the default is 1e-3.
 const ADDED: [f32; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
 /// Steps of a span for what is stable at any step, 1/64 s to 0.49 ms.
@@ -26,8 +26,8 @@ const YARDSTICK_STEPS: [u32; 3] = [2, 8, 32];
 /// How far IMPLICIT solves its equations: its own choice, and loosely.
 const ACCURACIES: [f32; 2] = [0.01, 0.1];
 /// Substeps of a frame, 1/64 s.
-const XPBD_SUBSTEPS: [u32; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
-const PROJECTIVE_STEPS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+const XPBD_SUBSTEPS: [u32; 6] = [8, 16, 32, 64, 128, 512];
+const PROJECTIVE_STEPS: [u32; 5] = [1, 4, 8, 32, 128];
 const PROJECTIVE_ITERATIONS: [u32; 3] = [1, 10, 30];
 
 /// All lines for a scene in which leapfrog stands steps of `stable_step`, s.

@@ -1,7 +1,7 @@
 //! Work-precision diagrams: error against a converged reference, and the time for it, for sinew's solvers, the paper's Verlet
 //! (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective Dynamics (Liu et al. 2013).
 //!
-//! `cargo bench --bench work_precision [-- --quick] [--only <scene>] [--threads <n>] [--check]` writes
+//! `cargo bench --bench work_precision [-- --quick] [--only <scene or settling>] [--threads <n>] [--check]` writes
 //! `target/report/work_precision.md` and diagrams beside it. References and rest shapes are computed once and kept in
 //! `target/reference`.
 #![allow(clippy::print_stderr)]
@@ -52,6 +52,8 @@ struct Options {
     quick: bool,
     check: bool,
     scenes: Vec<&'static str>,
+    /// The one part that belongs to no scene.
+    settling: bool,
     threads: u32,
 }
 
@@ -61,6 +63,7 @@ impl Options {
             quick: false,
             check: false,
             scenes: scenes::NAMES.to_vec(),
+            settling: true,
             threads: 1,
         };
         let mut arguments = std::env::args().skip(1);
@@ -73,8 +76,12 @@ impl Options {
                 "--only" => {
                     let name = arguments.next().unwrap_or_default();
                     options.scenes.retain(|scene| *scene == name);
-                    if options.scenes.is_empty() {
-                        return Err(format!("--only {name:?}: must be one of {:?}", scenes::NAMES));
+                    options.settling = name == "settling";
+                    if options.scenes.is_empty() && !options.settling {
+                        return Err(format!(
+                            "--only {name:?}: must be settling or one of {:?}",
+                            scenes::NAMES
+                        ));
                     }
                 }
                 "--threads" => match arguments.next().map(|count| count.parse()) {
@@ -83,7 +90,7 @@ impl Options {
                 },
                 other => {
                     return Err(format!(
-                        "{other}: there is --quick, --check, --only <scene> and --threads <n>"
+                        "{other}: there is --quick, --check, --only <scene or settling> and --threads <n>"
                     ));
                 }
             }
@@ -158,7 +165,9 @@ fn run(options: &Options) -> Result<(), String> {
             effort.patience_at_rest,
         );
     }
-    settling::run(&mut report);
+    if options.settling {
+        settling::run(&mut report);
+    }
     for (scene, reason) in scenes::PENDING {
         report.not_offered(scene, &format!("pending: {reason}"));
     }
@@ -176,7 +185,7 @@ fn introduction(options: &Options) -> String {
          motion. Force error: of the force on all pins together, in the RMS of that force. Volume error: of the \
          tetrahedra's volume, in that at the start. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
          drift: at the end, in the largest kinetic energies.\n\
-         - Times are the best of up to four runs, in processor time of the thread. Preparing (laying out springs, \
+         - Times are the best of up to two runs, in processor time of the thread. Preparing (laying out springs, \
          colouring, factoring) is not in them and stands apart. What takes too long is stopped, or not begun, and listed as \
          too slow, with the time it is expected to take.\n",
     );

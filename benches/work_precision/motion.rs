@@ -28,9 +28,9 @@ pub struct Effort {
 impl Effort {
     pub const FULL: Self = Self {
         quick: false,
-        runs: 3,
+        runs: 1,
         patience: 3.0,
-        patience_at_rest: 8.0,
+        patience_at_rest: 6.0,
     };
     pub const QUICK: Self = Self {
         quick: true,

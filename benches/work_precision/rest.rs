@@ -11,14 +11,14 @@ use crate::scene::Scene;
 use crate::tables::{iterations, percent};
 use crate::tissue::Tissue;
 
-/// 1/s
-const DAMPING: f32 = 5.0;
+/// 1/s, about as much as brings the slowest modes of the scenes to rest soonest.
+const DAMPING: f32 = 20.0;
 const FRAME: f64 = 1.0 / 60.0;
 /// Looked at every so many frames, up to so many.
-const LOOK: usize = 30;
-const MOST_FRAMES: usize = 600;
+const LOOK: usize = 15;
+const MOST_FRAMES: usize = 240;
 /// Nothing is at rest before.
-const FEWEST_FRAMES: usize = 240;
+const FEWEST_FRAMES: usize = 90;
 
 pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
     let scene = scene.settling(DAMPING, scene.gravity_at_rest);
