@@ -18,6 +18,7 @@ mod lines;
 #[path = "../storage/machine.rs"]
 mod machine;
 mod motion;
+mod overview;
 mod paper;
 mod projective;
 #[path = "../storage/random.rs"]
@@ -44,6 +45,7 @@ mod xpbd;
 use std::process::ExitCode;
 
 use motion::Effort;
+use overview::Overview;
 use reference::Reference;
 use report::Report;
 
@@ -129,6 +131,7 @@ fn run(options: &Options) -> Result<(), String> {
     let effort = if options.quick { Effort::QUICK } else { Effort::FULL };
     let mut report = Report::new("work_precision");
     report.write(&introduction(options));
+    let mut overview = Overview::default();
     for name in &options.scenes {
         let scene = match scenes::scene(name) {
             Ok(scene) => scene,
@@ -156,6 +159,7 @@ fn run(options: &Options) -> Result<(), String> {
             sweeps.push(sweep);
         }
         tables::write(&mut report, &scene, &reference, &sweeps);
+        overview.add(name, &reference, &sweeps);
         rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
         tolerance::run(
             &mut report,
@@ -165,6 +169,7 @@ fn run(options: &Options) -> Result<(), String> {
             effort.patience_at_rest,
         );
     }
+    overview.write(&mut report);
     if options.settling {
         settling::run(&mut report);
     }

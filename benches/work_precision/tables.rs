@@ -7,7 +7,7 @@ use crate::motion::{Missing, Point, Sweep};
 use crate::reference::Reference;
 use crate::report::{Report, Table, digits, milliseconds};
 use crate::scene::Scene;
-use crate::summary::{error_in, measured, time_for};
+use crate::summary::{error_in, families, measured, times};
 use crate::svg::{Series, plot};
 
 /// Frames per second.
@@ -76,21 +76,13 @@ fn summary(reference: &Reference, sweeps: &[Sweep]) -> Table {
         "error in 1 ms a frame",
         "in 16 ms",
     ]);
-    let mut families: Vec<&str> = sweeps.iter().map(|sweep| sweep.line.family).collect();
-    families.dedup();
-    for family in families {
-        let lines: Vec<&Sweep> = sweeps.iter().filter(|sweep| sweep.line.family == family).collect();
+    for (family, lines) in families(sweeps) {
         let mut row = vec![family.to_owned()];
         if lines.iter().all(|line| line.points.is_err()) {
             row.extend(vec!["not offered".to_owned(); 5]);
         } else {
-            let time = |error| match time_for(&lines, error) {
-                _ if error < reference.uncertainty => "unresolved".into(),
-                None => "never".into(),
-                Some(seconds) => digits(seconds),
-            };
             let error = |milliseconds: f64| error_in(&lines, 1e-3 * milliseconds * FRAMES).map_or("-".into(), percent);
-            row.extend([0.1, 0.01, 0.001].map(time));
+            row.extend(times(reference, &lines));
             row.extend([1.0, 16.0].map(error));
         }
         table.row(row);
