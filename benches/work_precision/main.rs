@@ -1,8 +1,8 @@
 //! Work-precision diagrams: error against a converged reference, and the time for it, for sinew's solvers, the paper's Verlet
 //! (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective Dynamics (Liu et al. 2013).
 //!
-//! `cargo bench --bench work_precision [-- --quick] [--only <scene or settling>] [--threads <n>] [--check]` writes
-//! `target/report/work_precision.md` and diagrams beside it. References and rest shapes are computed once and kept in
+//! `cargo bench --bench work_precision [-- --quick] [--only <scene or settling>] [--part <part>] [--threads <n>] [--check]` writes
+//! `target/report/work_precision.md` and diagrams beside it. References are computed once and kept in
 //! `target/reference`.
 #![allow(clippy::print_stderr)]
 
@@ -44,10 +44,14 @@ mod xpbd;
 
 use std::process::ExitCode;
 
-use motion::Effort;
+use motion::{Effort, Sweep};
 use overview::Overview;
 use reference::Reference;
 use report::Report;
+use scene::Scene;
+
+/// What is measured of a scene.
+const PARTS: [&str; 3] = ["motion", "rest", "tolerance"];
 
 /// What is asked for on the command line.
 struct Options {
@@ -56,6 +60,8 @@ struct Options {
     scenes: Vec<&'static str>,
     /// The one part that belongs to no scene.
     settling: bool,
+    /// What is measured of each scene.
+    parts: Vec<&'static str>,
     threads: u32,
 }
 
@@ -66,6 +72,7 @@ impl Options {
             check: false,
             scenes: scenes::NAMES.to_vec(),
             settling: true,
+            parts: PARTS.to_vec(),
             threads: 1,
         };
         let mut arguments = std::env::args().skip(1);
@@ -86,13 +93,20 @@ impl Options {
                         ));
                     }
                 }
+                "--part" => {
+                    let name = arguments.next().unwrap_or_default();
+                    options.parts.retain(|part| *part == name);
+                    if options.parts.is_empty() {
+                        return Err(format!("--part {name:?}: must be one of {PARTS:?}"));
+                    }
+                }
                 "--threads" => match arguments.next().map(|count| count.parse()) {
                     Some(Ok(threads)) if threads > 0 => options.threads = threads,
                     other => return Err(format!("--threads {other:?}: must be a number above 0")),
                 },
                 other => {
                     return Err(format!(
-                        "{other}: there is --quick, --check, --only <scene or settling> and --threads <n>"
+                        "{other}: there is --quick, --check, --only <scene or settling>, --part <part> and --threads <n>"
                     ));
                 }
             }
@@ -150,24 +164,24 @@ fn run(options: &Options) -> Result<(), String> {
             1e3 * reference.stable_step,
             tables::percent(reference.uncertainty)
         ));
-        let mut sweeps = Vec::new();
-        for line in lines::lines(reference.stable_step, options.threads) {
-            let sweep = motion::sweep(&scene, &reference, line, effort, &report);
-            if let Err(reason) = &sweep.points {
-                report.not_offered(&sweep.line.name, reason);
-            }
-            sweeps.push(sweep);
+        let asked = |part| options.parts.contains(&part);
+        if asked("motion") {
+            let sweeps = sweeps(&scene, &reference, options.threads, effort, &mut report);
+            tables::write(&mut report, &scene, &reference, &sweeps);
+            overview.add(name, &reference, &sweeps);
         }
-        tables::write(&mut report, &scene, &reference, &sweeps);
-        overview.add(name, &reference, &sweeps);
-        rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
-        tolerance::run(
-            &mut report,
-            &scene,
-            &reference,
-            options.threads,
-            effort.patience_at_rest,
-        );
+        if asked("rest") {
+            rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
+        }
+        if asked("tolerance") {
+            tolerance::run(
+                &mut report,
+                &scene,
+                &reference,
+                options.threads,
+                effort.patience_at_rest,
+            );
+        }
     }
     overview.write(&mut report);
     if options.settling {
@@ -181,6 +195,19 @@ fn run(options: &Options) -> Result<(), String> {
         .map_err(|error| format!("the report could not be written: {error}"))?;
     eprintln!("report: {}", path.display());
     Ok(())
+}
+
+/// All lines of a scene.
+fn sweeps(scene: &Scene, reference: &Reference, threads: u32, effort: Effort, report: &mut Report) -> Vec<Sweep> {
+    let mut sweeps = Vec::new();
+    for line in lines::lines(reference.stable_step, threads) {
+        let sweep = motion::sweep(scene, reference, line, effort, report);
+        if let Err(reason) = &sweep.points {
+            report.not_offered(&sweep.line.name, reason);
+        }
+        sweeps.push(sweep);
+    }
+    sweeps
 }
 
 fn introduction(options: &Options) -> String {
