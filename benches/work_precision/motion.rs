@@ -29,7 +29,7 @@ impl Effort {
     pub const FULL: Self = Self {
         quick: false,
         runs: 1,
-        patience: 3.0,
+        patience: 6.0,
         patience_at_rest: 6.0,
     };
     pub const QUICK: Self = Self {
