@@ -11,8 +11,9 @@ pub struct Series {
     pub dashed: bool,
 }
 
-const COLOURS: [&str; 10] = [
+const COLOURS: [&str; 12] = [
     "#1f6fb4", "#d1495b", "#2e8b57", "#8e5ea2", "#e08e2b", "#3aa6a6", "#7a5c3e", "#c2569b", "#6b7280", "#9aa52c",
+    "#12355b", "#f08080",
 ];
 const WIDTH: f64 = 980.0;
 const HEIGHT: f64 = 520.0;
@@ -61,9 +62,9 @@ impl Axis {
     }
 }
 
-/// The plot, with a legend in the order of the lines at their right ends.
+/// The plot, with a legend in the order of the lines at their right ends; below it, those that have no points.
 pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series]) -> String {
-    let series: Vec<&Series> = series.iter().filter(|series| !series.points.is_empty()).collect();
+    let (series, missing): (Vec<&Series>, Vec<&Series>) = series.iter().partition(|series| !series.points.is_empty());
     let points = || series.iter().flat_map(|series| &series.points);
     let mut svg = String::new();
     let _ = writeln!(
@@ -84,6 +85,15 @@ pub fn plot(title: &str, x_label: &str, y_label: &str, series: &[Series]) -> Str
             let legend = TOP + 12.0 + 22.0 * place as f64;
             line(&mut svg, series[index], COLOURS[index % COLOURS.len()], &x, &y, legend);
         }
+    }
+    for (place, missing) in (series.len()..).zip(missing) {
+        let _ = writeln!(
+            svg,
+            "<text x=\"{}\" y=\"{}\" fill=\"#888\">{}</text>",
+            RIGHT + 50.0,
+            TOP + 16.5 + 22.0 * place as f64,
+            escaped(&missing.name)
+        );
     }
     let _ = writeln!(
         svg,

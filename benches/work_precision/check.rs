@@ -19,12 +19,8 @@ pub fn run(report: &Report, scene: &Scene, reference: &Reference) -> Result<(), 
     };
     let stable = (2.0 * SPAN / reference.stable_step).ceil() as u32;
     let setup = |method, steps, iterations| Setup {
-        method,
-        steps,
-        substeps: 0,
         iterations,
-        span: SPAN,
-        threads: 1,
+        ..Setup::new(method, steps, SPAN, 1)
     };
     let baselines = [
         ("Verlet as printed", None, setup(Method::Paper, stable, 0)),
@@ -40,6 +36,7 @@ pub fn run(report: &Report, scene: &Scene, reference: &Reference) -> Result<(), 
             measure(scene, &exact, reference, setup, effort)?
                 .outcome
                 .map(|measured| measured.error)
+                .map_err(|why| why.to_string())
         };
         let fine = error(fine)?;
         let coarse = coarse.map_or(Ok(f64::INFINITY), error)?;

@@ -26,6 +26,11 @@ pub trait Contender {
     fn substeps(&self) -> Option<u32> {
         None
     }
+
+    /// How many iterations it took in the last span, where that is its own choice.
+    fn iterations(&self) -> Option<u32> {
+        None
+    }
 }
 
 /// Where nodes are and how fast, in the scene's order.
@@ -53,14 +58,35 @@ pub struct Setup {
     pub steps: u32,
     /// VERLET: substeps of a step, 0: as many as it takes.
     pub substeps: u32,
-    /// Iterations of a step, where the method has a number of them.
+    /// Iterations of a step, where the method has a number of them; sinew: the most it may take, 0: its own choice.
     pub iterations: u32,
+    /// VERLET: the part of the mass that may be added.
+    pub mass_scaling: f32,
+    /// IMPLICIT, NEWTON: the order of the formula, 0: their own choice.
+    pub order: u32,
+    /// IMPLICIT, NEWTON: how far equations are solved, 0: their own choice.
+    pub accuracy: f32,
     /// s
     pub span: f64,
     pub threads: u32,
 }
 
 impl Setup {
+    /// A span in so many steps, everything else as it is plainest.
+    pub fn new(method: Method, steps: u32, span: f64, threads: u32) -> Self {
+        Self {
+            method,
+            steps,
+            substeps: 0,
+            iterations: 0,
+            mass_scaling: 0.0,
+            order: 0,
+            accuracy: 0.0,
+            span,
+            threads,
+        }
+    }
+
     /// s
     pub fn step(&self) -> f64 {
         self.span / f64::from(self.steps)
@@ -69,7 +95,7 @@ impl Setup {
     /// In proportion to the time it takes, along a line.
     pub fn work(&self) -> f64 {
         match (self.method, self.substeps) {
-            // As many substeps as it takes, however many steps they are in.
+            // As many substeps as it takes, however many steps they are in; fewer where mass is added.
             (Method::Sinew(Solver::Verlet), 0) => 1.0,
             (_, substeps) => f64::from(self.steps * substeps.max(1)),
         }

@@ -71,6 +71,21 @@ impl Exact {
         self.hold(forces);
     }
 
+    /// What all springs together pull the pinned nodes with, N.
+    pub fn force_on_pins(&self, positions: &[DVec3]) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for spring in &self.springs {
+            let held = [spring.a, spring.b].map(|node| self.masses[node as usize] == 0.0);
+            if held[0] != held[1] {
+                let apart = spring.between(positions);
+                let length = apart.length();
+                let pull = apart * (spring.stiffness * (spring.rest_length - length) / length);
+                sum += if held[0] { pull } else { -pull };
+            }
+        }
+        sum
+    }
+
     /// Takes away what acts on pinned nodes.
     pub fn hold(&self, vectors: &mut [DVec3]) {
         for (vector, &mass) in vectors.iter_mut().zip(&self.masses) {

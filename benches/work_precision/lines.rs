@@ -14,60 +14,100 @@ pub struct Line {
 }
 
 /// Multiples of the steps that stability needs.
-const FINER: [f64; 6] = [1.0, 1.5, 2.0, 4.0, 8.0, 16.0];
+const FINER: [f64; 4] = [1.0, 1.5, 2.0, 4.0];
 /// World steps of a span, 1/64 s each to 0.1 ms.
-const WORLD_STEPS: [u32; 5] = [2, 8, 32, 128, 312];
-/// Steps of a span for what is stable at any step, 1/32 s to 0.12 ms.
-const STEPS: [u32; 9] = [1, 2, 4, 8, 16, 32, 64, 128, 256];
+const WORLD_STEPS: [u32; 3] = [2, 32, 312];
+/// Parts of the mass that may be added, in frames of 1/64 s; the default is 1e-3.
+const ADDED: [f32; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
+/// Steps of a span for what is stable at any step, 1/64 s to 0.49 ms.
+const STEPS: [u32; 6] = [2, 4, 8, 16, 32, 64];
+/// The same for the yardstick.
+const YARDSTICK_STEPS: [u32; 3] = [2, 8, 32];
+/// How far IMPLICIT solves its equations: its own choice, and loosely.
+const ACCURACIES: [f32; 2] = [0.01, 0.1];
 /// Substeps of a frame, 1/64 s.
-const XPBD_SUBSTEPS: [u32; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
-const PROJECTIVE_STEPS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
-const PROJECTIVE_ITERATIONS: [u32; 4] = [1, 3, 10, 30];
+const XPBD_SUBSTEPS: [u32; 6] = [8, 16, 32, 64, 128, 512];
+const PROJECTIVE_STEPS: [u32; 5] = [1, 4, 8, 32, 128];
+const PROJECTIVE_ITERATIONS: [u32; 3] = [1, 10, 30];
 
 /// All lines for a scene in which leapfrog stands steps of `stable_step`, s.
 pub fn lines(stable_step: f64, threads: u32) -> Vec<Line> {
-    let setup = |method: Method, steps: u32| Setup {
-        method,
-        steps,
-        substeps: 0,
-        iterations: 0,
-        span: SPAN,
-        threads,
-    };
-    let needed = |finer: f64| (finer * SPAN / stable_step).ceil() as u32;
-    let line = |name: &str, family: &'static str, setups: Vec<Setup>| Line {
-        name: name.to_owned(),
+    let mut lines = verlet(stable_step, threads);
+    lines.extend(implicit(threads));
+    lines.extend(baselines(stable_step, threads));
+    lines
+}
+
+fn line(name: impl Into<String>, family: &'static str, setups: impl IntoIterator<Item = Setup>) -> Line {
+    Line {
+        name: name.into(),
         family,
-        setups,
-    };
-    let sinew = |solver, steps: &[u32]| steps.iter().map(|&steps| setup(Method::Sinew(solver), steps)).collect();
-    let fixed = |finer: f64| Setup {
-        substeps: needed(finer).div_ceil(2),
-        ..setup(Method::Sinew(Solver::Verlet), 2)
-    };
-    let paper = |finer: f64| setup(Method::Paper, needed(finer));
-    let mut lines = vec![
-        line("VERLET, substeps fixed", "VERLET", FINER.map(fixed).to_vec()),
-        line("VERLET, substeps chosen", "VERLET", sinew(Solver::Verlet, &WORLD_STEPS)),
-        line("IMPLICIT", "IMPLICIT", sinew(Solver::Implicit, &STEPS)),
-        line("NEWTON", "NEWTON", sinew(Solver::Newton, &STEPS)),
-        line("Verlet as printed", "Verlet as printed", FINER.map(paper).to_vec()),
-        line(
-            "XPBD, substeps",
-            "XPBD",
-            XPBD_SUBSTEPS.map(|substeps| setup(Method::Xpbd, 2 * substeps)).to_vec(),
-        ),
-    ];
-    for iterations in PROJECTIVE_ITERATIONS {
-        let projective = |steps| Setup {
-            iterations,
-            ..setup(Method::Projective, steps)
-        };
-        lines.push(line(
-            &format!("Projective, {iterations} iterations"),
-            "Projective Dynamics",
-            PROJECTIVE_STEPS.map(projective).to_vec(),
-        ));
+        setups: setups.into_iter().collect(),
     }
+}
+
+/// So many times as many steps in a span as stability needs.
+fn needed(finer: f64, stable_step: f64) -> u32 {
+    (finer * SPAN / stable_step).ceil() as u32
+}
+
+fn verlet(stable_step: f64, threads: u32) -> Vec<Line> {
+    let setup = |steps| Setup::new(Method::Sinew(Solver::Verlet), steps, SPAN, threads);
+    let fixed = FINER.map(|finer| Setup {
+        substeps: needed(finer, stable_step).div_ceil(2),
+        ..setup(2)
+    });
+    let added = ADDED.map(|mass_scaling| Setup {
+        mass_scaling,
+        ..setup(2)
+    });
+    vec![
+        line("VERLET, substeps fixed", "VERLET, no mass added", fixed),
+        line(
+            "VERLET, substeps chosen",
+            "VERLET, no mass added",
+            WORLD_STEPS.map(setup),
+        ),
+        line("VERLET, mass scaling", "VERLET, mass scaling", added),
+    ]
+}
+
+fn implicit(threads: u32) -> Vec<Line> {
+    let setup = |solver, order, accuracy| {
+        move |steps| Setup {
+            order,
+            accuracy,
+            ..Setup::new(Method::Sinew(solver), steps, SPAN, threads)
+        }
+    };
+    let mut lines: Vec<Line> = ACCURACIES
+        .iter()
+        .map(|&accuracy| {
+            let name = format!("IMPLICIT, accuracy {accuracy}");
+            line(name, "IMPLICIT", STEPS.map(setup(Solver::Implicit, 2, accuracy)))
+        })
+        .collect();
+    let euler = STEPS.map(setup(Solver::Implicit, 1, ACCURACIES[0]));
+    lines.push(line("IMPLICIT, Euler", "IMPLICIT, Euler", euler));
+    let newton = YARDSTICK_STEPS.map(setup(Solver::Newton, 2, 0.0));
+    lines.push(line("NEWTON", "NEWTON", newton));
+    lines
+}
+
+fn baselines(stable_step: f64, threads: u32) -> Vec<Line> {
+    let paper = FINER.map(|finer| Setup::new(Method::Paper, needed(finer, stable_step), SPAN, threads));
+    let xpbd = XPBD_SUBSTEPS.map(|substeps| Setup::new(Method::Xpbd, 2 * substeps, SPAN, threads));
+    let mut lines = vec![
+        line("Verlet as printed", "Verlet as printed", paper),
+        line("XPBD, substeps", "XPBD", xpbd),
+    ];
+    lines.extend(PROJECTIVE_ITERATIONS.map(|iterations| {
+        let projective = PROJECTIVE_STEPS.map(|steps| Setup {
+            iterations,
+            ..Setup::new(Method::Projective, steps, SPAN, threads)
+        });
+        let name = format!("Projective, {iterations} iterations");
+        line(name, "Projective Dynamics", projective)
+    }));
     lines
 }

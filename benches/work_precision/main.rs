@@ -1,8 +1,8 @@
 //! Work-precision diagrams: error against a converged reference, and the time for it, for sinew's solvers, the paper's Verlet
 //! (Halic et al., section 3) as printed, XPBD with substeps (Macklin et al. 2019) and Projective Dynamics (Liu et al. 2013).
 //!
-//! `cargo bench --bench work_precision [-- --quick] [--only <scene>] [--threads <n>] [--check]` writes
-//! `target/report/work_precision.md` and diagrams beside it. References and rest shapes are computed once and kept in
+//! `cargo bench --bench work_precision [-- --quick] [--only <scene or settling>] [--part <part>] [--threads <n>] [--check]` writes
+//! `target/report/work_precision.md` and diagrams beside it. References are computed once and kept in
 //! `target/reference`.
 #![allow(clippy::print_stderr)]
 
@@ -18,6 +18,7 @@ mod lines;
 #[path = "../storage/machine.rs"]
 mod machine;
 mod motion;
+mod overview;
 mod paper;
 mod projective;
 #[path = "../storage/random.rs"]
@@ -31,26 +32,36 @@ mod rest;
 mod rows;
 mod scene;
 mod scenes;
+mod settling;
 mod simd;
-mod statics;
 mod summary;
 #[path = "../storage/svg.rs"]
 mod svg;
 mod tables;
 mod tissue;
+mod tolerance;
 mod xpbd;
 
 use std::process::ExitCode;
 
-use motion::Effort;
+use motion::{Effort, Sweep};
+use overview::Overview;
 use reference::Reference;
 use report::Report;
+use scene::Scene;
+
+/// What is measured of a scene.
+const PARTS: [&str; 3] = ["motion", "rest", "tolerance"];
 
 /// What is asked for on the command line.
 struct Options {
     quick: bool,
     check: bool,
     scenes: Vec<&'static str>,
+    /// The one part that belongs to no scene.
+    settling: bool,
+    /// What is measured of each scene.
+    parts: Vec<&'static str>,
     threads: u32,
 }
 
@@ -60,6 +71,8 @@ impl Options {
             quick: false,
             check: false,
             scenes: scenes::NAMES.to_vec(),
+            settling: true,
+            parts: PARTS.to_vec(),
             threads: 1,
         };
         let mut arguments = std::env::args().skip(1);
@@ -72,8 +85,19 @@ impl Options {
                 "--only" => {
                     let name = arguments.next().unwrap_or_default();
                     options.scenes.retain(|scene| *scene == name);
-                    if options.scenes.is_empty() {
-                        return Err(format!("--only {name:?}: must be one of {:?}", scenes::NAMES));
+                    options.settling = name == "settling";
+                    if options.scenes.is_empty() && !options.settling {
+                        return Err(format!(
+                            "--only {name:?}: must be settling or one of {:?}",
+                            scenes::NAMES
+                        ));
+                    }
+                }
+                "--part" => {
+                    let name = arguments.next().unwrap_or_default();
+                    options.parts.retain(|part| *part == name);
+                    if options.parts.is_empty() {
+                        return Err(format!("--part {name:?}: must be one of {PARTS:?}"));
                     }
                 }
                 "--threads" => match arguments.next().map(|count| count.parse()) {
@@ -82,7 +106,7 @@ impl Options {
                 },
                 other => {
                     return Err(format!(
-                        "{other}: there is --quick, --check, --only <scene> and --threads <n>"
+                        "{other}: there is --quick, --check, --only <scene or settling>, --part <part> and --threads <n>"
                     ));
                 }
             }
@@ -121,6 +145,7 @@ fn run(options: &Options) -> Result<(), String> {
     let effort = if options.quick { Effort::QUICK } else { Effort::FULL };
     let mut report = Report::new("work_precision");
     report.write(&introduction(options));
+    let mut overview = Overview::default();
     for name in &options.scenes {
         let scene = match scenes::scene(name) {
             Ok(scene) => scene,
@@ -139,16 +164,28 @@ fn run(options: &Options) -> Result<(), String> {
             1e3 * reference.stable_step,
             tables::percent(reference.uncertainty)
         ));
-        let mut sweeps = Vec::new();
-        for line in lines::lines(reference.stable_step, options.threads) {
-            let sweep = motion::sweep(&scene, &reference, line, effort, &report);
-            if let Err(reason) = &sweep.points {
-                report.not_offered(&sweep.line.name, reason);
-            }
-            sweeps.push(sweep);
+        let asked = |part| options.parts.contains(&part);
+        if asked("motion") {
+            let sweeps = sweeps(&scene, &reference, options.threads, effort, &mut report);
+            tables::write(&mut report, &scene, &reference, &sweeps);
+            overview.add(name, &reference, &sweeps);
         }
-        tables::write(&mut report, &scene, &reference, &sweeps);
-        rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
+        if asked("rest") {
+            rest::run(&mut report, &scene, options.threads, effort.patience_at_rest);
+        }
+        if asked("tolerance") {
+            tolerance::run(
+                &mut report,
+                &scene,
+                &reference,
+                options.threads,
+                effort.patience_at_rest,
+            );
+        }
+    }
+    overview.write(&mut report);
+    if options.settling {
+        settling::run(&mut report);
     }
     for (scene, reason) in scenes::PENDING {
         report.not_offered(scene, &format!("pending: {reason}"));
@@ -160,14 +197,29 @@ fn run(options: &Options) -> Result<(), String> {
     Ok(())
 }
 
+/// All lines of a scene.
+fn sweeps(scene: &Scene, reference: &Reference, threads: u32, effort: Effort, report: &mut Report) -> Vec<Sweep> {
+    let mut sweeps = Vec::new();
+    for line in lines::lines(reference.stable_step, threads) {
+        let sweep = motion::sweep(scene, reference, line, effort, report);
+        if let Err(reason) = &sweep.points {
+            report.not_offered(&sweep.line.name, reason);
+        }
+        sweeps.push(sweep);
+    }
+    sweeps
+}
+
 fn introduction(options: &Options) -> String {
     let mut text = format!("# Work and precision\n\n{}", machine::description());
     text.push_str(
         "- Error: RMS over nodes and 8 sample times within 0.25 s of the distance to leapfrog in `f64`, over RMS of its \
-         motion. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
+         motion. Force error: of the force on all pins together, in the RMS of that force. Volume error: of the \
+         tetrahedra's volume, in that at the start. s/s: seconds per simulated second. h: what a solver takes at once, a substep where it has any. Energy \
          drift: at the end, in the largest kinetic energies.\n\
-         - Times are the best of up to four runs, in processor time of the thread. Preparing (laying out springs, \
-         colouring, factoring) is not in them and stands apart. A line ends where a run would take too long.\n",
+         - Times are the best of up to two runs, in processor time of the thread. Preparing (laying out springs, \
+         colouring, factoring) is not in them and stands apart. What takes too long is stopped, or not begun, and listed as \
+         too slow, with the time it is expected to take.\n",
     );
     if options.threads > 1 {
         text.push_str(&format!(

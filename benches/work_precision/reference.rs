@@ -68,8 +68,8 @@ impl Reference {
             scene.name,
             2 * per_span * SAMPLES
         ));
-        let (coarse, _) = leapfrog(scene, &exact, per_span);
-        let (motion, kinetic_energy) = leapfrog(scene, &exact, 2 * per_span);
+        let (coarse, _) = motion(scene, &exact, per_span);
+        let (motion, kinetic_energy) = motion(scene, &exact, 2 * per_span);
         let start = scene.start();
         Self {
             uncertainty: relative_error(&coarse, &motion, &start),
@@ -98,30 +98,35 @@ fn relative_error(motion: &Motion, reference: &Motion, start: &[DVec3]) -> f64 {
 }
 
 /// The motion in so many steps from one sample to the next, and its largest kinetic energy.
-fn leapfrog(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64) {
+fn motion(scene: &Scene, exact: &Exact, steps_per_span: usize) -> (Motion, f64) {
     let step = SPAN / steps_per_span as f64;
-    let half_kicks: Vec<f64> = (exact.masses.iter())
-        .map(|&mass| if mass > 0.0 { 0.5 * step / mass } else { 0.0 })
-        .collect();
     let mut positions = scene.start();
     let mut velocities = vec![DVec3::ZERO; positions.len()];
-    let mut forces = vec![DVec3::ZERO; positions.len()];
     let mut motion = Vec::new();
     let mut kinetic: f64 = 0.0;
-    exact.forces(&positions, &mut forces);
     for _ in 0..SAMPLES {
-        for _ in 0..steps_per_span {
-            for node in 0..positions.len() {
-                velocities[node] += half_kicks[node] * forces[node];
-                positions[node] += step * velocities[node];
-            }
-            exact.forces(&positions, &mut forces);
-            for node in 0..positions.len() {
-                velocities[node] += half_kicks[node] * forces[node];
-            }
-        }
+        leapfrog(exact, &mut positions, &mut velocities, step, steps_per_span);
         motion.push(positions.clone());
         kinetic = kinetic.max(exact.energy(&positions, &velocities).kinetic);
     }
     (motion, kinetic)
+}
+
+/// Takes so many steps of leapfrog.
+pub fn leapfrog(exact: &Exact, positions: &mut [DVec3], velocities: &mut [DVec3], step: f64, count: usize) {
+    let half_kicks: Vec<f64> = (exact.masses.iter())
+        .map(|&mass| if mass > 0.0 { 0.5 * step / mass } else { 0.0 })
+        .collect();
+    let mut forces = vec![DVec3::ZERO; positions.len()];
+    exact.forces(positions, &mut forces);
+    for _ in 0..count {
+        for node in 0..positions.len() {
+            velocities[node] += half_kicks[node] * forces[node];
+            positions[node] += step * velocities[node];
+        }
+        exact.forces(positions, &mut forces);
+        for node in 0..positions.len() {
+            velocities[node] += half_kicks[node] * forces[node];
+        }
+    }
 }

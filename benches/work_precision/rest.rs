@@ -1,41 +1,48 @@
-//! How close each solver comes to the true rest shape, in frames of 1/60 s with damping against the world.
+//! How close each solver comes to the true rest shape, in frames of 1/60 s with damping against the world, and what a frame
+//! takes.
 
 use glam::DVec3;
-use sinew::Solver;
+use sinew::{RestStateReport, Solver};
 
 use crate::clock;
-use crate::contender::{Method, Setup};
+use crate::contender::{Contender, Method, Setup};
 use crate::report::{Report, Table, milliseconds};
 use crate::scene::Scene;
-use crate::statics::rest_shape;
 use crate::tables::{iterations, percent};
+use crate::tissue::Tissue;
 
-/// 1/s
-const DAMPING: f32 = 5.0;
+/// 1/s, about as much as brings the slowest modes of the scenes to rest soonest.
+const DAMPING: f32 = 20.0;
 const FRAME: f64 = 1.0 / 60.0;
 /// Looked at every so many frames, up to so many.
-const LOOK: usize = 30;
-const MOST_FRAMES: usize = 600;
+const LOOK: usize = 15;
+const MOST_FRAMES: usize = 240;
 /// Nothing is at rest before.
-const FEWEST_FRAMES: usize = 240;
+const FEWEST_FRAMES: usize = 90;
 
 pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
     let scene = scene.settling(DAMPING, scene.gravity_at_rest);
-    let Some((rest, left)) = rest_shape(&scene, report) else {
-        report.not_offered(
-            &format!("{} at rest", scene.name),
-            "its rest shape was not found in 90 s",
-        );
-        return;
+    let found = match rest_shape(&scene) {
+        Ok(found) => found,
+        Err(reason) => {
+            report.not_offered(&format!("{} at rest", scene.name), &reason);
+            return;
+        }
     };
-    let start = scene.start();
-    let size = distance(&rest, &start);
+    let rest = found.positions;
+    let size = distance(&rest, &scene.start());
     report.write(&format!(
-        "\n### {}: at rest\n\nFrames of 1/60 s, damping of {DAMPING} /s, until the distance to the rest shape falls no \
-         further. The rest shape is {:.1} mm from the start (RMS); the largest force left in it is {left:.0e} of a \
-         node's weight. Distances are RMS, in those of the rest shape from the start.\n",
+        "\n### {}: at rest, {:.2} m/s²\n\nFrames of 1/60 s, damping of {DAMPING} /s, until the distance to the rest shape \
+         falls no further. `rest_state` found it in {:.2} s and {} solutions; it is {:.1} mm from the start (RMS), and the \
+         largest force left in it is {:.0e} N, {:.0e} of the body's weight. Distances are RMS, in those of the rest shape from \
+         the start.\n",
         scene.name,
-        1e3 * size
+        scene.gravity.length(),
+        found.seconds,
+        found.report.iterations,
+        1e3 * size,
+        found.report.residual,
+        found.report.residual / weight(&scene),
     ));
     let mut table = Table::new(&[
         "solver",
@@ -52,7 +59,7 @@ pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
         match frames {
             Ok(settled) => row.extend([
                 milliseconds(settled.step),
-                iterations(&setup),
+                iterations(&setup, settled.iterations),
                 percent(settled.distance),
                 milliseconds(settled.per_frame),
                 settled.frames.to_string(),
@@ -69,23 +76,56 @@ pub fn run(report: &mut Report, scene: &Scene, threads: u32, patience: f64) {
     report.table(&table);
 }
 
+/// Products that IMPLICIT may take in a frame; 0: its own choice.
+const BUDGETS: [u32; 5] = [0, 3, 4, 6, 8];
+
 fn setups(threads: u32) -> Vec<(&'static str, Setup)> {
     let setup = |method, steps, iterations| Setup {
-        method,
-        steps,
-        substeps: 0,
         iterations,
-        span: FRAME,
-        threads,
+        ..Setup::new(method, steps, FRAME, threads)
+    };
+    let verlet = setup(Method::Sinew(Solver::Verlet), 1, 0);
+    let scaled = Setup {
+        mass_scaling: 1e-3,
+        ..verlet
     };
     let mut setups = vec![
-        ("VERLET, substeps chosen", setup(Method::Sinew(Solver::Verlet), 1, 0)),
-        ("IMPLICIT", setup(Method::Sinew(Solver::Implicit), 1, 0)),
+        ("VERLET, no mass added", verlet),
+        ("VERLET, mass scaling", scaled),
         ("NEWTON", setup(Method::Sinew(Solver::Newton), 1, 0)),
     ];
+    setups.extend(BUDGETS.map(|budget| ("IMPLICIT", setup(Method::Sinew(Solver::Implicit), 1, budget))));
     setups.extend([16, 32, 64, 128].map(|substeps| ("XPBD, substeps", setup(Method::Xpbd, substeps, 0))));
     setups.extend([1, 3, 10, 30].map(|iterations| ("Projective", setup(Method::Projective, 1, iterations))));
     setups
+}
+
+/// What `rest_state` says of a scene.
+struct Found {
+    positions: Vec<DVec3>,
+    report: RestStateReport,
+    seconds: f64,
+}
+
+fn rest_shape(scene: &Scene) -> Result<Found, String> {
+    let mut tissue = Tissue::new(
+        scene,
+        Solver::Newton,
+        Setup::new(Method::Sinew(Solver::Newton), 1, FRAME, 1),
+    )?;
+    let mut report = Err(String::new());
+    let seconds = clock::time(|| report = tissue.rest()).processor;
+    Ok(Found {
+        report: report?,
+        positions: tissue.read().positions,
+        seconds,
+    })
+}
+
+/// Of the whole scene, N.
+fn weight(scene: &Scene) -> f64 {
+    let mass: f64 = scene.masses.iter().map(|&mass| f64::from(mass)).sum();
+    mass * f64::from(scene.gravity.length())
 }
 
 struct Settled {
@@ -95,6 +135,8 @@ struct Settled {
     /// s
     step: f64,
     frames: usize,
+    /// Of the last frame, where they were the solver's choice.
+    iterations: Option<f64>,
     status: String,
 }
 
@@ -108,6 +150,7 @@ fn settle(scene: &Scene, setup: Setup, rest: &[DVec3], size: f64, patience: f64)
         per_frame: 0.0,
         step: setup.step(),
         frames: 0,
+        iterations: None,
         status: String::new(),
     };
     while settled.status.is_empty() {
@@ -119,6 +162,7 @@ fn settle(scene: &Scene, setup: Setup, rest: &[DVec3], size: f64, patience: f64)
         if let Some(substeps) = contender.substeps() {
             settled.step = setup.span / f64::from(substeps.max(1));
         }
+        settled.iterations = contender.iterations().map(f64::from);
         let out_of_time = seconds > patience || settled.frames >= MOST_FRAMES;
         if let Err(reason) = advanced {
             settled.status = format!("failed: {reason}");

@@ -21,6 +21,8 @@ pub struct Scene {
     /// kg; 0: pinned.
     pub masses: Vec<f32>,
     pub springs: Vec<[u32; 2]>,
+    /// Whose volume is compared; empty where there are none.
+    pub tetrahedra: Vec<[u32; 4]>,
     /// N/m
     pub stiffnesses: Vec<f32>,
     /// m
@@ -75,6 +77,11 @@ impl Scene {
             description,
             rest_lengths: springs.iter().map(|&[a, b]| at(a).distance(at(b)) as f32).collect(),
             positions: mesh.positions.clone(),
+            tetrahedra: mesh
+                .tetrahedra
+                .iter()
+                .map(|&tetrahedron| turned_out(tetrahedron, &at))
+                .collect(),
             masses: masses.into_iter().map(|mass| mass as f32).collect(),
             springs,
             stiffnesses: stiffnesses.into_iter().map(|stiffness| stiffness as f32).collect(),
@@ -97,6 +104,13 @@ impl Scene {
         self.positions.len()
     }
 
+    /// What the tetrahedra enclose, those turned inside out subtracted, m³.
+    pub fn volume(&self, positions: &[DVec3]) -> f64 {
+        let at = |node: u32| positions[node as usize];
+        let volume = |&[a, b, c, d]: &[u32; 4]| (at(b) - at(a)).dot((at(c) - at(a)).cross(at(d) - at(a))) / 6.0;
+        self.tetrahedra.iter().map(volume).sum()
+    }
+
     pub fn is_pinned(&self, node: usize) -> bool {
         self.masses[node] == 0.0
     }
@@ -105,4 +119,10 @@ impl Scene {
     pub fn start(&self) -> Vec<DVec3> {
         self.positions.iter().map(|position| position.as_dvec3()).collect()
     }
+}
+
+/// The tetrahedron, its corners in an order in which its volume is not negative.
+fn turned_out([a, b, c, d]: [u32; 4], at: &impl Fn(u32) -> DVec3) -> [u32; 4] {
+    let volume = (at(b) - at(a)).dot((at(c) - at(a)).cross(at(d) - at(a)));
+    if volume < 0.0 { [a, b, d, c] } else { [a, b, c, d] }
 }

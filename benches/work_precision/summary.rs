@@ -1,10 +1,36 @@
 //! What a sweep says at a glance: the time for an error, and the error in a time, between points on logarithmic axes.
 
-use crate::motion::{Measured, Point, Sweep};
+use crate::motion::{Measured, Missing, Point, Sweep};
+use crate::reference::Reference;
+use crate::report::digits;
 
 /// The least seconds per simulated second for so small an error.
 pub fn time_for(sweeps: &[&Sweep], error: f64) -> Option<f64> {
     best(sweeps, |point| (point.error, point.seconds), error)
+}
+
+/// The lines of each family.
+pub fn families(sweeps: &[Sweep]) -> Vec<(&'static str, Vec<&Sweep>)> {
+    let mut names: Vec<&str> = sweeps.iter().map(|sweep| sweep.line.family).collect();
+    names.dedup();
+    let lines = |name| sweeps.iter().filter(|sweep| sweep.line.family == name).collect();
+    names.into_iter().map(|name| (name, lines(name))).collect()
+}
+
+/// What a family needs for 10 %, 1 % and 0.1 %, in words where there is no such figure.
+pub fn times(reference: &Reference, lines: &[&Sweep]) -> [String; 3] {
+    let too_slow = |line: &&Sweep| {
+        let points = line.points.as_deref().unwrap_or_default();
+        points
+            .iter()
+            .any(|point| matches!(point.outcome, Err(Missing::TooSlow(_))))
+    };
+    [0.1, 0.01, 0.001].map(|error| match time_for(lines, error) {
+        _ if error < reference.uncertainty => "unresolved".to_owned(),
+        Some(seconds) => digits(seconds),
+        None if lines.iter().any(too_slow) => "too slow".to_owned(),
+        None => "never".to_owned(),
+    })
 }
 
 /// The least error in so many seconds per simulated second.

@@ -1,53 +1,69 @@
 //! The tables and the diagram of a scene's motion.
 
+use sinew::Solver;
+
 use crate::contender::{Method, Setup};
-use crate::motion::{Point, Sweep};
+use crate::motion::{Missing, Point, Sweep};
 use crate::reference::Reference;
 use crate::report::{Report, Table, digits, milliseconds};
 use crate::scene::Scene;
-use crate::summary::{error_in, measured, time_for};
+use crate::summary::{error_in, families, measured, times};
 use crate::svg::{Series, plot};
 
 /// Frames per second.
 const FRAMES: f64 = 60.0;
 
+/// Errors of the two diagrams of a scene; they overlap, so that lines can be followed.
+const RANGES: [(&str, &str, [f64; 2]); 2] = [("", "loose", [5e-3, 2.0]), ("_tight", "tight", [0.0, 2e-2])];
+
 pub fn write(report: &mut Report, scene: &Scene, reference: &Reference, sweeps: &[Sweep]) {
-    let series: Vec<Series> = sweeps.iter().map(series).collect();
-    let title = format!("{}: work and precision", scene.name);
-    let svg = plot(
-        &title,
-        "error, RMS over RMS of the motion",
-        "s per simulated s",
-        &series,
-    );
-    report.plot(&format!("work_precision_{}.svg", scene.name), &title, svg);
+    for (suffix, name, range) in RANGES {
+        let series: Vec<Series> = sweeps.iter().filter_map(|sweep| series(sweep, range)).collect();
+        let title = format!("{}: work and precision, {name}", scene.name);
+        let svg = plot(
+            &title,
+            "error, RMS over RMS of the motion",
+            "s per simulated s",
+            &series,
+        );
+        report.plot(&format!("work_precision_{}{suffix}.svg", scene.name), &title, svg);
+    }
     report.table(&summary(reference, sweeps));
     report.table(&points(sweeps));
 }
 
-/// The points that did not fail; how many did is said in the name.
-fn series(sweep: &Sweep) -> Series {
-    let Ok(points) = &sweep.points else {
-        return Series {
-            name: sweep.line.name.clone(),
-            points: Vec::new(),
-            dashed: false,
-        };
-    };
-    let failed = points.iter().filter(|point| point.outcome.is_err()).count();
-    let name = match failed {
-        0 => sweep.line.name.clone(),
-        failed => format!("{} ({failed} failed)", sweep.line.name),
-    };
-    Series {
-        name,
-        points: points
-            .iter()
-            .filter_map(measured)
-            .map(|point| (point.error, point.seconds))
-            .collect(),
-        dashed: matches!(points.first(), Some(point) if !matches!(point.setup.method, Method::Sinew(_))),
+/// The points of a line with errors in this range. What failed and what took too long is said in the name; a line of which
+/// all that was measured lies elsewhere is left out.
+fn series(sweep: &Sweep, [low, high]: [f64; 2]) -> Option<Series> {
+    let no_points = Vec::new();
+    let all = sweep.points.as_ref().unwrap_or(&no_points);
+    let failed = all
+        .iter()
+        .filter(|point| matches!(point.outcome, Err(Missing::Failed(_))))
+        .count();
+    let slow = all
+        .iter()
+        .filter(|point| matches!(point.outcome, Err(Missing::TooSlow(_))))
+        .count();
+    let shown: Vec<(f64, f64)> = (all.iter().filter_map(measured))
+        .filter(|point| (low..=high).contains(&point.error))
+        .map(|point| (point.error, point.seconds))
+        .collect();
+    if shown.is_empty() && all.iter().any(|point| point.outcome.is_ok()) {
+        return None;
     }
+    let name = &sweep.line.name;
+    let name = match (&sweep.points, failed, slow) {
+        (Err(_), ..) => format!("{name} (not offered)"),
+        (_, 0, _) if !shown.is_empty() => name.clone(),
+        (_, 0, slow) => format!("{name} ({slow} too slow)"),
+        (_, failed, _) => format!("{name} ({failed} failed)"),
+    };
+    Some(Series {
+        name,
+        points: shown,
+        dashed: matches!(sweep.line.setups.first(), Some(setup) if !matches!(setup.method, Method::Sinew(_))),
+    })
 }
 
 /// What each family of lines needs and leaves.
@@ -60,21 +76,13 @@ fn summary(reference: &Reference, sweeps: &[Sweep]) -> Table {
         "error in 1 ms a frame",
         "in 16 ms",
     ]);
-    let mut families: Vec<&str> = sweeps.iter().map(|sweep| sweep.line.family).collect();
-    families.dedup();
-    for family in families {
-        let lines: Vec<&Sweep> = sweeps.iter().filter(|sweep| sweep.line.family == family).collect();
+    for (family, lines) in families(sweeps) {
         let mut row = vec![family.to_owned()];
         if lines.iter().all(|line| line.points.is_err()) {
             row.extend(vec!["not offered".to_owned(); 5]);
         } else {
-            let time = |error| match time_for(&lines, error) {
-                _ if error < reference.uncertainty => "unresolved".into(),
-                None => "never".into(),
-                Some(seconds) => digits(seconds),
-            };
             let error = |milliseconds: f64| error_in(&lines, 1e-3 * milliseconds * FRAMES).map_or("-".into(), percent);
-            row.extend([0.1, 0.01, 0.001].map(time));
+            row.extend(times(reference, &lines));
             row.extend([1.0, 16.0].map(error));
         }
         table.row(row);
@@ -87,11 +95,13 @@ fn points(sweeps: &[Sweep]) -> Table {
         "solver",
         "h, ms",
         "iterations",
-        "error",
+        "position error",
+        "force error",
+        "volume error",
+        "energy drift",
         "s/s",
         "ns per spring and step",
         "times real time",
-        "energy drift",
         "prepared in, ms",
         "status",
     ]);
@@ -100,7 +110,7 @@ fn points(sweeps: &[Sweep]) -> Table {
             Ok(points) => points.iter().for_each(|point| table.row(row(&sweep.line.name, point))),
             Err(_) => {
                 let mut row = vec![sweep.line.name.clone()];
-                row.extend(vec!["-".to_owned(); 8]);
+                row.extend(vec!["-".to_owned(); 10]);
                 row.push("not offered".to_owned());
                 table.row(row);
             }
@@ -110,29 +120,40 @@ fn points(sweeps: &[Sweep]) -> Table {
 }
 
 fn row(name: &str, point: &Point) -> Vec<String> {
-    let mut row = vec![name.to_owned(), milliseconds(point.step), iterations(&point.setup)];
+    let name = match point.setup.mass_scaling {
+        0.0 => name.to_owned(),
+        part => format!("{name}, {part:e}"),
+    };
+    let taken = point.outcome.as_ref().ok().and_then(|measured| measured.iterations);
+    let mut row = vec![name, milliseconds(point.step), iterations(&point.setup, taken)];
     match &point.outcome {
         Ok(measured) => row.extend([
             percent(measured.error),
+            percent(measured.force_error),
+            measured.volume_error.map_or("-".into(), percent),
+            format!("{:+.1e}", measured.drift),
             digits(measured.seconds),
             digits(1e9 * measured.per_spring),
             digits(1.0 / measured.seconds),
-            format!("{:+.1e}", measured.drift),
         ]),
-        Err(_) => row.extend(vec!["-".to_owned(); 5]),
+        Err(_) => row.extend(vec!["-".to_owned(); 7]),
     }
     row.push(milliseconds(point.preparation));
     row.push(match &point.outcome {
         Ok(_) => "ok".to_owned(),
-        Err(reason) => format!("failed: {reason}"),
+        Err(missing) => missing.to_string(),
     });
     row
 }
 
-pub fn iterations(setup: &Setup) -> String {
-    match setup.iterations {
-        0 => "1".into(),
-        iterations => iterations.to_string(),
+/// Of a step: as they were taken on average, or as they were set.
+pub fn iterations(setup: &Setup, taken: Option<f64>) -> String {
+    match (taken, setup.iterations, setup.method) {
+        (Some(taken), 0, _) => digits(taken),
+        (Some(taken), most, _) => format!("{} of {most}", digits(taken)),
+        (None, 0, Method::Sinew(Solver::Implicit | Solver::Newton)) => "-".into(),
+        (None, 0, _) => "1".into(),
+        (None, iterations, _) => iterations.to_string(),
     }
 }
 

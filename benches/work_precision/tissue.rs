@@ -1,6 +1,8 @@
 //! sinew, through its public interface. The one place where a [`Setup`] becomes a definition.
 
-use sinew::{BodyDefinition, BodyId, Error, Solver, Values, World, WorldDefinition};
+use sinew::{
+    BodyDefinition, BodyId, Error, RestStateDefinition, RestStateReport, Solver, Values, World, WorldDefinition,
+};
 
 use crate::contender::{Contender, Setup, State};
 use crate::scene::Scene;
@@ -14,14 +16,24 @@ pub struct Tissue {
     step: f32,
     /// Taken in the last span.
     substeps: u32,
+    /// Taken in the last span.
+    iterations: u32,
+    /// m
+    estimate: f32,
 }
 
 impl Tissue {
     pub fn new(scene: &Scene, solver: Solver, setup: Setup) -> Result<Self, String> {
+        Self::with_tolerance(scene, solver, setup, 0.0)
+    }
+
+    /// In a world that keeps the error of each step below `tolerance`, m; 0: off.
+    pub fn with_tolerance(scene: &Scene, solver: Solver, setup: Setup, tolerance: f32) -> Result<Self, String> {
         let mut world = offered(World::new(WorldDefinition {
             gravity: scene.gravity,
             thread_count: setup.threads,
             substeps: setup.substeps,
+            tolerance,
             max_substeps: 1_000_000,
             ..WorldDefinition::default()
         }))?;
@@ -34,6 +46,10 @@ impl Tissue {
             rest_lengths: Some(&scene.rest_lengths),
             node_dampings: Values::Each(&dampings),
             solver,
+            order: setup.order,
+            iterations: setup.iterations,
+            accuracy: setup.accuracy,
+            mass_scaling: setup.mass_scaling,
             ..BodyDefinition::default()
         };
         let body = offered(world.create_body(&definition))?;
@@ -44,7 +60,21 @@ impl Tissue {
             steps: setup.steps,
             step: setup.step() as f32,
             substeps: 0,
+            iterations: 0,
+            estimate: 0.0,
         })
+    }
+
+    /// The largest of the errors that steps of the last span said they may have, m; 0 without a tolerance.
+    pub fn estimate(&self) -> f32 {
+        self.estimate
+    }
+
+    /// Moves the body to rest; or why that was not found.
+    pub fn rest(&mut self) -> Result<RestStateReport, String> {
+        self.world
+            .rest_state(self.body, &RestStateDefinition::default())
+            .map_err(|error| error.to_string())
     }
 }
 
@@ -58,6 +88,8 @@ impl Contender for Tissue {
 
     fn advance(&mut self) -> Result<(), String> {
         self.substeps = 0;
+        self.iterations = 0;
+        self.estimate = 0.0;
         for _ in 0..self.steps {
             let report = self.world.step(self.step).map_err(|error| match error {
                 Error::Unstable { .. } => "refused: unstable".to_owned(),
@@ -67,12 +99,19 @@ impl Contender for Tissue {
                 return Err("not finite, restored".into());
             }
             self.substeps += report.substeps;
+            self.estimate = self.estimate.max(report.error_estimate);
+            let body = self.world.body(self.body).expect("the world's body");
+            self.iterations += body.solver_report().iterations;
         }
         Ok(())
     }
 
     fn substeps(&self) -> Option<u32> {
         Some(self.substeps)
+    }
+
+    fn iterations(&self) -> Option<u32> {
+        Some(self.iterations).filter(|&iterations| iterations > 0)
     }
 
     fn read(&mut self) -> State {
