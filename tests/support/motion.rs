@@ -37,7 +37,7 @@ pub struct Mode {
     pub rate: f64,
     pub push: f64,
     pub now: [f64; 2],
-    last: Option<[f64; 2]>,
+    pub last: Option<[f64; 2]>,
 }
 
 impl Mode {
