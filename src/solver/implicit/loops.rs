@@ -25,29 +25,6 @@ impl Loops for Add<'_> {
     }
 }
 
-/// Velocities without forces, and what forces are expected to do.
-pub(super) struct Aim<'a, 'b> {
-    pub carried: f32,
-    pub expected: f32,
-    pub gains: [&'a [f32]; 3],
-    pub velocities: &'b mut [&'a mut [f32]; 3],
-    pub pushes: &'b mut [&'a mut [f32]; 3],
-}
-
-impl Loops for Aim<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for ((velocities, pushes), gains) in self.velocities.iter_mut().zip(self.pushes).zip(self.gains) {
-            for ((velocity, push), gain) in velocities.iter_mut().zip(pushes.iter_mut()).zip(gains) {
-                *velocity += self.carried * gain;
-                *push = self.expected * gain;
-            }
-        }
-    }
-}
-
 /// Where the nodes are with these pushes.
 pub(super) struct Place<'a, 'b> {
     pub carried: f32,
@@ -166,6 +143,8 @@ pub(super) struct Finish<'a, 'b> {
     pub carried: f32,
     pub time: f32,
     pub pushes: [&'a [f32]; 3],
+    /// Those at the step's start, where they are still there: what is added to them is rounded once, then, not twice.
+    pub before: Option<[&'a [f32]; 3]>,
     pub velocities: &'b mut [&'a mut [f32]; 3],
     pub ways: &'b mut [&'a mut [f32]; 3],
     pub gains: &'b mut [&'a mut [f32]; 3],
@@ -187,6 +166,11 @@ impl Loops for Finish<'_, '_> {
                 let given = pushes[place] * per_time;
                 velocities[place] += given;
                 gains[place] = self.carried * gains[place] + given;
+            }
+            if let Some(before) = self.before {
+                for ((velocity, before), gain) in velocities.iter_mut().zip(before[axis]).zip(&*gains) {
+                    *velocity = before + gain;
+                }
             }
         }
     }

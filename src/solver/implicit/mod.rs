@@ -85,8 +85,9 @@ struct Experience {
 pub(crate) struct Implicit {
     /// 1 or 2.
     order: u32,
-    /// The most products with the matrix in a step.
+    /// The most products with the matrix for each equation asked for, and what is left of it for the step in progress.
     budget: u32,
+    left: u32,
     /// The part of a step's correction that may be missing.
     accuracy: f32,
     histories: [History; 2],
@@ -151,6 +152,7 @@ impl Implicit {
         Ok(Self {
             order: if order == 0 { 2 } else { order },
             budget,
+            left: 0,
             accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
             histories: [History::new(node_count)?, History::new(node_count)?],
             settled: 0,

@@ -2,7 +2,7 @@
 
 use super::energy::Before;
 use super::gradient::Goal;
-use super::loops::{Add, Aim, Finish, Place, Predict, Residual, Slope};
+use super::loops::{Add, Finish, Place, Predict, Residual, Slope};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
@@ -29,8 +29,6 @@ struct Formula {
     time: f64,
     /// c: what part of the last way and of the last gain goes on.
     carried: f64,
-    /// What part of the last gain is expected to be what forces give.
-    expected: f64,
 }
 
 impl Formula {
@@ -40,14 +38,12 @@ impl Formula {
             Self {
                 time: step,
                 carried: 0.0,
-                expected: if ratio > LARGEST_RATIO { 0.0 } else { ratio },
             }
         } else {
             let carried = ratio * ratio / (1.0 + 2.0 * ratio);
             Self {
                 time: step * (1.0 + ratio) / (1.0 + 2.0 * ratio),
                 carried,
-                expected: ratio - carried,
             }
         }
     }
@@ -72,6 +68,7 @@ pub(in crate::solver) fn run(
     if let Some(mut implicit) = body.implicit.take() {
         implicit.report = SolverReport::BEFORE;
         implicit.was_stale = implicit.stale;
+        implicit.left = implicit.budget.saturating_mul(substeps);
         let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
             .max(1.0);
@@ -120,6 +117,7 @@ fn run_in_parts(
             start: f64::from(index) / f64::from(substeps),
             end: f64::from(index + 1) / f64::from(substeps),
             is_first: index == 0,
+            equations: substeps - index,
             formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
             team,
         };
@@ -147,25 +145,28 @@ pub(super) struct Substep<'a> {
     pub start: f64,
     pub end: f64,
     pub is_first: bool,
+    /// With those that come after it in the step.
+    equations: u32,
     formula: Formula,
     pub team: &'a Team<'a>,
 }
 
 impl Substep<'_> {
-    /// Takes it, with order 1 where that of order 2 gains energy; as a last resort what was gained is taken off again.
+    /// Takes it, with order 1 where that of order 2 gains energy; as a last resort, or where no product is left to try
+    /// anything else, what was gained is taken off again.
     fn take_safely(self, body: &mut Body, implicit: &mut Implicit, is_last_resort: bool) -> End {
         let before = self.energy_before(body, implicit);
         let mut end = self.take(body, implicit, before);
         // What a later substep began with has been written over: then the whole step is taken again.
-        let has_history = self.formula.carried != 0.0 || self.formula.expected != 0.0;
-        if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first {
+        let has_history = self.formula.carried != 0.0;
+        if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first && implicit.left > 0 {
             let euler = Self {
                 formula: Formula::new(1, self.step, 0.0),
                 ..self
             };
             end = euler.take(body, implicit, before);
         }
-        if matches!(end, End::Gained | End::NotFinite) && is_last_resort {
+        if matches!(end, End::Gained | End::NotFinite) && (is_last_resort || implicit.left == 0) {
             end = self.slow_down(body, implicit, before);
         }
         end
@@ -239,38 +240,29 @@ impl Substep<'_> {
         }
     }
 
-    /// Puts the velocities where they would be without forces, and expects of forces what they did before.
+    /// Puts the velocities where they would be without forces, and begins with no pushes at all: what forces did before is
+    /// the better guess where motion is smooth, and where stiff springs turn it is far worse than none.
     fn aim(&self, body: &mut Body, implicit: &mut Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
         let first = self.is_first.then_some(state.first_velocities);
         let gains = &implicit.histories[implicit.place(self.is_first)].gains;
-        let (carried, expected) = (
-            self.formula.carried as f32,
-            (self.formula.expected * self.formula.time) as f32,
-        );
-        let written = (
-            state.velocities.tiles_mut(),
-            implicit.pushes.tiles_mut(),
-            body.pins.tiles_mut(),
-        );
+        let carried = self.formula.carried as f32;
+        implicit.pushes.clear();
+        let written = (state.velocities.tiles_mut(), body.pins.tiles_mut());
         let (kernel, dt) = (body.kernel, self.request.dt);
-        self.team.pass(
-            tile_count(node_count),
-            written,
-            |tile, (mut velocities, mut pushes, pins)| {
+        self.team
+            .pass(tile_count(node_count), written, |tile, (mut velocities, pins)| {
                 let nodes = tile_nodes(tile, node_count);
                 if let Some(first) = first {
                     for (to, from) in velocities.iter_mut().zip(first.slices(nodes.clone())) {
                         to.copy_from_slice(from);
                     }
                 }
-                kernel.run(Aim {
-                    carried,
-                    expected,
-                    gains: gains.slices(nodes.clone()),
-                    velocities: &mut velocities,
-                    pushes: &mut pushes,
+                kernel.run(Add {
+                    factor: carried,
+                    from: gains.slices(nodes.clone()),
+                    to: velocities.each_mut().map(|axis| &mut **axis),
                 });
                 for pin in pins {
                     let place = pin.node as usize - nodes.start;
@@ -278,12 +270,8 @@ impl Substep<'_> {
                     for (axis, value) in velocities.iter_mut().zip(velocity.to_array()) {
                         axis[place] = value;
                     }
-                    for axis in &mut pushes {
-                        axis[place] = 0.0;
-                    }
                 }
-            },
-        );
+            });
     }
 
     /// Puts the nodes where `pushes` has them.
@@ -395,6 +383,11 @@ impl Substep<'_> {
         implicit.partials.iter().map(|partial| partial.first).sum()
     }
 
+    /// How many products this equation may take: its share of what is left, and one at least.
+    fn budget(&self, implicit: &Implicit) -> u32 {
+        (implicit.left / self.equations).max(1)
+    }
+
     /// Finds the pushes to the last digit that counts.
     fn solve_exactly(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
         let (from, to) = (implicit.place(self.is_first), 1 - implicit.settled);
@@ -406,11 +399,12 @@ impl Substep<'_> {
             ways: &implicit.histories[from].ways,
             from,
             to,
-            budget: implicit.budget,
+            budget: self.budget(implicit),
             accuracy: f64::from(implicit.accuracy),
             tolerance: f64::from(self.request.tolerance),
         };
         let found = newton.solve(body, &aimed, &mut implicit.pushes);
+        implicit.left = implicit.left.saturating_sub(found.products);
         let report = &mut implicit.report;
         report.iterations += found.products;
         report.solves += found.iterations;
@@ -426,6 +420,7 @@ impl Substep<'_> {
             implicit.noise.error,
         );
         let relative = f64::from(implicit.accuracy).powi(2);
+        let whole_budget = self.budget(implicit);
         let mut products = 0;
         let mut size = 0.0;
         let mut error = f64::INFINITY;
@@ -450,7 +445,7 @@ impl Substep<'_> {
             };
             let is_stuck = vain > 2;
             error = remaining;
-            let budget = implicit.budget.saturating_sub(products);
+            let budget = whole_budget - products.min(whole_budget);
             if error <= absolute.max(relative * size) || is_stuck || budget == 0 || !error.is_finite() {
                 break;
             }
@@ -479,7 +474,8 @@ impl Substep<'_> {
             self.place(body, implicit);
         }
         implicit.report.iterations += products;
-        implicit.report.converged &= products < implicit.budget && error.is_finite();
+        implicit.left = implicit.left.saturating_sub(products);
+        implicit.report.converged &= products < whole_budget && error.is_finite();
         let error = (error / all_inertia).sqrt() as f32;
         implicit.report.error = implicit.report.error.max(error);
     }
@@ -528,6 +524,7 @@ impl Substep<'_> {
         let state = body.state.substep();
         let positions = &*state.next_positions;
         let pushes = &implicit.pushes;
+        let before = self.is_first.then_some(state.first_velocities);
         let written = (
             state.velocities.tiles_mut(),
             next.ways.tiles_mut(),
@@ -552,6 +549,7 @@ impl Substep<'_> {
                     carried,
                     time,
                     pushes: pushes.slices(nodes.clone()),
+                    before: before.map(|before| before.slices(nodes.clone())),
                     velocities: &mut velocities,
                     ways: &mut ways,
                     gains: &mut gains,

@@ -34,7 +34,7 @@ pub(in crate::solver) struct Aimed<'a> {
 }
 
 impl Newton {
-    /// Solves the step's equation, from the pushes that are expected; leaves the positions at its end and the pushes that lead
+    /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
     /// there.
     pub(in crate::solver) fn solve(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) -> Found {
         self.descent.read(&*body.springs);
