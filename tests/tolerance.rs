@@ -4,7 +4,7 @@
 mod support;
 
 use glam::Vec3;
-use sinew::{BodyDefinition, Error, Solver, WorldDefinition};
+use sinew::{BodyDefinition, Solver, WorldDefinition};
 use support::bodies::{FREE, Parts, Scene, largest_difference};
 use support::organ::{cloth, gravity, organ};
 
@@ -15,38 +15,32 @@ fn level_chain() -> Parts {
     parts
 }
 
-/// The steps of a motion that begins at rest; those that no substeps allowed are enough for may be refused. How many were taken.
-fn worst_step(name: &str, parts: &Parts, solver: Solver, tolerance: f32, h: f32, steps: usize) -> usize {
+/// The largest error that a step of a motion from rest adds, over the tolerance.
+fn largest_error(name: &str, parts: &Parts, solver: Solver, tolerance: f32, h: f32, steps: usize) -> f64 {
     let world = WorldDefinition {
         gravity: gravity(1.0),
         tolerance,
         ..FREE
     };
     let mut scene = Scene::with(parts, world, |definition| BodyDefinition { solver, ..definition });
+    let mut largest = 0.0_f64;
     for step in 0..steps {
         let mut reference = parts.reference(gravity(1.0));
         reference.positions = scene.positions();
         reference.velocities = scene.velocities();
-        let report = match scene.world.step(h) {
-            Ok(report) => report,
-            Err(Error::Unstable { .. }) => return step,
-            Err(error) => panic!("{error}"),
-        };
-        assert_eq!(report.bodies_restored, 0);
+        let report = scene.step(h);
         // Leapfrog, in steps of 50 us at most and a tenth of those taken.
         let fine = (10 * report.substeps as usize).max((h / 5e-5) as usize);
         reference.run(f64::from(h) / fine as f64, fine);
         let error = largest_difference(&scene.positions(), &reference.positions);
-        let named = format!("{name}, {solver:?}, tolerance {tolerance}, {h} s, step {step}: {error:.2e}, {report:?}");
-        if error > 0.5 * f64::from(tolerance) {
-            eprintln!("{named}");
-        }
-        //assert!(error <= f64::from(tolerance), "{named}");
-        //assert!(report.error_estimate <= tolerance, "{named}");
+        let named = format!("{name}, {solver:?}, tolerance {tolerance}, {h} s, step {step}: {report:?}");
+        assert!(report.error_estimate <= tolerance, "{named}");
+        largest = largest.max(error / f64::from(tolerance));
     }
-    steps
+    largest
 }
 
+/// What IMPLICIT is tried with is in the test below.
 #[test]
 fn a_step_adds_no_more_than_its_tolerance() {
     for (name, parts) in [
@@ -54,14 +48,27 @@ fn a_step_adds_no_more_than_its_tolerance() {
         ("cloth", cloth(0.3, 12, 0.05, 40.0)),
         ("chain", level_chain()),
     ] {
-        for solver in [Solver::Implicit] {
-            for tolerance in [1e-3_f32, 1e-4] {
-                for (h, steps) in [(1e-3, 60), (1.0 / 60.0, 12)] {
-                    let c = std::time::Instant::now();
-                    let taken = worst_step(name, &parts, solver, tolerance, h, steps);
-                    eprintln!("== {name} {solver:?} {tolerance} {h} taken {taken} {:?}", c.elapsed());
-                }
+        for tolerance in [1e-3_f32, 1e-4, 1e-5] {
+            for (h, steps) in [(1e-3, 60), (1.0 / 60.0, 12)] {
+                let error = largest_error(name, &parts, Solver::Verlet, tolerance, h, steps);
+                assert!(
+                    error <= 1.0,
+                    "{name}, {tolerance} m, {h} s: {error:.2} of the tolerance"
+                );
             }
         }
     }
+}
+
+/// A known fault: IMPLICIT leaves unsolved what is shorter than a tenth of the tolerance, in each of its substeps. In short ones
+/// that is all that forces do: the body stays where it is, and as it does so with twice the substeps too, no error is seen.
+#[test]
+fn implicit_leaves_forces_out_where_a_tolerance_makes_substeps_short() {
+    let parts = organ(0.2, 0.025, 5000.0);
+    let error = largest_error("organ", &parts, Solver::Implicit, 1e-4, 1.0 / 60.0, 3);
+    // g h² / 2 is 1.36e-3 m.
+    assert!(
+        error > 10.0,
+        "{error:.2} of the tolerance: the fault is gone, and IMPLICIT belongs in the test above"
+    );
 }
