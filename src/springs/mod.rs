@@ -13,6 +13,7 @@ mod packed;
 mod tile;
 
 use std::fmt::Debug;
+use std::ops;
 
 use glam::Vec3;
 
@@ -101,7 +102,7 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// The nodes whose positions the forces of a tile are made of, and what lies between and at most sixteen beyond them;
     /// `None`: any.
-    fn reads(&self, _tile: usize) -> Option<std::ops::Range<isize>> {
+    fn reads(&self, _tile: usize) -> Option<ops::Range<isize>> {
         None
     }
 
@@ -134,10 +135,10 @@ pub(crate) trait Springs: Debug + Send + Sync {
         }
     }
 
-    /// Half the energy of all links of the nodes of `tile`, J: of a spring between two tiles each has a half.
-    fn half_energy(&self, tile: usize, positions: &Vectors) -> f64 {
+    /// Half the energy of all links of the nodes of a tile, J: of a spring between two tiles each has a half.
+    fn half_energy(&self, nodes: ops::Range<usize>, positions: View) -> f64 {
         let mut sum = 0.0;
-        for node in tile_nodes(tile, positions.len()) {
+        for node in nodes {
             self.visit(node, &mut |link| {
                 let way = positions.get(link.neighbour as usize) - positions.get(node);
                 sum += f64::from(half_energy(node, &link, way));

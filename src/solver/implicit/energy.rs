@@ -2,12 +2,15 @@
 
 use super::step::Substep;
 use super::{End, Implicit};
-use crate::body::{Body, Vectors};
+use crate::body::{Body, Records, Vectors};
 use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// What rounding may add, as a fraction of the energies involved.
 const ROUNDING: f64 = 1e-6;
+
+/// Sums that are made side by side, so that none waits for itself.
+const LANES: usize = 16;
 
 /// What was lost may come back, as far as it is no more than this part of the energy there is.
 const CREDIT: f64 = 0.1;
@@ -39,14 +42,14 @@ impl Substep<'_> {
         };
         let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, body.kernel);
         let from = implicit.place(self.is_first);
-        let mut energy = implicit.elastic(&*body.springs, state.positions, from, self.team);
+        let mut energy = implicit.elastic(&*body.springs, state.positions, None, from, self.team);
         if travels {
             let moved = state.next_positions;
             moved.copy_from(state.positions);
             for pin in body.pins.iter() {
                 moved.set(pin.node as usize, pin.place(self.end));
             }
-            energy = energy.max(implicit.elastic(&*body.springs, moved, from, self.team));
+            energy = energy.max(implicit.elastic(&*body.springs, moved, None, from, self.team));
         }
         Before {
             energy: kinetic + energy,
@@ -59,7 +62,9 @@ impl Substep<'_> {
         let state = body.state.substep();
         let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
         let next = 1 - implicit.settled;
-        let elastic = implicit.elastic(&*body.springs, state.next_positions, next, self.team);
+        // Records are those of the positions that were looked at last.
+        let records = body.records.as_ref();
+        let elastic = implicit.elastic(&*body.springs, state.next_positions, records, next, self.team);
         let work = self.work(body, &implicit.histories[next].ways);
         let after = kinetic + elastic;
         let allowed = before.energy + work + before.credit;
@@ -115,22 +120,53 @@ impl Substep<'_> {
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let mut work = 0.0;
         for (axis, ways) in ways.axes().into_iter().enumerate() {
-            let gravity = self.request.gravity[axis];
-            let masses = body.masses.iter().zip(&body.inverse_masses);
-            let weighted: f64 = masses
-                .zip(ways)
-                .filter(|((_, inverse_mass), _)| **inverse_mass > 0.0)
-                .map(|((&mass, _), &way)| f64::from(mass) * f64::from(way))
-                .sum();
-            work += f64::from(gravity) * weighted;
+            let gravity = f64::from(self.request.gravity[axis]);
+            if gravity != 0.0 {
+                work += gravity
+                    * body.kernel.run(Weighted {
+                        weights: &body.masses,
+                        values: ways,
+                        free: &body.inverse_masses,
+                    });
+            }
             if let Some(applied) = applied {
-                let products = applied.axes()[axis].iter().zip(ways);
-                work += products
-                    .map(|(&force, &way)| f64::from(force) * f64::from(way))
-                    .sum::<f64>();
+                let free = &body.inverse_masses;
+                work += body.kernel.run(Weighted {
+                    weights: applied.axes()[axis],
+                    values: ways,
+                    free,
+                });
             }
         }
         work
+    }
+}
+
+/// The sum of products over the nodes that are free to move: those that are not 0.
+struct Weighted<'a> {
+    weights: &'a [f32],
+    values: &'a [f32],
+    free: &'a [f32],
+}
+
+impl Loops for Weighted<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let mut lanes = [0.0; LANES];
+        let chunks = self
+            .weights
+            .chunks(LANES)
+            .zip(self.values.chunks(LANES))
+            .zip(self.free.chunks(LANES));
+        for ((weights, values), free) in chunks {
+            for (lane, ((&weight, &value), &free)) in lanes.iter_mut().zip(weights.iter().zip(values).zip(free)) {
+                let weight = if free > 0.0 { f64::from(weight) } else { 0.0 };
+                *lane += weight * f64::from(value);
+            }
+        }
+        lanes.into_iter().sum()
     }
 }
 
@@ -142,13 +178,22 @@ fn scale(vectors: &mut Vectors, factor: f32) {
 
 impl Implicit {
     /// The energy of the springs with nodes at `positions`, which lack the remainders of this place where there are some.
-    fn elastic(&mut self, springs: &dyn Springs, positions: &Vectors, place: usize, team: &Team) -> f64 {
+    fn elastic(
+        &mut self,
+        springs: &dyn Springs,
+        positions: &Vectors,
+        records: Option<&Records>,
+        place: usize,
+        team: &Team,
+    ) -> f64 {
         if let Some(newton) = &self.newton {
             return newton.elastic(springs, positions, place);
         }
+        let node_count = positions.len();
+        let view = positions.view().with_records(records);
         let partials = Items::new(&mut self.partials);
-        team.pass(tile_count(positions.len()), partials, |tile, partial| {
-            partial.first = springs.half_energy(tile, positions);
+        team.pass(tile_count(node_count), partials, |tile, partial| {
+            partial.first = springs.half_energy(tile_nodes(tile, node_count), view);
         });
         self.partials.iter().map(|partial| partial.first).sum()
     }
@@ -178,23 +223,17 @@ impl Loops for Kinetic<'_> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let count = self.masses.len();
-        let [x, y, z] = self.velocities.map(|axis| &axis[..count]);
-        let inverse_masses = &self.inverse_masses[..count];
-        let mut sum = 0.0;
-        for node in 0..count {
-            let square = [x[node], y[node], z[node]]
-                .map(f64::from)
-                .iter()
-                .map(|v| v * v)
-                .sum::<f64>();
-            let mass = if inverse_masses[node] > 0.0 {
-                f64::from(self.masses[node])
-            } else {
-                0.0
-            };
-            sum += mass * square;
+        let mut lanes = [0.0; LANES];
+        for velocities in self.velocities {
+            let nodes = velocities.chunks(LANES).zip(self.masses.chunks(LANES));
+            for ((velocities, masses), free) in nodes.zip(self.inverse_masses.chunks(LANES)) {
+                for (lane, ((&velocity, &mass), &free)) in lanes.iter_mut().zip(velocities.iter().zip(masses).zip(free))
+                {
+                    let mass = if free > 0.0 { f64::from(mass) } else { 0.0 };
+                    *lane += mass * f64::from(velocity) * f64::from(velocity);
+                }
+            }
         }
-        0.5 * sum
+        0.5 * lanes.into_iter().sum::<f64>()
     }
 }

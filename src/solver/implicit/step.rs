@@ -462,9 +462,15 @@ impl Substep<'_> {
             implicit.wear(solved.products);
             size = f64::max(size, solved.size);
             solved_error = solved.error;
+            // Where the correction itself is no more than what may be left, there is no need to look at what it led to.
+            if solved.size <= absolute {
+                add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
+                self.place(body, implicit);
+                error = solved.error;
+                break;
+            }
             gone = self.go(body, implicit, solved.work);
-            // The correction itself was no more than what may be left.
-            if solved.size <= absolute.max(relative * size) {
+            if solved.size <= relative * size {
                 error = solved.error;
                 break;
             }

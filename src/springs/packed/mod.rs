@@ -19,7 +19,7 @@ use pack::{Loose, NO_KIND, pack};
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
 use super::{Course, Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes};
-use crate::body::{Spring, Vectors};
+use crate::body::{Spring, View};
 use crate::error::Result;
 use crate::memory;
 
@@ -210,10 +210,10 @@ impl Springs for Packed {
             .changes(self.kernel, &self.materials, course, changes);
     }
 
-    fn half_energy(&self, tile: usize, positions: &Vectors) -> f64 {
-        self.tiles[tile]
+    fn half_energy(&self, nodes: Range<usize>, positions: View) -> f64 {
+        self.tiles[nodes.start / TILE]
             .columns
-            .half_energy(self.kernel, &self.materials, positions.view())
+            .half_energy(self.kernel, &self.materials, positions)
     }
 
     fn add(&mut self, spring: &Spring) -> Result<()> {

@@ -246,7 +246,7 @@ fn every_kernel_computes_changes_and_energy() {
                 for tile in 0..tile_count(count) {
                     let mut changes = TileForces::ZERO;
                     packed.changes(tile, &course, &mut changes);
-                    found_energy += packed.half_energy(tile, &positions);
+                    found_energy += packed.half_energy(tile_nodes(tile, count), course_of_records.positions);
                     let mut of_records = TileForces::ZERO;
                     packed.changes(tile, &course_of_records, &mut of_records);
                     assert_eq!(changes.axes(), of_records.axes(), "{name}, {kernel:?}, from records");
