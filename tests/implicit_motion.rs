@@ -229,23 +229,32 @@ fn waves_travel_at_their_speed() {
     }
 }
 
+/// The period of the pendulum from 150 degrees over what it should be, less 1, in steps of 1 ms.
+fn error_of_period(solver: Solver) -> f64 {
+    let (pendulum, h) = (Pendulum::from_150_degrees(), 1e-3_f32);
+    let mut scene = scene(&pendulum.parts, under(Vec3::NEG_Y * pendulum.gravity), solver, 2);
+    let period = period_of(f64::from(h), || {
+        scene.step(h);
+        scene.positions()[1].x
+    });
+    period / pendulum.period() - 1.0
+}
+
 #[test]
 fn a_pendulum_from_150_degrees_keeps_its_period() {
-    let pendulum = Pendulum::from_150_degrees();
-    for solver in SOLVERS {
-        let h = 1e-3_f32;
-        let mut scene = scene(&pendulum.parts, under(Vec3::NEG_Y * pendulum.gravity), solver, 2);
-        let period = period_of(f64::from(h), || {
-            scene.step(h);
-            scene.positions()[1].x
-        });
-        let expected = pendulum.period();
-        let error = period / expected - 1.0;
-        // IMPLICIT leaves alone what it takes for rounding, which is more than that with a spring so stiff: the bob comes to
-        // vibrate on it, and loses what that costs. 1.3e-2 of the period.
-        let allowed = if solver == Solver::Implicit { 3e-2 } else { 1e-4 };
-        assert!(error.abs() < allowed, "{solver:?}: {period} s for {expected} s");
-    }
+    let error = error_of_period(Solver::Newton);
+    assert!(error.abs() < 1e-4, "{error:.2e}");
+}
+
+/// A known fault: IMPLICIT leaves alone what it takes for rounding, which is more than that with a spring so stiff. Steps remain
+/// unsolved, the bob comes to vibrate on its spring, and loses what that costs.
+#[test]
+fn implicit_loses_energy_in_a_pendulum_on_a_stiff_spring() {
+    let error = error_of_period(Solver::Implicit).abs();
+    assert!(
+        error > 1e-4,
+        "{error:.2e}: the fault is gone, and IMPLICIT belongs in the test above"
+    );
 }
 
 /// Springs give a body neither momentum nor a torque: the sum over the nodes of `x1 x m (3 v1 - 4 v0 + v')`, with the velocities

@@ -54,7 +54,7 @@ pub const PENDING: [(&str, &str); 5] = [
     ("tetrahedra inverted", "recovers: the volume term"),
     (
         "crushed between two tools",
-        "recovers from half its thickness and from 0.1 mm: the volume term",
+        "recovers when pressed to less than five sixths of its thickness, as to 0.1 mm: the volume term",
     ),
 ];
 
