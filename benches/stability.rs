@@ -1,7 +1,7 @@
 //! The table of stability, all of it: every case with every solver, storage and step.
 //!
-//! `cargo bench --bench stability [-- part of a case's name]` writes `target/report/stability.md`. What is not as it should
-//! be makes it fail.
+//! `cargo bench --bench stability [-- part of a case's name [solver]]` writes `target/report/stability.md`. What is not as it
+//! should be makes it fail. A name of nothing, `""`, is part of all.
 #![allow(clippy::print_stderr)]
 
 #[path = "../tests/stability/mod.rs"]
@@ -14,6 +14,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use cases::{CASES, Case, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
+use sinew::Solver;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args()
@@ -21,10 +22,15 @@ fn main() -> ExitCode {
         .filter(|argument| argument != "--bench")
         .collect();
     let asked = arguments.first().map_or("", String::as_str);
+    let solver = arguments.get(1).map(String::as_str);
+    let solvers: Vec<Solver> = SOLVERS
+        .into_iter()
+        .filter(|tried| solver.is_none_or(|name| name.eq_ignore_ascii_case(&format!("{tried:?}"))))
+        .collect();
     let mut report = String::from("# Stability\n\n");
     let mut wrong = 0;
     for case in CASES.iter().filter(|case| case.name.contains(asked)) {
-        wrong += line(case, &mut report);
+        wrong += line(case, &solvers, &mut report);
     }
     report.push_str("## Waiting for what is not there yet\n\n");
     for (name, what) in PENDING {
@@ -49,7 +55,7 @@ fn main() -> ExitCode {
 }
 
 /// Tries a line of the table; how many of its cells are not as they should be.
-fn line(case: &Case, report: &mut String) -> usize {
+fn line(case: &Case, solvers: &[Solver], report: &mut String) -> usize {
     let mut wrong = 0;
     let _ = writeln!(report, "## {}\n", case.name);
     report.push_str("| solver | storage |");
@@ -57,7 +63,7 @@ fn line(case: &Case, report: &mut String) -> usize {
         let _ = write!(report, " {step:.3e} s |");
     }
     let _ = writeln!(report, "\n|---|---|{}", "---|".repeat(STEPS.len()));
-    for solver in SOLVERS {
+    for &solver in solvers {
         for storage in STORAGES {
             let _ = write!(report, "| {solver:?} | {storage:?} |");
             for step in STEPS {

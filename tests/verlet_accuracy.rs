@@ -5,39 +5,14 @@
 
 mod support;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 use sinew::{Error, WorldDefinition};
 use support::bodies::{FREE, Parts, Scene};
-
-const REST: f32 = 0.1;
-const STRETCH: f64 = 0.05;
-
-/// Two masses, 1 and 3 kg, joined by a spring that is stretched; the mass that moves between them.
-fn two_masses() -> (Parts, f64) {
-    let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X * (REST + STRETCH as f32)], 1.0);
-    parts.join(0, 1, 100.0);
-    parts.masses[1] = 3.0;
-    parts.rest_lengths[0] = REST;
-    (parts, 0.75)
-}
-
-/// sqrt(k (1/m1 + 1/m2)).
-fn omega() -> f64 {
-    (100.0_f64 / 0.75).sqrt()
-}
-
-/// How far the spring is stretched, and how fast that grows.
-fn stretch(scene: &Scene) -> (f64, f64) {
-    let (x, v) = (scene.positions(), scene.velocities());
-    (x[1].x - x[0].x - f64::from(REST), v[1].x - v[0].x)
-}
-
-/// `angle` plus the whole turns that bring it nearest to `expected`.
-fn unwrapped(angle: f64, expected: f64) -> f64 {
-    angle + TAU * ((expected - angle) / TAU).round()
-}
+use support::motion::{
+    Pendulum, STRETCH, Waves, fixed_chain, omega, period_of, rounding, stretch, two_masses, unwrapped,
+};
 
 /// The phase of an oscillation at rest at first, from its displacement and velocity; `theta` is what a step turns it by.
 fn phase(q: f64, v: f64, h: f64, theta: f64, steps: usize) -> f64 {
@@ -235,21 +210,6 @@ fn bodies_fall_alike_far_from_the_origin() {
     }
 }
 
-/// Half the distance between neighbouring `f32` about `value`.
-fn rounding(value: f64) -> f64 {
-    let value = (value as f32).abs();
-    f64::from(value.next_up() - value) / 2.0
-}
-
-/// A chain along x with fixed ends and `free` nodes between them.
-fn fixed_chain(free: usize, spacing: f32, mass: f32, stiffness: f32) -> Parts {
-    let mut parts = Parts::chain(free + 2, Vec3::X * spacing, mass, stiffness);
-    parts.masses[0] = 0.0;
-    parts.masses[free + 1] = 0.0;
-    parts.rest_lengths.fill(spacing);
-    parts
-}
-
 #[test]
 fn all_modes_of_a_chain_turn_as_the_discrete_solution() {
     let (free, spacing, mass, stiffness) = (100, 0.01_f32, 0.01_f32, 100.0_f32);
@@ -288,52 +248,25 @@ fn all_modes_of_a_chain_turn_as_the_discrete_solution() {
 
 #[test]
 fn waves_travel_at_their_speed() {
-    let (spacing, mass, stiffness) = (0.01_f32, 0.01_f32, 100.0_f32);
-    let (free, wavelength, h) = (799, 20.0, 0.001_f32);
-    let parts = fixed_chain(free, spacing, mass, stiffness);
-    let wave_number = TAU / wavelength; // per node
-    let omega = 2.0 * (f64::from(stiffness) / f64::from(mass)).sqrt() * (wave_number / 2.0).sin();
-    let amplitude = f64::from(spacing);
-    let mut scene = Scene::new(&parts, FREE);
-    let mut positions = parts.positions.clone();
-    let mut velocities = vec![Vec3::ZERO; free + 2];
-    for i in 1..=free {
-        let phase = wave_number * i as f64;
-        positions[i].x = (f64::from(positions[i].x) + amplitude * phase.cos()) as f32;
-        velocities[i].x = (amplitude * omega * phase.sin()) as f32;
-    }
-    scene.body_mut().set_positions(&positions).expect("positions");
-    scene.body_mut().set_velocities(&velocities).expect("velocities");
+    let waves = Waves::new(799);
+    let h = 0.001;
+    let mut scene = Scene::new(&waves.parts, FREE);
+    waves.start(&mut scene);
     // c = spacing sqrt(k/m) is one node in 10 ms: what the ends do has not come to the middle in 2 s.
     let steps = 2000;
     scene.run(h, steps);
-    let (mut cosine, mut sine) = (0.0, 0.0);
-    for (i, x) in scene.positions().iter().enumerate().skip(300).take(200) {
-        let displacement = x.x - f64::from(spacing) * i as f64;
-        cosine += displacement * (wave_number * i as f64).cos();
-        sine += displacement * (wave_number * i as f64).sin();
-    }
-    let t = f64::from(h) * steps as f64;
-    let travelled = unwrapped(sine.atan2(cosine), omega * t);
-    let speed = travelled / t / wave_number * f64::from(spacing);
-    let long_waves = f64::from(spacing) * (f64::from(stiffness) / f64::from(mass)).sqrt();
-    let dispersed = long_waves * (wave_number / 2.0).sin() / (wave_number / 2.0);
+    let (speed, dispersed) = waves.speed(&scene, f64::from(h) * steps as f64, 200);
     assert!((speed / dispersed - 1.0).abs() < 1e-3, "{speed} for {dispersed}");
 }
 
 #[test]
 fn a_pendulum_from_150_degrees_keeps_its_period() {
-    let (g, stiffness, h) = (9.81_f32, 1e5_f32, 1e-3_f32);
-    let start = 150.0_f64.to_radians();
-    let compressed = 1.0 + f64::from(g) * start.cos() / f64::from(stiffness);
-    let bob = DVec3::new(start.sin(), -start.cos(), 0.0) * compressed;
-    let mut parts = Parts::nodes(vec![Vec3::ZERO, bob.as_vec3()], 1.0);
-    parts.masses[0] = 0.0;
-    parts.join(0, 1, stiffness);
-    parts.rest_lengths[0] = 1.0;
-    let gravity = Vec3::NEG_Y * g;
+    let h = 1e-3_f32;
+    let pendulum = Pendulum::from_150_degrees();
+    let parts = &pendulum.parts;
+    let gravity = Vec3::NEG_Y * pendulum.gravity;
 
-    let mut scene = Scene::new(&parts, WorldDefinition { gravity, ..FREE });
+    let mut scene = Scene::new(parts, WorldDefinition { gravity, ..FREE });
     let period = period_of(f64::from(h), || {
         scene.step(h);
         scene.positions()[1].x
@@ -349,29 +282,9 @@ fn a_pendulum_from_150_degrees_keeps_its_period() {
         "{period} s, in f64 {expected} s"
     );
 
-    let mean = arithmetic_geometric_mean(1.0, (start / 2.0).cos());
-    let rigid = TAU / f64::from(g).sqrt() / mean;
-    let lengthened = rigid * (1.0 + 1.98 * f64::from(g) / f64::from(stiffness));
+    let lengthened = pendulum.period();
     assert!(
         (period / lengthened - 1.0).abs() < 1e-4,
         "{period} s, by formula {lengthened} s"
     );
-}
-
-/// The mean period of an oscillation about zero over three periods, from samples `h` apart.
-fn period_of(h: f64, mut sample: impl FnMut() -> f64) -> f64 {
-    let mut crossings = Vec::new();
-    let (mut before, mut t) = (sample(), h);
-    while crossings.len() < 7 {
-        let now = sample();
-        if before * now < 0.0 {
-            crossings.push(t + h * before / (before - now));
-        }
-        (before, t) = (now, t + h);
-    }
-    (crossings[6] - crossings[0]) / 3.0
-}
-
-fn arithmetic_geometric_mean(a: f64, b: f64) -> f64 {
-    (0..20).fold((a, b), |(a, b), _| ((a + b) / 2.0, (a * b).sqrt())).0
 }

@@ -54,7 +54,7 @@ pub const PENDING: [(&str, &str); 5] = [
     ("tetrahedra inverted", "recovers: the volume term"),
     (
         "crushed between two tools",
-        "recovers from half its thickness and from 0.1 mm: the volume term",
+        "recovers when pressed to less than five sixths of its thickness, as to 0.1 mm: the volume term",
     ),
 ];
 
@@ -77,10 +77,6 @@ const fn lost(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
     }
 }
 
-/// The formula of order 2 goes on a third of the way it came, which takes a folded body from one shape to another and back:
-/// both are solutions of its equation.
-const TWO_SHAPES: &str = "a long step of order 2 goes to and fro between two folded shapes";
-
 /// The equations of IMPLICIT are solved to a hundredth of what a step changes: near rest that leaves a jitter.
 const JITTER: &str = "solved to a hundredth of a step's change";
 
@@ -92,7 +88,7 @@ const fn jitter(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
     }
 }
 
-pub const KNOWN: [Known; 16] = [
+pub const KNOWN: [Known; 22] = [
     // 6.8e-6 of the size after 10 ms.
     lost("started rotated", |setup| is_verlet_at(setup, 1e-5)),
     // 1.65e-3 of the stretch.
@@ -113,41 +109,49 @@ pub const KNOWN: [Known; 16] = [
     lost("a million steps", |setup| is_full(setup) && is_verlet_at(setup, 1e-5)),
     // 3e-6 of the size.
     lost("a million steps", |setup| is_full(setup) && is_verlet_at(setup, 1e-4)),
+    // Of IMPLICIT, that adds to positions as VERLET does: 6.9e-6 of the size, 1.64e-3 of the stretch, a strain of 2.1e-4, 3.0e-6 to
+    // 4.5e-6 of the size.
+    lost("started rotated", |setup| is_implicit_in_full(setup, &[1e-5])),
+    lost("masses 1 : 1e6", |setup| is_implicit_in_full(setup, &[1e-5])),
+    lost("a pin stretched and let go", |setup| {
+        is_implicit_in_full(setup, &[1e-5])
+    }),
+    lost("steps of changing length", |setup| is_implicit_in_full(setup, &[1e-5])),
+    // 2.2e-5 and 2.1e-6 of the size.
+    lost("a million steps", |setup| is_implicit_in_full(setup, &[1e-5, 1e-4])),
+    // 1.0e-5 and 1.5e-5 of the energy at first is still kinetic after 20 steps.
+    jitter("scattered at random", |setup| {
+        is_full(setup) && setup.solver != Solver::Verlet && setup.step == 0.1
+    }),
+    // 1.6e-4 to 1e-3 of the stretch.
+    jitter("stiffness 1 : 1e6 in a chain", |setup| {
+        is_implicit_in_full(setup, &[1e-5, 1e-4, 1e-3])
+    }),
+    // 4.4e-4 to 3.1e-3 of the sag up to 1 ms, 9.2e-4 to 0.12 from 0.1 s on.
+    jitter("stiffness 1 : 1e6 in a block", |setup| {
+        is_implicit_in_full(setup, &[1e-5, 1e-4, 1e-3, 0.1, 1.0])
+    }),
     // 1.5e-6 of the kinetic energy at first.
     jitter("scattered at random", |setup| {
         is_implicit(setup, Storage::Packed, &[0.1])
-    }),
-    // 2.8e-5 and 1.5e-5.
-    jitter("flattened to a plane", |setup| {
-        is_implicit(setup, Storage::Efficient, &[0.1]) || is_implicit(setup, Storage::FastLink, &[1.0])
     }),
     // 1.5e-6 of the size.
     jitter("started rotated", |setup| {
         is_implicit(setup, Storage::Efficient, &[1e-5])
     }),
-    // 7.5e-4 and 1.1e-4 of the stretch.
+    // 7.5e-4 of the stretch.
     jitter("stiffness 1 : 1e6 in a chain", |setup| {
-        is_implicit(setup, Storage::DynamicBulk, &[1e-3]) || is_implicit(setup, Storage::Packed, &[1.0 / 60.0])
+        !is_full(setup) && is_implicit(setup, Storage::DynamicBulk, &[1e-3])
     }),
     // 1.2e-4 to 0.11 of the sag.
     jitter("stiffness 1 : 1e6 in a block", |setup| {
         let of = |storage, step| is_implicit(setup, storage, &[step]);
-        of(Storage::Packed, 1e-3)
-            || of(Storage::Efficient, 1.0 / 60.0)
-            || of(Storage::FastLink, 0.1)
-            || of(Storage::DynamicBulk, 1.0)
+        of(Storage::Packed, 1e-3) || of(Storage::FastLink, 0.1) || of(Storage::DynamicBulk, 1.0)
     }),
-    // 1.3e-4 of the energy at first, and 2.0e-4.
-    Known {
-        case: "collapsed to a point",
-        applies: |setup| setup.solver == Solver::Newton && setup.step == 0.1,
-        figure: TWO_SHAPES,
-    },
-    Known {
-        case: "flattened to a plane",
-        applies: |setup| setup.solver == Solver::Newton && setup.step == 1.0,
-        figure: TWO_SHAPES,
-    },
+    // 2.3e-5 of the parts' momentum, 1e-5 is right.
+    jitter("nodes in one place, springs without length", |setup| {
+        is_implicit(setup, Storage::Efficient, &[1.0])
+    }),
     Known {
         case: "crushed between two tools",
         applies: |setup| is_implicit(setup, Storage::Packed, &[1.0]),
@@ -162,6 +166,10 @@ pub const KNOWN: [Known; 16] = [
 
 fn is_implicit(setup: &Setup, storage: Storage, steps: &[f32]) -> bool {
     setup.solver == Solver::Implicit && setup.storage == storage && steps.contains(&setup.step)
+}
+
+fn is_implicit_in_full(setup: &Setup, steps: &[f32]) -> bool {
+    is_full(setup) && setup.solver == Solver::Implicit && steps.contains(&setup.step)
 }
 
 fn is_full(setup: &Setup) -> bool {

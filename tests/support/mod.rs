@@ -5,7 +5,10 @@
 
 pub mod bodies;
 pub mod euler;
+pub mod motion;
+pub mod organ;
 pub mod reference;
+pub mod statics;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

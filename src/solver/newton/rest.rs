@@ -60,7 +60,7 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
     descent.read(&*body.springs);
     set_up(&mut descent, body, gravity);
     let parts = Parts::new(&descent)?;
-    parts.check(&descent, body)?;
+    parts.balance(&mut descent, body)?;
     let origin = body.origin;
     let energy_before = descent.equation.potential(&descent.network, origin);
     let extent = extent(&descent);
@@ -196,25 +196,43 @@ impl Parts {
         node
     }
 
-    /// Refuses a part that nothing holds against the forces on it.
-    fn check(&self, descent: &Descent, body: &Body) -> Result<()> {
-        let equation = &descent.equation;
-        let mut sums = memory::filled((DVec3::ZERO, 0.0), self.lowest.len())?;
-        let mut is_held = memory::filled(false, self.lowest.len())?;
-        for (node, &part) in self.lowest.iter().enumerate() {
-            let (sum, size) = &mut sums[part as usize];
-            *sum += equation.loads[node];
-            *size += equation.loads[node].length();
-            is_held[part as usize] |= !equation.is_free(node);
+    /// Refuses a part that nothing holds against the forces on it. Where they cancel but for rounding, the rest is taken off
+    /// them, by mass: it would carry the part away.
+    fn balance(&self, descent: &mut Descent, body: &Body) -> Result<()> {
+        #[derive(Clone, Copy, Default)]
+        struct Sums {
+            load: DVec3,
+            size: f64,
+            mass: f64,
+            is_held: bool,
         }
-        for (part, (sum, size)) in sums.into_iter().enumerate() {
-            if !is_held[part] && sum.length() > CANCELS * size {
+        let equation = &mut descent.equation;
+        let mut sums = memory::filled(Sums::default(), self.lowest.len())?;
+        for (node, &part) in self.lowest.iter().enumerate() {
+            let sums = &mut sums[part as usize];
+            sums.load += equation.loads[node];
+            sums.size += equation.loads[node].length();
+            sums.mass += equation.masses[node];
+            sums.is_held |= !equation.is_free(node);
+        }
+        for (node, &part) in self.lowest.iter().enumerate() {
+            let Sums {
+                load,
+                size,
+                mass,
+                is_held,
+            } = sums[part as usize];
+            if is_held {
+                continue;
+            }
+            if load.length() > CANCELS * size {
                 return Err(Error::invalid(format!(
                     "there is no state of rest: nothing holds node {} and what it is joined to against {:e} N",
-                    body.callers(part),
-                    sum.length()
+                    body.callers(part as usize),
+                    load.length()
                 )));
             }
+            equation.loads[node] -= load * (equation.masses[node] / mass);
         }
         Ok(())
     }
