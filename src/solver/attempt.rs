@@ -81,7 +81,11 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
     let are_scaled = body.carry.masses_for > 0.0;
     let is_worth_estimating = || {
         let substeps = request.dt / (RESERVE * known.limit_anywhere());
-        request.substeps == 0 && !are_scaled && known.is_coarse() && substeps > WORTH_ESTIMATING
+        request.substeps == 0
+            && !are_scaled
+            && known.is_coarse()
+            && known.is_worth_estimating()
+            && substeps > WORTH_ESTIMATING
     };
     if known.limit().is_none() {
         body.watch();
@@ -147,9 +151,9 @@ fn run(
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
 fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = start.stability.limit().unwrap_or(f32::INFINITY);
-    let is_fast = is_too_fast_for_estimates(body, request, &start);
+    let is_anywhere = is_better_anywhere(body, &start.stability);
     for attempt in 0..=ATTEMPTS {
-        if attempt == ATTEMPTS || is_fast {
+        if attempt == ATTEMPTS || is_anywhere {
             stable_substep = start.stability.limit_anywhere();
         }
         let stability = start.stability.shortened_to(stable_substep);
@@ -181,21 +185,11 @@ fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team)
     Err(TooLong { stable_substep })
 }
 
-/// Whether the body moves so fast that shorter substeps, which are stable wherever its nodes are, cost less than to estimate
-/// again and again what longer ones are stable for.
-fn is_too_fast_for_estimates(body: &Body, request: &StepRequest, start: &Carry) -> bool {
-    let stability = &start.stability;
-    let Some(limit) = stability.limit() else {
-        return false;
-    };
-    // A few watched nodes cost nothing.
-    if body.watched.limit_of_others() >= limit || stability.is_coarse() {
-        return false;
-    }
-    let travel = request.dt * verlet::diagonal(&start.gravity.velocities);
-    let estimates = 1.0 / stability.substeps_of(travel);
-    let more = substeps_needed(request, stability.limit_anywhere()) - substeps_needed(request, limit);
-    f64::from(WORTH_ESTIMATING * estimates) > more
+/// Whether substeps that are stable wherever the nodes are come cheaper than estimates of all nodes for slightly longer ones.
+/// It is not asked how fast the body moves: what is known of that is a box along the axes, and turns with them.
+fn is_better_anywhere(body: &Body, stability: &Stability) -> bool {
+    let found = stability.limit().unwrap_or(0.0);
+    body.watched.limit_of_others() < found && !stability.is_worth_estimating()
 }
 
 /// How many substeps a step takes of which the longest stable one is this long, s.

@@ -17,6 +17,9 @@ use crate::springs::{Springs, separation};
 /// which the matrices of their springs change. It then changes by less than what a chosen substep keeps in reserve.
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
+/// How much longer substeps have to be to be worth estimates of all nodes of a moving body.
+const WORTH_ESTIMATING: f32 = 1.5;
+
 /// What bounds the frequencies and the dampings of a node and its springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rates {
@@ -81,6 +84,8 @@ pub(crate) struct Stability {
     now: Option<f32>,
     /// The limit wherever the nodes are, s.
     anywhere: f32,
+    /// What the last estimate found, s.
+    found: f32,
     /// How far neighbours may still move against each other before the estimate is stale, m.
     reach: f32,
 }
@@ -89,6 +94,7 @@ impl Stability {
     pub const UNKNOWN: Self = Self {
         now: None,
         anywhere: 0.0,
+        found: 0.0,
         reach: 0.0,
     };
 
@@ -131,6 +137,11 @@ impl Stability {
         self.reach == f32::INFINITY && self.now.is_some_and(f32::is_finite)
     }
 
+    /// Whether estimates allow substeps so much longer than those that are stable anywhere that they are worth their time.
+    pub fn is_worth_estimating(&self) -> bool {
+        self.found > WORTH_ESTIMATING * self.anywhere
+    }
+
     /// The same, where the limit is found to be no longer than `limit`, s.
     pub fn shortened_to(self, limit: f32) -> Self {
         Self {
@@ -165,6 +176,7 @@ impl Stability {
         Self {
             now: Some(found.limit),
             anywhere: watched.limit(),
+            found: found.limit,
             reach: TRAVEL_BEFORE_ESTIMATE * found.shortest,
         }
     }
@@ -198,14 +210,15 @@ impl Stability {
         }
         Self {
             now: Some(found.limit),
+            found: self.found.min(found.limit),
             anywhere: watched.limit(),
             reach: TRAVEL_BEFORE_ESTIMATE * found.shortest,
         }
     }
 
     /// What the next step depends on.
-    pub fn floats(&self) -> [f32; 3] {
-        [self.now.unwrap_or(-1.0), self.anywhere, self.reach]
+    pub fn floats(&self) -> [f32; 4] {
+        [self.now.unwrap_or(-1.0), self.anywhere, self.found, self.reach]
     }
 }
 

@@ -218,7 +218,7 @@ impl Step<'_> {
 }
 
 /// How fast two nodes may be against each other, m/s.
-pub(super) fn diagonal(velocities: &Bounds) -> f32 {
+fn diagonal(velocities: &Bounds) -> f32 {
     (velocities.max - velocities.min).length()
 }
 
