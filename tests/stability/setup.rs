@@ -79,5 +79,5 @@ pub fn at_most(what: &str, figure: f64, bound: f64) -> Result<(), Stop> {
     if figure <= bound {
         return Ok(());
     }
-    fault(format!("{what} is {figure:.3e}, at most {bound:.3e} is right"))
+    fault(format!("{what} is {figure:.5e}, at most {bound:.5e} is right"))
 }
