@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use sinew::{BodyDefinition, Error, Solver, Storage, World, WorldDefinition};
 use support::bodies::{FREE, Parts, Scene, largest_difference};
 use support::euler::{euler_step, uneven_block};
+use support::motion::two_masses;
 
 const STORAGES: [Storage; 4] = [
     Storage::Packed,
@@ -21,15 +22,6 @@ fn implicit(parts: &Parts, world: WorldDefinition, order: u32, accuracy: f32) ->
         accuracy,
         ..definition
     })
-}
-
-/// Two masses, 1 and 3 kg, joined by a spring of 100 N/m, 0.1 m long, stretched by 0.05 m.
-fn two_masses() -> Parts {
-    let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X * 0.15], 1.0);
-    parts.join(0, 1, 100.0);
-    parts.masses[1] = 3.0;
-    parts.rest_lengths[0] = 0.1;
-    parts
 }
 
 const OMEGA_SQUARED: f64 = 100.0 / 0.75;
@@ -65,7 +57,7 @@ fn stretch(scene: &Scene) -> f64 {
 fn two_masses_follow_the_discrete_solution() {
     for order in [1, 2] {
         for h in [1e-4_f32, 1e-3, 1e-2, 0.1, 1.0] {
-            let mut scene = implicit(&two_masses(), FREE, order, 1e-6);
+            let mut scene = implicit(&two_masses().0, FREE, order, 1e-6);
             for (step, expected) in discrete(order, f64::from(h), 100).into_iter().enumerate() {
                 scene.step(h);
                 let error = (stretch(&scene) - expected).abs() / 0.05;
@@ -77,7 +69,7 @@ fn two_masses_follow_the_discrete_solution() {
 
 /// The error of the stretch after a second, over the amplitude.
 fn error_after_a_second(order: u32, steps: usize) -> f64 {
-    let mut scene = implicit(&two_masses(), FREE, order, 1e-6);
+    let mut scene = implicit(&two_masses().0, FREE, order, 1e-6);
     scene.run((1.0 / steps as f64) as f32, steps);
     let exact = 0.05 * OMEGA_SQUARED.sqrt().cos();
     (stretch(&scene) - exact).abs() / 0.05
@@ -270,7 +262,7 @@ fn a_change_of_topology_is_taken_in() {
 
 #[test]
 fn what_is_out_of_range_is_refused() {
-    let parts = two_masses();
+    let (parts, _) = two_masses();
     let mut world = World::new(FREE).expect("a world");
     let plain = BodyDefinition {
         solver: Solver::Implicit,

@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 use sinew::{BodyDefinition, Solver, Storage, WorldDefinition};
 use support::bodies::{FREE, Parts, Scene, largest_difference};
 use support::euler::{euler_step, uneven_block};
+use support::motion::two_masses;
 
 const STORAGES: [Storage; 4] = [
     Storage::Packed,
@@ -26,15 +27,6 @@ fn newton(parts: &Parts, world: WorldDefinition, order: u32, storage: Storage) -
         storage,
         ..definition
     })
-}
-
-/// 1 and 3 kg, a spring of 100 N/m, 0.1 m long, stretched by 0.05 m.
-fn two_masses() -> Parts {
-    let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X * 0.15], 1.0);
-    parts.join(0, 1, 100.0);
-    parts.masses[1] = 3.0;
-    parts.rest_lengths[0] = 0.1;
-    parts
 }
 
 const OMEGA_SQUARED: f64 = 100.0 / 0.75;
@@ -63,7 +55,7 @@ fn two_masses_follow_the_discrete_solution() {
     for order in [1, 2] {
         for h in [1e-5_f32, 1e-3, 1e-2, 0.1, 1.0] {
             let steps = 50;
-            let mut scene = newton(&two_masses(), FREE, order, Storage::Packed);
+            let mut scene = newton(&two_masses().0, FREE, order, Storage::Packed);
             for (step, expected) in discrete(order, f64::from(h), steps).into_iter().enumerate() {
                 scene.step(h);
                 assert!(scene.body().solver_report().converged);
@@ -205,7 +197,7 @@ fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state() {
 
 #[test]
 fn damping_along_springs_takes_what_it_should() {
-    let mut parts = two_masses();
+    let (mut parts, _) = two_masses();
     parts.spring_damping = 2.0;
     let (h, steps) = (1e-4_f64, 1000);
     let mut scene = newton(&parts, FREE, 2, Storage::Packed);

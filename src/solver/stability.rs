@@ -18,7 +18,7 @@ use crate::springs::{Springs, separation};
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
 /// How much longer substeps have to be to be worth estimates of all nodes of a moving body.
-const WORTH_ESTIMATING: f32 = 1.5;
+const WORTH_LENGTHENING: f32 = 1.5;
 
 /// What bounds the frequencies and the dampings of a node and its springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,7 +139,7 @@ impl Stability {
 
     /// Whether estimates allow substeps so much longer than those that are stable anywhere that they are worth their time.
     pub fn is_worth_estimating(&self) -> bool {
-        self.found > WORTH_ESTIMATING * self.anywhere
+        self.found > WORTH_LENGTHENING * self.anywhere
     }
 
     /// The same, where the limit is found to be no longer than `limit`, s.
