@@ -105,6 +105,7 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
     let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X, Vec3::Y], 0.0);
     parts.masses = vec![0.001, 0.5, 20.0];
     parts.node_dampings = vec![1.0, 20.0, 1000.0];
+    let all: f32 = parts.masses.iter().sum();
     for solver in SOLVERS {
         for order in [1, 2] {
             for h in [1e-4_f32, 1e-3, 1.0 / 60.0, 0.1, 1.0] {
@@ -122,7 +123,13 @@ fn nodes_reach_their_terminal_velocity_at_every_step() {
                         let terminal = f64::from(DOWN.y) / rate(node);
                         let error = (velocity.y - modes[node].now[1]) / terminal;
                         // A step rounds the velocity by 6e-8, and forgets the part h rate of it.
-                        let allowed = f64::max(1e-5, 3.6e-7 / (rate(node) * f64::from(h)));
+                        let rounded = f64::max(1e-5, 3.6e-7 / (rate(node) * f64::from(h)));
+                        // A millionth of what all nodes do together, in the norm of their masses, may be missing.
+                        let unsolved = match solver {
+                            Solver::Implicit => f64::from(all / parts.masses[node]).sqrt() * 1e-6,
+                            _ => 0.0,
+                        };
+                        let allowed = rounded.max(unsolved);
                         let named = format!("{solver:?}, order {order}, {h} s, node {node}, step {step}");
                         assert!(error.abs() < allowed, "{named}: {error:.2e}");
                         if step == steps {
@@ -242,19 +249,10 @@ fn error_of_period(solver: Solver) -> f64 {
 
 #[test]
 fn a_pendulum_from_150_degrees_keeps_its_period() {
-    let error = error_of_period(Solver::Newton);
-    assert!(error.abs() < 1e-4, "{error:.2e}");
-}
-
-/// A known fault: IMPLICIT leaves alone what it takes for rounding, which is more than that with a spring so stiff. Steps remain
-/// unsolved, the bob comes to vibrate on its spring, and loses what that costs.
-#[test]
-fn implicit_loses_energy_in_a_pendulum_on_a_stiff_spring() {
-    let error = error_of_period(Solver::Implicit).abs();
-    assert!(
-        error > 1e-4,
-        "{error:.2e}: the fault is gone, and IMPLICIT belongs in the test above"
-    );
+    for solver in SOLVERS {
+        let error = error_of_period(solver);
+        assert!(error.abs() < 1e-4, "{solver:?}: {error:.2e}");
+    }
 }
 
 /// Springs give a body neither momentum nor a torque: the sum over the nodes of `x1 x m (3 v1 - 4 v0 + v')`, with the velocities

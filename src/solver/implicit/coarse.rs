@@ -38,12 +38,13 @@ pub(super) struct Coarse {
     free: Vec<f32>,
     /// The springs' part of the matrix.
     stiffness: Vec<f64>,
-    factor: Vec<f64>,
-    /// Its inverse.
-    inverse: Vec<f32>,
+    /// The inverse of the whole. Functions that hardly differ on the nodes of a cluster, or motions that hardly cost anything,
+    /// make its entries so large that the products of loads with it, rounded to `f32`, might be below 0.
+    inverse: Vec<f64>,
     /// What the last residual comes to, and its solution.
-    pub loads: Vec<f32>,
-    pub motions: Vec<f32>,
+    pub loads: Vec<f64>,
+    motions: Vec<f32>,
+    sums: Vec<f64>,
 }
 
 impl Coarse {
@@ -70,10 +71,10 @@ impl Coarse {
             places: Vectors::zeros(node_count)?,
             free: memory::filled(0.0, node_count)?,
             stiffness: memory::filled(0.0, size * size)?,
-            factor: memory::filled(0.0, size * size)?,
             inverse: memory::filled(0.0, size * size)?,
             loads: memory::filled(0.0, size)?,
             motions: memory::filled(0.0, size)?,
+            sums: memory::filled(0.0, size)?,
         })
     }
 
@@ -174,7 +175,7 @@ impl Coarse {
     /// Makes the inverse, with this inertia of each node, N/m. Where it has none, the level does nothing.
     pub fn invert(&mut self, inertia: &[f32]) {
         let size = self.size();
-        self.factor.copy_from_slice(&self.stiffness);
+        self.inverse.copy_from_slice(&self.stiffness);
         for (node, &inertia) in inertia.iter().enumerate() {
             let place = self.places.get(node);
             let values = [self.free[node], place.x, place.y, place.z];
@@ -183,32 +184,32 @@ impl Coarse {
                 for column in 0..FUNCTIONS {
                     let value = f64::from(values[row] * values[column] * inertia) * f64::from(self.free[node]);
                     for axis in 0..3 {
-                        self.factor[(first + 3 * row + axis) * size + first + 3 * column + axis] += value;
+                        self.inverse[(first + 3 * row + axis) * size + first + 3 * column + axis] += value;
                     }
                 }
             }
         }
         for row in 0..size {
             // What no node takes part in does not move.
-            let diagonal = &mut self.factor[row * size + row];
+            let diagonal = &mut self.inverse[row * size + row];
             *diagonal = if *diagonal > 0.0 { *diagonal * (1.0 + 1e-7) } else { 1.0 };
         }
-        if invert(&mut self.factor, size) {
-            for (to, &from) in self.inverse.iter_mut().zip(&self.factor) {
-                *to = from as f32;
-            }
-        } else {
+        if !invert(&mut self.inverse, size) {
             self.inverse.fill(0.0);
         }
     }
 
     /// Solves for `loads`: the work done, `loads . motions`.
     pub fn solve(&mut self, kernel: ChosenKernel) -> f64 {
-        kernel.run(Solve {
+        let work = kernel.run(Solve {
             inverse: &self.inverse,
             loads: &self.loads,
-            motions: &mut self.motions,
-        })
+            motions: &mut self.sums,
+        });
+        for (motion, &sum) in self.motions.iter_mut().zip(&self.sums) {
+            *motion = sum as f32;
+        }
+        work
     }
 
     /// What forces on the nodes of a tile come to for each cluster: added to `loads`.
@@ -345,9 +346,9 @@ fn invert(matrix: &mut [f64], size: usize) -> bool {
 
 /// The inverse times the loads.
 struct Solve<'a> {
-    inverse: &'a [f32],
-    loads: &'a [f32],
-    motions: &'a mut [f32],
+    inverse: &'a [f64],
+    loads: &'a [f64],
+    motions: &'a mut [f64],
 }
 
 impl Loops for Solve<'_> {
@@ -365,7 +366,7 @@ impl Loops for Solve<'_> {
         self.loads
             .iter()
             .zip(&*self.motions)
-            .map(|(&load, &motion)| f64::from(load) * f64::from(motion))
+            .map(|(&load, &motion)| load * motion)
             .sum()
     }
 }

@@ -158,8 +158,8 @@ impl Implicit {
         for (partial, loads) in self.partials.iter().zip(self.loads.chunks_exact(size)) {
             sums.first += partial.first;
             sums.second += partial.second;
-            for (sum, load) in self.coarse.loads.iter_mut().zip(loads) {
-                *sum += load;
+            for (sum, &load) in self.coarse.loads.iter_mut().zip(loads) {
+                *sum += f64::from(load);
             }
         }
         sums.first += self.coarse.solve(body.kernel);
