@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::subnormal::{on_grid, still_or};
 use crate::body::{Bounds, Inertia, InverseMasses, NodeDamping, Vectors};
 use crate::springs::{ChosenKernel, Loops, TileForces};
 
@@ -169,20 +170,11 @@ impl Axis<'_> {
                 for place in 0..count {
                     let velocity = kicked(place, forces[place], velocities[place]);
                     velocities[place] = velocity;
-                    next_positions[place] = positions[place] + velocity * substep;
+                    next_positions[place] = on_grid(positions[place] + velocity * substep);
                 }
             }
         }
     }
-}
-
-/// A velocity, or 0 where its square would be no normal number: nothing moves by it, and processors take many times as long
-/// for what they make of it.
-#[inline(always)]
-fn still_or(velocity: f32) -> f32 {
-    /// m/s: 2^-63.
-    const SLOWEST: f32 = 1.0842022e-19;
-    if velocity.abs() < SLOWEST { 0.0 } else { velocity }
 }
 
 /// What there is to know of a tile after a kick.
