@@ -123,11 +123,17 @@ impl Axis<'_> {
         let (duration, gravity, fall) = (kick.duration, self.gravity, self.fall);
         match (kick.damping, kick.inertia.inverse_masses) {
             (None, InverseMasses::Uniform(inverse_mass)) => {
-                self.each(|_, force, velocity| velocity + (force * inverse_mass * duration + fall));
+                self.each(
+                    |_, force, velocity| velocity + (force * inverse_mass * duration + fall),
+                    |coordinate| coordinate,
+                );
             }
             (None, InverseMasses::Each(inverse_masses)) => {
                 let inverse_masses = &inverse_masses[self.nodes.clone()];
-                self.each(|place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall));
+                self.each(
+                    |place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall),
+                    |coordinate| coordinate,
+                );
             }
             (Some(damping), inverse_masses) => {
                 let nodes = self.nodes.clone();
@@ -141,11 +147,17 @@ impl Axis<'_> {
                 };
                 match inverse_masses {
                     InverseMasses::Uniform(inverse_mass) => {
-                        self.each(|place, force, velocity| damped(place, force * inverse_mass, velocity));
+                        self.each(
+                            |place, force, velocity| damped(place, force * inverse_mass, velocity),
+                            on_grid,
+                        );
                     }
                     InverseMasses::Each(inverse_masses) => {
                         let inverse_masses = &inverse_masses[nodes];
-                        self.each(|place, force, velocity| damped(place, force * inverse_masses[place], velocity));
+                        self.each(
+                            |place, force, velocity| damped(place, force * inverse_masses[place], velocity),
+                            on_grid,
+                        );
                     }
                 }
             }
@@ -153,9 +165,9 @@ impl Axis<'_> {
     }
 
     /// Gives each node the velocity that `kicked` makes of its place in the tile, its force and its velocity, and lets it
-    /// drift.
+    /// drift to what `rounded` makes of its coordinate. Only what is damped comes to rest, and needs that.
     #[inline(always)]
-    fn each(self, kicked: impl Fn(usize, f32, f32) -> f32) {
+    fn each(self, kicked: impl Fn(usize, f32, f32) -> f32, rounded: impl Fn(f32) -> f32) {
         let count = self.nodes.len();
         let (forces, velocities) = (&self.forces[..count], &mut self.velocities[..count]);
         match self.drift {
@@ -170,7 +182,7 @@ impl Axis<'_> {
                 for place in 0..count {
                     let velocity = kicked(place, forces[place], velocities[place]);
                     velocities[place] = velocity;
-                    next_positions[place] = on_grid(positions[place] + velocity * substep);
+                    next_positions[place] = rounded(positions[place] + velocity * substep);
                 }
             }
         }
