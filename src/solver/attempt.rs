@@ -14,6 +14,9 @@ use crate::threads::Team;
 /// The part of the longest stable substep that is used.
 const RESERVE: f32 = 0.8;
 
+/// The part that is used of the substep that is stable wherever the nodes go: nothing is to be made up for as they move.
+const RESERVE_ANYWHERE: f32 = 0.9;
+
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 4;
 
@@ -91,7 +94,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         body.watch();
     }
     // While masses are made for the substep, the estimate is one of earlier positions: it still says what is saved.
-    let is_earlier = are_scaled && fewer_substeps(body, request, &known).is_none();
+    let is_earlier = are_scaled && fewer_substeps(body, request, known.limit().unwrap_or(f32::INFINITY)).is_none();
     let stability = if known.limit().is_none() || is_earlier || is_worth_estimating() {
         body.estimate(body.state.positions())
     } else {
@@ -150,14 +153,19 @@ fn run(
 
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
 fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team) -> Result<(u32, Taken), TooLong> {
-    let mut stable_substep = start.stability.limit().unwrap_or(f32::INFINITY);
-    let is_anywhere = is_better_anywhere(body, &start.stability);
+    let limit = start.stability.limit().unwrap_or(f32::INFINITY);
+    let is_anywhere = start.stability.is_coarse() || is_better_anywhere(body, &start.stability);
+    let mut stable_substep = if is_anywhere {
+        anywhere_with_less_reserve(&start.stability)
+    } else {
+        limit
+    };
     for attempt in 0..=ATTEMPTS {
-        if attempt == ATTEMPTS || is_anywhere {
+        if attempt == ATTEMPTS {
             stable_substep = start.stability.limit_anywhere();
         }
         let stability = start.stability.shortened_to(stable_substep);
-        if let Some((substeps, masses_for)) = fewer_substeps(body, request, &stability) {
+        if let Some((substeps, masses_for)) = fewer_substeps(body, request, stable_substep) {
             if substeps > request.max_substeps {
                 break;
             }
@@ -192,6 +200,12 @@ fn is_better_anywhere(body: &Body, stability: &Stability) -> bool {
     body.watched.limit_of_others() < found && !stability.is_worth_estimating()
 }
 
+/// The substep, s, of which `RESERVE` is `RESERVE_ANYWHERE` of the one that is stable anywhere, or no more than is used at the
+/// positions of the last estimate.
+fn anywhere_with_less_reserve(stability: &Stability) -> f32 {
+    (RESERVE_ANYWHERE / RESERVE * stability.limit_anywhere()).min(stability.found())
+}
+
 /// How many substeps a step takes of which the longest stable one is this long, s.
 fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
     (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil()
@@ -199,12 +213,12 @@ fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
 
 /// In how few substeps the step can be taken with some mass added, and for what substep, s; `None`: it is not to be, or saves
 /// too little.
-fn fewer_substeps(body: &Body, request: &StepRequest, stability: &Stability) -> Option<(u32, f32)> {
+fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
     // What a tolerance is about would not show what added mass changes.
     if request.substeps > 0 || request.tolerance > 0.0 {
         return None;
     }
-    let needed = substeps_needed(request, stability.limit()?);
+    let needed = substeps_needed(request, stable_substep);
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let scaling = body.scaling.as_ref()?;
     scaling.fewer_substeps(request.dt, needed, masses, inverse_masses)

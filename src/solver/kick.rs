@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::subnormal::{on_grid, still_or};
 use crate::body::{Bounds, Inertia, InverseMasses, NodeDamping, Vectors};
 use crate::springs::{ChosenKernel, Loops, TileForces};
 
@@ -122,11 +123,17 @@ impl Axis<'_> {
         let (duration, gravity, fall) = (kick.duration, self.gravity, self.fall);
         match (kick.damping, kick.inertia.inverse_masses) {
             (None, InverseMasses::Uniform(inverse_mass)) => {
-                self.each(|_, force, velocity| velocity + (force * inverse_mass * duration + fall));
+                self.each(
+                    |_, force, velocity| velocity + (force * inverse_mass * duration + fall),
+                    |coordinate| coordinate,
+                );
             }
             (None, InverseMasses::Each(inverse_masses)) => {
                 let inverse_masses = &inverse_masses[self.nodes.clone()];
-                self.each(|place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall));
+                self.each(
+                    |place, force, velocity| velocity + (force * inverse_masses[place] * duration + fall),
+                    |coordinate| coordinate,
+                );
             }
             (Some(damping), inverse_masses) => {
                 let nodes = self.nodes.clone();
@@ -140,11 +147,17 @@ impl Axis<'_> {
                 };
                 match inverse_masses {
                     InverseMasses::Uniform(inverse_mass) => {
-                        self.each(|place, force, velocity| damped(place, force * inverse_mass, velocity));
+                        self.each(
+                            |place, force, velocity| damped(place, force * inverse_mass, velocity),
+                            on_grid,
+                        );
                     }
                     InverseMasses::Each(inverse_masses) => {
                         let inverse_masses = &inverse_masses[nodes];
-                        self.each(|place, force, velocity| damped(place, force * inverse_masses[place], velocity));
+                        self.each(
+                            |place, force, velocity| damped(place, force * inverse_masses[place], velocity),
+                            on_grid,
+                        );
                     }
                 }
             }
@@ -152,9 +165,9 @@ impl Axis<'_> {
     }
 
     /// Gives each node the velocity that `kicked` makes of its place in the tile, its force and its velocity, and lets it
-    /// drift.
+    /// drift to what `rounded` makes of its coordinate. Only what is damped comes to rest, and needs that.
     #[inline(always)]
-    fn each(self, kicked: impl Fn(usize, f32, f32) -> f32) {
+    fn each(self, kicked: impl Fn(usize, f32, f32) -> f32, rounded: impl Fn(f32) -> f32) {
         let count = self.nodes.len();
         let (forces, velocities) = (&self.forces[..count], &mut self.velocities[..count]);
         match self.drift {
@@ -169,20 +182,11 @@ impl Axis<'_> {
                 for place in 0..count {
                     let velocity = kicked(place, forces[place], velocities[place]);
                     velocities[place] = velocity;
-                    next_positions[place] = positions[place] + velocity * substep;
+                    next_positions[place] = rounded(positions[place] + velocity * substep);
                 }
             }
         }
     }
-}
-
-/// A velocity, or 0 where its square would be no normal number: nothing moves by it, and processors take many times as long
-/// for what they make of it.
-#[inline(always)]
-fn still_or(velocity: f32) -> f32 {
-    /// m/s: 2^-63.
-    const SLOWEST: f32 = 1.0842022e-19;
-    if velocity.abs() < SLOWEST { 0.0 } else { velocity }
 }
 
 /// What there is to know of a tile after a kick.

@@ -9,6 +9,7 @@ mod mass_scaling;
 mod newton;
 mod pipeline;
 mod stability;
+mod subnormal;
 mod substep;
 mod verlet;
 mod watched;

@@ -18,7 +18,11 @@ use crate::springs::{Springs, separation};
 const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 
 /// How much longer substeps have to be to be worth estimates of all nodes of a moving body.
-const WORTH_LENGTHENING: f32 = 1.5;
+///
+/// A node's largest eigenvalue is at least a third of the sum of all three, which is no less than what its springs' stiffnesses
+/// add up to: without damping along springs an estimate allows at most sqrt(3) times the substep that is stable anywhere, as in
+/// even lattices in three dimensions. A moving body would pay for that with the time of several substeps every few substeps.
+const WORTH_LENGTHENING: f32 = 2.0;
 
 /// What bounds the frequencies and the dampings of a node and its springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,6 +110,11 @@ impl Stability {
     /// The longest substep that is stable wherever the nodes are, s, where `limit` is known.
     pub fn limit_anywhere(&self) -> f32 {
         self.anywhere
+    }
+
+    /// What the last estimate found, s, wherever the nodes have gone since.
+    pub fn found(&self) -> f32 {
+        self.found
     }
 
     /// Whether the estimate still holds after neighbours have moved against each other by up to `travel` more.

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::gradient::{add_products, total};
+use crate::solver::subnormal::{or_zero, still_or};
 use crate::springs::{Loops, TileForces};
 
 /// `factor` times the one added to the other.
@@ -47,7 +48,7 @@ impl Loops for Place<'_, '_> {
             let (ways, pushes) = (&self.ways[axis][..count], &self.pushes[axis][..count]);
             for place in 0..count {
                 let way = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
-                next[place] = positions[place] + way;
+                next[place] = or_zero(positions[place] + way);
             }
         }
     }
@@ -164,12 +165,12 @@ impl Loops for Finish<'_, '_> {
             for place in 0..count {
                 ways[place] = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
                 let given = pushes[place] * per_time;
-                velocities[place] += given;
+                velocities[place] = still_or(velocities[place] + given);
                 gains[place] = self.carried * gains[place] + given;
             }
             if let Some(before) = self.before {
                 for ((velocity, before), gain) in velocities.iter_mut().zip(before[axis]).zip(&*gains) {
-                    *velocity = before + gain;
+                    *velocity = still_or(before + gain);
                 }
             }
         }
