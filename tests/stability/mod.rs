@@ -88,7 +88,7 @@ const fn jitter(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
     }
 }
 
-pub const KNOWN: [Known; 23] = [
+pub const KNOWN: [Known; 22] = [
     // 6.8e-6 of the size after 10 ms.
     lost("started rotated", |setup| is_verlet_at(setup, 1e-5)),
     // 1.65e-3 of the stretch.
@@ -158,11 +158,6 @@ pub const KNOWN: [Known; 23] = [
             !is_full(setup) && setup.solver == Solver::Verlet && setup.storage == Storage::FastLink && setup.step == 0.1
         },
         figure: "2e-5 above the shadow energy, which is one of second order",
-    },
-    Known {
-        case: "crushed between two tools",
-        applies: |setup| is_implicit(setup, Storage::Packed, &[1.0]),
-        figure: "the mean force of a step of 1 s is not that along the way",
     },
     Known {
         case: "springs removed in motion",

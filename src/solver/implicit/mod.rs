@@ -113,6 +113,8 @@ pub(crate) struct Implicit {
     prepared: f32,
     blocks: Blocks,
     coarse: Coarse,
+    /// Nodes that tools press on, and what they take of the coarse level otherwise.
+    stiffened: Vec<(u32, [f32; 4])>,
     /// The loads of the clusters from each tile.
     loads: Vec<f32>,
     partials: Vec<Partial>,
@@ -170,6 +172,7 @@ impl Implicit {
             blocks: Blocks::new(node_count)?,
             loads: memory::filled(0.0, coarse.size() * tile_count(node_count))?,
             coarse,
+            stiffened: Vec::new(),
             partials: memory::filled(Partial::default(), tile_count(node_count))?,
             spectrum: Spectrum::new()?,
             stale: true,
@@ -200,6 +203,12 @@ impl Implicit {
         self.newton
             .as_mut()
             .map_or(Ok(()), |newton| newton.make_room(spring_count))
+    }
+
+    /// Makes room for so many contacts in an equation.
+    pub fn reserve_contacts(&mut self, count: usize) -> Result<()> {
+        let nodes = (3 * count).min(self.inertia.len());
+        Ok(self.stiffened.try_reserve(nodes)?)
     }
 
     /// Makes what the step in progress leaves to the next that of the current state.

@@ -22,13 +22,16 @@ const ROUNDING: f64 = 1e-7;
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 40;
 
+/// The multipliers of contacts are improved so often: then what is left has a function to minimise.
+const MULTIPLIERS: u32 = 3;
+
 /// How one step is made from what was before.
 #[derive(Clone, Copy, Debug)]
-struct Formula {
+pub(super) struct Formula {
     /// t, s.
-    time: f64,
+    pub time: f64,
     /// c: what part of the last way and of the last gain goes on.
-    carried: f64,
+    pub carried: f64,
 }
 
 impl Formula {
@@ -51,6 +54,12 @@ impl Formula {
 
 /// How often a step that has gained energy is taken again in four times as many parts.
 const CUTS: u32 = 4;
+
+/// A step is not cut into more parts than this because it has gained energy.
+const PARTS: u32 = 1 << 12;
+
+/// Products for each part into which a tool cuts a step, at least.
+const PRODUCTS: u32 = 32;
 
 /// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
 /// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
@@ -75,15 +84,20 @@ pub(in crate::solver) fn run(
         let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
         if contact::is_near(body) {
             parts = short;
+            implicit.left = implicit.left.max(PRODUCTS.saturating_mul(parts));
         }
         let mut cuts = 0;
         loop {
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
-            end = run_in_parts(body, &mut implicit, request, whole, cuts == CUTS, team);
+            let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS;
+            end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
             match end {
                 End::Fine => break,
-                End::Near => parts = parts.max(short),
-                End::Gained | End::NotFinite if cuts == CUTS => break,
+                End::Near => {
+                    parts = parts.max(short);
+                    implicit.left = implicit.left.max(PRODUCTS.saturating_mul(parts));
+                }
+                End::Gained | End::NotFinite if is_last_resort => break,
                 End::Gained | End::NotFinite => {
                     cuts += 1;
                     parts = parts.saturating_mul(4);
@@ -147,7 +161,7 @@ pub(super) struct Substep<'a> {
     pub is_first: bool,
     /// With those that come after it in the step.
     equations: u32,
-    formula: Formula,
+    pub(super) formula: Formula,
     pub team: &'a Team<'a>,
 }
 
@@ -167,7 +181,10 @@ impl Substep<'_> {
             end = euler.take(body, implicit, before);
         }
         if matches!(end, End::Gained | End::NotFinite) && (is_last_resort || implicit.left == 0) {
-            end = self.slow_down(body, implicit, before);
+            end = match self.slow_down(body, implicit, before) {
+                End::Fine => self.meet(body, implicit),
+                end => end,
+            };
         }
         end
     }
@@ -175,11 +192,13 @@ impl Substep<'_> {
     fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
         if let Some(mut newton) = implicit.newton.take() {
             self.aim(body, implicit);
+            self.foresee(body, implicit);
             self.solve_exactly(body, implicit, &mut newton);
             implicit.newton = Some(newton);
         } else {
             self.prepare(body, implicit);
             self.aim(body, implicit);
+            self.foresee(body, implicit);
             self.minimise(body, implicit);
         }
         if !self.finish(body, implicit) {
@@ -330,9 +349,13 @@ impl Substep<'_> {
 
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
     fn residual(&self, body: &mut Body, implicit: &mut Implicit) -> f64 {
+        if let Some(contacts) = &mut body.contacts {
+            contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
+        }
         let node_count = body.node_count();
         let state = body.state.substep();
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
+        let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let rates = body.damping.as_ref().map(|damping| damping.rates());
         let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
@@ -369,6 +392,9 @@ impl Substep<'_> {
                     pushes: pushes.slices(nodes.clone()),
                     residuals: &mut residuals,
                 });
+                if let Some(holds) = holds {
+                    holds.add_forces(&nodes, &mut residuals);
+                }
                 for pin in &*pins {
                     for axis in &mut residuals {
                         axis[pin.node as usize - nodes.start] = 0.0;
@@ -390,6 +416,23 @@ impl Substep<'_> {
 
     /// Finds the pushes to the last digit that counts.
     fn solve_exactly(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
+        /// What contacts may still lack, as a part of what they do.
+        const CONTACTS: f64 = 1e-4;
+        for multipliers in 0..=MULTIPLIERS {
+            self.solve_pressed(body, implicit, newton);
+            let Some(contacts) = &mut body.contacts else {
+                break;
+            };
+            let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+            if multipliers == MULTIPLIERS || contacts.holds.missing(push) <= CONTACTS {
+                break;
+            }
+            contacts.holds.improve(push, |_, _| ());
+        }
+    }
+
+    /// The same, with the multipliers that contacts have.
+    fn solve_pressed(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
         let (from, to) = (implicit.place(self.is_first), 1 - implicit.settled);
         let aimed = Aimed {
             time: self.formula.time,
@@ -428,7 +471,8 @@ impl Substep<'_> {
         self.place(body, implicit);
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
-        for _ in 0..NEWTON {
+        for iteration in 0..NEWTON {
+            self.stiffen(body, implicit);
             implicit.corrections.clear();
             let square = implicit.precondition(body, 0.0, self.team).first;
             // What a solution has left of it is rounding.
@@ -460,7 +504,9 @@ impl Substep<'_> {
             let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
             implicit.report.solves += 1;
             products += solved.products;
-            implicit.wear(solved.products);
+            if implicit.stiffened.is_empty() {
+                implicit.wear(solved.products);
+            }
             size = f64::max(size, solved.size);
             solved_error = solved.error;
             // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
@@ -472,12 +518,28 @@ impl Substep<'_> {
                 break;
             }
             gone = self.go(body, implicit, solved.work);
+            if iteration < MULTIPLIERS
+                && let Some(contacts) = &mut body.contacts
+            {
+                let (residuals, free) = (&mut implicit.residuals, &body.inverse_masses);
+                let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+                contacts.holds.improve(push, |node, more| {
+                    if free[node] > 0.0 {
+                        residuals.set(node, residuals.get(node) + more.as_vec3());
+                    }
+                });
+            }
             if solved.size <= relative * size {
                 error = solved.error;
                 break;
             }
         }
-        if !is_held {
+        implicit.soften();
+        let is_touched = body
+            .contacts
+            .as_ref()
+            .is_some_and(|contacts| contacts.holds.are_pressed());
+        if !is_held && !is_touched {
             implicit.balance(body.state.next_positions());
             self.place(body, implicit);
         }
