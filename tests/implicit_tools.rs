@@ -117,11 +117,7 @@ fn force_of_rest() -> f64 {
 fn a_tool_feels_what_it_presses_whatever_the_step() {
     let expected = force_of_rest();
     for (solver, storage, steps) in [
-        (
-            Solver::Implicit,
-            Storage::Packed,
-            &[1e-3, 1.0 / 60.0, 0.1, 1.0][..],
-        ),
+        (Solver::Implicit, Storage::Packed, &[1e-3, 1.0 / 60.0, 0.1, 1.0][..]),
         (Solver::Implicit, Storage::FastLink, &[1.0 / 60.0]),
         (Solver::Newton, Storage::Packed, &[1.0 / 60.0]),
     ] {

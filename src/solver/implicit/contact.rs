@@ -24,24 +24,26 @@ pub(super) fn is_near(body: &Body) -> bool {
 }
 
 impl Substep<'_> {
-    /// Finds the contacts that belong to the equation.
-    pub(super) fn foresee(&self, body: &mut Body, implicit: &mut Implicit) {
+    /// Finds the contacts that belong to the equation. What they do begins and ends within a step, so that it is one of order 1
+    /// where there are some.
+    pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Self {
         if self.step > LONGEST || !is_near(body) {
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.clear();
             }
-            return;
+            return *self;
         }
-        // How fast nodes go where nothing pushes them.
-        let ways = implicit.histories[implicit.place(self.is_first)].ways.axes();
-        let (carried, time) = (self.formula.carried / self.step, self.formula.time / self.step);
-        let axes = implicit.products.axes_mut().into_iter().zip(ways);
-        for ((means, ways), velocities) in axes.zip(body.state.substep().velocities.axes()) {
-            for ((mean, way), velocity) in means.iter_mut().zip(ways).zip(velocities) {
-                *mean = carried as f32 * way + time as f32 * velocity;
-            }
+        let state = body.state.substep();
+        let velocities = if self.is_first {
+            state.first_velocities
+        } else {
+            &*state.velocities
+        };
+        implicit.products.copy_from(velocities);
+        for pin in body.pins.iter() {
+            implicit.products.set(pin.node as usize, pin.travel / self.request.dt);
         }
-        let per_mass = 1.0 / (self.formula.time * self.formula.time);
+        let per_mass = 1.0 / (self.step * self.step);
         self.contact(body, &mut implicit.products, |contacts, meeting, springs, masses| {
             let inverse_masses = meeting.mobility.inverse_masses;
             contacts.foresee(meeting, |node| {
@@ -53,6 +55,10 @@ impl Substep<'_> {
                 stiffness
             });
         });
+        if body.contacts.as_ref().is_none_or(|contacts| contacts.holds.is_empty()) {
+            return *self;
+        }
+        self.of_order_1()
     }
 
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which

@@ -69,7 +69,7 @@ impl Substep<'_> {
         let work = self.work(body, &implicit.histories[next].ways);
         let after = kinetic + elastic;
         let allowed = before.energy + work + before.credit;
-        let rounding = ROUNDING * (before.energy + after + work.abs());
+        let rounding = ROUNDING * (before.energy + after + work.abs()) + implicit.noise.square;
         if !after.is_finite() {
             return End::NotFinite;
         }

@@ -27,11 +27,11 @@ const MULTIPLIERS: u32 = 3;
 
 /// How one step is made from what was before.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Formula {
+struct Formula {
     /// t, s.
-    pub time: f64,
+    time: f64,
     /// c: what part of the last way and of the last gain goes on.
-    pub carried: f64,
+    carried: f64,
 }
 
 impl Formula {
@@ -161,7 +161,7 @@ pub(super) struct Substep<'a> {
     pub is_first: bool,
     /// With those that come after it in the step.
     equations: u32,
-    pub(super) formula: Formula,
+    formula: Formula,
     pub team: &'a Team<'a>,
 }
 
@@ -174,11 +174,7 @@ impl Substep<'_> {
         // What a later substep began with has been written over: then the whole step is taken again.
         let has_history = self.formula.carried != 0.0;
         if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first && implicit.left > 0 {
-            let euler = Self {
-                formula: Formula::new(1, self.step, 0.0),
-                ..self
-            };
-            end = euler.take(body, implicit, before);
+            end = self.of_order_1().take(body, implicit, before);
         }
         if matches!(end, End::Gained | End::NotFinite) && (is_last_resort || implicit.left == 0) {
             end = match self.slow_down(body, implicit, before) {
@@ -189,16 +185,26 @@ impl Substep<'_> {
         end
     }
 
+    /// The same step by implicit Euler.
+    pub(super) fn of_order_1(&self) -> Self {
+        Self {
+            formula: Formula::new(1, self.step, 0.0),
+            ..*self
+        }
+    }
+
     fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+        self.foreseeing(body, implicit).take_formula(body, implicit, before)
+    }
+
+    fn take_formula(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
         if let Some(mut newton) = implicit.newton.take() {
             self.aim(body, implicit);
-            self.foresee(body, implicit);
             self.solve_exactly(body, implicit, &mut newton);
             implicit.newton = Some(newton);
         } else {
             self.prepare(body, implicit);
             self.aim(body, implicit);
-            self.foresee(body, implicit);
             self.minimise(body, implicit);
         }
         if !self.finish(body, implicit) {
