@@ -33,18 +33,21 @@ impl Substep<'_> {
             }
             return *self;
         }
+        let Some(means) = &mut implicit.means else {
+            return *self;
+        };
         let state = body.state.substep();
         let velocities = if self.is_first {
             state.first_velocities
         } else {
             &*state.velocities
         };
-        implicit.products.copy_from(velocities);
+        means.copy_from(velocities);
         for pin in body.pins.iter() {
-            implicit.products.set(pin.node as usize, pin.travel / self.request.dt);
+            means.set(pin.node as usize, pin.travel / self.request.dt);
         }
         let per_mass = 1.0 / (self.step * self.step);
-        self.contact(body, &mut implicit.products, |contacts, meeting, springs, masses| {
+        self.contact(body, means, |contacts, meeting, springs, masses| {
             let inverse_masses = meeting.mobility.inverse_masses;
             contacts.foresee(meeting, |node| {
                 if inverse_masses[node] == 0.0 {
@@ -121,12 +124,11 @@ impl Substep<'_> {
 
     /// Lets tools stop the nodes that would enter them.
     pub(super) fn meet(&self, body: &mut Body, implicit: &mut Implicit) -> End {
-        if body.contacts.is_none() {
+        let Some(means) = &mut implicit.means else {
             return End::Fine;
-        }
+        };
         let next = 1 - implicit.settled;
         let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
-        let means = &mut implicit.products;
         scaled(&implicit.histories[next].ways, per_step, means);
         self.contact(body, means, |contacts, meeting, _, _| contacts.resolve(meeting));
         let Some(contacts) = &body.contacts else {
