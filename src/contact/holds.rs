@@ -154,6 +154,14 @@ impl Holds {
         }
     }
 
+    /// What the residuals lack of balance along the contacts' normals, as a part of what those do.
+    pub fn imbalance(&self, residual_of: impl Fn(usize) -> DVec3) -> f64 {
+        let pressed = || self.holds.iter().filter(|hold| hold.answer.force > 0.0);
+        let off: f64 = pressed().map(|hold| hold.weighted(&residual_of).abs()).sum();
+        let all: f64 = pressed().map(|hold| hold.answer.force).sum();
+        if all > 0.0 { off / all } else { 0.0 }
+    }
+
     /// Whether a contact pushes.
     pub fn are_pressed(&self) -> bool {
         self.holds.iter().any(|hold| hold.answer.stiffness > 0.0)

@@ -64,6 +64,13 @@ impl Substep<'_> {
         self.of_order_1()
     }
 
+    /// Whether contacts do what the nodes at them need, as far as is asked for.
+    pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit) -> bool {
+        let residual = |node: usize| implicit.residuals.get(node).as_dvec3();
+        let imbalance = |contacts: &Contacts| contacts.holds.imbalance(residual);
+        body.contacts.as_ref().map_or(0.0, imbalance) <= f64::from(implicit.accuracy)
+    }
+
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which
     /// knows nothing of it, leaves their nodes alone.
     pub(super) fn stiffen(&self, body: &Body, implicit: &mut Implicit) {

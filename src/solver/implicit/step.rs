@@ -497,7 +497,8 @@ impl Substep<'_> {
             let is_stuck = vain > 2;
             error = remaining;
             let budget = whole_budget - products.min(whole_budget);
-            if error <= absolute.max(relative * size) || is_stuck || budget == 0 || !error.is_finite() {
+            let is_found = error <= absolute.max(relative * size) && self.is_balanced(body, implicit);
+            if is_found || is_stuck || budget == 0 || !error.is_finite() {
                 break;
             }
             let goal = Goal {
@@ -517,7 +518,7 @@ impl Substep<'_> {
             solved_error = solved.error;
             // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
-            if solved.size <= absolute && is_held {
+            if solved.size <= absolute && is_held && implicit.stiffened.is_empty() {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
                 error = solved.error;
@@ -535,7 +536,7 @@ impl Substep<'_> {
                     }
                 });
             }
-            if solved.size <= relative * size {
+            if solved.size <= relative * size && self.is_balanced(body, implicit) {
                 error = solved.error;
                 break;
             }
