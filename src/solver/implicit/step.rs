@@ -58,8 +58,8 @@ const CUTS: u32 = 4;
 /// A step is not cut into more parts than this because it has gained energy.
 const PARTS: u32 = 1 << 12;
 
-/// Products for each part into which a tool cuts a step, at least.
-const PRODUCTS: u32 = 32;
+/// The part of the budget that there is for each part of a step, at least: those into which a tool or a tolerance cuts it.
+const SHARE: u32 = 32;
 
 /// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
 /// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
@@ -77,15 +77,15 @@ pub(in crate::solver) fn run(
     if let Some(mut implicit) = body.implicit.take() {
         implicit.report = SolverReport::BEFORE;
         implicit.was_stale = implicit.stale;
-        implicit.left = implicit.budget.saturating_mul(substeps);
+        implicit.left = implicit.budget.saturating_mul(request.substeps.max(1));
         let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
             .max(1.0);
         let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
         if contact::is_near(body) {
             parts = short;
-            implicit.left = implicit.left.max(PRODUCTS.saturating_mul(parts));
         }
+        implicit.grant(substeps.saturating_mul(parts));
         let mut cuts = 0;
         loop {
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
@@ -95,7 +95,7 @@ pub(in crate::solver) fn run(
                 End::Fine => break,
                 End::Near => {
                     parts = parts.max(short);
-                    implicit.left = implicit.left.max(PRODUCTS.saturating_mul(parts));
+                    implicit.grant(substeps.saturating_mul(parts));
                 }
                 End::Gained | End::NotFinite if is_last_resort => break,
                 End::Gained | End::NotFinite => {
@@ -111,6 +111,14 @@ pub(in crate::solver) fn run(
         finite: end == End::Fine,
     };
     (substeps.saturating_mul(parts), taken)
+}
+
+impl Implicit {
+    /// Lets a step of so many parts have its share for each.
+    fn grant(&mut self, parts: u32) {
+        let share = (self.budget / SHARE).max(1);
+        self.left = self.left.max(share.saturating_mul(parts));
+    }
 }
 
 fn run_in_parts(
