@@ -98,7 +98,7 @@ impl Body {
         let node_count = definition.positions.len();
         let mut springs = definition.resolved_springs()?;
         let order = match definition.storage {
-            Storage::Packed => NodeOrder::for_springs(definition.positions, &springs)?,
+            Storage::Packed => NodeOrder::for_springs(definition.positions, &springs, definition.rounding())?,
             _ => NodeOrder::default(),
         };
         for spring in &mut springs {

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::definition::Spring;
 use crate::error::Result;
 use crate::memory;
+use crate::springs::{Rounding, costs};
 
 /// Where each node is kept, for bodies that do not keep them in the caller's order.
 ///
@@ -21,10 +22,10 @@ pub(crate) struct NodeOrder {
 
 impl NodeOrder {
     /// The order that suits these springs best.
-    pub fn for_springs(positions: &[Vec3], springs: &[Spring]) -> Result<Self> {
+    pub fn for_springs(positions: &[Vec3], springs: &[Spring], rounding: Rounding) -> Result<Self> {
         let mut pairs = memory::reserved(springs.len())?;
         pairs.extend(springs.iter().map(|spring| spring.nodes));
-        match crate::mesh::best_order(positions, &pairs)? {
+        match crate::mesh::best_order(positions, &pairs, costs(springs, rounding)?)? {
             Some(order) => Self::new(order),
             None => Ok(Self::default()),
         }

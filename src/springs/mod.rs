@@ -22,7 +22,7 @@ pub(crate) use kernels::{ChosenKernel, Loops, Range, prefetch};
 use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
-pub(crate) use packed::Rounding;
+pub(crate) use packed::{Costs, Rounding, Row, Split, cheapest, costs};
 pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
 use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};

@@ -4,20 +4,11 @@ use super::inverse;
 use super::links::Links;
 use crate::Result;
 use crate::memory;
+use crate::springs::{Row, Split, cheapest};
 
 /// Nodes side by side whose links share columns.
 const LANES: usize = 1 << LANE_BITS;
 const LANE_BITS: u32 = 4;
-
-/// The fewest links that make a run, and a gather.
-const RUN: usize = 5;
-const GATHER: usize = 4;
-
-/// What a column costs, in cycles of the processor, measured with AVX-512: sixteen neighbours side by side, sixteen
-/// anywhere; and a link of a node that has far more of them than those around it.
-pub(super) const RUN_COST: f64 = 9.0;
-pub(super) const GATHER_COST: f64 = 30.0;
-pub(super) const STRAY_COST: f64 = 10.0;
 
 /// Neighbours further away than this many nodes have left the first, or the second, cache since their own turn. What a line
 /// of sixteen of them costs then, in cycles beyond those of its gather.
@@ -32,7 +23,7 @@ const PIECE: usize = 512;
 
 /// The least that any order can cost: nothing but full runs.
 pub(super) fn least_cost(links: &Links) -> f64 {
-    links.count() as f64 / LANES as f64 * RUN_COST
+    links.count() as f64 / LANES as f64 * links.costs.run
 }
 
 /// An estimate of the cycles that a visit of all springs takes, with nodes in this order: the columns that packed storage
@@ -59,7 +50,7 @@ pub(super) fn cost(order: &[u32], links: &Links) -> Result<f64> {
 struct Block {
     /// How far away the neighbour is, above the bits of the lane.
     links: Vec<i64>,
-    /// For each level, how many links lie there: where a node has its n-th link, n - 1 others lie below.
+    rows: Vec<Row>,
     levels: Vec<u32>,
     /// Lines of sixteen nodes that are far away.
     lines: Vec<(u64, bool)>,
@@ -67,8 +58,9 @@ struct Block {
 
 impl Block {
     fn cost(&mut self, first: i64, nodes: &[u32], places: &[u32], links: &Links) -> Result<f64> {
+        let costs = links.costs;
         self.links.clear();
-        self.levels.clear();
+        self.rows.clear();
         self.lines.clear();
         for (lane, &node) in (0..).zip(nodes) {
             let neighbours = links.of(node);
@@ -82,34 +74,24 @@ impl Block {
         }
         self.links.sort_unstable();
 
-        let mut sum = 0.0;
-        let mut heights = [0; LANES];
-        for same in self.links.chunk_by(|a, b| a >> LANE_BITS == b >> LANE_BITS) {
-            if same.len() >= RUN {
-                sum += RUN_COST;
-                continue;
-            }
-            for &link in same {
+        let same = |a: &i64, b: &i64| a >> LANE_BITS == b >> LANE_BITS;
+        for links in self.links.chunk_by(same) {
+            let lanes = links
+                .iter()
+                .fold(0, |lanes, link| lanes | 1 << (link & (LANES as i64 - 1)));
+            let (kind, costs) = (0, costs);
+            memory::push(&mut self.rows, Row { kind, costs, lanes })?;
+        }
+        let Split { run, cost: mut sum, .. } = cheapest(&self.rows, &mut self.levels)?;
+        for links in self.links.chunk_by(same).filter(|links| links.len() < run) {
+            for &link in links {
                 let (offset, lane) = (link >> LANE_BITS, link & (LANES as i64 - 1));
-                let height = &mut heights[lane as usize];
-                match self.levels.get_mut(*height) {
-                    Some(level) => *level += 1,
-                    None => memory::push(&mut self.levels, 1)?,
-                }
-                *height += 1;
                 let distance = offset.unsigned_abs();
                 if distance > FAR {
                     let line = (first + lane + offset) as u64 / LANES as u64;
                     memory::push(&mut self.lines, (line, distance > VERY_FAR))?;
                 }
             }
-        }
-        for &links in &self.levels {
-            sum += if links as usize >= GATHER {
-                GATHER_COST
-            } else {
-                STRAY_COST * f64::from(links)
-            };
         }
         self.lines.sort_unstable();
         self.lines.dedup_by_key(|line| line.0);

@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::memory;
+use crate::springs::Costs;
 
 /// As many as the processor writes to side by side.
 const GROUPS: usize = 256;
@@ -11,11 +12,13 @@ pub(super) struct Links {
     /// Where the neighbours of each node begin; one more entry at the end.
     starts: Vec<usize>,
     neighbours: Vec<u32>,
+    /// What they cost.
+    pub costs: Costs,
 }
 
 impl Links {
     /// The links of nodes of which number `n` of the springs is called `names[n]`.
-    pub fn new(springs: &[[u32; 2]], names: &[u32]) -> Result<Self> {
+    pub fn new(springs: &[[u32; 2]], names: &[u32], costs: Costs) -> Result<Self> {
         let ends = ends(springs, names)?;
         // Counted one place late, so that filling in moves each start to its place.
         let mut starts = memory::filled(0_usize, names.len() + 2)?;
@@ -32,7 +35,11 @@ impl Links {
             *place += 1;
         }
         starts.pop();
-        Ok(Self { starts, neighbours })
+        Ok(Self {
+            starts,
+            neighbours,
+            costs,
+        })
     }
 
     pub fn node_count(&self) -> usize {

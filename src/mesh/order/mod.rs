@@ -20,6 +20,7 @@ use glam::Vec3;
 
 use crate::Result;
 use crate::memory;
+use crate::springs::Costs;
 use cost::{cost, least_cost};
 use cuthill_mckee::reverse_cuthill_mckee;
 use hilbert::along_curve;
@@ -33,10 +34,10 @@ const WORTH: f64 = 0.03;
 const WINDOW: usize = 512;
 
 /// The order in which packed storage works fastest, `order[new] = old`; `None` where that in which nodes are given is as good
-/// within 3 %. The springs join nodes that there are, each two at most once.
+/// within 3 %. The springs join nodes that there are, each two at most once; `costs` are those of most of them.
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
-pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]]) -> Result<Option<Vec<u32>>> {
+pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]], costs: Costs) -> Result<Option<Vec<u32>>> {
     if springs.is_empty() {
         return Ok(None);
     }
@@ -44,7 +45,7 @@ pub(crate) fn best_order(positions: &[Vec3], springs: &[[u32; 2]]) -> Result<Opt
     // as fast where nodes are given in random order.
     let curve = along_curve(positions)?;
     let given = inverse(&curve)?;
-    let links = Links::new(springs, &given)?;
+    let links = Links::new(springs, &given, costs)?;
 
     let mut best = Best {
         order: None,

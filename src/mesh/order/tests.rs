@@ -54,7 +54,7 @@ fn identity(count: usize) -> Vec<u32> {
 }
 
 fn cost_of(order: &[u32], (positions, springs): &Body) -> f64 {
-    let links = Links::new(springs, &identity(positions.len())).expect("memory for a test");
+    let links = Links::new(springs, &identity(positions.len()), Costs::SHARED).expect("memory for a test");
     cost(order, &links).expect("memory for a test")
 }
 
@@ -64,7 +64,7 @@ fn cost_as_given(body: &Body) -> f64 {
 
 /// The best order, checked to be one.
 fn best((positions, springs): &Body) -> Option<Vec<u32>> {
-    let order = best_order(positions, springs).expect("memory for a test");
+    let order = best_order(positions, springs, Costs::SHARED).expect("memory for a test");
     if let Some(order) = &order {
         let mut sorted = order.clone();
         sorted.sort_unstable();
@@ -232,7 +232,7 @@ fn chains_that_are_coincident_are_ordered_by_their_springs() {
     let chain = (1..count).map(|n| [n - 1, n]).collect();
     let body = mixed(&(vec![Vec3::ZERO; count as usize], chain));
     // Two springs a node, and but for the ends nothing but full runs.
-    assert!(best_cost(&body) < 1.03 * (2.0 * cost::RUN_COST * f64::from(count) / 16.0));
+    assert!(best_cost(&body) < 1.03 * (2.0 * Costs::SHARED.run * f64::from(count) / 16.0));
 }
 
 #[test]
@@ -240,15 +240,15 @@ fn columns_are_counted_as_they_are_packed() {
     // Two blocks of sixteen; each node joined to that sixteen further on: one full run in each.
     let run: Vec<[u32; 2]> = (0..16).map(|n| [n, n + 16]).collect();
     let body = (vec![Vec3::ZERO; 32], run);
-    assert_eq!(cost_as_given(&body), 2.0 * cost::RUN_COST);
+    assert_eq!(cost_as_given(&body), 2.0 * Costs::SHARED.run);
     // The same joined crosswise: no two offsets are alike, one gather in each.
     let gather: Vec<[u32; 2]> = (0..16).map(|n| [n, 31 - n]).collect();
     let body = (vec![Vec3::ZERO; 32], gather);
-    assert_eq!(cost_as_given(&body), 2.0 * cost::GATHER_COST);
+    assert_eq!(cost_as_given(&body), 2.0 * Costs::SHARED.gather);
     // Three springs alone make no gather: each end by itself.
     let strays = vec![[0, 31], [5, 20], [9, 30]];
     let body = (vec![Vec3::ZERO; 32], strays);
-    assert_eq!(cost_as_given(&body), 6.0 * cost::STRAY_COST);
+    assert_eq!(cost_as_given(&body), 6.0 * Costs::SHARED.stray);
 }
 
 #[test]

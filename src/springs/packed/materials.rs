@@ -90,6 +90,11 @@ impl Kinds {
         Ok(found)
     }
 
+    /// Whether no kind is common.
+    pub fn is_empty(&self) -> bool {
+        self.kinds.is_empty()
+    }
+
     /// The table that a spring's kind is a place in.
     pub fn materials(&self) -> Result<Vec<Material>> {
         let mut materials = memory::reserved(self.kinds.len())?;

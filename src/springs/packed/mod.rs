@@ -7,6 +7,7 @@
 
 mod materials;
 mod pack;
+mod split;
 #[cfg(test)]
 mod tests;
 
@@ -15,6 +16,7 @@ use std::ops::Range;
 use materials::Kinds;
 pub(crate) use materials::Rounding;
 use pack::{Loose, NO_KIND, pack};
+pub(crate) use split::{Costs, Row, Split, cheapest};
 
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
@@ -73,6 +75,12 @@ pub(crate) struct Packed {
     kinds: Kinds,
     materials: Vec<Material>,
     tiles: Vec<Tile>,
+}
+
+/// What columns of these springs cost, the most of them.
+pub(crate) fn costs(springs: &[Spring], rounding: Rounding) -> Result<Costs> {
+    let kinds = Kinds::of(springs, rounding)?;
+    Ok(if kinds.is_empty() { Costs::OWN } else { Costs::SHARED })
 }
 
 impl Packed {

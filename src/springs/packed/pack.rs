@@ -2,17 +2,11 @@
 
 use std::ops::Range;
 
+use super::split::{Costs, GATHER, Row, Split, cheapest};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Link;
 use crate::springs::kernels::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
-
-/// The fewest links that are worth a run: a run costs the processor about a quarter of a gather, and what a run takes a
-/// gather may lose.
-const RUN: usize = 5;
-
-/// The fewest links that are worth a gather: alone they cost a third as much as a gather of sixteen.
-const GATHER: usize = 4;
 
 /// Marks a link that is of no kind in the table of materials.
 pub(super) const NO_KIND: u16 = u16::MAX;
@@ -47,6 +41,7 @@ pub(super) fn pack(
     let mut packer = Packer {
         node_count,
         columns: Vec::new(),
+        rows: Vec::new(),
         levels: Vec::new(),
     };
     let mut rest = links;
@@ -77,6 +72,7 @@ pub(super) fn pack(
 struct Packer {
     node_count: usize,
     columns: Vec<Column>,
+    rows: Vec<Row>,
     /// For each level, how many links lie there: where a node has its n-th link, n - 1 others lie below.
     levels: Vec<u32>,
 }
@@ -87,8 +83,12 @@ impl Packer {
         self.columns.clear();
         self.columns.try_reserve(links.len() / GATHER + 1)?;
         links.sort_unstable_by_key(|link| (link.kind, link.offset(), link.node));
-        let left = self.take_runs(first, links);
-        let left = self.take_gathers(first, &mut links[..left])?;
+        self.see_rows(first, links)?;
+        let Split { run, mixed, .. } = cheapest(&self.rows, &mut self.levels)?;
+        let mut left = self.take_runs(first, links, run);
+        if !mixed {
+            left = self.take_gathers(first, &mut links[..left])?;
+        }
         // What is too little of one kind may do together, each with its own parameters.
         for link in &mut links[..left] {
             link.kind = NO_KIND;
@@ -97,15 +97,30 @@ impl Packer {
         self.take_gathers(first, &mut links[..left])
     }
 
-    /// Makes runs of links of a kind with the same offset: how many are left, moved to the front.
-    fn take_runs(&mut self, first: usize, links: &mut [Loose]) -> usize {
+    /// Notes which links are of a kind and lead equally far.
+    fn see_rows(&mut self, first: usize, links: &[Loose]) -> Result<()> {
+        self.rows.clear();
+        let same = |a: &Loose, b: &Loose| a.kind == b.kind && a.offset() == b.offset();
+        for links in links.chunk_by(same) {
+            let kind = links[0].kind;
+            let costs = if kind == NO_KIND { Costs::OWN } else { Costs::SHARED };
+            let lanes = links
+                .iter()
+                .fold(0, |lanes, link| lanes | 1 << (link.node as usize - first));
+            memory::push(&mut self.rows, Row { kind, costs, lanes })?;
+        }
+        Ok(())
+    }
+
+    /// Makes runs of links of a kind with the same offset, so many at least: how many are left, moved to the front.
+    fn take_runs(&mut self, first: usize, links: &mut [Loose], fewest: usize) -> usize {
         let (mut left, mut start) = (0, 0);
         while start < links.len() {
             let head = links[start];
             let same = |link: &&Loose| link.kind == head.kind && link.offset() == head.offset();
             let count = links[start..].iter().take_while(same).count();
             let run = start..start + count;
-            if count >= RUN
+            if count >= fewest
                 && let Ok(offset) = i32::try_from(head.offset())
             {
                 let mut column = Column::empty(Neighbours::Run(offset), head.kind);
