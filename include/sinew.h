@@ -394,6 +394,7 @@ typedef struct sinew_body_def {
   /**
    * IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
    * long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
+   * Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least.
    */
   uint32_t iterations;
   /**

@@ -306,6 +306,9 @@ impl Body {
                 self.contacts = Some(Contacts::new(self.node_count(), &surface, tools)?);
             }
         }
+        if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
+            implicit.reserve_contacts(contacts.reserve_holds()?)?;
+        }
         Ok(())
     }
 

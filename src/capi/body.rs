@@ -97,6 +97,7 @@ pub struct sinew_body_def {
     pub order: u32,
     /// IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
     /// long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
+    /// Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least.
     pub iterations: u32,
     /// IMPLICIT, NEWTON: what may be missing of the solution of a step's equation, as a part of what forces change in the step;
     /// from 1e-6 to 1; 0, the default: 0.01, or 1e-6 with NEWTON.

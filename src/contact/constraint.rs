@@ -89,6 +89,17 @@ impl Constraint {
         self.least_speed = self.surface_velocity.dot(self.normal) - gap.max(0.0) / duration;
     }
 
+    /// The least weighted velocity of its nodes along the normal, m/s.
+    pub fn least_speed(&self) -> f32 {
+        self.least_speed
+    }
+
+    /// Its nodes have already received this, N s.
+    pub fn has_given(&mut self, given: Vec3) {
+        self.impulse = given.dot(self.normal);
+        self.friction_impulse = given - self.normal * self.impulse;
+    }
+
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
     pub fn solve(&mut self, velocities: &mut Vectors) -> f32 {
         let velocity = self.velocity(velocities);

@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use super::candidates::Candidates;
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
+use super::holds::Holds;
 use super::path::{Motion, Solid, ToolPath};
 use super::sweep::{Corners, Segment};
 use crate::body::{Bounds, Mobility, Pins, Vectors};
@@ -16,6 +17,9 @@ use crate::error::Result;
 
 /// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
 const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
+
+/// So many of them at most are part of a solved equation.
+const HELD: usize = 1 << 12;
 
 /// A substep is cut into at most so many slices.
 const SLICES: u32 = 512;
@@ -49,6 +53,8 @@ pub(crate) struct Contacts {
     constraints: Vec<Constraint>,
     /// How many of them are solved together.
     together: usize,
+    /// The first of them, which a solved equation has seen.
+    pub holds: Holds,
     /// By the place of a tool among those of the step.
     loads: Vec<Load>,
     /// The box of all velocities that contacts gave in this substep.
@@ -71,6 +77,8 @@ pub(crate) struct Meeting<'a> {
     pub substep: f32,
     /// Whether positions change: not with the last half kick of a step.
     pub drifts: bool,
+    /// Contacts that are open by less count, m.
+    pub slack: f32,
     /// No node is faster, m/s.
     pub fastest: f32,
     pub mobility: Mobility<'a>,
@@ -90,6 +98,8 @@ struct Slice {
     duration: f32,
     first: bool,
     sweeps: u32,
+    /// Whether contacts are only looked for.
+    foresees: bool,
 }
 
 impl Contacts {
@@ -100,6 +110,7 @@ impl Contacts {
             candidates: Candidates::new(&features)?,
             constraints: Vec::new(),
             together: 0,
+            holds: Holds::default(),
             features,
             loads: Vec::new(),
             given: Bounds::EMPTY,
@@ -129,6 +140,14 @@ impl Contacts {
             self.candidates.invalidate();
         }
         self.committed = false;
+        self.holds.clear();
+    }
+
+    /// Makes room for contacts within equations, where the body has such: for how many.
+    pub fn reserve_holds(&mut self) -> Result<usize> {
+        let count = self.together.min(HELD);
+        self.holds.reserve(count)?;
+        Ok(count)
     }
 
     /// The step that was begun last is current now.
@@ -146,6 +165,17 @@ impl Contacts {
         self.loads.is_empty() || self.candidates.near().is_empty()
     }
 
+    /// Shows each node that a tool gave something to, and along what normal; with friction `None`: all of its motion.
+    pub fn show_touched(&self, mut see: impl FnMut(usize, Option<Vec3>)) {
+        for constraint in &self.constraints {
+            if constraint.given() != Vec3::ZERO {
+                for &node in constraint.feature.nodes() {
+                    see(node as usize, (constraint.friction == 0.0).then_some(constraint.normal));
+                }
+            }
+        }
+    }
+
     /// What each tool of the step received.
     pub fn loads(&self) -> &[Load] {
         &self.loads
@@ -159,6 +189,26 @@ impl Contacts {
         }
     }
 
+    /// Finds the contacts that the equation of the substep is to know of: all that may touch with these velocities, or are open by
+    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m.
+    pub fn foresee(&mut self, mut meeting: Meeting, stiffness_of: impl Fn(usize) -> f32) {
+        self.holds.clear();
+        self.constraints.clear();
+        if meeting.tools.is_empty() {
+            return;
+        }
+        self.find_candidates(&meeting);
+        if self.candidates.near().is_empty() || slices(&meeting) > 1 {
+            return;
+        }
+        let slice = Slice::ahead(&meeting);
+        let (start, end) = (meeting.start, meeting.end);
+        self.find(&mut meeting, &slice, [start, end]);
+        self.constraints.truncate(HELD);
+        let way = |node: usize| meeting.velocities.get(node) * meeting.substep;
+        self.holds.begin(&self.constraints, meeting.substep, stiffness_of, way);
+    }
+
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.
     pub fn resolve(&mut self, mut meeting: Meeting) {
         self.given = Bounds::EMPTY;
@@ -166,10 +216,15 @@ impl Contacts {
             return;
         }
         self.find_candidates(&meeting);
-        if self.candidates.near().is_empty() {
+        if self.candidates.near().is_empty() && self.holds.is_empty() {
             return;
         }
-        let slices = if meeting.drifts { slices(&meeting) } else { 1 };
+        let is_foreseen = !self.holds.is_empty();
+        let slices = if meeting.drifts && !is_foreseen {
+            slices(&meeting)
+        } else {
+            1
+        };
         for index in 0..slices {
             let part = |index: u32| f64::from(index) / f64::from(slices);
             let slice = Slice {
@@ -177,22 +232,34 @@ impl Contacts {
                 duration: meeting.substep / slices as f32,
                 first: index == 0,
                 sweeps: if slices == 1 { SWEEPS } else { SWEEPS_OF_A_SLICE },
+                foresees: false,
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
-            let (start, end) = (fraction(part(index)), fraction(part(index + 1)));
-            self.constraints.clear();
-            for place in 0..meeting.tools.len() {
-                let motion = meeting.tools[place].motion(start, end, meeting.dt, meeting.origin);
-                for candidate in 0..self.candidates.near().len() {
-                    let feature = self.features.get(self.candidates.near()[candidate]);
-                    self.touch(&mut meeting, &slice, place, &motion, feature);
+            if is_foreseen {
+                for (index, constraint) in self.constraints.iter_mut().enumerate() {
+                    constraint.has_given(self.holds.force(index) * meeting.substep);
                 }
+            } else {
+                self.constraints.clear();
             }
+            let ends = [fraction(part(index)), fraction(part(index + 1))];
+            self.find(&mut meeting, &slice, ends);
             self.solve(&mut meeting, &slice);
         }
         if self.given != Bounds::EMPTY {
             let fastest = self.given.min.abs().max(self.given.max.abs()).length();
             self.candidates.spend(meeting.substep * fastest);
+        }
+    }
+
+    /// Adds the contacts of a slice between these fractions of the step.
+    fn find(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
+        for place in 0..meeting.tools.len() {
+            let motion = meeting.tools[place].motion(start, end, meeting.dt, meeting.origin);
+            for candidate in 0..self.candidates.near().len() {
+                let feature = self.features.get(self.candidates.near()[candidate]);
+                self.touch(meeting, slice, place, &motion, feature);
+            }
         }
     }
 
@@ -212,7 +279,7 @@ impl Contacts {
             meeting.positions,
             meeting.tools,
             meeting.origin,
-            meeting.substep * tool_speed,
+            meeting.substep * tool_speed + meeting.slack,
             slack,
         );
         self.candidates.spend(travel);
@@ -249,7 +316,7 @@ impl Contacts {
         constraint.tool = tool;
         if self.constraints.len() < self.together {
             self.constraints.push(constraint);
-        } else {
+        } else if !slice.foresees {
             constraint.solve(meeting.velocities);
             self.settle(meeting, slice, &constraint);
         }
@@ -324,6 +391,19 @@ fn slices(meeting: &Meeting) -> u32 {
     (slices as u32).clamp(1, SLICES)
 }
 
+impl Slice {
+    /// The whole substep, looked at before it is taken.
+    fn ahead(meeting: &Meeting) -> Self {
+        Self {
+            remains: meeting.substep,
+            duration: meeting.substep,
+            first: true,
+            sweeps: SWEEPS,
+            foresees: true,
+        }
+    }
+}
+
 impl Meeting<'_> {
     /// Where a node is when the slice begins.
     fn position(&self, slice: &Slice, node: usize) -> Vec3 {
@@ -380,7 +460,7 @@ fn meet_plane(meeting: &Meeting, slice: &Slice, motion: &Motion, feature: Featur
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
     let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * slice.duration;
-    let margin = surface_velocity.length() * slice.duration;
+    let margin = surface_velocity.length() * slice.duration + meeting.slack;
     if !(gap <= closing.max(0.0) + margin) {
         return None;
     }
@@ -410,7 +490,7 @@ fn meet_rounded(
         corners.points[corner] = meeting.position(slice, node as usize);
         corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
     }
-    let separation = corners.approach(segment, segment.travel())?;
+    let separation = corners.approach(segment, segment.travel() + meeting.slack)?;
     if !separation.inside {
         return None;
     }

@@ -266,6 +266,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         end: part.end,
         substep: part.substep,
         drifts: part.drifts,
+        slack: 0.0,
         fastest,
         mobility: Mobility {
             inverse_masses: &body.inverse_masses,

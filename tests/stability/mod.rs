@@ -88,7 +88,7 @@ const fn jitter(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
     }
 }
 
-pub const KNOWN: [Known; 22] = [
+pub const KNOWN: [Known; 21] = [
     // 6.8e-6 of the size after 10 ms.
     lost("started rotated", |setup| is_verlet_at(setup, 1e-5)),
     // 1.65e-3 of the stretch.
@@ -152,11 +152,6 @@ pub const KNOWN: [Known; 22] = [
     jitter("nodes in one place, springs without length", |setup| {
         is_implicit(setup, Storage::Efficient, &[1.0])
     }),
-    Known {
-        case: "crushed between two tools",
-        applies: |setup| is_implicit(setup, Storage::Packed, &[1.0]),
-        figure: "the mean force of a step of 1 s is not that along the way",
-    },
     Known {
         case: "springs removed in motion",
         applies: |setup| setup.solver != Solver::Verlet && setup.step > 5e-4,

@@ -12,7 +12,7 @@ use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
 use crate::threads::{Team, Tiles};
 
 /// A symmetric matrix as xx, yy, zz, yz, zx, xy.
-type Symmetric = [f32; 6];
+pub(super) type Symmetric = [f32; 6];
 
 /// What rounding leaves, J.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,6 +70,17 @@ impl Blocks {
                 }
             }
         });
+    }
+
+    /// Makes the inverse of one node's block anew, with so much more stiffness.
+    pub fn invert_one(&mut self, node: usize, inertia: f32, more: Symmetric) {
+        let mut block = self.stiffness[node];
+        for (entry, more) in block.iter_mut().zip(more) {
+            *entry += more;
+        }
+        for (to, entry) in self.inverse.iter_mut().zip(inverse_of(block, inertia)) {
+            to[node] = entry;
+        }
     }
 
     /// What rounding does to the residual where coordinates are off by `distance`.

@@ -253,6 +253,18 @@ impl Coarse {
         }
     }
 
+    /// What a node takes of its cluster's motions.
+    pub fn part(&self, node: usize) -> [f32; FUNCTIONS] {
+        let place = self.places.get(node);
+        [self.free[node], place.x, place.y, place.z]
+    }
+
+    /// Lets it take another part; nothing: it is left to the fine level.
+    pub fn set_part(&mut self, node: usize, part: [f32; FUNCTIONS]) {
+        self.free[node] = part[0];
+        self.places.set(node, Vec3::new(part[1], part[2], part[3]));
+    }
+
     /// Adds what the clusters' motions are for the nodes of a tile.
     #[inline(always)]
     pub fn prolong(&self, tile: usize, ways: &mut [&mut [f32]; 3]) {

@@ -1,17 +1,22 @@
-//! Tools and an implicit step: the springs' equation is solved as if there were none, and then the nodes that would enter them
-//! are stopped.
+//! Tools and an implicit step: contacts that can be foreseen belong to its equation, and then the nodes that would still enter
+//! a tool are stopped.
 //!
-//! What the tools give is not known to the springs before the next step, so near them steps are short.
+//! What is not foreseen is not known to the springs before the next step, so near tools steps are short.
+
+use glam::Vec3;
 
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::body::{Body, Bounds, Mobility, Vectors};
-use crate::contact::Meeting;
+use crate::contact::{Contacts, Meeting};
 use crate::solver::kick::look;
-use crate::springs::{tile_count, tile_nodes};
+use crate::springs::{Springs, tile_count, tile_nodes};
 
 /// The longest step near a tool, s.
 pub(super) const LONGEST: f64 = 1e-3;
+
+/// How far an open contact may be to belong to an equation, as a part of the body's extent.
+const SLACK: f32 = 0.002;
 
 /// Whether a tool was near when the body was last looked at.
 pub(super) fn is_near(body: &Body) -> bool {
@@ -19,48 +24,133 @@ pub(super) fn is_near(body: &Body) -> bool {
 }
 
 impl Substep<'_> {
-    /// Lets tools stop the nodes that would enter them.
-    pub(super) fn meet(&self, body: &mut Body, implicit: &mut Implicit) -> End {
-        let Some(contacts) = &mut body.contacts else {
-            return End::Fine;
+    /// Finds the contacts that belong to the equation. What they do begins and ends within a step, so that it is one of order 1
+    /// where there are some.
+    pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Self {
+        if self.step > LONGEST || !is_near(body) {
+            if let Some(contacts) = &mut body.contacts {
+                contacts.holds.clear();
+            }
+            return *self;
+        }
+        let Some(means) = &mut implicit.means else {
+            return *self;
         };
-        let next = 1 - implicit.settled;
-        let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
-        let means = &mut implicit.products;
-        scaled(&implicit.histories[next].ways, per_step, means);
-        let velocities = (0..tile_count(means.len()))
-            .map(|tile| look(body.kernel, means.slices(tile_nodes(tile, means.len())), None).velocities)
+        let state = body.state.substep();
+        let velocities = if self.is_first {
+            state.first_velocities
+        } else {
+            &*state.velocities
+        };
+        means.copy_from(velocities);
+        for pin in body.pins.iter() {
+            means.set(pin.node as usize, pin.travel / self.request.dt);
+        }
+        let per_mass = 1.0 / (self.step * self.step);
+        self.contact(body, means, |contacts, meeting, springs, masses| {
+            let inverse_masses = meeting.mobility.inverse_masses;
+            contacts.foresee(meeting, |node| {
+                if inverse_masses[node] == 0.0 {
+                    return f32::INFINITY;
+                }
+                let mut stiffness = (f64::from(masses[node]) * per_mass) as f32;
+                springs.visit(node, &mut |link| stiffness += link.stiffness);
+                stiffness
+            });
+        });
+        if body.contacts.as_ref().is_none_or(|contacts| contacts.holds.is_empty()) {
+            return *self;
+        }
+        self.of_order_1()
+    }
+
+    /// Whether contacts do what the nodes at them need, as far as is asked for.
+    pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit) -> bool {
+        let residual = |node: usize| implicit.residuals.get(node).as_dvec3();
+        let imbalance = |contacts: &Contacts| contacts.holds.imbalance(residual);
+        body.contacts.as_ref().map_or(0.0, imbalance) <= f64::from(implicit.accuracy)
+    }
+
+    /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which
+    /// knows nothing of it, leaves their nodes alone.
+    pub(super) fn stiffen(&self, body: &Body, implicit: &mut Implicit) {
+        implicit.soften();
+        let Some(contacts) = &body.contacts else {
+            return;
+        };
+        contacts.holds.show_blocks(|node, block| {
+            if implicit.stiffened.len() < implicit.stiffened.capacity() {
+                implicit.stiffened.push((node as u32, implicit.coarse.part(node)));
+                implicit.coarse.set_part(node, [0.0; 4]);
+                implicit
+                    .blocks
+                    .invert_one(node, implicit.inertia[node], block.map(|entry| entry as f32));
+            }
+        });
+    }
+
+    /// Has the contacts of `body` do something about nodes that move with these velocities.
+    fn contact(
+        &self,
+        body: &mut Body,
+        velocities: &mut Vectors,
+        act: impl FnOnce(&mut Contacts, Meeting, &dyn Springs, &[f32]),
+    ) {
+        let slack = SLACK * body.extent();
+        let Some(contacts) = &mut body.contacts else {
+            return;
+        };
+        let node_count = velocities.len();
+        let bounds = (0..tile_count(node_count))
+            .map(|tile| look(body.kernel, velocities.slices(tile_nodes(tile, node_count)), None).velocities)
             .fold(Bounds::EMPTY, |bounds, other| bounds.and(&other));
         let state = body.state.substep();
-        contacts.resolve(Meeting {
+        let meeting = Meeting {
             tools: self.request.tools,
             origin: body.origin,
             dt: self.request.dt,
             start: self.start,
             end: self.end,
-            substep: step,
+            substep: self.step as f32,
             drifts: true,
-            fastest: velocities.min.abs().max(velocities.max.abs()).length(),
+            slack,
+            fastest: bounds.min.abs().max(bounds.max.abs()).length(),
             mobility: Mobility {
                 inverse_masses: &body.inverse_masses,
                 damping: None,
-                substep: step,
+                substep: self.step as f32,
                 half: false,
             },
             positions: state.positions,
-            velocities: means,
+            velocities,
             next_positions: state.next_positions,
             pins: &mut body.pins,
-        });
+        };
+        act(contacts, meeting, &*body.springs, &body.masses);
+    }
+
+    /// Lets tools stop the nodes that would enter them.
+    pub(super) fn meet(&self, body: &mut Body, implicit: &mut Implicit) -> End {
+        let Some(means) = &mut implicit.means else {
+            return End::Fine;
+        };
+        let next = 1 - implicit.settled;
+        let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
+        scaled(&implicit.histories[next].ways, per_step, means);
+        self.contact(body, means, |contacts, meeting, _, _| contacts.resolve(meeting));
+        let Some(contacts) = &body.contacts else {
+            return End::Fine;
+        };
         if contacts.are_far() {
             return End::Fine;
         }
         if self.step > LONGEST {
             return End::Near;
         }
-        // What a tool gives belongs to the whole step and the one before: it is no gain that will go on.
         let history = &mut implicit.histories[next];
-        let axes = state
+        let axes = body
+            .state
+            .substep()
             .velocities
             .axes_mut()
             .into_iter()
@@ -75,11 +165,28 @@ impl Substep<'_> {
                 }
             }
         }
+        // What a tool gives is no gain that will go on.
+        contacts.show_touched(|node, normal| {
+            let gain = history.gains.get(node);
+            let left = normal.map_or(Vec3::ZERO, |normal| gain.reject_from_normalized(normal));
+            history.gains.set(node, left);
+        });
         history.energy = None;
         if body.state.next_is_finite() {
             End::Fine
         } else {
             End::NotFinite
+        }
+    }
+}
+
+impl Implicit {
+    /// Makes the preconditioner what it is without contacts.
+    pub(super) fn soften(&mut self) {
+        while let Some((node, part)) = self.stiffened.pop() {
+            let node = node as usize;
+            self.coarse.set_part(node, part);
+            self.blocks.invert_one(node, self.inertia[node], [0.0; 6]);
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::body::{Body, Records, Vectors};
+use crate::contact::Contacts;
 use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -68,7 +69,7 @@ impl Substep<'_> {
         let work = self.work(body, &implicit.histories[next].ways);
         let after = kinetic + elastic;
         let allowed = before.energy + work + before.credit;
-        let rounding = ROUNDING * (before.energy + after + work.abs());
+        let rounding = ROUNDING * (before.energy + after + work.abs()) + implicit.noise.square;
         if !after.is_finite() {
             return End::NotFinite;
         }
@@ -106,9 +107,9 @@ impl Substep<'_> {
                 state.next_positions.set(pin.node as usize, pin.place(self.end));
             }
             state.velocities.clear();
+            history.ways.clear();
             history.energy = None;
         }
-        history.ways.clear();
         history.gains.clear();
         history.step = 0.0;
         history.credit = 0.0;
@@ -118,7 +119,8 @@ impl Substep<'_> {
     /// What gravity and forces from outside did on these ways, J.
     fn work(&self, body: &Body, ways: &Vectors) -> f64 {
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
-        let mut work = 0.0;
+        let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node));
+        let mut work = body.contacts.as_ref().map_or(0.0, held);
         for (axis, ways) in ways.axes().into_iter().enumerate() {
             let gravity = f64::from(self.request.gravity[axis]);
             if gravity != 0.0 {

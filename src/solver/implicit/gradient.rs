@@ -114,6 +114,10 @@ impl Implicit {
                 changes: &changes,
                 products: &mut products,
             });
+            if let Some(contacts) = &body.contacts {
+                let search = |node: usize| searches.get(node);
+                partial.first += contacts.holds.add_products(&nodes, search, &mut products);
+            }
             hold(&body.pins, tile, nodes.start, &mut products);
         });
         self.partials.iter().map(|partial| partial.first).sum()

@@ -95,6 +95,9 @@ pub(crate) struct Implicit {
     settled: usize,
     /// s: what forces do within the step, m.
     pushes: Vectors,
+    /// Where there are tools: how fast nodes go on their way, m/s.
+    means: Option<Vectors>,
+    // What follows, up to the spectrum, has room for no node where the equations are solved exactly.
     /// What is added to it by one solution of the linearised equation, m.
     corrections: Vectors,
     residuals: Vectors,
@@ -113,6 +116,8 @@ pub(crate) struct Implicit {
     prepared: f32,
     blocks: Blocks,
     coarse: Coarse,
+    /// Nodes that tools press on, and what they take of the coarse level otherwise.
+    stiffened: Vec<(u32, [f32; 4])>,
     /// The loads of the clusters from each tile.
     loads: Vec<f32>,
     partials: Vec<Partial>,
@@ -141,13 +146,25 @@ impl Experience {
 impl Implicit {
     /// For nodes at these positions, whose springs gather them or not; what is 0 is as by default.
     pub fn new(positions: &Vectors, gathers: bool, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
+        Self::solving(positions, positions.len(), gathers, order, budget, accuracy)
+    }
+
+    /// For so many nodes, with conjugate gradients for those at these positions.
+    fn solving(
+        positions: &Vectors,
+        node_count: usize,
+        gathers: bool,
+        order: u32,
+        budget: u32,
+        accuracy: f32,
+    ) -> Result<Self> {
         /// A fraction of what a step of a length worth taking is off by itself.
         const ACCURACY: f32 = 0.01;
         /// More than a body that is to be stepped while somebody waits can need.
         const BUDGET: u32 = 1000;
         let budget = if budget == 0 { BUDGET } else { budget };
-        let node_count = positions.len();
-        let vectors = || Vectors::zeros(node_count);
+        let solved_count = positions.len();
+        let vectors = || Vectors::zeros(solved_count);
         let coarse = Coarse::new(positions)?;
         Ok(Self {
             order: if order == 0 { 2 } else { order },
@@ -156,21 +173,23 @@ impl Implicit {
             accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
             histories: [History::new(node_count)?, History::new(node_count)?],
             settled: 0,
-            pushes: vectors()?,
+            pushes: Vectors::zeros(node_count)?,
+            means: None,
             corrections: vectors()?,
             residuals: vectors()?,
             searches: vectors()?,
-            search_records: gathers.then(|| Records::zeros(node_count)).transpose()?,
+            search_records: gathers.then(|| Records::zeros(solved_count)).transpose()?,
             products: vectors()?,
             preconditioned: vectors()?,
-            inertia: memory::filled(0.0, node_count)?,
+            inertia: memory::filled(0.0, solved_count)?,
             all_inertia: 0.0,
             noise: Noise::default(),
             prepared: 0.0,
-            blocks: Blocks::new(node_count)?,
-            loads: memory::filled(0.0, coarse.size() * tile_count(node_count))?,
+            blocks: Blocks::new(solved_count)?,
+            loads: memory::filled(0.0, coarse.size() * tile_count(solved_count))?,
             coarse,
-            partials: memory::filled(Partial::default(), tile_count(node_count))?,
+            stiffened: Vec::new(),
+            partials: memory::filled(Partial::default(), tile_count(solved_count))?,
             spectrum: Spectrum::new()?,
             stale: true,
             was_stale: true,
@@ -191,7 +210,7 @@ impl Implicit {
         let accuracy = if accuracy == 0.0 { ACCURACY } else { accuracy };
         Ok(Self {
             newton: Some(Newton::new(positions.len(), spring_count)?),
-            ..Self::new(positions, false, order, budget, accuracy)?
+            ..Self::solving(&Vectors::zeros(0)?, positions.len(), false, order, budget, accuracy)?
         })
     }
 
@@ -200,6 +219,15 @@ impl Implicit {
         self.newton
             .as_mut()
             .map_or(Ok(()), |newton| newton.make_room(spring_count))
+    }
+
+    /// Makes room for so many contacts in an equation.
+    pub fn reserve_contacts(&mut self, count: usize) -> Result<()> {
+        if self.means.is_none() {
+            self.means = Some(Vectors::zeros(self.pushes.len())?);
+        }
+        let nodes = (3 * count).min(self.inertia.len());
+        Ok(self.stiffened.try_reserve(nodes)?)
     }
 
     /// Makes what the step in progress leaves to the next that of the current state.

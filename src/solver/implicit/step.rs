@@ -22,6 +22,9 @@ const ROUNDING: f64 = 1e-7;
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 40;
 
+/// The multipliers of contacts are improved so often: then what is left has a function to minimise.
+const MULTIPLIERS: u32 = 3;
+
 /// How one step is made from what was before.
 #[derive(Clone, Copy, Debug)]
 struct Formula {
@@ -52,6 +55,12 @@ impl Formula {
 /// How often a step that has gained energy is taken again in four times as many parts.
 const CUTS: u32 = 4;
 
+/// A step is not cut into more parts than this because it has gained energy.
+const PARTS: u32 = 1 << 12;
+
+/// The part of the budget that there is for each part of a step, at least: those into which a tool or a tolerance cuts it.
+const SHARE: u32 = 32;
+
 /// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
 /// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
 /// down. How many parts were taken, and what came of them.
@@ -68,7 +77,7 @@ pub(in crate::solver) fn run(
     if let Some(mut implicit) = body.implicit.take() {
         implicit.report = SolverReport::BEFORE;
         implicit.was_stale = implicit.stale;
-        implicit.left = implicit.budget.saturating_mul(substeps);
+        implicit.left = implicit.budget.saturating_mul(request.substeps.max(1));
         let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
             .max(1.0);
@@ -76,14 +85,19 @@ pub(in crate::solver) fn run(
         if contact::is_near(body) {
             parts = short;
         }
+        implicit.grant(substeps.saturating_mul(parts));
         let mut cuts = 0;
         loop {
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
-            end = run_in_parts(body, &mut implicit, request, whole, cuts == CUTS, team);
+            let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS;
+            end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
             match end {
                 End::Fine => break,
-                End::Near => parts = parts.max(short),
-                End::Gained | End::NotFinite if cuts == CUTS => break,
+                End::Near => {
+                    parts = parts.max(short);
+                    implicit.grant(substeps.saturating_mul(parts));
+                }
+                End::Gained | End::NotFinite if is_last_resort => break,
                 End::Gained | End::NotFinite => {
                     cuts += 1;
                     parts = parts.saturating_mul(4);
@@ -97,6 +111,14 @@ pub(in crate::solver) fn run(
         finite: end == End::Fine,
     };
     (substeps.saturating_mul(parts), taken)
+}
+
+impl Implicit {
+    /// Lets a step of so many parts have its share for each.
+    fn grant(&mut self, parts: u32) {
+        let share = (self.budget / SHARE).max(1);
+        self.left = self.left.max(share.saturating_mul(parts));
+    }
 }
 
 fn run_in_parts(
@@ -160,19 +182,30 @@ impl Substep<'_> {
         // What a later substep began with has been written over: then the whole step is taken again.
         let has_history = self.formula.carried != 0.0;
         if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first && implicit.left > 0 {
-            let euler = Self {
-                formula: Formula::new(1, self.step, 0.0),
-                ..self
-            };
-            end = euler.take(body, implicit, before);
+            end = self.of_order_1().take(body, implicit, before);
         }
         if matches!(end, End::Gained | End::NotFinite) && (is_last_resort || implicit.left == 0) {
-            end = self.slow_down(body, implicit, before);
+            end = match self.slow_down(body, implicit, before) {
+                End::Fine => self.meet(body, implicit),
+                end => end,
+            };
         }
         end
     }
 
+    /// The same step by implicit Euler.
+    pub(super) fn of_order_1(&self) -> Self {
+        Self {
+            formula: Formula::new(1, self.step, 0.0),
+            ..*self
+        }
+    }
+
     fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+        self.foreseeing(body, implicit).take_formula(body, implicit, before)
+    }
+
+    fn take_formula(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
         if let Some(mut newton) = implicit.newton.take() {
             self.aim(body, implicit);
             self.solve_exactly(body, implicit, &mut newton);
@@ -330,9 +363,13 @@ impl Substep<'_> {
 
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
     fn residual(&self, body: &mut Body, implicit: &mut Implicit) -> f64 {
+        if let Some(contacts) = &mut body.contacts {
+            contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
+        }
         let node_count = body.node_count();
         let state = body.state.substep();
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
+        let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let rates = body.damping.as_ref().map(|damping| damping.rates());
         let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
@@ -369,6 +406,9 @@ impl Substep<'_> {
                     pushes: pushes.slices(nodes.clone()),
                     residuals: &mut residuals,
                 });
+                if let Some(holds) = holds {
+                    holds.add_forces(&nodes, &mut residuals);
+                }
                 for pin in &*pins {
                     for axis in &mut residuals {
                         axis[pin.node as usize - nodes.start] = 0.0;
@@ -390,6 +430,23 @@ impl Substep<'_> {
 
     /// Finds the pushes to the last digit that counts.
     fn solve_exactly(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
+        /// What contacts may still lack, as a part of what they do.
+        const CONTACTS: f64 = 1e-4;
+        for multipliers in 0..=MULTIPLIERS {
+            self.solve_pressed(body, implicit, newton);
+            let Some(contacts) = &mut body.contacts else {
+                break;
+            };
+            let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+            if multipliers == MULTIPLIERS || contacts.holds.missing(push) <= CONTACTS {
+                break;
+            }
+            contacts.holds.improve(push, |_, _| ());
+        }
+    }
+
+    /// The same, with the multipliers that contacts have.
+    fn solve_pressed(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
         let (from, to) = (implicit.place(self.is_first), 1 - implicit.settled);
         let aimed = Aimed {
             time: self.formula.time,
@@ -428,7 +485,8 @@ impl Substep<'_> {
         self.place(body, implicit);
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
-        for _ in 0..NEWTON {
+        for iteration in 0..NEWTON {
+            self.stiffen(body, implicit);
             implicit.corrections.clear();
             let square = implicit.precondition(body, 0.0, self.team).first;
             // What a solution has left of it is rounding.
@@ -447,7 +505,8 @@ impl Substep<'_> {
             let is_stuck = vain > 2;
             error = remaining;
             let budget = whole_budget - products.min(whole_budget);
-            if error <= absolute.max(relative * size) || is_stuck || budget == 0 || !error.is_finite() {
+            let is_found = error <= absolute.max(relative * size) && self.is_balanced(body, implicit);
+            if is_found || is_stuck || budget == 0 || !error.is_finite() {
                 break;
             }
             let goal = Goal {
@@ -460,24 +519,42 @@ impl Substep<'_> {
             let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
             implicit.report.solves += 1;
             products += solved.products;
-            implicit.wear(solved.products);
+            if implicit.stiffened.is_empty() {
+                implicit.wear(solved.products);
+            }
             size = f64::max(size, solved.size);
             solved_error = solved.error;
             // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
-            if solved.size <= absolute && is_held {
+            if solved.size <= absolute && is_held && implicit.stiffened.is_empty() {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
                 error = solved.error;
                 break;
             }
             gone = self.go(body, implicit, solved.work);
-            if solved.size <= relative * size {
+            if iteration < MULTIPLIERS
+                && let Some(contacts) = &mut body.contacts
+            {
+                let (residuals, free) = (&mut implicit.residuals, &body.inverse_masses);
+                let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+                contacts.holds.improve(push, |node, more| {
+                    if free[node] > 0.0 {
+                        residuals.set(node, residuals.get(node) + more.as_vec3());
+                    }
+                });
+            }
+            if solved.size <= relative * size && self.is_balanced(body, implicit) {
                 error = solved.error;
                 break;
             }
         }
-        if !is_held {
+        implicit.soften();
+        let is_touched = body
+            .contacts
+            .as_ref()
+            .is_some_and(|contacts| contacts.holds.are_pressed());
+        if !is_held && !is_touched {
             implicit.balance(body.state.next_positions());
             self.place(body, implicit);
         }

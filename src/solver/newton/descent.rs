@@ -169,9 +169,14 @@ impl Descent {
             let vector = DVec3::new(number(), number(), number());
             if equation.is_free(node) { vector } else { DVec3::ZERO }
         };
-        let solved = self
-            .gradient
-            .solve(&self.network, [&self.matrix, &self.factor], right, 1e-3, budget);
+        let solved = self.gradient.solve(
+            &self.network,
+            equation,
+            [&self.matrix, &self.factor],
+            right,
+            1e-3,
+            budget,
+        );
         found.products += solved.products;
         if !solved.is_negative {
             return false;
@@ -207,6 +212,7 @@ impl Descent {
 
     /// Solves the linearised equation; whether its matrix was found indefinite.
     fn correct(&mut self, tangent: Tangent, shift: f64, goal: &Goal, found: &mut Found) -> bool {
+        self.equation.press();
         self.equation
             .assemble(&self.network, Tangent::Clamped, shift, &mut self.factor);
         factor::factorise(&mut self.factor, &self.network);
@@ -220,9 +226,14 @@ impl Descent {
             }
         };
         let budget = goal.budget.saturating_sub(found.products);
-        let solved = self
-            .gradient
-            .solve(&self.network, [&self.matrix, &self.factor], right, PART, budget);
+        let solved = self.gradient.solve(
+            &self.network,
+            equation,
+            [&self.matrix, &self.factor],
+            right,
+            PART,
+            budget,
+        );
         found.products += solved.products;
         solved.is_negative
     }

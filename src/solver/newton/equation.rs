@@ -7,6 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
 use super::network::Network;
+use crate::contact::Holds;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Link;
@@ -26,6 +27,8 @@ pub(super) struct Equation {
     pub masses: Vec<f64>,
     /// Velocities without a way, m/s: for springs with damping alone.
     pub drifts: Vec<DVec3>,
+    /// What tools do.
+    pub holds: Holds,
     /// What a way counts as a velocity, 1/s; 0: nothing is damped.
     pub rate: f64,
 }
@@ -58,6 +61,7 @@ impl Equation {
             loads: vectors()?,
             masses: memory::filled(0.0, node_count)?,
             drifts: vectors()?,
+            holds: Holds::default(),
             rate: 0.0,
         })
     }
@@ -94,6 +98,12 @@ impl Equation {
             residuals[node] += force;
             residuals[link.neighbour as usize] -= force;
         }
+        let way = |node: usize| self.ways[node];
+        self.holds.show_forces(way, |node, force| {
+            if self.is_free(node) {
+                residuals[node] += force;
+            }
+        });
     }
 
     /// How the function changes where the ways become longer by `part` of `corrections`, and the sum of what it changes by
@@ -121,6 +131,8 @@ impl Equation {
             let along = more.dot(spring.direction);
             add(0.5 * damping(link) * along * (2.0 * spring.speed + self.rate * along));
         }
+        let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
+        self.holds.show_changes(way, more, add);
         sums
     }
 
@@ -145,6 +157,32 @@ impl Equation {
             let joins = self.is_free(node) && self.is_free(neighbour);
             matrix.beside[place] = if joins { -block } else { DMat3::ZERO };
         }
+        self.holds.show_blocks(|node, block| {
+            if self.is_free(node) {
+                matrix.diagonal[node] += whole(block);
+            }
+        });
+    }
+
+    /// Brings what contacts do up to the ways, of which the matrix is made.
+    pub fn press(&mut self) {
+        let ways = &self.ways;
+        self.holds.press(|node| ways[node]);
+    }
+
+    /// Adds to the products with a matrix what contacts of several nodes have beside its diagonal.
+    pub fn add_products(&self, vectors: &[DVec3], products: &mut [DVec3]) {
+        let vector = |node: usize| vectors[node];
+        self.holds.show_products(vector, |node, product| {
+            if self.is_free(node) {
+                products[node] += product;
+            }
+        });
+        self.holds.show_blocks(|node, block| {
+            if self.is_free(node) {
+                products[node] -= whole(block) * vectors[node];
+            }
+        });
     }
 
     /// The matrix of a spring, `x n n^T + y I`.
@@ -225,4 +263,8 @@ fn rest_length(link: &Link) -> f64 {
 
 fn damping(link: &Link) -> f64 {
     f64::from(link.damping)
+}
+
+fn whole([xx, yy, zz, yz, zx, xy]: [f64; 6]) -> DMat3 {
+    DMat3::from_cols_array(&[xx, xy, zx, xy, yy, yz, zx, yz, zz])
 }

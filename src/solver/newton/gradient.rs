@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::equation::Equation;
 use super::factor;
 use super::matrix::Matrix;
 use super::network::Network;
@@ -52,6 +53,7 @@ impl Gradient {
     pub fn solve(
         &mut self,
         network: &Network,
+        equation: &Equation,
         [matrix, factor]: [&Matrix; 2],
         mut right: impl FnMut(usize) -> DVec3,
         part: f64,
@@ -93,6 +95,7 @@ impl Gradient {
                 *search = *preconditioned + *search * carried;
             }
             matrix.multiply(network, &self.searches, &mut self.products);
+            equation.add_products(&self.searches, &mut self.products);
             let curvature = dot(&self.searches, &self.products);
             let scale: f64 = self
                 .searches

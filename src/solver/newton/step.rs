@@ -39,6 +39,9 @@ impl Newton {
     pub(in crate::solver) fn solve(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) -> Found {
         self.descent.read(&*body.springs);
         self.set_up(body, aimed, pushes);
+        if let Some(contacts) = &mut body.contacts {
+            self.descent.equation.holds = std::mem::take(&mut contacts.holds);
+        }
         let extent = self.descent.equation.extent();
         let rate = 1.0 / aimed.time;
         let found = self.descent.run(&Goal {
@@ -52,6 +55,10 @@ impl Newton {
             next_shift: rate * rate,
         });
         self.descent.weigh();
+        self.descent.equation.press();
+        if let Some(contacts) = &mut body.contacts {
+            contacts.holds = std::mem::take(&mut self.descent.equation.holds);
+        }
         self.take_over(body, aimed, pushes);
         found
     }

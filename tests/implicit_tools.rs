@@ -1,0 +1,208 @@
+//! IMPLICIT and NEWTON with tools: what springs do against a tool belongs to the equation, so a tool feels what it should
+//! whatever the step; and a step near tools ends.
+
+use glam::{Quat, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{
+    BodyDefinition, BodyId, Error, Pose, Shape, Solver, StepReport, Storage, ToolDefinition, ToolId, Values, World,
+    WorldDefinition,
+};
+
+const THICKNESS: f32 = 0.06;
+/// The most parts of a step to a tolerance.
+const CUT: u32 = 64;
+const START: f32 = THICKNESS + 1e-3;
+
+/// A block between two planes.
+struct Press {
+    world: World,
+    body: BodyId,
+    planes: [(f32, ToolId); 2],
+    distance: f32,
+    /// What the planes have put in, J.
+    worked: f64,
+}
+
+impl Press {
+    fn new(solver: Solver, storage: Storage, friction: f32) -> Self {
+        Self::to_tolerance(solver, storage, friction, 0.0)
+    }
+
+    fn to_tolerance(solver: Solver, storage: Storage, friction: f32, tolerance: f32) -> Self {
+        let mesh = Mesh::block([THICKNESS; 3], [4; 3]).expect("a block");
+        let node_mass = 0.1 / mesh.positions.len() as f32;
+        let mut world = World::new(WorldDefinition {
+            gravity: Vec3::ZERO,
+            tolerance,
+            max_substeps: if tolerance > 0.0 { CUT } else { 1000 },
+            ..WorldDefinition::default()
+        })
+        .expect("a world");
+        let body = world
+            .create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                masses: Values::Uniform(node_mass),
+                node_dampings: Values::Uniform(30.0 * node_mass),
+                stiffnesses: Values::Uniform(100.0),
+                tetrahedra: &mesh.tetrahedra,
+                triangles: &mesh.triangles,
+                solver,
+                storage,
+                ..BodyDefinition::default()
+            })
+            .expect("a body");
+        let half_turn = Quat::from_rotation_x(std::f32::consts::PI);
+        let planes = [(-1.0, Quat::IDENTITY), (1.0, half_turn)].map(|(side, orientation)| {
+            let tool = ToolDefinition {
+                friction,
+                pose: Pose {
+                    position: Vec3::Y * side * 0.5 * START,
+                    orientation,
+                },
+                ..ToolDefinition::new(Shape::Plane)
+            };
+            (side, world.create_tool(&tool).expect("a tool"))
+        });
+        Self {
+            world,
+            body,
+            planes,
+            distance: START,
+            worked: 0.0,
+        }
+    }
+
+    /// Has the next step bring the planes to this distance.
+    fn lead(&mut self, distance: f32) {
+        for (side, tool) in self.planes {
+            self.world
+                .set_pose(tool, Vec3::Y * side * 0.5 * distance, None)
+                .expect("a pose");
+        }
+    }
+
+    /// Brings the planes to this distance in one step.
+    fn step(&mut self, dt: f32, distance: f32) -> StepReport {
+        self.lead(distance);
+        let report = self.world.step(dt).expect("a step");
+        assert_eq!(report.bodies_restored, 0);
+        for (side, force) in self.forces() {
+            self.worked -= f64::from(force * side * 0.5 * (distance - self.distance));
+        }
+        self.distance = distance;
+        report
+    }
+
+    /// Closes to `gap` within a tenth of a second or one step, and stays for `rest` seconds.
+    fn close(&mut self, dt: f32, gap: f32, rest: f32) {
+        let steps = (0.1 / dt).ceil().max(1.0) as usize;
+        for step in 1..=steps {
+            let part = step as f32 / steps as f32;
+            self.step(dt, START + (gap - START) * part);
+        }
+        for _ in 0..(rest / dt).ceil() as usize {
+            self.step(dt, gap);
+        }
+    }
+
+    fn forces(&self) -> [(f32, f32); 2] {
+        self.planes
+            .map(|(side, tool)| (side, self.world.wrench(tool).expect("a tool").0.y))
+    }
+
+    fn energy(&self) -> f64 {
+        let energy = self.world.body(self.body).expect("the body").energy(Vec3::ZERO);
+        energy.kinetic + energy.elastic
+    }
+}
+
+/// By how much the energy of the springs grows where the block at rest is pressed by a little more: what a plane feels, N.
+fn force_of_rest() -> f64 {
+    let energies = [0.0505, 0.0495].map(|gap| {
+        let mut press = Press::new(Solver::Verlet, Storage::Packed, 0.0);
+        press.close(1e-3, gap, 1.0);
+        press.energy()
+    });
+    (energies[1] - energies[0]) / 0.001
+}
+
+#[test]
+fn a_tool_feels_what_it_presses_whatever_the_step() {
+    let expected = force_of_rest();
+    for (solver, storage, steps) in [
+        (Solver::Implicit, Storage::Packed, &[1e-3, 1.0 / 60.0, 1.0][..]),
+        (Solver::Implicit, Storage::FastLink, &[1.0 / 60.0]),
+        (Solver::Newton, Storage::Packed, &[1.0 / 60.0]),
+    ] {
+        for &dt in steps {
+            let mut press = Press::new(solver, storage, 0.0);
+            press.close(dt, 0.05, 0.3);
+            for (side, force) in press.forces() {
+                let off = f64::from(side * force) / expected - 1.0;
+                assert!(
+                    off.abs() < 0.02,
+                    "{solver:?}, {storage:?}, {dt} s: {force} N, {expected} N is right"
+                );
+            }
+            let energy = press.energy();
+            // The mean force is told, which is off by 1 % where an equation is solved to 1 %.
+            assert!(
+                energy < 1.02 * press.worked,
+                "{solver:?}, {dt} s: {energy} J of {} J",
+                press.worked
+            );
+        }
+    }
+}
+
+#[test]
+fn crushed_flat_a_step_still_ends() {
+    for (solver, dt) in [
+        (Solver::Implicit, 1.0),
+        (Solver::Implicit, 0.1),
+        (Solver::Implicit, 0.01),
+        (Solver::Newton, 0.01),
+    ] {
+        let mut press = Press::new(solver, Storage::Packed, 0.5);
+        let mut gaps = vec![1e-4; 3];
+        gaps.push(10.0 * THICKNESS);
+        for gap in gaps {
+            let report = press.step(dt, gap);
+            // Parts of a millisecond, cut again at most until there are 4096.
+            assert!(report.substeps <= 4096, "{solver:?}, {dt} s: {report:?}");
+            let solved = press.world.body(press.body).expect("the body").solver_report();
+            assert!(solved.error.is_finite());
+            if solver == Solver::Implicit {
+                // A thirty-second of the budget for each, or one where nothing is left.
+                let most = 1000 + 31 * (dt / 1e-3).ceil() as u32 + 2 * 4096;
+                assert!(solved.iterations <= most, "{dt} s: {solved:?}");
+            }
+            let energy = press.energy();
+            assert!(
+                energy < 1e-6 + 1.1 * press.worked,
+                "{solver:?}, {dt} s: {energy} J of {} J",
+                press.worked
+            );
+        }
+    }
+}
+
+#[test]
+fn crushed_flat_a_step_to_a_tolerance_ends() {
+    for solver in [Solver::Implicit, Solver::Newton] {
+        let mut press = Press::to_tolerance(solver, Storage::Packed, 0.5, 1e-4);
+        for gap in [0.02, 1e-4, 1e-4] {
+            press.lead(gap);
+            let before = press.energy();
+            match press.world.step(0.01) {
+                Ok(report) => assert!(report.error_estimate <= 1e-4, "{solver:?}: {report:?}"),
+                // It is cut in two until it would be more parts than are allowed, and nothing has changed then.
+                Err(Error::Unstable { report, allowed }) => {
+                    assert!(report.error_estimate > 1e-4 && allowed == CUT, "{solver:?}: {report:?}");
+                    assert_eq!(press.energy(), before, "{solver:?}");
+                }
+                Err(error) => panic!("{solver:?}: {error}"),
+            }
+        }
+    }
+}

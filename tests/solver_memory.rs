@@ -1,0 +1,79 @@
+//! A body pays for its own solver alone: bytes that each node takes, counted at the allocator. Alone in its program.
+#![allow(unsafe_code)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::Vec3;
+use sinew::{BodyDefinition, Solver, Storage, Values, World, WorldDefinition};
+
+static HELD: AtomicUsize = AtomicUsize::new(0);
+
+struct Weighing;
+
+// SAFETY: every call goes to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Weighing {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        HELD.fetch_add(layout.size(), Ordering::Relaxed);
+        // SAFETY: the same contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the same contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Weighing = Weighing;
+
+/// What a body of so many nodes without springs holds, bytes.
+fn held(solver: Solver, storage: Storage, node_count: usize) -> usize {
+    let positions: Vec<Vec3> = (0..node_count).map(|i| Vec3::X * i as f32 * 0.01).collect();
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let before = HELD.load(Ordering::Relaxed);
+    world
+        .create_body(&BodyDefinition {
+            positions: &positions,
+            masses: Values::Uniform(1e-3),
+            springs: Some(&[]),
+            solver,
+            storage,
+            mass_scaling: 0.0,
+            ..BodyDefinition::default()
+        })
+        .expect("a body");
+    HELD.load(Ordering::Relaxed) - before
+}
+
+/// What each node of a body takes beyond what it takes with VERLET, bytes.
+fn beyond_verlet(solver: Solver, storage: Storage) -> usize {
+    let [few, many] =
+        [1 << 14, 1 << 15].map(|count| held(solver, storage, count) - held(Solver::Verlet, storage, count));
+    (many - few) >> 14
+}
+
+#[test]
+fn a_body_pays_for_its_own_solver_alone() {
+    /// Three numbers of single and of double precision.
+    const SINGLE: usize = 12;
+    const DOUBLE: usize = 24;
+    for storage in [Storage::Packed, Storage::FastLink] {
+        // Two histories of two vectors each, and the pushes.
+        let both = 5 * SINGLE;
+        // What positions lack, twice; anchors, ways, loads, drifts; masses and inertia; residuals; five vectors of the conjugate
+        // gradient; two diagonals of 3x3; where rows begin.
+        let newton = 2 * SINGLE + 4 * DOUBLE + 2 * 8 + DOUBLE + 5 * DOUBLE + 2 * 72 + 8;
+        assert_eq!(beyond_verlet(Solver::Newton, storage), both + newton, "{storage:?}");
+        // Five vectors, the inertia, two symmetric blocks, and a place in a cluster; each 256 nodes or fewer a few numbers more.
+        let implicit = 5 * SINGLE + 4 + 2 * 24 + 4 * 4;
+        let found = beyond_verlet(Solver::Implicit, storage);
+        let records = 16 * usize::from(found > both + implicit + 16);
+        assert!(
+            (both + implicit..both + implicit + records + 16).contains(&found),
+            "{storage:?}: {found}"
+        );
+    }
+}
