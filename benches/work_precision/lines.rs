@@ -18,7 +18,7 @@ const FINER: [f64; 4] = [1.0, 1.5, 2.0, 4.0];
 /// World steps of a span, 1/64 s each to 0.1 ms.
 const WORLD_STEPS: [u32; 3] = [2, 32, 312];
 /// Parts of the mass that may be added, in frames of 1/64 s; the default is 1e-3.
-const ADDED: [f32; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
+const ADDED: [f32; 7] = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
 /// Steps of a span for what is stable at any step, 1/64 s to 0.49 ms.
 const STEPS: [u32; 6] = [2, 4, 8, 16, 32, 64];
 /// The same for the yardstick.

@@ -14,6 +14,7 @@ mod contact;
 mod energy;
 mod estimate;
 mod gradient;
+mod iterations;
 mod loops;
 mod rigid;
 mod step;

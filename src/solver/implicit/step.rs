@@ -1,8 +1,7 @@
-//! A step of IMPLICIT: where it aims, Newton's iterations, and what is made of their result.
+//! A step of IMPLICIT: in how many parts it is taken, where each aims, and what is made of what Newton's iterations find.
 
 use super::energy::Before;
-use super::gradient::Goal;
-use super::loops::{Add, Finish, Place, Predict, Residual, Slope};
+use super::loops::{Add, Finish, Place, Predict};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
@@ -10,7 +9,7 @@ use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
 use crate::solver::verlet::{Taken, begin};
-use crate::springs::{ChosenKernel, Motion, Tangent, TileForces, tile_count, tile_nodes};
+use crate::springs::{Tangent, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
@@ -19,11 +18,8 @@ const LARGEST_RATIO: f64 = 2.0;
 /// What rounding makes of a coordinate, as a fraction of the body's extent.
 const ROUNDING: f64 = 1e-7;
 
-/// Linearised equations solved in a step at most.
-const NEWTON: u32 = 40;
-
 /// The multipliers of contacts are improved so often: then what is left has a function to minimise.
-const MULTIPLIERS: u32 = 3;
+pub(super) const MULTIPLIERS: u32 = 3;
 
 /// How one step is made from what was before.
 #[derive(Clone, Copy, Debug)]
@@ -225,7 +221,7 @@ impl Substep<'_> {
     }
 
     /// The tangent of the springs for this step.
-    fn tangent(&self) -> Tangent {
+    pub(super) fn tangent(&self) -> Tangent {
         Tangent {
             floor: 0.0,
             rate: (1.0 / self.formula.time) as f32,
@@ -308,7 +304,7 @@ impl Substep<'_> {
     }
 
     /// Puts the nodes where `pushes` has them.
-    fn place(&self, body: &mut Body, implicit: &Implicit) {
+    pub(super) fn place(&self, body: &mut Body, implicit: &Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
         let history = implicit.last(self.is_first);
@@ -361,70 +357,8 @@ impl Substep<'_> {
         );
     }
 
-    /// What the equation lacks with the nodes where they are: its product with the last correction, J.
-    fn residual(&self, body: &mut Body, implicit: &mut Implicit) -> f64 {
-        if let Some(contacts) = &mut body.contacts {
-            contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
-        }
-        let node_count = body.node_count();
-        let state = body.state.substep();
-        let (positions, velocities) = (&*state.next_positions, &*state.velocities);
-        let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
-        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
-        let rates = body.damping.as_ref().map(|damping| damping.rates());
-        let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
-        let motion = Motion {
-            positions: positions.view().with_records(body.records.as_ref()),
-            ..Motion::at(positions, body.predicted_velocities.as_ref())
-        };
-        let (pushes, corrections, inertia) = (&implicit.pushes, &implicit.corrections, &implicit.inertia);
-        let gravity = self.request.gravity;
-        let written = (
-            implicit.residuals.tiles_mut(),
-            Items::new(&mut implicit.partials),
-            body.pins.tiles_mut(),
-        );
-        self.team.pass(
-            tile_count(node_count),
-            written,
-            |tile, (mut residuals, partial, pins)| {
-                let nodes = tile_nodes(tile, node_count);
-                let mut forces = TileForces::ZERO;
-                springs.forces(tile, &motion, &mut forces);
-                for pin in &mut *pins {
-                    let node = pin.node as usize;
-                    pin.solved = -(forces.get(node - nodes.start) + gravity * masses[node]);
-                }
-                kernel.run(Residual {
-                    gravity,
-                    forces: &forces,
-                    applied: applied.map(|applied| applied.slices(nodes.clone())),
-                    masses: &masses[nodes.clone()],
-                    rates: rates.map(|rates| &rates[nodes.clone()]),
-                    inertia: &inertia[nodes.clone()],
-                    velocities: velocities.slices(nodes.clone()),
-                    pushes: pushes.slices(nodes.clone()),
-                    residuals: &mut residuals,
-                });
-                if let Some(holds) = holds {
-                    holds.add_forces(&nodes, &mut residuals);
-                }
-                for pin in &*pins {
-                    for axis in &mut residuals {
-                        axis[pin.node as usize - nodes.start] = 0.0;
-                    }
-                }
-                partial.first = kernel.run(Slope {
-                    residuals: residuals.map(|axis| &*axis),
-                    corrections: corrections.slices(nodes),
-                });
-            },
-        );
-        implicit.partials.iter().map(|partial| partial.first).sum()
-    }
-
     /// How many products this equation may take: its share of what is left, and one at least.
-    fn budget(&self, implicit: &Implicit) -> u32 {
+    pub(super) fn budget(&self, implicit: &Implicit) -> u32 {
         (implicit.left / self.equations).max(1)
     }
 
@@ -467,129 +401,6 @@ impl Substep<'_> {
         report.solves += found.iterations;
         report.error = report.error.max(found.error as f32);
         report.converged &= found.converged;
-    }
-
-    /// Newton's iterations.
-    fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
-        let all_inertia = implicit.all_inertia;
-        // What each of n equations lacks of its ways goes into the velocity too, and grows as n² by the step's end.
-        let part = self.end - self.start;
-        let tolerated = 0.1 * f64::from(self.request.tolerance) * part * part;
-        let absolute = f64::max(tolerated.powi(2) * all_inertia, implicit.noise.error);
-        let relative = f64::from(implicit.accuracy).powi(2);
-        let whole_budget = self.budget(implicit);
-        let mut products = 0;
-        let mut size = 0.0;
-        let mut error = f64::INFINITY;
-        let is_held = body.pins.iter().next().is_some();
-        self.place(body, implicit);
-        self.residual(body, implicit);
-        let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
-        for iteration in 0..NEWTON {
-            self.stiffen(body, implicit);
-            implicit.corrections.clear();
-            let square = implicit.precondition(body, 0.0, self.team).first;
-            // What a solution has left of it is rounding.
-            if gone == 1.0 && square <= implicit.noise.square {
-                error = solved_error.max(implicit.noise.error);
-                break;
-            }
-            implicit.spectrum.begin();
-            let remaining = square * implicit.spectrum.factor();
-            // What rounding leaves is not improved by going all the way again.
-            vain = if gone == 1.0 && remaining > 0.5 * error {
-                vain + 1
-            } else {
-                0
-            };
-            let is_stuck = vain > 2;
-            error = remaining;
-            let budget = whole_budget - products.min(whole_budget);
-            let is_found = error <= absolute.max(relative * size) && self.is_balanced(body, implicit);
-            if is_found || is_stuck || budget == 0 || !error.is_finite() {
-                break;
-            }
-            let goal = Goal {
-                budget,
-                absolute,
-                relative,
-                size,
-            };
-            let positions = body.state.next_positions();
-            let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
-            implicit.report.solves += 1;
-            products += solved.products;
-            if implicit.stiffened.is_empty() {
-                implicit.wear(solved.products);
-            }
-            size = f64::max(size, solved.size);
-            solved_error = solved.error;
-            // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
-            // nothing holds is to keep its momentum.
-            if solved.size <= absolute && is_held && implicit.stiffened.is_empty() {
-                add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
-                self.place(body, implicit);
-                error = solved.error;
-                break;
-            }
-            gone = self.go(body, implicit, solved.work);
-            if iteration < MULTIPLIERS
-                && let Some(contacts) = &mut body.contacts
-            {
-                let (residuals, free) = (&mut implicit.residuals, &body.inverse_masses);
-                let push = |node: usize| implicit.pushes.get(node).as_dvec3();
-                contacts.holds.improve(push, |node, more| {
-                    if free[node] > 0.0 {
-                        residuals.set(node, residuals.get(node) + more.as_vec3());
-                    }
-                });
-            }
-            if solved.size <= relative * size && self.is_balanced(body, implicit) {
-                error = solved.error;
-                break;
-            }
-        }
-        implicit.soften();
-        let is_touched = body
-            .contacts
-            .as_ref()
-            .is_some_and(|contacts| contacts.holds.are_pressed());
-        if !is_held && !is_touched {
-            implicit.balance(body.state.next_positions());
-            self.place(body, implicit);
-        }
-        implicit.report.iterations += products;
-        implicit.left = implicit.left.saturating_sub(products);
-        implicit.report.converged &= products < whole_budget && error.is_finite();
-        let error = (error / all_inertia).sqrt() as f32;
-        implicit.report.error = implicit.report.error.max(error);
-    }
-
-    /// Goes along the correction, as far as the forces do not turn against it: what part of it.
-    fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
-        let mut gone = 1.0;
-        add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
-        for _ in 0..12 {
-            self.place(body, implicit);
-            let slope = self.residual(body, implicit);
-            if slope >= -0.5 * work {
-                return gone;
-            }
-            // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
-            let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
-            let next = gone * f64::clamp(part, 0.1, 0.7);
-            add(
-                &mut implicit.pushes,
-                &implicit.corrections,
-                (next - gone) as f32,
-                body.kernel,
-                self.team,
-            );
-            gone = next;
-        }
-        self.place(body, implicit);
-        self.residual(body, implicit);
-        gone
     }
 
     /// Makes velocities and history of what was found; whether all is finite.
@@ -655,13 +466,4 @@ impl Substep<'_> {
         );
         body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and).finite
     }
-}
-
-/// Adds `factor` times the one to the other.
-fn add(to: &mut Vectors, from: &Vectors, factor: f32, kernel: ChosenKernel, team: &Team) {
-    let node_count = from.len();
-    team.pass(tile_count(node_count), to.tiles_mut(), |tile, to| {
-        let from = from.slices(tile_nodes(tile, node_count));
-        kernel.run(Add { factor, from, to });
-    });
 }

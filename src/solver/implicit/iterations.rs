@@ -1,0 +1,208 @@
+//! Newton's iterations of a step of IMPLICIT: along corrections, to where its equation holds.
+
+use super::Implicit;
+use super::gradient::Goal;
+use super::loops::{Add, Residual, Slope};
+use super::step::{MULTIPLIERS, Substep};
+use crate::body::{Body, Vectors};
+use crate::springs::{ChosenKernel, Motion, TileForces, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
+
+/// Linearised equations solved in a step at most.
+const NEWTON: u32 = 40;
+
+impl Substep<'_> {
+    /// What the equation lacks with the nodes where they are: its product with the last correction, J.
+    fn residual(&self, body: &mut Body, implicit: &mut Implicit) -> f64 {
+        if let Some(contacts) = &mut body.contacts {
+            contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
+        }
+        let node_count = body.node_count();
+        let state = body.state.substep();
+        let (positions, velocities) = (&*state.next_positions, &*state.velocities);
+        let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
+        let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+        let rates = body.damping.as_ref().map(|damping| damping.rates());
+        let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
+        let motion = Motion {
+            positions: positions.view().with_records(body.records.as_ref()),
+            ..Motion::at(positions, body.predicted_velocities.as_ref())
+        };
+        let (pushes, corrections, inertia) = (&implicit.pushes, &implicit.corrections, &implicit.inertia);
+        let gravity = self.request.gravity;
+        let written = (
+            implicit.residuals.tiles_mut(),
+            Items::new(&mut implicit.partials),
+            body.pins.tiles_mut(),
+        );
+        self.team.pass(
+            tile_count(node_count),
+            written,
+            |tile, (mut residuals, partial, pins)| {
+                let nodes = tile_nodes(tile, node_count);
+                let mut forces = TileForces::ZERO;
+                springs.forces(tile, &motion, &mut forces);
+                for pin in &mut *pins {
+                    let node = pin.node as usize;
+                    pin.solved = -(forces.get(node - nodes.start) + gravity * masses[node]);
+                }
+                kernel.run(Residual {
+                    gravity,
+                    forces: &forces,
+                    applied: applied.map(|applied| applied.slices(nodes.clone())),
+                    masses: &masses[nodes.clone()],
+                    rates: rates.map(|rates| &rates[nodes.clone()]),
+                    inertia: &inertia[nodes.clone()],
+                    velocities: velocities.slices(nodes.clone()),
+                    pushes: pushes.slices(nodes.clone()),
+                    residuals: &mut residuals,
+                });
+                if let Some(holds) = holds {
+                    holds.add_forces(&nodes, &mut residuals);
+                }
+                for pin in &*pins {
+                    for axis in &mut residuals {
+                        axis[pin.node as usize - nodes.start] = 0.0;
+                    }
+                }
+                partial.first = kernel.run(Slope {
+                    residuals: residuals.map(|axis| &*axis),
+                    corrections: corrections.slices(nodes),
+                });
+            },
+        );
+        implicit.partials.iter().map(|partial| partial.first).sum()
+    }
+
+    /// Goes down to where the equation holds, as far as is asked for and the budget reaches.
+    pub(super) fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
+        let all_inertia = implicit.all_inertia;
+        // What each of n equations lacks of its ways goes into the velocity too, and grows as n² by the step's end.
+        let part = self.end - self.start;
+        let tolerated = 0.1 * f64::from(self.request.tolerance) * part * part;
+        let absolute = f64::max(tolerated.powi(2) * all_inertia, implicit.noise.error);
+        let relative = f64::from(implicit.accuracy).powi(2);
+        let whole_budget = self.budget(implicit);
+        let mut products = 0;
+        let mut size = 0.0;
+        let mut error = f64::INFINITY;
+        let is_held = body.pins.iter().next().is_some();
+        self.place(body, implicit);
+        self.residual(body, implicit);
+        let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
+        for iteration in 0..NEWTON {
+            self.stiffen(body, implicit);
+            implicit.corrections.clear();
+            let square = implicit.precondition(body, 0.0, self.team).first;
+            // What a solution has left of it is rounding.
+            if gone == 1.0 && square <= implicit.noise.square {
+                error = solved_error.max(implicit.noise.error);
+                break;
+            }
+            implicit.spectrum.begin();
+            let remaining = square * implicit.spectrum.factor();
+            // What rounding leaves is not improved by going all the way again.
+            vain = if gone == 1.0 && remaining > 0.5 * error {
+                vain + 1
+            } else {
+                0
+            };
+            let is_stuck = vain > 2;
+            error = remaining;
+            let budget = whole_budget - products.min(whole_budget);
+            let is_found = error <= absolute.max(relative * size) && self.is_balanced(body, implicit);
+            if is_found || is_stuck || budget == 0 || !error.is_finite() {
+                break;
+            }
+            let goal = Goal {
+                budget,
+                absolute,
+                relative,
+                size,
+            };
+            let positions = body.state.next_positions();
+            let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
+            implicit.report.solves += 1;
+            products += solved.products;
+            if implicit.stiffened.is_empty() {
+                implicit.wear(solved.products);
+            }
+            size = f64::max(size, solved.size);
+            solved_error = solved.error;
+            // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
+            // nothing holds is to keep its momentum.
+            if solved.size <= absolute && is_held && implicit.stiffened.is_empty() {
+                add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
+                self.place(body, implicit);
+                error = solved.error;
+                break;
+            }
+            gone = self.go(body, implicit, solved.work);
+            if iteration < MULTIPLIERS
+                && let Some(contacts) = &mut body.contacts
+            {
+                let (residuals, free) = (&mut implicit.residuals, &body.inverse_masses);
+                let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+                contacts.holds.improve(push, |node, more| {
+                    if free[node] > 0.0 {
+                        residuals.set(node, residuals.get(node) + more.as_vec3());
+                    }
+                });
+            }
+            if solved.size <= relative * size && self.is_balanced(body, implicit) {
+                error = solved.error;
+                break;
+            }
+        }
+        implicit.soften();
+        let is_touched = body
+            .contacts
+            .as_ref()
+            .is_some_and(|contacts| contacts.holds.are_pressed());
+        if !is_held && !is_touched {
+            implicit.balance(body.state.next_positions());
+            self.place(body, implicit);
+        }
+        implicit.report.iterations += products;
+        implicit.left = implicit.left.saturating_sub(products);
+        implicit.report.converged &= products < whole_budget && error.is_finite();
+        let error = (error / all_inertia).sqrt() as f32;
+        implicit.report.error = implicit.report.error.max(error);
+    }
+
+    /// Goes along the correction, as far as the forces do not turn against it: what part of it.
+    fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
+        let mut gone = 1.0;
+        add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
+        for _ in 0..12 {
+            self.place(body, implicit);
+            let slope = self.residual(body, implicit);
+            if slope >= -0.5 * work {
+                return gone;
+            }
+            // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
+            let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
+            let next = gone * f64::clamp(part, 0.1, 0.7);
+            add(
+                &mut implicit.pushes,
+                &implicit.corrections,
+                (next - gone) as f32,
+                body.kernel,
+                self.team,
+            );
+            gone = next;
+        }
+        self.place(body, implicit);
+        self.residual(body, implicit);
+        gone
+    }
+}
+
+/// Adds `factor` times the one to the other.
+fn add(to: &mut Vectors, from: &Vectors, factor: f32, kernel: ChosenKernel, team: &Team) {
+    let node_count = from.len();
+    team.pass(tile_count(node_count), to.tiles_mut(), |tile, to| {
+        let from = from.slices(tile_nodes(tile, node_count));
+        kernel.run(Add { factor, from, to });
+    });
+}
