@@ -266,31 +266,59 @@ impl Tile<'_> {
                 };
                 sums.add::<1, Q>(here, [links], &self.tangent);
             }
-            for near in start.near as usize..end.near as usize {
-                let header = columns.near.get_unchecked(near);
-                let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
-                let spring = self.spring::<L, Q>(header.material(), &mut own, lane);
-                let there = self.gathered_near::<L, Q>(indices);
-                let links = Links {
-                    spring,
-                    there,
-                    lanes: u32::from(header.lanes) >> lane,
-                };
+            // The neighbours of a column are fetched before what the one before it adds up to: that is a long chain of operations,
+            // each of which waits for the last, and the processor looks no more than a column or two ahead for other work.
+            if start.near < end.near {
+                let mut links = self.near::<L, Q>(start.near as usize, &mut own, lane);
+                for near in start.near as usize + 1..end.near as usize {
+                    let next = self.near::<L, Q>(near, &mut own, lane);
+                    sums.add::<1, Q>(here, [links], &self.tangent);
+                    links = next;
+                }
                 sums.add::<1, Q>(here, [links], &self.tangent);
             }
-            for far in start.far as usize..end.far as usize {
-                let header = columns.far.get_unchecked(far);
-                let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
-                let spring = self.spring::<L, Q>(header.material(), &mut own, lane);
-                let there = self.gathered::<L, Q>(indices);
-                let links = Links {
-                    spring,
-                    there,
-                    lanes: u32::from(header.lanes) >> lane,
-                };
+            if start.far < end.far {
+                let mut links = self.far::<L, Q>(start.far as usize, &mut own, lane);
+                for far in start.far as usize + 1..end.far as usize {
+                    let next = self.far::<L, Q>(far, &mut own, lane);
+                    sums.add::<1, Q>(here, [links], &self.tangent);
+                    links = next;
+                }
                 sums.add::<1, Q>(here, [links], &self.tangent);
             }
             sums
+        }
+    }
+
+    /// A gather with small indices.
+    #[inline(always)]
+    unsafe fn near<L: Lanes, Q: Quantity>(&self, near: usize, own: &mut usize, lane: usize) -> Links<L> {
+        let columns = self.columns;
+        // SAFETY: as in `others`.
+        unsafe {
+            let header = columns.near.get_unchecked(near);
+            let indices = columns.near_indices.get_unchecked(near).0.as_ptr().add(lane);
+            Links {
+                spring: self.spring::<L, Q>(header.material(), own, lane),
+                there: self.gathered_near::<L, Q>(indices),
+                lanes: u32::from(header.lanes) >> lane,
+            }
+        }
+    }
+
+    /// A gather with indices of any size.
+    #[inline(always)]
+    unsafe fn far<L: Lanes, Q: Quantity>(&self, far: usize, own: &mut usize, lane: usize) -> Links<L> {
+        let columns = self.columns;
+        // SAFETY: as in `others`.
+        unsafe {
+            let header = columns.far.get_unchecked(far);
+            let indices = columns.far_indices.get_unchecked(far).0.as_ptr().add(lane);
+            Links {
+                spring: self.spring::<L, Q>(header.material(), own, lane),
+                there: self.gathered::<L, Q>(indices),
+                lanes: u32::from(header.lanes) >> lane,
+            }
         }
     }
 

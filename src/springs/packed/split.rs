@@ -45,6 +45,12 @@ pub(crate) struct Row {
     pub lanes: u16,
 }
 
+impl Row {
+    fn links(&self) -> usize {
+        self.lanes.count_ones() as usize
+    }
+}
+
 /// How a block is split.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Split {
@@ -57,44 +63,65 @@ pub(crate) struct Split {
 
 /// Finds the split of a block that costs least; `levels` is room to count in.
 pub(crate) fn cheapest(rows: &[Row], levels: &mut Vec<u32>) -> Result<Split> {
-    let mut best: Option<Split> = None;
-    for (run, mixed) in FEWEST.into_iter().flat_map(|run| [(run, false), (run, true)]) {
-        let mut cost = 0.0;
-        for rows in rows.chunk_by(|a, b| mixed || a.kind == b.kind) {
-            let mut heights = [0; LANES];
-            levels.clear();
-            for row in rows {
-                if row.lanes.count_ones() as usize >= run {
-                    cost += row.costs.run;
-                    continue;
-                }
-                for (lane, height) in heights.iter_mut().enumerate() {
-                    if row.lanes >> lane & 1 == 1 {
-                        match levels.get_mut(*height) {
-                            Some(level) => *level += 1,
-                            None => memory::push(levels, 1)?,
-                        }
-                        *height += 1;
-                    }
-                }
-            }
-            let costs = if mixed { Costs::OWN } else { rows[0].costs };
-            // A level is never fuller than the one below.
-            for &links in &*levels {
-                cost += if links as usize >= GATHER {
-                    costs.gather
-                } else {
-                    costs.stray * f64::from(links)
-                };
-            }
+    let has_kinds = rows.windows(2).any(|pair| pair[0].kind != pair[1].kind);
+    let mut best = Split {
+        run: FEWEST[0],
+        mixed: false,
+        cost: cost(rows, FEWEST[0], false, levels)?,
+    };
+    let mut offer = |run, mixed| -> Result<()> {
+        let cost = cost(rows, run, mixed, levels)?;
+        if cost < best.cost {
+            best = Split { run, mixed, cost };
         }
-        if best.is_none_or(|best| cost < best.cost) {
-            best = Some(Split { run, mixed, cost });
+        Ok(())
+    };
+    if has_kinds {
+        offer(FEWEST[0], true)?;
+    }
+    for pair in FEWEST.windows(2) {
+        // Else it is the same split.
+        if rows.iter().any(|row| (pair[0]..pair[1]).contains(&row.links())) {
+            offer(pair[1], false)?;
+            if has_kinds {
+                offer(pair[1], true)?;
+            }
         }
     }
-    Ok(best.unwrap_or(Split {
-        run: LANES,
-        mixed: false,
-        cost: 0.0,
-    }))
+    Ok(best)
+}
+
+/// What a block costs with runs of at least so many links, and gathers of kinds or mixed.
+fn cost(rows: &[Row], run: usize, mixed: bool, levels: &mut Vec<u32>) -> Result<f64> {
+    let mut cost = 0.0;
+    for rows in rows.chunk_by(|a, b| mixed || a.kind == b.kind) {
+        let mut heights = [0; LANES];
+        levels.clear();
+        for row in rows {
+            if row.links() >= run {
+                cost += row.costs.run;
+                continue;
+            }
+            let mut lanes = row.lanes;
+            while lanes != 0 {
+                let height = &mut heights[lanes.trailing_zeros() as usize];
+                match levels.get_mut(*height) {
+                    Some(level) => *level += 1,
+                    None => memory::push(levels, 1)?,
+                }
+                *height += 1;
+                lanes &= lanes - 1;
+            }
+        }
+        let costs = if mixed { Costs::OWN } else { rows[0].costs };
+        // A level is never fuller than the one below.
+        for &links in &*levels {
+            cost += if links as usize >= GATHER {
+                costs.gather
+            } else {
+                costs.stray * f64::from(links)
+            };
+        }
+    }
+    Ok(cost)
 }
