@@ -137,19 +137,28 @@ impl Strays {
     #[inline(always)]
     pub(super) fn batch(&self, batch: usize) -> Batch {
         let start = batch * LANES;
-        let count = (self.len() - start).min(LANES);
-        let index = |lane: usize| start + lane.min(count - 1);
-        let places: [u16; LANES] = std::array::from_fn(|lane| self.places[index(lane)]);
+        let places: [u16; LANES] = sixteen(&self.places[start..]);
         Batch {
-            count,
+            count: (self.len() - start).min(LANES),
             places,
             nodes: places.map(|place| (self.first + usize::from(place)) as u32),
-            neighbours: std::array::from_fn(|lane| self.neighbours[index(lane)]),
-            stiffnesses: Line(std::array::from_fn(|lane| self.stiffnesses[index(lane)])),
-            rest_lengths: Line(std::array::from_fn(|lane| self.rest_lengths[index(lane)])),
-            dampings: Line(std::array::from_fn(|lane| {
-                if self.damped { self.dampings[index(lane)] } else { 0.0 }
-            })),
+            neighbours: sixteen(&self.neighbours[start..]),
+            stiffnesses: Line(sixteen(&self.stiffnesses[start..])),
+            rest_lengths: Line(sixteen(&self.rest_lengths[start..])),
+            dampings: if self.damped {
+                Line(sixteen(&self.dampings[start..]))
+            } else {
+                Line::ZERO
+            },
         }
+    }
+}
+
+/// The first sixteen; where there are fewer, the last of them again.
+#[inline(always)]
+fn sixteen<T: Copy>(values: &[T]) -> [T; LANES] {
+    match values.first_chunk() {
+        Some(whole) => *whole,
+        None => std::array::from_fn(|lane| values[lane.min(values.len() - 1)]),
     }
 }
