@@ -67,8 +67,8 @@ fn a_body_pays_for_its_own_solver_alone() {
         // gradient; two diagonals of 3x3; where rows begin.
         let newton = 2 * SINGLE + 4 * DOUBLE + 2 * 8 + DOUBLE + 5 * DOUBLE + 2 * 72 + 8;
         assert_eq!(beyond_verlet(Solver::Newton, storage), both + newton, "{storage:?}");
-        // Five vectors, the inertia, two symmetric blocks, and a place in a cluster; each 256 nodes or fewer a few numbers more.
-        let implicit = 5 * SINGLE + 4 + 2 * 24 + 4 * 4;
+        // Five vectors, what positions lack, twice, the inertia, two symmetric blocks, and a place in a cluster; each 256 nodes or fewer a few numbers more.
+        let implicit = 5 * SINGLE + 2 * SINGLE + 4 + 2 * 24 + 4 * 4;
         let found = beyond_verlet(Solver::Implicit, storage);
         let records = 16 * usize::from(found > both + implicit + 16);
         assert!(

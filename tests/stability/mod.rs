@@ -88,7 +88,18 @@ const fn jitter(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
     }
 }
 
-pub const KNOWN: [Known; 21] = [
+/// A step of 1 s on the block takes some ten thousand products: with the default budget it reports that it has not converged.
+const SHORT: &str = "a thousand products do not suffice";
+
+const fn short(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
+    Known {
+        case,
+        applies,
+        figure: SHORT,
+    }
+}
+
+pub const KNOWN: [Known; 16] = [
     // 6.8e-6 of the size after 10 ms.
     lost("started rotated", |setup| is_verlet_at(setup, 1e-5)),
     // 1.65e-3 of the stretch.
@@ -109,48 +120,48 @@ pub const KNOWN: [Known; 21] = [
     lost("a million steps", |setup| is_full(setup) && is_verlet_at(setup, 1e-5)),
     // 3e-6 of the size.
     lost("a million steps", |setup| is_full(setup) && is_verlet_at(setup, 1e-4)),
-    // Of IMPLICIT, that adds to positions as VERLET does: 6.9e-6 of the size, 1.64e-3 of the stretch, a strain of 2.1e-4, 3.0e-6 to
-    // 4.5e-6 of the size.
-    lost("started rotated", |setup| is_implicit_in_full(setup, &[1e-5])),
-    lost("masses 1 : 1e6", |setup| is_implicit_in_full(setup, &[1e-5])),
-    lost("a pin stretched and let go", |setup| {
-        is_implicit_in_full(setup, &[1e-5])
-    }),
-    lost("steps of changing length", |setup| is_implicit_in_full(setup, &[1e-5])),
-    // 2.2e-5 and 2.1e-6 of the size.
-    lost("a million steps", |setup| is_implicit_in_full(setup, &[1e-5, 1e-4])),
     // 1.0e-5 and 1.5e-5 of the energy at first is still kinetic after 20 steps.
     jitter("scattered at random", |setup| {
         is_full(setup) && setup.solver != Solver::Verlet && setup.step == 0.1
     }),
-    // 1.6e-4 to 1e-3 of the stretch.
+    // 1.1e-4 to 4.7e-4 of the stretch.
     jitter("stiffness 1 : 1e6 in a chain", |setup| {
-        is_implicit_in_full(setup, &[1e-5, 1e-4, 1e-3])
+        let is_packed = setup.storage == Storage::Packed;
+        let steps: &[f32] = if is_packed {
+            &[1e-5, 1e-4, 1e-3]
+        } else {
+            &[1e-4, 1e-3, FRAME]
+        };
+        is_implicit_in_full(setup, steps)
     }),
-    // 4.4e-4 to 3.1e-3 of the sag up to 1 ms, 9.2e-4 to 0.12 from 0.1 s on.
+    // 1.1e-4 to 8.9e-4 of the sag.
     jitter("stiffness 1 : 1e6 in a block", |setup| {
-        is_implicit_in_full(setup, &[1e-5, 1e-4, 1e-3, 0.1, 1.0])
+        let is_framed = matches!(setup.storage, Storage::Efficient | Storage::FastLink);
+        is_implicit_in_full(setup, &[1e-4, 1e-3])
+            || is_framed && is_implicit_in_full(setup, &[FRAME])
+            || setup.storage == Storage::Packed && is_implicit_in_full(setup, &[1e-5])
     }),
     // 1.5e-6 of the kinetic energy at first.
     jitter("scattered at random", |setup| {
         is_implicit(setup, Storage::Packed, &[0.1])
     }),
-    // 1.5e-6 of the size.
-    jitter("started rotated", |setup| {
-        is_implicit(setup, Storage::Efficient, &[1e-5])
-    }),
     // 7.5e-4 of the stretch.
     jitter("stiffness 1 : 1e6 in a chain", |setup| {
         !is_full(setup) && is_implicit(setup, Storage::DynamicBulk, &[1e-3])
     }),
-    // 1.2e-4 to 0.11 of the sag.
+    // 1.1e-4 and more of the sag.
     jitter("stiffness 1 : 1e6 in a block", |setup| {
-        let of = |storage, step| is_implicit(setup, storage, &[step]);
-        of(Storage::Packed, 1e-3) || of(Storage::FastLink, 0.1) || of(Storage::DynamicBulk, 1.0)
+        is_implicit(setup, Storage::Packed, &[1e-3]) || is_implicit(setup, Storage::Efficient, &[FRAME])
     }),
-    // 2.3e-5 of the parts' momentum, 1e-5 is right.
+    // 2.4e-2 to 0.28 of the sag.
+    short("stiffness 1 : 1e6 in a block", |setup| {
+        is_implicit_in_full(setup, &[0.1, 1.0])
+            || is_implicit(setup, Storage::FastLink, &[0.1])
+            || is_implicit(setup, Storage::DynamicBulk, &[1.0])
+    }),
+    // Up to twice what rounding a step's velocities may add to the momentum.
     jitter("nodes in one place, springs without length", |setup| {
-        is_implicit(setup, Storage::Efficient, &[1.0])
+        is_implicit(setup, Storage::Efficient, &[1.0]) || is_implicit_in_full(setup, &[1.0])
     }),
     Known {
         case: "springs removed in motion",
@@ -158,6 +169,8 @@ pub const KNOWN: [Known; 21] = [
         figure: "implicit formulas keep momentum, and lose angular momentum",
     },
 ];
+
+const FRAME: f32 = 1.0 / 60.0;
 
 fn is_implicit(setup: &Setup, storage: Storage, steps: &[f32]) -> bool {
     setup.solver == Solver::Implicit && setup.storage == storage && steps.contains(&setup.step)

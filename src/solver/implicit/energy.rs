@@ -111,6 +111,7 @@ impl Substep<'_> {
             history.energy = None;
         }
         history.gains.clear();
+        history.remainders.clear();
         history.step = 0.0;
         history.credit = 0.0;
         End::Fine

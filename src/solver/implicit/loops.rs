@@ -34,6 +34,7 @@ pub(super) struct Place<'a, 'b> {
     pub velocities: [&'a [f32]; 3],
     pub ways: [&'a [f32]; 3],
     pub pushes: [&'a [f32]; 3],
+    pub remainders: [&'a [f32]; 3],
     pub next: &'b mut [&'a mut [f32]; 3],
 }
 
@@ -46,9 +47,10 @@ impl Loops for Place<'_, '_> {
             let count = next.len();
             let (positions, velocities) = (&self.positions[axis][..count], &self.velocities[axis][..count]);
             let (ways, pushes) = (&self.ways[axis][..count], &self.pushes[axis][..count]);
+            let remainders = &self.remainders[axis][..count];
             for place in 0..count {
                 let way = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
-                next[place] = or_zero(positions[place] + way);
+                next[place] = or_zero(positions[place] + (way + remainders[place]));
             }
         }
     }
@@ -172,6 +174,30 @@ impl Loops for Finish<'_, '_> {
                 for ((velocity, before), gain) in velocities.iter_mut().zip(before[axis]).zip(&*gains) {
                     *velocity = still_or(before + gain);
                 }
+            }
+        }
+    }
+}
+
+/// What positions lack at the end of ways that began at `starts`, with what they lacked there.
+pub(super) struct Remain<'a, 'b> {
+    pub ways: [&'b [f32]; 3],
+    pub starts: [&'a [f32]; 3],
+    pub ends: [&'a [f32]; 3],
+    pub remainders: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Remain<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (axis, remainders) in self.remainders.iter_mut().enumerate() {
+            let count = remainders.len();
+            let (ways, starts) = (&self.ways[axis][..count], &self.starts[axis][..count]);
+            let ends = &self.ends[axis][..count];
+            for place in 0..count {
+                remainders[place] = (ways[place] + remainders[place]) - (ends[place] - starts[place]);
             }
         }
     }

@@ -39,6 +39,8 @@ pub(crate) struct History {
     pub ways: Vectors,
     /// How its velocity changed, m/s.
     pub gains: Vectors,
+    /// What its position lacks of where it is, m: less than the last place of its coordinates (Kahan 1965). NEWTON keeps its own.
+    pub remainders: Vectors,
     /// s; 0: there is none.
     pub step: f32,
     /// Kinetic and elastic energy at its end, J, where they are known.
@@ -59,10 +61,12 @@ enum End {
 }
 
 impl History {
-    fn new(node_count: usize) -> Result<Self> {
+    /// For so many nodes, and those of them whose remainders are kept.
+    fn new(node_count: usize, solved_count: usize) -> Result<Self> {
         Ok(Self {
             ways: Vectors::zeros(node_count)?,
             gains: Vectors::zeros(node_count)?,
+            remainders: Vectors::zeros(solved_count)?,
             step: 0.0,
             energy: None,
             credit: 0.0,
@@ -172,7 +176,10 @@ impl Implicit {
             budget,
             left: 0,
             accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
-            histories: [History::new(node_count)?, History::new(node_count)?],
+            histories: [
+                History::new(node_count, solved_count)?,
+                History::new(node_count, solved_count)?,
+            ],
             settled: 0,
             pushes: Vectors::zeros(node_count)?,
             means: None,
@@ -262,7 +269,9 @@ impl Implicit {
 
     /// Nodes have been put elsewhere or given other velocities.
     pub fn forget_history(&mut self) {
-        self.histories[self.settled].step = 0.0;
+        let history = &mut self.histories[self.settled];
+        history.step = 0.0;
+        history.remainders.clear();
         if let Some(newton) = &mut self.newton {
             newton.forget_remainders(self.settled);
         }
@@ -280,11 +289,12 @@ impl Implicit {
         let History {
             ways,
             gains,
+            remainders,
             step,
             energy,
             credit,
         } = &self.histories[self.settled];
-        for vector in ways.iter().chain(gains.iter()) {
+        for vector in ways.iter().chain(gains.iter()).chain(remainders.iter()) {
             hasher.write_floats(&vector.to_array());
         }
         hasher.write_floats(&[*step, self.accuracy]);

@@ -1,7 +1,7 @@
 //! A step of IMPLICIT: in how many parts it is taken, where each aims, and what is made of what Newton's iterations find.
 
 use super::energy::Before;
-use super::loops::{Add, Finish, Place, Predict};
+use super::loops::{Add, Finish, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
@@ -332,6 +332,7 @@ impl Substep<'_> {
                     velocities: velocities.slices(nodes.clone()),
                     ways: history.ways.slices(nodes.clone()),
                     pushes: implicit.pushes.slices(nodes.clone()),
+                    remainders: history.remainders.slices(nodes.clone()),
                     next: &mut next,
                 });
                 if let Some(mut predicted) = predicted {
@@ -418,20 +419,22 @@ impl Substep<'_> {
         let from = self.is_first.then_some(settled);
         next.step = self.step as f32;
         let state = body.state.substep();
-        let positions = &*state.next_positions;
+        let (starts, positions) = (state.positions, &*state.next_positions);
         let pushes = &implicit.pushes;
+        let is_exact = implicit.newton.is_some();
         let before = self.is_first.then_some(state.first_velocities);
         let written = (
             state.velocities.tiles_mut(),
             next.ways.tiles_mut(),
             next.gains.tiles_mut(),
+            (!is_exact).then(|| next.remainders.tiles_mut()),
             body.pins.tiles_mut(),
             Items::new(&mut body.surveys),
         );
         self.team.pass(
             tile_count(node_count),
             written,
-            |tile, (mut velocities, mut ways, mut gains, pins, survey)| {
+            |tile, (mut velocities, mut ways, mut gains, remainders, pins, survey)| {
                 let nodes = tile_nodes(tile, node_count);
                 if let Some(from) = from {
                     for (to, from) in ways.iter_mut().zip(from.ways.slices(nodes.clone())) {
@@ -450,6 +453,24 @@ impl Substep<'_> {
                     ways: &mut ways,
                     gains: &mut gains,
                 });
+                if let Some(mut remainders) = remainders {
+                    if let Some(from) = from {
+                        for (to, from) in remainders.iter_mut().zip(from.remainders.slices(nodes.clone())) {
+                            to.copy_from_slice(from);
+                        }
+                    }
+                    kernel.run(Remain {
+                        ways: ways.each_ref().map(|axis| &**axis),
+                        starts: starts.slices(nodes.clone()),
+                        ends: positions.slices(nodes.clone()),
+                        remainders: &mut remainders,
+                    });
+                    for pin in &*pins {
+                        for axis in &mut remainders {
+                            axis[pin.node as usize - nodes.start] = 0.0;
+                        }
+                    }
+                }
                 for pin in pins {
                     let place = pin.node as usize - nodes.start;
                     let velocity = pin.travel / dt;
