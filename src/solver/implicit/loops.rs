@@ -197,7 +197,9 @@ impl Loops for Remain<'_, '_> {
             let (ways, starts) = (&self.ways[axis][..count], &self.starts[axis][..count]);
             let ends = &self.ends[axis][..count];
             for place in 0..count {
-                remainders[place] = (ways[place] + remainders[place]) - (ends[place] - starts[place]);
+                let lacking = (ways[place] + remainders[place]) - (ends[place] - starts[place]);
+                // What was put to 0 because it was next to nothing stays there.
+                remainders[place] = if ends[place] == 0.0 { 0.0 } else { lacking };
             }
         }
     }
