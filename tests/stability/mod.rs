@@ -69,63 +69,49 @@ pub struct Known {
 /// `x += h v` loses what is below half of the last place of x: at 10 us a body stops short of rest, or starts late.
 const LOST: &str = "x += h v loses what is below half of the last place of x";
 
-const fn lost(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
-    Known {
-        case,
-        applies,
-        figure: LOST,
-    }
-}
-
 /// The equations of IMPLICIT are solved to a hundredth of what a step changes: near rest that leaves a jitter.
 const JITTER: &str = "solved to a hundredth of a step's change";
-
-const fn jitter(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
-    Known {
-        case,
-        applies,
-        figure: JITTER,
-    }
-}
 
 /// A step of 1 s on the block takes some ten thousand products: with the default budget it reports that it has not converged.
 const SHORT: &str = "a thousand products do not suffice";
 
-const fn short(case: &'static str, applies: fn(&Setup) -> bool) -> Known {
-    Known {
-        case,
-        applies,
-        figure: SHORT,
-    }
+const fn known(figure: &'static str, case: &'static str, applies: fn(&Setup) -> bool) -> Known {
+    Known { case, applies, figure }
 }
 
 pub const KNOWN: [Known; 16] = [
     // 6.8e-6 of the size after 10 ms.
-    lost("started rotated", |setup| is_verlet_at(setup, 1e-5)),
+    known(LOST, "started rotated", |setup| is_verlet_at(setup, 1e-5)),
     // 1.65e-3 of the stretch.
-    lost("masses 1 : 1e6", |setup| is_full(setup) && is_verlet_at(setup, 1e-5)),
+    known(LOST, "masses 1 : 1e6", |setup| {
+        is_full(setup) && is_verlet_at(setup, 1e-5)
+    }),
     // 1e-3 of the sag.
-    lost("stiffness 1 : 1e6 in a block", |setup| {
+    known(LOST, "stiffness 1 : 1e6 in a block", |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // A strain of 2.2e-4.
-    lost("a pin stretched and let go", |setup| {
+    known(LOST, "a pin stretched and let go", |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 3e-6 to 4.5e-6 of the size.
-    lost("steps of changing length", |setup| {
+    known(LOST, "steps of changing length", |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
     }),
     // 2.5e-5 of the size.
-    lost("a million steps", |setup| is_full(setup) && is_verlet_at(setup, 1e-5)),
+    known(LOST, "a million steps", |setup| {
+        is_full(setup) && is_verlet_at(setup, 1e-5)
+    }),
     // 3e-6 of the size.
-    lost("a million steps", |setup| is_full(setup) && is_verlet_at(setup, 1e-4)),
+    known(LOST, "a million steps", |setup| {
+        is_full(setup) && is_verlet_at(setup, 1e-4)
+    }),
     // 1.0e-5 and 1.5e-5 of the energy at first is still kinetic after 20 steps.
-    jitter("scattered at random", |setup| {
+    known(JITTER, "scattered at random", |setup| {
         is_full(setup) && setup.solver != Solver::Verlet && setup.step == 0.1
     }),
     // 1.1e-4 to 4.7e-4 of the stretch.
-    jitter("stiffness 1 : 1e6 in a chain", |setup| {
+    known(JITTER, "stiffness 1 : 1e6 in a chain", |setup| {
         let is_packed = setup.storage == Storage::Packed;
         let steps: &[f32] = if is_packed {
             &[1e-5, 1e-4, 1e-3]
@@ -135,30 +121,30 @@ pub const KNOWN: [Known; 16] = [
         is_implicit_in_full(setup, steps)
     }),
     // 1.1e-4 to 1.2e-3 of the sag.
-    jitter("stiffness 1 : 1e6 in a block", |setup| {
+    known(JITTER, "stiffness 1 : 1e6 in a block", |setup| {
         let is_framed = matches!(setup.storage, Storage::Efficient | Storage::FastLink);
         is_implicit_in_full(setup, &[1e-5, 1e-4, 1e-3]) || is_framed && is_implicit_in_full(setup, &[FRAME])
     }),
     // 1.5e-6 of the kinetic energy at first.
-    jitter("scattered at random", |setup| {
+    known(JITTER, "scattered at random", |setup| {
         is_implicit(setup, Storage::Packed, &[0.1])
     }),
     // 7.5e-4 of the stretch.
-    jitter("stiffness 1 : 1e6 in a chain", |setup| {
+    known(JITTER, "stiffness 1 : 1e6 in a chain", |setup| {
         !is_full(setup) && is_implicit(setup, Storage::DynamicBulk, &[1e-3])
     }),
     // 1.1e-4 and more of the sag.
-    jitter("stiffness 1 : 1e6 in a block", |setup| {
+    known(JITTER, "stiffness 1 : 1e6 in a block", |setup| {
         is_implicit(setup, Storage::Packed, &[1e-3]) || is_implicit(setup, Storage::Efficient, &[FRAME])
     }),
     // 2.4e-2 to 0.28 of the sag.
-    short("stiffness 1 : 1e6 in a block", |setup| {
+    known(SHORT, "stiffness 1 : 1e6 in a block", |setup| {
         is_implicit_in_full(setup, &[0.1, 1.0])
             || is_implicit(setup, Storage::FastLink, &[0.1])
             || is_implicit(setup, Storage::DynamicBulk, &[1.0])
     }),
     // Up to twice what rounding a step's velocities may add to the momentum.
-    jitter("nodes in one place, springs without length", |setup| {
+    known(JITTER, "nodes in one place, springs without length", |setup| {
         is_implicit(setup, Storage::Efficient, &[1.0]) || is_implicit_in_full(setup, &[1.0])
     }),
     Known {
