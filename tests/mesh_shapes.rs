@@ -102,6 +102,7 @@ fn the_boundary_leaves_out_inner_faces() {
         positions: unit_points(),
         triangles: boundary(&[[0, 1, 2, 3]]).unwrap(),
         tetrahedra: vec![],
+        ..Mesh::default()
     };
     assert!((mesh.volume().unwrap() - 1.0 / 6.0).abs() < 1e-12);
 }
@@ -128,6 +129,7 @@ fn volumes_are_signed_and_keep_their_digits_far_away() {
         positions: unit_points(),
         triangles: TETRAHEDRON.to_vec(),
         tetrahedra: vec![],
+        ..Mesh::default()
     };
     assert!((mesh.volume().unwrap() - 1.0 / 6.0).abs() < 1e-12);
     for position in &mut mesh.positions {
@@ -196,6 +198,7 @@ fn triangles_on_tetrahedra_face_outward() {
         positions: unit_points(),
         triangles,
         tetrahedra: vec![[0, 1, 2, 3]],
+        ..Mesh::default()
     };
     let tidied = tidy(&mesh).unwrap();
     assert_eq!(
@@ -232,6 +235,7 @@ fn welding_agrees_with_comparing_all_pairs() {
         positions: positions.clone(),
         triangles,
         tetrahedra: vec![],
+        ..Mesh::default()
     })
     .unwrap();
 
@@ -256,6 +260,7 @@ fn tidy_refuses_what_cannot_be() {
         positions: unit_points(),
         triangles: vec![[0, 1, 4]],
         tetrahedra: vec![],
+        ..Mesh::default()
     };
     assert!(matches!(tidy(&mesh), Err(Error::InvalidArgument(m)) if m.contains("node 4")));
     mesh.triangles = vec![[0, 1, 2]];

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::error::{Error, Result};
+use crate::material::Material;
 use crate::memory;
 use crate::springs::Rounding;
 
@@ -60,6 +61,9 @@ pub enum Solver {
     Newton,
 }
 
+/// A smaller mass, kg, has no finite inverse.
+pub(crate) const SMALLEST_MASS: f32 = 1e-37;
+
 /// The most iterations of a step.
 const MOST_ITERATIONS: u32 = 1_000_000;
 
@@ -70,11 +74,13 @@ pub struct BodyDefinition<'a> {
     pub positions: &'a [Vec3],
     /// Where each node would be at rest, in metres; `None`: as in `positions`.
     pub rest_positions: Option<&'a [Vec3]>,
-    /// The mass of each node in kilograms, above 0; in [`Values::Each`] 0 pins a node for good.
+    /// The mass of each node in kilograms, above 0; in [`Values::Each`] 0 pins a node for good. [`Values::Uniform`] of 0 where a
+    /// material's density gives them.
     pub masses: Values<'a>,
     /// Damping of each node against the world, in N s/m, at least 0.
     pub node_dampings: Values<'a>,
-    /// The two nodes of each spring, each pair once; `None`: the edges of the triangles and tetrahedra, each once.
+    /// The two nodes of each spring, each pair once; `None`: the edges of the triangles, tetrahedra and cells, of
+    /// the latter with the diagonals of their faces, each once.
     pub springs: Option<&'a [[u32; 2]]>,
     /// The stiffness of each spring in N/m, at least 0.
     pub stiffnesses: Values<'a>,
@@ -83,10 +89,16 @@ pub struct BodyDefinition<'a> {
     /// Damping along each spring in N s/m, at least 0.
     pub spring_dampings: Values<'a>,
     /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the boundary of the
-    /// tetrahedra.
+    /// tetrahedra, or of the cells.
     pub triangles: &'a [[u32; 3]],
     /// Tetrahedra, four nodes each.
     pub tetrahedra: &'a [[u32; 4]],
+    /// Cubes of a lattice, eight nodes each, numbered by bits: x 1, y 2, z 4; see [`Mesh::lattice`](crate::mesh::Mesh::lattice).
+    pub cells: &'a [[u32; 8]],
+    /// Where stiffnesses, and masses if it has a density, come from instead; it fills the tetrahedra or the cells, or else the
+    /// triangles, as they are at rest. `springs` must be `None` then and `stiffnesses` 0, and triangles beside tetrahedra or cells
+    /// may have no edges but theirs.
+    pub material: Option<Material>,
     /// How the springs are kept.
     pub storage: Storage,
     /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
@@ -126,6 +138,8 @@ impl Default for BodyDefinition<'_> {
             spring_dampings: Values::Uniform(0.0),
             triangles: &[],
             tetrahedra: &[],
+            cells: &[],
+            material: None,
             storage: Storage::Packed,
             springs_per_node: 0,
             solver: Solver::Verlet,
@@ -161,10 +175,13 @@ impl BodyDefinition<'_> {
             expect_count("rest_positions", rest.len(), nodes)?;
             finite_vectors("rest_positions", rest)?;
         }
-        self.check_masses()?;
+        if self.material.is_none_or(|material| material.density == 0.0) {
+            self.check_masses()?;
+        }
         check_values("node_damping", &self.node_dampings, nodes)?;
         node_indices("triangles", self.triangles, nodes)?;
         node_indices("tetrahedra", self.tetrahedra, nodes)?;
+        node_indices("cells", self.cells, nodes)?;
         match self.springs {
             Some(springs) => self.check_springs(springs)?,
             None => {
@@ -183,12 +200,13 @@ impl BodyDefinition<'_> {
                 check_values("spring_damping", &self.spring_dampings, 0)?;
             }
         }
+        if let Some(material) = &self.material {
+            material.check(self)?;
+        }
         self.check_solver()
     }
 
     fn check_masses(&self) -> Result<()> {
-        // A smaller mass has no finite inverse.
-        const SMALLEST_MASS: f32 = 1e-37;
         match self.masses {
             Values::Uniform(mass) if !(mass >= SMALLEST_MASS && mass.is_finite()) => Err(Error::invalid(format!(
                 "node_mass is {mass}: must be above 0 and finite"
@@ -275,7 +293,7 @@ impl BodyDefinition<'_> {
         let pairs = match self.springs {
             Some(springs) => springs,
             None => {
-                edges = crate::mesh::edges(self.triangles, self.tetrahedra)?;
+                edges = crate::mesh::element_edges(self.triangles, self.tetrahedra, self.cells)?;
                 &edges
             }
         };

@@ -18,7 +18,7 @@ use glam::{DVec3, Vec3};
 pub(crate) use coarse::CoarseStep;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
-pub(crate) use definition::{Spring, finite_vector, not_negative};
+pub(crate) use definition::{SMALLEST_MASS, Spring, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
@@ -26,6 +26,7 @@ pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
 use crate::error::Result;
+use crate::material::Made;
 use crate::memory;
 use crate::solver::{Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched, close};
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
@@ -95,6 +96,12 @@ pub(crate) struct Needs {
 impl Body {
     pub(crate) fn new(definition: &BodyDefinition, needs: Needs) -> Result<Self> {
         definition.check()?;
+        let made = definition
+            .material
+            .as_ref()
+            .map(|material| Made::of(material, definition));
+        let made = made.transpose()?;
+        let definition = &made.as_ref().map_or(*definition, |made| made.complete(definition));
         let node_count = definition.positions.len();
         let mut springs = definition.resolved_springs()?;
         let order = match definition.storage {
@@ -124,10 +131,10 @@ impl Body {
             rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
             Some(NodeDamping::new(rates)?)
         };
-        let surface = if definition.triangles.is_empty() {
-            crate::mesh::boundary(definition.tetrahedra)?
-        } else {
-            memory::copied(definition.triangles)?
+        let surface = match (definition.triangles, definition.tetrahedra) {
+            ([], []) => crate::mesh::cell_boundary(definition.cells)?,
+            ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,
+            (triangles, _) => memory::copied(triangles)?,
         };
         let mut body = Self {
             order,
@@ -203,7 +210,8 @@ impl Body {
         self.masses.len()
     }
 
-    /// The triangles that are drawn and touched, outward: those of its definition, or the boundary of its tetrahedra.
+    /// The triangles that are drawn and touched, outward: those of its definition, or the boundary of its tetrahedra
+    /// or cells.
     pub fn surface(&self) -> &[[u32; 3]] {
         &self.surface
     }

@@ -9,6 +9,7 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::body::{Body, BodyDefinition, Solver, Storage, Values};
 use crate::error::{Error, Result};
+use crate::material::{Material, Model};
 use crate::slots::SlotId;
 use crate::world::BodyId;
 
@@ -38,6 +39,12 @@ pub const SINEW_SOLVER_IMPLICIT: u32 = 1;
 /// The accurate reference: the equations of IMPLICIT, solved to the last digits that count; slow.
 pub const SINEW_SOLVER_NEWTON: u32 = 2;
 
+/// Springs as they are given, or all of one stiffness.
+pub const SINEW_MATERIAL_NONE: u32 = 0;
+/// Springs along the edges of the elements, as stiff as young_modulus asks for. Poisson's ratio is what they imply: 1/4 for
+/// tetrahedra and cells, 1/3 in the plane for triangles.
+pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
+
 /// What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -54,11 +61,11 @@ pub struct sinew_body_def {
     pub masses: *const f32,
     /// node_count floats, N s/m: the gamma_i of m a = ... - gamma_i v; nullable: node_damping.
     pub node_dampings: *const f32,
-    /// kg, above 0; no default.
+    /// kg, above 0; no default. 0 where density gives each node its mass.
     pub node_mass: f32,
     /// N s/m; default 0.
     pub node_damping: f32,
-    /// 2 spring_count node indices, each pair once; NULL: the edges of triangles and tetrahedra, each once (then no
+    /// 2 spring_count node indices, each pair once; NULL: the edges of triangles, tetrahedra and cells, each once (then no
     /// per-spring arrays); not NULL with spring_count 0: no springs.
     pub springs: *const u32,
     /// Springs given.
@@ -73,8 +80,8 @@ pub struct sinew_body_def {
     pub stiffness: f32,
     /// N s/m; default 0.
     pub spring_damping: f32,
-    /// 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra is what is
-    /// drawn and touched.
+    /// 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra or cells is what
+    /// is drawn and touched.
     pub triangles: *const u32,
     /// Triangles given.
     pub triangle_count: usize,
@@ -111,6 +118,26 @@ pub struct sinew_body_def {
     pub mass_scaling: f32,
     /// 0.
     pub reserved2: u32,
+    /// 8 cell_count node indices: cubes of a lattice, corners numbered by bits, x 1, y 2, z 4; nullable. Their springs are their
+    /// edges and the diagonals of their faces.
+    pub cells: *const u32,
+    /// Cells given.
+    pub cell_count: usize,
+    /// SINEW_MATERIAL_...; NONE, the default: the four below are 0. Else it fills the tetrahedra or the cells, or where there are
+    /// none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
+    /// triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001.
+    pub material: u32,
+    /// Young's modulus at small strains, Pa, above 0. Where tetrahedra or triangles are irregular the body is softer, by 5 to 25 %.
+    pub young_modulus: f32,
+    /// 0, the default: what the material implies; with SINEW_MATERIAL_SPRINGS else just that, within 0.001.
+    pub poisson_ratio: f32,
+    /// kg/m3, above 0: each node has its share of the mass of the elements about it (masses is NULL and node_mass 0 then, and
+    /// every node belongs to an element); 0, the default: masses or node_mass.
+    pub density: f32,
+    /// m: above 0 where the material fills triangles, else 0.
+    pub thickness: f32,
+    /// 0.
+    pub reserved3: u32,
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
@@ -181,6 +208,7 @@ unsafe impl Versioned for sinew_body_def {
     const SIZES: &'static [usize] = &[
         offset_of!(Self, order),
         offset_of!(Self, mass_scaling),
+        offset_of!(Self, cells),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -255,7 +283,46 @@ impl sinew_body_def {
             reserved1: 0,
             mass_scaling: BodyDefinition::default().mass_scaling,
             reserved2: 0,
+            cells: std::ptr::null(),
+            cell_count: 0,
+            material: SINEW_MATERIAL_NONE,
+            young_modulus: 0.0,
+            poisson_ratio: 0.0,
+            density: 0.0,
+            thickness: 0.0,
+            reserved3: 0,
         }
+    }
+
+    fn material(&self) -> Result<Option<Material>> {
+        let model = match self.material {
+            SINEW_MATERIAL_NONE => {
+                for (name, value) in [
+                    ("young_modulus", self.young_modulus),
+                    ("poisson_ratio", self.poisson_ratio),
+                    ("density", self.density),
+                    ("thickness", self.thickness),
+                ] {
+                    if value != 0.0 {
+                        return Err(Error::invalid(format!(
+                            "{name} is {value} while material is SINEW_MATERIAL_NONE: must be 0"
+                        )));
+                    }
+                }
+                return Ok(None);
+            }
+            SINEW_MATERIAL_SPRINGS => Model::Springs,
+            unknown => {
+                return Err(Error::invalid(format!("material is {unknown}: no SINEW_MATERIAL_...")));
+            }
+        };
+        Ok(Some(Material {
+            model,
+            young_modulus: self.young_modulus,
+            poisson_ratio: self.poisson_ratio,
+            density: self.density,
+            thickness: self.thickness,
+        }))
     }
 
     /// The definition with its arrays found.
@@ -266,6 +333,7 @@ impl sinew_body_def {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
         memory::reserved("reserved2", self.reserved2)?;
+        memory::reserved("reserved3", self.reserved3)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -287,6 +355,8 @@ impl sinew_body_def {
                 spring_dampings: values("spring_dampings", self.spring_dampings, springs, self.spring_damping)?,
                 triangles: memory::array("triangles", self.triangles.cast(), self.triangle_count)?,
                 tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
+                cells: memory::array("cells", self.cells.cast(), self.cell_count)?,
+                material: self.material()?,
                 storage: match self.storage {
                     SINEW_STORAGE_PACKED => Storage::Packed,
                     SINEW_STORAGE_EFFICIENT => Storage::Efficient,

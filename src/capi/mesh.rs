@@ -1,5 +1,7 @@
 //! Meshes: from files, and shapes that need none.
 
+use std::mem::offset_of;
+
 use libc::c_char;
 
 use super::guard::guard;
@@ -8,7 +10,7 @@ use super::status::sinew_status;
 use crate::error::{Error, Result};
 use crate::mesh::{self, LoadedMesh, Mesh, MeshFormat, is_closed};
 
-/// A mesh: positions, triangles and tetrahedra. It belongs to the caller, never changes, and may be read by any number of
+/// A mesh: positions, triangles, tetrahedra and cells. It belongs to the caller, never changes, and may be read by any number of
 /// threads at once.
 pub struct sinew_mesh {
     loaded: LoadedMesh,
@@ -50,7 +52,8 @@ pub struct sinew_mesh_view {
     pub tetrahedra: *const u32,
     /// Tetrahedra.
     pub tetrahedron_count: usize,
-    /// 3 surface_triangle_count node indices, outward: the boundary of the tetrahedra; without tetrahedra the triangles.
+    /// 3 surface_triangle_count node indices, outward: the boundary of the tetrahedra or cells; without either the
+    /// triangles.
     pub surface: *const u32,
     /// Triangles of the surface.
     pub surface_triangle_count: usize,
@@ -72,11 +75,15 @@ pub struct sinew_mesh_view {
     pub closed: u32,
     /// 0.
     pub reserved: u32,
+    /// 8 cell_count node indices: the cubes of a lattice, corners numbered by bits, x 1, y 2, z 4.
+    pub cells: *const u32,
+    /// Cells.
+    pub cell_count: usize,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_mesh_view {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[offset_of!(Self, cells), size_of::<Self>()];
     const NAME: &'static str = "sinew_mesh_view";
 }
 
@@ -107,6 +114,8 @@ impl sinew_mesh_view {
             flipped_tetrahedra: report.flipped_tetrahedra,
             closed: u32::from(*closed),
             reserved: 0,
+            cells: loaded.mesh.cells.as_ptr().cast(),
+            cell_count: loaded.mesh.cells.len(),
         }
     }
 }
@@ -207,6 +216,28 @@ pub unsafe extern "C" fn sinew_mesh_create_block(
             let size: &[f32; 3] = memory::reference("size", size.cast())?;
             let cells: &[u32; 3] = memory::reference("cells", cells.cast())?;
             LoadedMesh::unchanged(Mesh::block(*size, *cells)?)
+        })
+    }
+}
+
+/// Makes a lattice of cubes about the origin: `edge` is the length of theirs, m, above 0, `cells` their 3 numbers along the axes,
+/// at least 1. The caller destroys it with sinew_mesh_destroy.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+///
+/// # Safety
+/// `cells` is NULL or 3 numbers; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_mesh_create_lattice(
+    edge: f32,
+    cells: *const u32,
+    out: *mut *mut sinew_mesh,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        create(out, || {
+            let cells: &[u32; 3] = memory::reference("cells", cells.cast())?;
+            LoadedMesh::unchanged(Mesh::lattice(edge, *cells)?)
         })
     }
 }

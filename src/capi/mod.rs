@@ -16,6 +16,8 @@ pub mod world;
 
 pub mod body;
 
+pub mod material;
+
 pub mod rest_state;
 
 pub mod tool;

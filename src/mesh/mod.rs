@@ -1,7 +1,7 @@
 //! Meshes: topology, tidying, shapes, files.
 //!
-//! [`load`] reads a file, [`Mesh::cloth`], [`Mesh::block`] and [`Mesh::organ`] make a shape, and [`tidy`] cleans a mesh
-//! that is already in memory.
+//! [`load`] reads a file, [`Mesh::cloth`], [`Mesh::block`], [`Mesh::lattice`] and [`Mesh::organ`] make a shape, and [`tidy`]
+//! cleans a mesh that is already in memory.
 
 mod file;
 pub(crate) mod order;
@@ -18,9 +18,12 @@ use crate::{Error, Result};
 pub use file::{MeshFormat, load};
 pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
+pub(crate) use topology::{
+    CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, cell_boundary, element_edges, pack, unpack,
+};
 pub use topology::{boundary, edges, is_closed};
 
-/// Nodes joined by triangles, tetrahedra or both. Positions in metres; triangles outward by the right-hand rule.
+/// Nodes joined by triangles, tetrahedra or cells. Positions in metres; triangles outward by the right-hand rule.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Where each node is, in metres.
@@ -29,12 +32,14 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Four node indices each.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Eight node indices each, the corners of a cube numbered by bits: x 1, y 2, z 4.
+    pub cells: Vec<[u32; 8]>,
 }
 
 impl Mesh {
     /// Whether the mesh can be used at all: every position finite, every index that of a node.
     ///
-    /// Errors: [`Error::InvalidArgument`] naming the first node, triangle or tetrahedron that is not.
+    /// Errors: [`Error::InvalidArgument`] naming the first node, triangle, tetrahedron or cell that is not.
     pub fn check(&self) -> Result<()> {
         let node_count = self.positions.len();
         // The last index is kept for "no node".
@@ -48,35 +53,41 @@ impl Mesh {
             return Err(Error::invalid(format!("the position of node {node} is {position}")));
         }
         check_indices("triangle", &self.triangles, node_count)?;
-        check_indices("tetrahedron", &self.tetrahedra, node_count)
+        check_indices("tetrahedron", &self.tetrahedra, node_count)?;
+        check_indices("cell", &self.cells, node_count)
     }
 
-    /// Every edge of the triangles and tetrahedra once: see [`edges`].
+    /// Every edge of the triangles and tetrahedra once, see [`edges`], and of the cells, with the diagonals of their faces.
     pub fn edges(&self) -> Result<Vec<[u32; 2]>> {
-        edges(&self.triangles, &self.tetrahedra)
+        element_edges(&self.triangles, &self.tetrahedra, &self.cells)
     }
 
-    /// The surface, outward: the [`boundary`] of the tetrahedra; without tetrahedra, the triangles.
+    /// The surface, outward: the [`boundary`] of the tetrahedra; without tetrahedra, the outer faces of the cells; without
+    /// these, the triangles.
     ///
     /// Errors: [`Error::OutOfMemory`].
     pub fn surface(&self) -> Result<Vec<[u32; 3]>> {
         if !self.tetrahedra.is_empty() {
             return boundary(&self.tetrahedra);
         }
+        if !self.cells.is_empty() {
+            return cell_boundary(&self.cells);
+        }
         let mut surface = memory::reserved(self.triangles.len())?;
         surface.extend_from_slice(&self.triangles);
         Ok(surface)
     }
 
-    /// The volume in m³: that of the tetrahedra, those inside out counting as negative; without tetrahedra, what the
+    /// The volume in m³: that of the tetrahedra and cells, those inside out counting as negative; without either, what the
     /// triangles enclose, negative if they face inward and without meaning if they are not closed.
     ///
     /// Errors: [`Error::InvalidArgument`] where [`Mesh::check`] gives it.
     pub fn volume(&self) -> Result<f64> {
         self.check()?;
-        if !self.tetrahedra.is_empty() {
-            let volumes = self.tetrahedra.iter().map(|&t| self.corners(t));
-            return Ok(volumes.map(tetrahedron_volume).sum());
+        if !self.tetrahedra.is_empty() || !self.cells.is_empty() {
+            let tetrahedra = self.tetrahedra.iter().map(|&t| tetrahedron_volume(self.corners(t)));
+            let cells = self.cells.iter().map(|&cell| cell_volume(self.corners(cell)));
+            return Ok(tetrahedra.sum::<f64>() + cells.sum::<f64>());
         }
         // Seen from a point of the mesh rather than from the origin, a body far away loses no digits.
         let apex = self.positions.first().map_or(DVec3::ZERO, |p| p.as_dvec3());
@@ -91,8 +102,14 @@ impl Mesh {
 }
 
 /// The volume of a tetrahedron: positive if `b`, `c`, `d` turn counter-clockwise seen from outside, `a` behind them.
-fn tetrahedron_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
+pub(crate) fn tetrahedron_volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).dot((c - a).cross(d - a)) / 6.0
+}
+
+/// The volume of a cell, cut into tetrahedra: positive if its axes are right-handed.
+pub(crate) fn cell_volume(corners: [DVec3; 8]) -> f64 {
+    let volumes = shapes::EVEN_CELL.map(|tetrahedron| tetrahedron_volume(tetrahedron.map(|corner| corners[corner])));
+    volumes.iter().sum()
 }
 
 fn check_indices<const N: usize>(what: &str, elements: &[[u32; N]], node_count: usize) -> Result<()> {

@@ -1,15 +1,15 @@
-//! Regular shapes: a cloth and a block.
+//! Regular shapes: a cloth, a block and a lattice.
 
 use glam::Vec3;
 
 use super::tidy::NO_NODE;
-use super::{Mesh, boundary};
+use super::{Mesh, boundary, cell_boundary};
 use crate::memory;
 use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
 /// face are cut in opposite ways, so that the diagonals meet.
-const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 6, 5], [1, 0, 5, 3], [2, 0, 3, 6], [4, 0, 6, 5], [7, 3, 5, 6]];
+pub(super) const EVEN_CELL: [[usize; 4]; 5] = [[0, 3, 6, 5], [1, 0, 5, 3], [2, 0, 3, 6], [4, 0, 6, 5], [7, 3, 5, 6]];
 const ODD_CELL: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4]];
 
 impl Mesh {
@@ -21,8 +21,8 @@ impl Mesh {
     /// or cells so small that their nodes would coincide; [`Error::OutOfMemory`].
     pub fn cloth(size: [f32; 2], cells: [u32; 2]) -> Result<Mesh> {
         check_node_count(&cells)?;
-        let xs = axis("x", size[0], cells[0])?;
-        let zs = axis("z", size[1], cells[1])?;
+        let xs = axis("x", f64::from(size[0]), cells[0])?;
+        let zs = axis("z", f64::from(size[1]), cells[1])?;
         let mut mesh = Mesh::default();
         mesh.positions.try_reserve_exact(xs.len() * zs.len())?;
         for &z in &zs {
@@ -51,36 +51,68 @@ impl Mesh {
     /// Errors: those of [`Mesh::cloth`].
     pub fn block(size: [f32; 3], cells: [u32; 3]) -> Result<Mesh> {
         check_node_count(&cells)?;
-        let xs = axis("x", size[0], cells[0])?;
-        let ys = axis("y", size[1], cells[1])?;
-        let zs = axis("z", size[2], cells[2])?;
+        let xs = axis("x", f64::from(size[0]), cells[0])?;
+        let ys = axis("y", f64::from(size[1]), cells[1])?;
+        let zs = axis("z", f64::from(size[2]), cells[2])?;
         let mut mesh = Mesh::default();
-        mesh.positions.try_reserve_exact(xs.len() * ys.len() * zs.len())?;
-        for &z in &zs {
-            for &y in &ys {
-                mesh.positions.extend(xs.iter().map(|&x| Vec3::new(x, y, z)));
-            }
-        }
-        let row = xs.len() as u32;
-        let layer = row * ys.len() as u32;
-        for z in 0..cells[2] {
-            for y in 0..cells[1] {
-                for x in 0..cells[0] {
-                    let first = x + y * row + z * layer;
-                    let pattern = if (x ^ y ^ z) & 1 == 0 { &EVEN_CELL } else { &ODD_CELL };
-                    for corners in pattern {
-                        let tetrahedron = corners.map(|corner| {
-                            let corner = corner as u32;
-                            first + (corner & 1) + (corner >> 1 & 1) * row + (corner >> 2) * layer
-                        });
-                        memory::push(&mut mesh.tetrahedra, tetrahedron)?;
-                    }
-                }
+        mesh.positions = grid(&xs, &ys, &zs)?;
+        for (cell, corners) in cells_of_grid(cells) {
+            let pattern = if cell.iter().sum::<u32>() & 1 == 0 {
+                &EVEN_CELL
+            } else {
+                &ODD_CELL
+            };
+            for tetrahedron in pattern {
+                memory::push(&mut mesh.tetrahedra, tetrahedron.map(|corner| corners[corner]))?;
             }
         }
         mesh.triangles = boundary(&mesh.tetrahedra)?;
         Ok(mesh)
     }
+
+    /// A box about the origin of cubes: `edge` is the length of theirs in metres, above 0, `cells` their number along x, y
+    /// and z. Nodes as in [`Mesh::block`]; the cubes are in `cells`, and the surface is there as triangles too.
+    ///
+    /// Errors: those of [`Mesh::cloth`].
+    pub fn lattice(edge: f32, cells: [u32; 3]) -> Result<Mesh> {
+        check_node_count(&cells)?;
+        if !(edge.is_finite() && edge > 0.0) {
+            return Err(Error::invalid(format!(
+                "edge is {edge} m: it must be finite and above 0"
+            )));
+        }
+        let [xs, ys, zs] = [("x", 0), ("y", 1), ("z", 2)]
+            .map(|(name, along)| axis(name, f64::from(edge) * f64::from(cells[along]), cells[along]));
+        let mut mesh = Mesh::default();
+        mesh.positions = grid(&xs?, &ys?, &zs?)?;
+        mesh.cells = memory::reserved(cells.iter().map(|&count| count as usize).product())?;
+        mesh.cells.extend(cells_of_grid(cells).map(|(_, corners)| corners));
+        mesh.triangles = cell_boundary(&mesh.cells)?;
+        Ok(mesh)
+    }
+}
+
+/// The nodes of a grid in three dimensions, x first.
+fn grid(xs: &[f32], ys: &[f32], zs: &[f32]) -> Result<Vec<Vec3>> {
+    let mut positions = memory::reserved(xs.len() * ys.len() * zs.len())?;
+    for &z in zs {
+        for &y in ys {
+            positions.extend(xs.iter().map(|&x| Vec3::new(x, y, z)));
+        }
+    }
+    Ok(positions)
+}
+
+/// The cells of a grid in three dimensions and their corners, x first.
+fn cells_of_grid([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = ([u32; 3], [u32; 8])> {
+    let row = nx + 1;
+    let layer = row * (ny + 1);
+    let cells = (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
+    cells.map(move |[x, y, z]| {
+        let first = x + y * row + z * layer;
+        let corner = |bits: u32| first + (bits & 1) + (bits >> 1 & 1) * row + (bits >> 2) * layer;
+        ([x, y, z], std::array::from_fn(|bits| corner(bits as u32)))
+    })
 }
 
 /// Refuses a grid whose nodes `u32` cannot count.
@@ -96,10 +128,11 @@ fn check_node_count(cells: &[u32]) -> Result<()> {
 }
 
 /// The places of a grid's nodes along one axis, about 0.
-fn axis(name: &str, size: f32, cells: u32) -> Result<Vec<f32>> {
-    if !(size.is_finite() && size > 0.0) {
+fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
+    if !((size as f32).is_finite() && size > 0.0) {
         return Err(Error::invalid(format!(
-            "size along {name} is {size} m: it must be finite and above 0"
+            "size along {name} is {} m: it must be finite and above 0",
+            size as f32
         )));
     }
     if cells == 0 {
@@ -109,7 +142,8 @@ fn axis(name: &str, size: f32, cells: u32) -> Result<Vec<f32>> {
     }
     let coincide = || {
         Error::invalid(format!(
-            "cells along {name} is {cells} over {size} m: nodes would coincide"
+            "cells along {name} is {cells} over {} m: nodes would coincide",
+            size as f32
         ))
     };
     // f32 has no more evenly spaced values than that; no need to try.
@@ -119,7 +153,7 @@ fn axis(name: &str, size: f32, cells: u32) -> Result<Vec<f32>> {
     let mut places = memory::reserved(cells as usize + 1)?;
     places.extend((0..=cells).map(|i| {
         let share = f64::from(i) / f64::from(cells) - 0.5;
-        (share * f64::from(size)) as f32
+        (share * size) as f32
     }));
     if places.windows(2).any(|pair| pair[0] >= pair[1]) {
         return Err(coincide());

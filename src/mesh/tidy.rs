@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use super::topology::{boundary, sorted};
 use super::{Mesh, tetrahedron_volume};
-use crate::Result;
 use crate::memory;
+use crate::{Error, Result};
 
 /// In [`LoadedMesh::node_of_vertex`]: the vertex was dropped.
 pub const NO_NODE: u32 = u32::MAX;
@@ -67,7 +67,7 @@ impl TidyReport {
 impl LoadedMesh {
     /// A mesh that needs no tidying, such as a generated shape: every vertex is its own node, nothing was changed.
     ///
-    /// Errors: [`Error::InvalidArgument`](crate::Error::InvalidArgument) where [`Mesh::check`] gives it, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// Errors: [`Error::InvalidArgument`] where [`Mesh::check`] gives it, [`Error::OutOfMemory`].
     pub fn unchanged(mesh: Mesh) -> Result<Self> {
         mesh.check()?;
         let mut node_of_vertex = memory::reserved(mesh.positions.len())?;
@@ -91,9 +91,16 @@ impl LoadedMesh {
 ///   would open a closed surface;
 /// - vertices that nothing uses are dropped.
 ///
-/// Errors: [`Error::InvalidArgument`](crate::Error::InvalidArgument) where [`Mesh::check`] gives it, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+/// Errors: [`Error::InvalidArgument`] where [`Mesh::check`] gives it, and where there are cells;
+/// [`Error::OutOfMemory`].
 pub fn tidy(mesh: &Mesh) -> Result<LoadedMesh> {
     mesh.check()?;
+    if !mesh.cells.is_empty() {
+        return Err(Error::invalid(format!(
+            "{} cells: only triangles and tetrahedra are tidied",
+            mesh.cells.len()
+        )));
+    }
     let mut raw = RawMesh::default();
     raw.vertices.try_reserve_exact(mesh.positions.len())?;
     raw.triangles.try_reserve_exact(mesh.triangles.len())?;

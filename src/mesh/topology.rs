@@ -6,25 +6,76 @@ use crate::memory;
 /// The corners of a tetrahedron's faces; outward if its volume is positive.
 const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
+/// The corners of a cell's faces in turn, outward, from one with an even number of bits on; numbered by bits, x 1, y 2, z 4.
+const CELL_FACES: [[usize; 4]; 6] = [
+    [0, 4, 6, 2],
+    [3, 7, 5, 1],
+    [0, 1, 5, 4],
+    [6, 7, 3, 2],
+    [0, 2, 3, 1],
+    [5, 7, 6, 4],
+];
+
+/// The pairs of a tetrahedron's corners.
+pub(crate) const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// The pairs of a triangle's corners.
+pub(crate) const TRIANGLE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
+/// The pairs of a cell's corners along an axis.
+pub(crate) const CELL_EDGES: [[usize; 2]; 12] = pairs_apart(1);
+
+/// The pairs of a cell's corners across a face.
+pub(crate) const CELL_DIAGONALS: [[usize; 2]; 12] = pairs_apart(2);
+
+/// The pairs of a cell's corners whose numbers differ in so many bits, 1 or 2.
+const fn pairs_apart(bits: u32) -> [[usize; 2]; 12] {
+    let mut pairs = [[0; 2]; 12];
+    let (mut count, mut a) = (0, 0);
+    while a < 8_usize {
+        let mut b = a + 1;
+        while b < 8 {
+            if (a ^ b).count_ones() == bits {
+                pairs[count] = [a, b];
+                count += 1;
+            }
+            b += 1;
+        }
+        a += 1;
+    }
+    pairs
+}
+
 /// Every edge of the triangles and tetrahedra once, the lower node first, in ascending order. An element that repeats a
 /// node has no edge there.
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
 pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 2]>> {
-    let mut packed = memory::reserved(triangles.len() * 3 + tetrahedra.len() * 6)?;
-    for &[a, b, c] in triangles {
-        packed.extend([pack(a, b), pack(b, c), pack(c, a)]);
+    element_edges(triangles, tetrahedra, &[])
+}
+
+/// The same with cells: their edges and the diagonals of their faces.
+pub(crate) fn element_edges(
+    triangles: &[[u32; 3]],
+    tetrahedra: &[[u32; 4]],
+    cells: &[[u32; 8]],
+) -> Result<Vec<[u32; 2]>> {
+    let mut packed = memory::reserved(triangles.len() * 3 + tetrahedra.len() * 6 + cells.len() * 24)?;
+    for triangle in triangles {
+        packed.extend(TRIANGLE_EDGES.map(|ends| pack(triangle, ends)));
     }
-    for &[a, b, c, d] in tetrahedra {
-        packed.extend([pack(a, b), pack(a, c), pack(a, d)]);
-        packed.extend([pack(b, c), pack(b, d), pack(c, d)]);
+    for tetrahedron in tetrahedra {
+        packed.extend(TETRAHEDRON_EDGES.map(|ends| pack(tetrahedron, ends)));
+    }
+    for cell in cells {
+        packed.extend(CELL_EDGES.map(|ends| pack(cell, ends)));
+        packed.extend(CELL_DIAGONALS.map(|ends| pack(cell, ends)));
     }
     packed.sort_unstable();
     packed.dedup();
 
     let mut edges = memory::reserved(packed.len())?;
-    let unpacked = packed.iter().map(|&edge| [(edge >> 32) as u32, edge as u32]);
-    edges.extend(unpacked.filter(|[a, b]| a != b));
+    edges.extend(packed.iter().map(|&edge| unpack(edge)).filter(|[a, b]| a != b));
     Ok(edges)
 }
 
@@ -33,10 +84,27 @@ pub fn edges(triangles: &[[u32; 3]], tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32
 ///
 /// Errors: [`Error::OutOfMemory`](crate::Error::OutOfMemory).
 pub fn boundary(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
-    let mut faces = memory::reserved(tetrahedra.len() * 4)?;
-    for (i, tetrahedron) in tetrahedra.iter().enumerate() {
-        for (k, corners) in FACES.iter().enumerate() {
-            faces.push((sorted(corners.map(|corner| tetrahedron[corner])), i * 4 + k));
+    faces_of_one(tetrahedra, &FACES)
+}
+
+/// The surface of cells, their outer faces, in the order of the cells and outward; two triangles each, cut along the diagonal
+/// that joins corners with an even number of bits.
+pub(crate) fn cell_boundary(cells: &[[u32; 8]]) -> Result<Vec<[u32; 3]>> {
+    let faces = faces_of_one(cells, &CELL_FACES)?;
+    let mut surface = memory::reserved(faces.len() * 2)?;
+    surface.extend(faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]));
+    Ok(surface)
+}
+
+/// The faces that exactly one element has, in the order of the elements.
+fn faces_of_one<const CORNERS: usize, const SIDES: usize, const FACES: usize>(
+    elements: &[[u32; CORNERS]],
+    sides: &[[usize; SIDES]; FACES],
+) -> Result<Vec<[u32; SIDES]>> {
+    let mut faces = memory::reserved(elements.len() * FACES)?;
+    for (i, element) in elements.iter().enumerate() {
+        for (k, corners) in sides.iter().enumerate() {
+            faces.push((sorted(corners.map(|corner| element[corner])), i * FACES + k));
         }
     }
     faces.sort_unstable();
@@ -52,7 +120,7 @@ pub fn boundary(tetrahedra: &[[u32; 4]]) -> Result<Vec<[u32; 3]>> {
     let mut surface = memory::reserved(once.len())?;
     surface.extend(
         once.iter()
-            .map(|face| FACES[face % 4].map(|corner| tetrahedra[face / 4][corner])),
+            .map(|face| sides[face % FACES].map(|corner| elements[face / FACES][corner])),
     );
     Ok(surface)
 }
@@ -83,7 +151,13 @@ pub(super) fn sorted<const N: usize>(mut nodes: [u32; N]) -> [u32; N] {
     nodes
 }
 
-/// An edge as one number that sorts by its lower node, then its higher.
-fn pack(a: u32, b: u32) -> u64 {
+/// The edge between two corners as one number that sorts by its lower node, then its higher.
+pub(crate) fn pack<const N: usize>(element: &[u32; N], ends: [usize; 2]) -> u64 {
+    let [a, b] = ends.map(|corner| element[corner]);
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
+}
+
+/// The nodes of an edge.
+pub(crate) fn unpack(edge: u64) -> [u32; 2] {
+    [(edge >> 32) as u32, edge as u32]
 }

@@ -1,0 +1,50 @@
+//! Masses of nodes from a density: each element's mass in equal parts to its nodes.
+
+use super::elements::{Elements, corners, triangle_area};
+use crate::body::{BodyDefinition, SMALLEST_MASS};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::mesh::tetrahedron_volume;
+
+/// The mass of each node, kg; `density` in kg/m³, above 0.
+pub(super) fn of(elements: &Elements, density: f32, definition: &BodyDefinition) -> Result<Vec<f32>> {
+    let rest = definition.rest_positions.unwrap_or(definition.positions);
+    let mut volumes = memory::filled(0.0_f64, rest.len())?;
+    match elements {
+        Elements::Tetrahedra(tetrahedra) => share_out(&mut volumes, tetrahedra, |tetrahedron| {
+            tetrahedron_volume(corners(tetrahedron, rest)).abs()
+        }),
+        Elements::Cells(cells, edge) => share_out(&mut volumes, cells, |_| edge.powi(3)),
+        Elements::Triangles(triangles, thickness) => share_out(&mut volumes, triangles, |triangle| {
+            triangle_area(corners(triangle, rest)) * thickness
+        }),
+    }
+    let mut masses = memory::reserved(volumes.len())?;
+    masses.extend(volumes.iter().map(|volume| (f64::from(density) * volume) as f32));
+    if let Some(node) = volumes.iter().position(|&volume| volume == 0.0) {
+        return Err(Error::invalid(format!(
+            "density is {density} kg/m³: node {node} belongs to none of the {}, and would have no mass",
+            elements.name()
+        )));
+    }
+    match masses
+        .iter()
+        .position(|&mass| !(mass >= SMALLEST_MASS && mass.is_finite()))
+    {
+        None => Ok(masses),
+        Some(node) => Err(Error::invalid(format!(
+            "density is {density} kg/m³: node {node} would have a mass of {} kg",
+            masses[node]
+        ))),
+    }
+}
+
+/// Gives each node of each element an equal part of what it has.
+fn share_out<const N: usize>(sums: &mut [f64], elements: &[[u32; N]], of: impl Fn(&[u32; N]) -> f64) {
+    for element in elements {
+        let share = of(element) / N as f64;
+        for &node in element {
+            sums[node as usize] += share;
+        }
+    }
+}

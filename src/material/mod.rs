@@ -1,0 +1,160 @@
+//! Tissue by a laboratory's numbers: the stiffnesses of springs from Young's modulus, masses from density.
+//!
+//! A material is worked out when a body is made. It becomes stiffnesses and masses of the definition, and a body keeps nothing
+//! else of it.
+
+mod elements;
+mod masses;
+pub mod presets;
+mod springs;
+
+use crate::body::{BodyDefinition, Values, not_negative};
+use crate::error::{Error, Result};
+use elements::Elements;
+
+/// How a material's numbers become forces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Model {
+    /// Springs along the edges of the elements. Poisson's ratio is what such springs imply: 1/4 for tetrahedra and cells, 1/3
+    /// in the plane for triangles.
+    ///
+    /// - *Tetrahedra*: `k = sum E V / L²` over the tetrahedra at an edge (Van Gelder 1998), V their volume, L the edge's length.
+    ///   What nodes would do in a body deformed evenly, each moved by the same affine map, has this E and nu 1/4 in the mean over
+    ///   directions, on any mesh. In an irregular mesh nodes give way, and the body is softer: see the table.
+    /// - *Cells*, cubes of edge a: `k = 0.4 E a` for their edges and the diagonals of their faces alike, at an outer face or edge
+    ///   the share of the cells that meet there, a quarter each of the cells at an edge and half of those at a diagonal. E along
+    ///   the axes and nu = 1/4 are exact for small strains, and the same in every direction.
+    /// - *Triangles* of a thickness t: `k = sum E t A / L²` over the triangles at an edge, A their area; for equilateral ones
+    ///   sqrt(3)/2 E t, and half at the border. For these E and nu = 1/3 in the plane are exact for small strains, the same in
+    ///   every direction; there is no bending.
+    ///
+    /// All follow from the even deformation of a network of springs, whose stiffness is `sum k L² n n n n / V` (Cauchy-Born).
+    /// Springs turn stiffer as they are stretched: along an axis of the cubic lattice the secant E shifts by 0.7 of the strain.
+    #[default]
+    Springs,
+}
+
+/// What a body is made of, by its numbers. Plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Material {
+    /// How they become forces.
+    pub model: Model,
+    /// Young's modulus at small strains, Pa, above 0.
+    pub young_modulus: f32,
+    /// Poisson's ratio; 0: what the model implies. [`Model::Springs`] takes no other than that, within 0.001.
+    pub poisson_ratio: f32,
+    /// kg/m³, at least 0. Above 0: each node has its share of the mass of the elements that it belongs to, a quarter of a
+    /// tetrahedron, an eighth of a cell, a third of a triangle; the definition's masses must be 0 then. 0: the definition's masses.
+    pub density: f32,
+    /// m: for bodies of triangles alone, above 0; 0 for all others.
+    pub thickness: f32,
+}
+
+/// How far a ratio may be from the one that the model implies.
+const SAME_RATIO: f32 = 1e-3;
+
+impl Material {
+    /// Refuses numbers out of their ranges, and what a definition may not give beside a material.
+    pub(crate) fn check(&self, definition: &BodyDefinition) -> Result<()> {
+        if !(self.young_modulus > 0.0 && self.young_modulus.is_finite()) {
+            return Err(Error::invalid(format!(
+                "young_modulus is {} Pa: must be above 0 and finite",
+                self.young_modulus
+            )));
+        }
+        not_negative("density", self.density)?;
+        not_negative("thickness", self.thickness)?;
+        match self.model {
+            Model::Springs => check_springs(definition)?,
+        }
+        if self.density > 0.0 {
+            check_no_masses(definition.masses)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses a Poisson's ratio that the model does not have on such elements.
+    fn check_poisson_ratio(&self, elements: &Elements) -> Result<()> {
+        let given = self.poisson_ratio;
+        match self.model {
+            Model::Springs => {
+                let implied = elements.poisson_ratio_of_springs();
+                if given == 0.0 || (given - implied).abs() <= SAME_RATIO {
+                    return Ok(());
+                }
+                Err(Error::invalid(format!(
+                    "poisson_ratio is {given}: springs of {} imply {implied}; must be that, or 0 for what they imply",
+                    elements.name()
+                )))
+            }
+        }
+    }
+}
+
+/// Springs come from the material alone.
+fn check_springs(definition: &BodyDefinition) -> Result<()> {
+    if definition.springs.is_some() {
+        return Err(Error::invalid(
+            "springs is given beside a material, which makes springs of the elements",
+        ));
+    }
+    match definition.stiffnesses {
+        Values::Uniform(stiffness) if stiffness != 0.0 => Err(Error::invalid(format!(
+            "stiffness is {stiffness}: must be 0 beside a material, which gives each spring its own"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Masses come from the density alone.
+fn check_no_masses(masses: Values) -> Result<()> {
+    match masses {
+        Values::Uniform(0.0) => Ok(()),
+        Values::Uniform(mass) => Err(Error::invalid(format!(
+            "node_mass is {mass}: must be 0 beside a density, which gives each node its mass"
+        ))),
+        Values::Each(_) => Err(Error::invalid(
+            "masses is given beside a density, which gives each node its mass",
+        )),
+    }
+}
+
+/// What a material makes of a definition.
+#[derive(Debug)]
+pub(crate) struct Made {
+    springs: Vec<[u32; 2]>,
+    stiffnesses: Vec<f32>,
+    /// `None`: the definition's own.
+    masses: Option<Vec<f32>>,
+}
+
+impl Made {
+    /// Of a definition that has been checked and whose material this is.
+    pub fn of(material: &Material, definition: &BodyDefinition) -> Result<Self> {
+        let elements = Elements::of(definition, material.thickness)?;
+        material.check_poisson_ratio(&elements)?;
+        let (springs, stiffnesses) = match material.model {
+            Model::Springs => springs::of(&elements, material.young_modulus, definition)?,
+        };
+        let masses = match material.density {
+            0.0 => None,
+            density => Some(masses::of(&elements, density, definition)?),
+        };
+        Ok(Self {
+            springs,
+            stiffnesses,
+            masses,
+        })
+    }
+
+    /// The definition with what was made.
+    pub fn complete<'a>(&'a self, definition: &BodyDefinition<'a>) -> BodyDefinition<'a> {
+        BodyDefinition {
+            springs: Some(&self.springs),
+            stiffnesses: Values::Each(&self.stiffnesses),
+            masses: self.masses.as_deref().map_or(definition.masses, Values::Each),
+            material: None,
+            ..*definition
+        }
+    }
+}
