@@ -127,7 +127,8 @@ pub struct sinew_body_def {
     /// none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
     /// triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001.
     pub material: u32,
-    /// Young's modulus at small strains, Pa, above 0. Where tetrahedra or triangles are irregular the body is softer, by 5 to 25 %.
+    /// Young's modulus at small strains, Pa, above 0. Exact for cells and equilateral triangles; an irregular mesh is some 4 to 8 %
+    /// softer, one that is one or two tetrahedra thick far more.
     pub young_modulus: f32,
     /// 0, the default: what the material implies; with SINEW_MATERIAL_SPRINGS else just that, within 0.001.
     pub poisson_ratio: f32,
