@@ -272,7 +272,7 @@ fn tidy_refuses_what_cannot_be() {
     let same = LoadedMesh::unchanged(Mesh::cloth([1.0, 1.0], [1, 1]).unwrap()).unwrap();
     assert_eq!(same.node_of_vertex, [0, 1, 2, 3]);
     let lattice = Mesh::lattice(1.0, [1, 1, 1]).unwrap();
-    assert!(matches!(tidy(&lattice), Err(Error::InvalidArgument(m)) if m.contains("1 cells")));
+    assert!(matches!(tidy(&lattice), Err(Error::InvalidArgument(m)) if m.contains("cells")));
 }
 
 #[test]
