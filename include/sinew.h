@@ -104,6 +104,59 @@
 #define SINEW_SOLVER_NEWTON 2
 
 /**
+ * Springs as they are given, or all of one stiffness.
+ */
+#define SINEW_MATERIAL_NONE 0
+
+/**
+ * Springs along the edges of the elements, as stiff as young_modulus asks for. Poisson's ratio is what they imply: 1/4 for
+ * tetrahedra and cells, 1/3 in the plane for triangles.
+ */
+#define SINEW_MATERIAL_SPRINGS 1
+
+/**
+ * Tetrahedra as finite elements, St Venant and Kirchhoff's law with a signed volume term: of any Poisson's ratio from 0 to 0.49, right
+ * up to compressions of some 20 % and stable beyond. There are no springs but those that are given. sinew_body_remove_spring takes
+ * away the tetrahedra that have the edge, whether or not there is a spring along it.
+ */
+#define SINEW_MATERIAL_TETRAHEDRA 2
+
+/**
+ * Healthy liver, E 5.4 kPa.
+ */
+#define SINEW_PRESET_LIVER 0
+
+/**
+ * Diseased liver, E 59.4 kPa.
+ */
+#define SINEW_PRESET_FIBROTIC_LIVER 1
+
+/**
+ * Hepatocellular carcinoma, E 70.2 kPa.
+ */
+#define SINEW_PRESET_LIVER_TUMOUR 2
+
+/**
+ * Stomach, E 1.9 kPa.
+ */
+#define SINEW_PRESET_STOMACH 3
+
+/**
+ * Gallbladder, E 255 kPa.
+ */
+#define SINEW_PRESET_GALLBLADDER 4
+
+/**
+ * Bile duct, E 498 kPa.
+ */
+#define SINEW_PRESET_BILE_DUCT 5
+
+/**
+ * Hepatic artery, E 630 kPa.
+ */
+#define SINEW_PRESET_HEPATIC_ARTERY 6
+
+/**
  * A ball about the origin.
  */
 #define SINEW_SHAPE_SPHERE 0
@@ -174,7 +227,7 @@
 #define SINEW_NO_NODE UINT32_MAX
 
 /**
- * A mesh: positions, triangles and tetrahedra. It belongs to the caller, never changes, and may be read by any number of
+ * A mesh: positions, triangles, tetrahedra and cells. It belongs to the caller, never changes, and may be read by any number of
  * threads at once.
  */
 typedef struct sinew_mesh sinew_mesh;
@@ -315,7 +368,7 @@ typedef struct sinew_body_def {
    */
   const float *node_dampings;
   /**
-   * kg, above 0; no default.
+   * kg, above 0; no default. 0 where density gives each node its mass.
    */
   float node_mass;
   /**
@@ -323,7 +376,7 @@ typedef struct sinew_body_def {
    */
   float node_damping;
   /**
-   * 2 spring_count node indices, each pair once; NULL: the edges of triangles and tetrahedra, each once (then no
+   * 2 spring_count node indices, each pair once; NULL: the edges of triangles, tetrahedra and cells, each once (then no
    * per-spring arrays); not NULL with spring_count 0: no springs.
    */
   const uint32_t *springs;
@@ -352,8 +405,8 @@ typedef struct sinew_body_def {
    */
   float spring_damping;
   /**
-   * 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra is what is
-   * drawn and touched.
+   * 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra or cells is what
+   * is drawn and touched.
    */
   const uint32_t *triangles;
   /**
@@ -417,6 +470,42 @@ typedef struct sinew_body_def {
    * 0.
    */
   uint32_t reserved2;
+  /**
+   * 8 cell_count node indices: cubes of a lattice, corners numbered by bits, x 1, y 2, z 4; nullable. Their springs are their
+   * edges and the diagonals of their faces.
+   */
+  const uint32_t *cells;
+  /**
+   * Cells given.
+   */
+  size_t cell_count;
+  /**
+   * SINEW_MATERIAL_...; NONE, the default: the four below are 0. Else it fills the tetrahedra or the cells, or where there are
+   * none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
+   * triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001.
+   */
+  uint32_t material;
+  /**
+   * Young's modulus at small strains, Pa, above 0. Where tetrahedra or triangles are irregular the body is softer, by 5 to 25 %.
+   */
+  float young_modulus;
+  /**
+   * SINEW_MATERIAL_SPRINGS: 0, the default, or what it implies within 0.001; SINEW_MATERIAL_TETRAHEDRA: from 0 to 0.49.
+   */
+  float poisson_ratio;
+  /**
+   * kg/m3, above 0: each node has its share of the mass of the elements about it (masses is NULL and node_mass 0 then, and
+   * every node belongs to an element); 0, the default: masses or node_mass.
+   */
+  float density;
+  /**
+   * m: above 0 where the material fills triangles, else 0.
+   */
+  float thickness;
+  /**
+   * 0.
+   */
+  uint32_t reserved3;
 } sinew_body_def;
 
 /**
@@ -531,6 +620,41 @@ typedef struct sinew_solver_report {
    */
   uint32_t converged;
 } sinew_solver_report;
+
+/**
+ * A tissue's figures, from the literature, for young_modulus and density of a body. Single organs differ by more than the
+ * digits suggest.
+ */
+typedef struct sinew_material_preset {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * What tissue it is, in English; static.
+   */
+  const char *name;
+  /**
+   * Where the figures are from; static.
+   */
+  const char *source;
+  /**
+   * Pa, as the source gives it.
+   */
+  float shear_modulus;
+  /**
+   * Pa: three times the shear modulus, since tissue hardly changes its volume.
+   */
+  float young_modulus;
+  /**
+   * kg/m3.
+   */
+  float density;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_material_preset;
 
 /**
  * How a state of rest is looked for. Filled by sinew_rest_state_def_init.
@@ -694,7 +818,8 @@ typedef struct sinew_mesh_view {
    */
   size_t tetrahedron_count;
   /**
-   * 3 surface_triangle_count node indices, outward: the boundary of the tetrahedra; without tetrahedra the triangles.
+   * 3 surface_triangle_count node indices, outward: the boundary of the tetrahedra or cells; without either the
+   * triangles.
    */
   const uint32_t *surface;
   /**
@@ -737,6 +862,14 @@ typedef struct sinew_mesh_view {
    * 0.
    */
   uint32_t reserved;
+  /**
+   * 8 cell_count node indices: the cubes of a lattice, corners numbered by bits, x 1, y 2, z 4.
+   */
+  const uint32_t *cells;
+  /**
+   * Cells.
+   */
+  size_t cell_count;
 } sinew_mesh_view;
 
 /**
@@ -1148,6 +1281,18 @@ sinew_status sinew_body_get_solver_report(const struct sinew_world *world,
                                           struct sinew_solver_report *out);
 
 /**
+ * Writes the figures of a tissue, `preset` being a SINEW_PRESET_...; they are numbered from 0 without a gap. Its texts are
+ * static. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_material_get_preset(uint32_t preset,
+                                       struct sinew_material_preset *out);
+
+/**
  * Fills `def` with the defaults. `struct_size` is sizeof(sinew_rest_state_def).
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT.
@@ -1281,6 +1426,19 @@ sinew_status sinew_mesh_create_cloth(const float *size,
 sinew_status sinew_mesh_create_block(const float *size,
                                      const uint32_t *cells,
                                      struct sinew_mesh **out);
+
+/**
+ * Makes a lattice of cubes about the origin: `edge` is the length of theirs, m, above 0, `cells` their 3 numbers along the axes,
+ * at least 1. The caller destroys it with sinew_mesh_destroy.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `cells` is NULL or 3 numbers; `out` is NULL or writable.
+ */
+sinew_status sinew_mesh_create_lattice(float edge,
+                                       const uint32_t *cells,
+                                       struct sinew_mesh **out);
 
 /**
  * Makes an organ, liver-like, of tetrahedra about the origin: `length` is its longest extent, along x, and `spacing` that
