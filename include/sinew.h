@@ -486,7 +486,8 @@ typedef struct sinew_body_def {
    */
   uint32_t material;
   /**
-   * Young's modulus at small strains, Pa, above 0. Where tetrahedra or triangles are irregular the body is softer, by 5 to 25 %.
+   * Young's modulus at small strains, Pa, above 0. Exact for cells and equilateral triangles; an irregular mesh is some 4 to 8 %
+   * softer, one that is one or two tetrahedra thick far more.
    */
   float young_modulus;
   /**

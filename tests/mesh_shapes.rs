@@ -167,6 +167,7 @@ fn tidy_counts_what_it_does() {
             [0, 1, 2, 5], // collapses
             [0, 6, 2, 1], // flat
         ],
+        ..Mesh::default()
     };
     let LoadedMesh {
         mesh,
@@ -270,6 +271,8 @@ fn tidy_refuses_what_cannot_be() {
     assert_eq!(tidy(&Mesh::default()).unwrap(), LoadedMesh::default());
     let same = LoadedMesh::unchanged(Mesh::cloth([1.0, 1.0], [1, 1]).unwrap()).unwrap();
     assert_eq!(same.node_of_vertex, [0, 1, 2, 3]);
+    let lattice = Mesh::lattice(1.0, [1, 1, 1]).unwrap();
+    assert!(matches!(tidy(&lattice), Err(Error::InvalidArgument(m)) if m.contains("cells")));
 }
 
 #[test]
@@ -407,6 +410,7 @@ fn parameters_out_of_range_are_refused() {
         refused(Mesh::cloth([bad, 1.0], [2, 2]), "size along x");
         refused(Mesh::cloth([1.0, bad], [2, 2]), "size along z");
         refused(Mesh::block([1.0, bad, 1.0], [2, 2, 2]), "size along y");
+        refused(Mesh::lattice(bad, [2, 2, 2]), "edge");
         refused(Mesh::organ(bad, 0.01), "length");
         refused(Mesh::organ(0.2, bad), "spacing");
     }

@@ -131,7 +131,8 @@ pub struct sinew_body_def {
     /// none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
     /// triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001.
     pub material: u32,
-    /// Young's modulus at small strains, Pa, above 0. Where tetrahedra or triangles are irregular the body is softer, by 5 to 25 %.
+    /// Young's modulus at small strains, Pa, above 0. Exact for cells and equilateral triangles; an irregular mesh is some 4 to 8 %
+    /// softer, one that is one or two tetrahedra thick far more.
     pub young_modulus: f32,
     /// SINEW_MATERIAL_SPRINGS: 0, the default, or what it implies within 0.001; SINEW_MATERIAL_TETRAHEDRA: from 0 to 0.49.
     pub poisson_ratio: f32,

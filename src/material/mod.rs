@@ -21,13 +21,16 @@ pub enum Model {
     ///
     /// - *Tetrahedra*: `k = sum E V / L²` over the tetrahedra at an edge (Van Gelder 1998), V their volume, L the edge's length.
     ///   What nodes would do in a body deformed evenly, each moved by the same affine map, has this E and nu 1/4 in the mean over
-    ///   directions, on any mesh. In an irregular mesh nodes give way, and the body is softer: see the table.
+    ///   directions, on any mesh. In an irregular mesh nodes give way: one that TetGen filled is 4 to 8 % softer, nu 0.25; nodes
+    ///   moved about by a fifth of an edge cost 5 %. A body that is one or two tetrahedra thick has half to a third of E. Cubes cut
+    ///   in five are 19 % stiffer along the axes, with nu 0.19, and 14 % softer along their diagonals.
     /// - *Cells*, cubes of edge a: `k = 0.4 E a` for their edges and the diagonals of their faces alike, at an outer face or edge
     ///   the share of the cells that meet there, a quarter each of the cells at an edge and half of those at a diagonal. E along
     ///   the axes and nu = 1/4 are exact for small strains, and the same in every direction.
     /// - *Triangles* of a thickness t: `k = sum E t A / L²` over the triangles at an edge, A their area; for equilateral ones
     ///   sqrt(3)/2 E t, and half at the border. For these E and nu = 1/3 in the plane are exact for small strains, the same in
-    ///   every direction; there is no bending.
+    ///   every direction; with nodes moved about by a fifth of an edge E is 5 % lower, nu 0.34. Squares cut in two are 19 % stiffer
+    ///   along their sides, with nu 0.19. There is no bending.
     ///
     /// All follow from the even deformation of a network of springs, whose stiffness is `sum k L² n n n n / V` (Cauchy-Born).
     /// Springs turn stiffer as they are stretched: along an axis of the cubic lattice the secant E shifts by 0.7 of the strain.

@@ -56,7 +56,8 @@ pub const PRESETS: [Preset; 7] = [
 /// Healthy liver, G = 1.8 ± 0.4 kPa, E 5.4 kPa.
 pub const LIVER: Preset = tissue(
     c"liver",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: liver, 1.8 +- 0.4 kPa (from Bamber and Hill 1981, Palmeri et al. 2008, Webb et al. 2011, Honjo et al. 2014)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: liver, 1.8 +- 0.4 kPa \
+     (from Bamber and Hill 1981, Palmeri et al. 2008, Webb et al. 2011, Honjo et al. 2014)",
     1800.0,
     1060.0,
 );
@@ -64,7 +65,8 @@ pub const LIVER: Preset = tissue(
 /// Diseased liver, G = 19.8 kPa.
 pub const FIBROTIC_LIVER: Preset = tissue(
     c"fibrotic liver",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: diseased liver (from Bamber and Hill 1981, Palmeri et al. 2008, Webb et al. 2011, Honjo et al. 2014)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: diseased liver \
+     (from Bamber and Hill 1981, Palmeri et al. 2008, Webb et al. 2011, Honjo et al. 2014)",
     19_800.0,
     1060.0,
 );
@@ -72,7 +74,8 @@ pub const FIBROTIC_LIVER: Preset = tissue(
 /// Hepatocellular carcinoma, G = 23.4 kPa.
 pub const LIVER_TUMOUR: Preset = tissue(
     c"liver tumour",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: HCC (from Bamber and Hill 1981, Palmeri et al. 2008, Webb et al. 2011, Honjo et al. 2014)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: HCC \
+     (from Bamber and Hill 1981, Palmeri et al. 2008, Webb et al. 2011, Honjo et al. 2014)",
     23_400.0,
     1060.0,
 );
@@ -80,7 +83,8 @@ pub const LIVER_TUMOUR: Preset = tissue(
 /// Stomach, G = 0.637 kPa.
 pub const STOMACH: Preset = tissue(
     c"stomach",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: stomach (from Saijo et al. 1991, Lim et al. 2009)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: stomach \
+     (from Saijo et al. 1991, Lim et al. 2009)",
     637.0,
     1058.0,
 );
@@ -88,7 +92,8 @@ pub const STOMACH: Preset = tissue(
 /// Gallbladder, G = 85 ± 8.2 kPa.
 pub const GALLBLADDER: Preset = tissue(
     c"gallbladder",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: gallbladder, 85 +- 8.2 kPa (from Karimi et al. 2017)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: gallbladder, 85 +- 8.2 kPa \
+     (from Karimi et al. 2017)",
     85_000.0,
     1060.0,
 );
@@ -96,7 +101,8 @@ pub const GALLBLADDER: Preset = tissue(
 /// Bile duct, G = 166 ± 67 kPa.
 pub const BILE_DUCT: Preset = tissue(
     c"bile duct",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: bile duct, 166 +- 67 kPa (from Duch et al. 2004)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: bile duct, 166 +- 67 kPa \
+     (from Duch et al. 2004)",
     166_000.0,
     1060.0,
 );
@@ -104,7 +110,8 @@ pub const BILE_DUCT: Preset = tissue(
 /// Hepatic artery, G = 210 ± 47 kPa.
 pub const HEPATIC_ARTERY: Preset = tissue(
     c"hepatic artery",
-    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: hepatic artery, 210 +- 47 kPa (from Deng et al. 1994, Holzapfel et al. 2005)",
+    c"Phys. Med. Biol. 64 (2019) 225001, table 1, PMC6925591: hepatic artery, 210 +- 47 kPa \
+     (from Deng et al. 1994, Holzapfel et al. 2005)",
     210_000.0,
     1050.0,
 );

@@ -54,8 +54,10 @@ impl Mesh {
         let xs = axis("x", f64::from(size[0]), cells[0])?;
         let ys = axis("y", f64::from(size[1]), cells[1])?;
         let zs = axis("z", f64::from(size[2]), cells[2])?;
-        let mut mesh = Mesh::default();
-        mesh.positions = grid(&xs, &ys, &zs)?;
+        let mut mesh = Mesh {
+            positions: grid(&xs, &ys, &zs)?,
+            ..Mesh::default()
+        };
         for (cell, corners) in cells_of_grid(cells) {
             let pattern = if cell.iter().sum::<u32>() & 1 == 0 {
                 &EVEN_CELL
@@ -83,9 +85,11 @@ impl Mesh {
         }
         let [xs, ys, zs] = [("x", 0), ("y", 1), ("z", 2)]
             .map(|(name, along)| axis(name, f64::from(edge) * f64::from(cells[along]), cells[along]));
-        let mut mesh = Mesh::default();
-        mesh.positions = grid(&xs?, &ys?, &zs?)?;
-        mesh.cells = memory::reserved(cells.iter().map(|&count| count as usize).product())?;
+        let mut mesh = Mesh {
+            positions: grid(&xs?, &ys?, &zs?)?,
+            cells: memory::reserved(cells.iter().map(|&count| count as usize).product())?,
+            ..Mesh::default()
+        };
         mesh.cells.extend(cells_of_grid(cells).map(|(_, corners)| corners));
         mesh.triangles = cell_boundary(&mesh.cells)?;
         Ok(mesh)

@@ -96,10 +96,9 @@ impl LoadedMesh {
 pub fn tidy(mesh: &Mesh) -> Result<LoadedMesh> {
     mesh.check()?;
     if !mesh.cells.is_empty() {
-        return Err(Error::invalid(format!(
-            "{} cells: only triangles and tetrahedra are tidied",
-            mesh.cells.len()
-        )));
+        return Err(Error::invalid(
+            "cells are given: only triangles and tetrahedra are tidied",
+        ));
     }
     let mut raw = RawMesh::default();
     raw.vertices.try_reserve_exact(mesh.positions.len())?;

@@ -195,6 +195,69 @@ static void body_definitions(void)
         PLAIN_BODY(INVALID, "node_damping", def.node_damping = bad[i]);
 }
 
+static const float cube_nodes[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1};
+static const uint32_t one_cell[] = {0, 1, 2, 3, 4, 5, 6, 7};
+static const uint32_t mirrored_cell[] = {1, 0, 3, 2, 5, 4, 7, 6};
+
+/* A cube by its numbers. */
+static sinew_body_def tissue(void)
+{
+    sinew_body_def def;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    def.positions = cube_nodes;
+    def.node_count = 8;
+    def.cells = one_cell;
+    def.cell_count = 1;
+    def.material = SINEW_MATERIAL_SPRINGS;
+    def.young_modulus = 5000.0f;
+    def.poisson_ratio = 0.25f;
+    def.density = 1000.0f;
+    return def;
+}
+
+#define TISSUE(status, word, change) BODY_FROM(tissue(), status, word, change)
+
+static void materials(void)
+{
+    const sinew_world_def world_def = good_world();
+    const sinew_body_def good = tissue();
+    sinew_world *world = NULL;
+    sinew_body_id body;
+    int i;
+    MUST(sinew_world_create(&world_def, &world));
+    MUST(sinew_body_create(world, &good, &body));
+    sinew_world_destroy(world);
+    for (i = 0; i < OR_ZERO; i++)
+        TISSUE(INVALID, "young_modulus", def.young_modulus = bad[i]);
+    for (i = 0; i < OR_NEGATIVE; i++) {
+        TISSUE(INVALID, "poisson_ratio", def.poisson_ratio = bad[i]);
+        TISSUE(INVALID, "density", def.density = bad[i]);
+        TISSUE(INVALID, "thickness", def.thickness = bad[i]);
+    }
+    TISSUE(INVALID, "material", def.material = UINT32_MAX);
+    TISSUE(INVALID, "reserved3", def.reserved3 = 1);
+    TISSUE(INVALID, "cells", def.cells = NULL);
+    TISSUE(INVALID, "cells", def.cells = renumbered(def.cells, 8, 7, 8));
+    TISSUE(INVALID, "cells", def.cells = renumbered(def.cells, 8, 7, 0));
+    TISSUE(INVALID, "cells", def.cells = mirrored_cell);
+    TISSUE(INVALID, "cells", def.positions = spoiled(def.positions, 24, 23, 1.01f));
+    TISSUE(INVALID, "poisson_ratio", def.poisson_ratio = 0.45f);
+    TISSUE(INVALID, "thickness", def.thickness = 0.001f);
+    TISSUE(INVALID, "stiffness", def.stiffness = 1.0f);
+    TISSUE(INVALID, "springs", def.springs = five_springs; def.spring_count = 5);
+    TISSUE(INVALID, "node_mass", def.node_mass = 0.1f);
+    TISSUE(INVALID, "node_mass", def.density = 0.0f);
+    TISSUE(INVALID, "masses", def.masses = cube_nodes);
+    TISSUE(INVALID, "material", def.cell_count = 0);
+    TISSUE(INVALID, "tetrahedra", def.tetrahedra = one_tetrahedron; def.tetrahedron_count = 1);
+    TISSUE(INVALID, "thickness", def.cell_count = 0; def.triangles = four_triangles; def.triangle_count = 4);
+    /* Numbers without a material to belong to. */
+    PLAIN_BODY(INVALID, "young_modulus", def.young_modulus = 5000.0f);
+    PLAIN_BODY(INVALID, "poisson_ratio", def.poisson_ratio = 0.25f);
+    PLAIN_BODY(INVALID, "density", def.density = 1000.0f);
+    PLAIN_BODY(INVALID, "thickness", def.thickness = 0.001f);
+}
+
 static void bodies_springs_and_elements(void)
 {
     int i;
@@ -475,6 +538,7 @@ int main(void)
     body_definitions_unspoiled();
     body_definitions();
     bodies_springs_and_elements();
+    materials();
     forces();
     positions_and_velocities();
     pins();

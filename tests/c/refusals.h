@@ -45,6 +45,7 @@ static struct outputs {
     sinew_rest_state_report rest;
     sinew_mesh *mesh;
     sinew_mesh_view mesh_view;
+    sinew_material_preset preset;
     sinew_picture_def picture_def;
 } out, untouched;
 

@@ -26,6 +26,8 @@ static void shapes(void)
     REFUSED(INVALID, "size", sinew_mesh_create_block(NULL, good_cells, &out.mesh));
     REFUSED(INVALID, "cells", sinew_mesh_create_block(good_size, NULL, &out.mesh));
     REFUSED(INVALID, "out", sinew_mesh_create_block(good_size, good_cells, NULL));
+    REFUSED(INVALID, "cells", sinew_mesh_create_lattice(0.1f, NULL, &out.mesh));
+    REFUSED(INVALID, "out", sinew_mesh_create_lattice(0.1f, good_cells, NULL));
     REFUSED(INVALID, "out", sinew_mesh_create_organ(0.2f, 0.02f, NULL));
     for (axis = 0; axis < 3; axis++) {
         const uint32_t none[] = {0, UINT32_MAX};
@@ -38,9 +40,11 @@ static void shapes(void)
             if (axis < 2)
                 REFUSED(INVALID, "cells", sinew_mesh_create_cloth(good_size, renumbered(good_cells, 2, axis, none[i]), &out.mesh));
             REFUSED(INVALID, "cells", sinew_mesh_create_block(good_size, renumbered(good_cells, 3, axis, none[i]), &out.mesh));
+            REFUSED(INVALID, "cells", sinew_mesh_create_lattice(0.1f, renumbered(good_cells, 3, axis, none[i]), &out.mesh));
         }
     }
     for (i = 0; i < OR_ZERO; i++) {
+        REFUSED(INVALID, "edge", sinew_mesh_create_lattice(bad[i], good_cells, &out.mesh));
         REFUSED(INVALID, "length", sinew_mesh_create_organ(bad[i], 0.02f, &out.mesh));
         REFUSED(INVALID, "spacing", sinew_mesh_create_organ(0.2f, bad[i], &out.mesh));
     }
@@ -52,9 +56,18 @@ static void views(void)
     MUST(sinew_mesh_create_block(good_size, good_cells, &mesh));
     REFUSED(INVALID, "mesh", sinew_mesh_get_view(NULL, &out.mesh_view));
     REFUSED(INVALID, "out", sinew_mesh_get_view(mesh, NULL));
-    REFUSES_RESULT_SIZES(sinew_mesh_view, sizeof(sinew_mesh_view), mesh_view, sinew_mesh_get_view(mesh, &out.mesh_view));
+    REFUSES_RESULT_SIZES(sinew_mesh_view, offsetof(sinew_mesh_view, cells), mesh_view, sinew_mesh_get_view(mesh, &out.mesh_view));
     sinew_mesh_destroy(mesh);
     sinew_mesh_destroy(NULL);
+}
+
+static void presets(void)
+{
+    REFUSED(INVALID, "out", sinew_material_get_preset(SINEW_PRESET_LIVER, NULL));
+    REFUSED(INVALID, "preset", sinew_material_get_preset(SINEW_PRESET_HEPATIC_ARTERY + 1, &out.preset));
+    REFUSED(INVALID, "preset", sinew_material_get_preset(UINT32_MAX, &out.preset));
+    REFUSES_RESULT_SIZES(sinew_material_preset, sizeof(sinew_material_preset), preset,
+                         sinew_material_get_preset(SINEW_PRESET_LIVER, &out.preset));
 }
 
 static sinew_picture_def good_picture(void)
@@ -110,6 +123,7 @@ int main(void)
     loading();
     shapes();
     views();
+    presets();
     pictures();
     return tear_down();
 }
