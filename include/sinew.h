@@ -115,6 +115,13 @@
 #define SINEW_MATERIAL_SPRINGS 1
 
 /**
+ * Tetrahedra as finite elements, St Venant and Kirchhoff's law with a signed volume term: of any Poisson's ratio from 0 to 0.49, right
+ * up to compressions of some 20 % and stable beyond. There are no springs but those that are given. sinew_body_remove_spring takes
+ * away the tetrahedra that have the edge, whether or not there is a spring along it.
+ */
+#define SINEW_MATERIAL_TETRAHEDRA 2
+
+/**
  * Healthy liver, E 5.4 kPa.
  */
 #define SINEW_PRESET_LIVER 0
@@ -484,7 +491,7 @@ typedef struct sinew_body_def {
    */
   float young_modulus;
   /**
-   * 0, the default: what the material implies; with SINEW_MATERIAL_SPRINGS else just that, within 0.001.
+   * SINEW_MATERIAL_SPRINGS: 0, the default, or what it implies within 0.001; SINEW_MATERIAL_TETRAHEDRA: from 0 to 0.49.
    */
   float poisson_ratio;
   /**

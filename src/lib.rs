@@ -4,6 +4,7 @@ mod body;
 pub mod capi;
 mod contact;
 mod diagnostics;
+mod elements;
 mod error;
 pub mod material;
 mod memory;

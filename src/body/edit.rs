@@ -186,6 +186,9 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
+        if let Some(elements) = &mut self.elements {
+            elements.forget_rates();
+        }
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         self.scale_for_springs(nodes);
         let stability = self.carry.stability;
@@ -198,12 +201,31 @@ impl Body {
         Ok(())
     }
 
-    /// Removes the spring between two nodes.
+    /// Removes the spring between two nodes, and with it the tetrahedra of [`Model::Tetrahedra`](crate::Model::Tetrahedra) that
+    /// have this edge, whether or not there is a spring along it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or no spring between them.
+    /// [`Error::InvalidArgument`]: there is no such node, or neither spring nor tetrahedra between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
         let [own_a, own_b] = self.check_pair(a, b)?;
+        let removed = self
+            .elements
+            .as_mut()
+            .map_or(0, |elements| elements.remove_edge(own_a, own_b));
+        if removed > 0 {
+            self.forces_current = false;
+            if let Some(implicit) = &mut self.implicit {
+                implicit.forget_matrix();
+            }
+        }
+        match self.remove_own_spring([a, b], [own_a, own_b]) {
+            // The edge was one of tetrahedra alone.
+            Err(Error::InvalidArgument(_)) if removed > 0 => Ok(()),
+            result => result,
+        }
+    }
+
+    fn remove_own_spring(&mut self, [a, b]: [u32; 2], [own_a, own_b]: [u32; 2]) -> Result<()> {
         let mut link = None;
         self.springs.visit(own_a as usize, &mut |other| {
             if other.neighbour == own_b {
@@ -213,6 +235,9 @@ impl Body {
         let link = link.ok_or_else(|| not_joined(a, b))?;
         self.springs.remove(own_a, own_b)?;
         self.forces_current = false;
+        if let Some(elements) = &mut self.elements {
+            elements.forget_rates();
+        }
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -238,6 +263,9 @@ impl Body {
     /// Other nodes move now.
     fn forget_matrix(&mut self) {
         self.carry.stability = Stability::UNKNOWN;
+        if let Some(elements) = &mut self.elements {
+            elements.forget_rates();
+        }
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }

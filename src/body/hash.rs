@@ -39,6 +39,9 @@ impl Body {
                 hasher.write_floats(&[link.stiffness, link.rest_length, link.damping]);
             });
         }
+        if let Some(elements) = &self.elements {
+            elements.hash(hasher);
+        }
         for pin in self.pins.iter() {
             hasher.write_u64(u64::from(pin.node) << 1 | u64::from(pin.target.is_some()));
             if let Some(target) = pin.target {

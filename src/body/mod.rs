@@ -25,10 +25,13 @@ pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
 use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
+use crate::elements::{Elements, Law};
 use crate::error::Result;
 use crate::material::Made;
 use crate::memory;
-use crate::solver::{Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched, close};
+use crate::solver::{
+    Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched, close, write_records,
+};
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::threads::Team;
 use order::NodeOrder;
@@ -45,6 +48,8 @@ pub struct Body {
     /// The numbers of nodes inside are its own, but in `surface` and what is published.
     order: NodeOrder,
     pub(crate) springs: Box<dyn Springs>,
+    /// For bodies whose tetrahedra are more than edges.
+    pub(crate) elements: Option<Box<Elements>>,
     pub(crate) kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
     pub(crate) masses: Vec<f32>,
@@ -104,9 +109,15 @@ impl Body {
         let definition = &made.as_ref().map_or(*definition, |made| made.complete(definition));
         let node_count = definition.positions.len();
         let mut springs = definition.resolved_springs()?;
+        let law = made.as_ref().and_then(|made| made.law);
         let order = match definition.storage {
+            Storage::Packed if law.is_some() => NodeOrder::for_tetrahedra(definition.positions, definition.tetrahedra)?,
             Storage::Packed => NodeOrder::for_springs(definition.positions, &springs, definition.rounding())?,
             _ => NodeOrder::default(),
+        };
+        let elements = match law {
+            Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
+            None => None,
         };
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
@@ -139,7 +150,10 @@ impl Body {
         let mut body = Self {
             order,
             predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
-            records: springs.gathers().then(|| Records::zeros(node_count)).transpose()?,
+            records: (springs.gathers() || elements.is_some())
+                .then(|| Records::zeros(node_count))
+                .transpose()?,
+            elements,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
             springs,
             kernel: needs.kernel,
@@ -189,12 +203,15 @@ impl Body {
                 positions, gathers, order, iterations, accuracy,
             )?)),
             Solver::Newton => {
-                let springs = body.springs.spring_count();
-                let implicit = Implicit::exact(positions, springs, order, iterations, accuracy)?;
+                let (springs, elements) = (&*body.springs, body.elements.as_deref());
+                let implicit = Implicit::exact(positions, springs, elements, order, iterations, accuracy)?;
                 Some(Box::new(implicit))
             }
         };
-        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
+        if let (Some(implicit), Some(elements)) = (&mut body.implicit, &body.elements) {
+            implicit.join(elements)?;
+        }
+        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && body.elements.is_none() {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
             body.scaling = scaling.map(Box::new);
@@ -279,6 +296,24 @@ impl Body {
             inverse_masses: &self.inverse_masses,
         };
         self.watched.gather(&*self.springs, masses);
+    }
+
+    /// The longest substep that elements allow with the nodes as they are, s; infinity where there are none.
+    pub(crate) fn limit_of_elements(&mut self, team: &Team) -> f32 {
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        let Some(elements) = &mut self.elements else {
+            return f32::INFINITY;
+        };
+        let known = elements.find_rates(&*self.springs, &masses) && self.forces_current;
+        if let Some(records) = self.records.as_mut().filter(|_| !known) {
+            write_records(self.kernel, self.state.positions(), records, team);
+            elements.find_forces(self.kernel, records.as_slice(), team);
+            elements.settle();
+        }
+        elements.settled_limit()
     }
 
     /// The longest stable substep with the nodes at these positions.
@@ -381,6 +416,9 @@ impl Body {
         self.state.commit();
         self.carry = carry;
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
+        if let Some(elements) = &mut self.elements {
+            elements.settle();
+        }
         if let Some(implicit) = &mut self.implicit {
             implicit.commit();
         }
@@ -437,4 +475,18 @@ impl Body {
             contacts.forget();
         }
     }
+}
+
+/// The tetrahedra of a definition as elements, in the body's own numbers.
+fn elements_of(law: Law, definition: &BodyDefinition, order: &NodeOrder) -> Result<Elements> {
+    let mut tetrahedra = memory::reserved(definition.tetrahedra.len())?;
+    tetrahedra.extend(
+        definition
+            .tetrahedra
+            .iter()
+            .map(|corners| corners.map(|corner| order.own(corner))),
+    );
+    let rest = definition.rest_positions.unwrap_or(definition.positions);
+    let at_rest = |own: u32| rest[order.caller(own) as usize].as_dvec3();
+    Elements::new(law, &tetrahedra, at_rest, definition.positions.len())
 }

@@ -31,6 +31,19 @@ impl NodeOrder {
         }
     }
 
+    /// The order that suits the edges of these tetrahedra best.
+    pub fn for_tetrahedra(positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<Self> {
+        let edges = crate::mesh::edges(&[], tetrahedra)?;
+        let mut springs = memory::reserved(edges.len())?;
+        springs.extend(edges.into_iter().map(|nodes| Spring {
+            nodes,
+            stiffness: 0.0,
+            rest_length: 0.0,
+            damping: 0.0,
+        }));
+        Self::for_springs(positions, &springs, Rounding { reach: 0.0 })
+    }
+
     /// Whether nodes are kept in the caller's order.
     pub fn is_callers(&self) -> bool {
         self.own.is_empty()

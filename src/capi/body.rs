@@ -44,6 +44,10 @@ pub const SINEW_MATERIAL_NONE: u32 = 0;
 /// Springs along the edges of the elements, as stiff as young_modulus asks for. Poisson's ratio is what they imply: 1/4 for
 /// tetrahedra and cells, 1/3 in the plane for triangles.
 pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
+/// Tetrahedra as finite elements, St Venant and Kirchhoff's law with a signed volume term: of any Poisson's ratio from 0 to 0.49, right
+/// up to compressions of some 20 % and stable beyond. There are no springs but those that are given. sinew_body_remove_spring takes
+/// away the tetrahedra that have the edge, whether or not there is a spring along it.
+pub const SINEW_MATERIAL_TETRAHEDRA: u32 = 2;
 
 /// What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
 #[repr(C)]
@@ -130,7 +134,7 @@ pub struct sinew_body_def {
     /// Young's modulus at small strains, Pa, above 0. Exact for cells and equilateral triangles; an irregular mesh is some 4 to 8 %
     /// softer, one that is one or two tetrahedra thick far more.
     pub young_modulus: f32,
-    /// 0, the default: what the material implies; with SINEW_MATERIAL_SPRINGS else just that, within 0.001.
+    /// SINEW_MATERIAL_SPRINGS: 0, the default, or what it implies within 0.001; SINEW_MATERIAL_TETRAHEDRA: from 0 to 0.49.
     pub poisson_ratio: f32,
     /// kg/m3, above 0: each node has its share of the mass of the elements about it (masses is NULL and node_mass 0 then, and
     /// every node belongs to an element); 0, the default: masses or node_mass.
@@ -313,6 +317,7 @@ impl sinew_body_def {
                 return Ok(None);
             }
             SINEW_MATERIAL_SPRINGS => Model::Springs,
+            SINEW_MATERIAL_TETRAHEDRA => Model::Tetrahedra,
             unknown => {
                 return Err(Error::invalid(format!("material is {unknown}: no SINEW_MATERIAL_...")));
             }

@@ -9,7 +9,7 @@ use crate::body::Body;
 pub struct Energy {
     /// Of the nodes that are free to move, with what mass scaling adds to them.
     pub kinetic: f64,
-    /// Of the springs.
+    /// Of the springs, and of tetrahedra that are elements.
     pub elastic: f64,
     /// Of all nodes, zero at the origin.
     pub gravitational: f64,
@@ -39,6 +39,9 @@ impl Energy {
                     energy.elastic += 0.5 * f64::from(link.stiffness) * stretch * stretch;
                 }
             });
+        }
+        if let Some(elements) = &body.elements {
+            elements.visit_deformed(positions, &mut |_, _, deformed| energy.elastic += deformed.energy());
         }
         energy
     }

@@ -9,6 +9,7 @@ pub mod presets;
 mod springs;
 
 use crate::body::{BodyDefinition, Values, not_negative};
+use crate::elements::Law;
 use crate::error::{Error, Result};
 use elements::Elements;
 
@@ -35,6 +36,14 @@ pub enum Model {
     /// Springs turn stiffer as they are stretched: along an axis of the cubic lattice the secant E shifts by 0.7 of the strain.
     #[default]
     Springs,
+    /// Tetrahedra as finite elements: St Venant and Kirchhoff's law with a signed volume term, of any Poisson's ratio from 0 to 0.49.
+    ///
+    /// The energy of a tetrahedron of volume V at rest is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`, with E Green's strain
+    /// and J how much larger its volume is (negative where it is inside out); lambda + kappa and mu are those of Young's
+    /// modulus and Poisson's ratio, and kappa is lambda + kappa, or a quarter of lambda + kappa + 2 mu where that is more. Forces are
+    /// right up to compressions of some 20 %, and stable beyond. There are no springs but those that are given; removing the
+    /// spring between two nodes takes away the tetrahedra that have this edge.
+    Tetrahedra,
 }
 
 /// What a body is made of, by its numbers. Plain data.
@@ -44,7 +53,7 @@ pub struct Material {
     pub model: Model,
     /// Young's modulus at small strains, Pa, above 0.
     pub young_modulus: f32,
-    /// Poisson's ratio; 0: what the model implies. [`Model::Springs`] takes no other than that, within 0.001.
+    /// Poisson's ratio. [`Model::Springs`]: 0, or what it implies within 0.001. [`Model::Tetrahedra`]: from 0 to 0.49.
     pub poisson_ratio: f32,
     /// kg/m³, at least 0. Above 0: each node has its share of the mass of the elements that it belongs to, a quarter of a
     /// tetrahedron, an eighth of a cell, a third of a triangle; the definition's masses must be 0 then. 0: the definition's masses.
@@ -69,6 +78,7 @@ impl Material {
         not_negative("thickness", self.thickness)?;
         match self.model {
             Model::Springs => check_springs(definition)?,
+            Model::Tetrahedra => check_tetrahedra(self, definition)?,
         }
         if self.density > 0.0 {
             check_no_masses(definition.masses)?;
@@ -80,6 +90,7 @@ impl Material {
     fn check_poisson_ratio(&self, elements: &Elements) -> Result<()> {
         let given = self.poisson_ratio;
         match self.model {
+            Model::Tetrahedra => Ok(()),
             Model::Springs => {
                 let implied = elements.poisson_ratio_of_springs();
                 if given == 0.0 || (given - implied).abs() <= SAME_RATIO {
@@ -92,6 +103,23 @@ impl Material {
             }
         }
     }
+}
+
+/// There are tetrahedra, and Poisson's ratio is one that they can have.
+fn check_tetrahedra(material: &Material, definition: &BodyDefinition) -> Result<()> {
+    const HIGHEST: f32 = 0.49;
+    if definition.tetrahedra.is_empty() {
+        return Err(Error::invalid(
+            "material is of tetrahedra, and the body has none: tetrahedron_count is 0",
+        ));
+    }
+    if !(0.0..=HIGHEST).contains(&material.poisson_ratio) {
+        return Err(Error::invalid(format!(
+            "poisson_ratio is {}: must be from 0 to {HIGHEST}",
+            material.poisson_ratio
+        )));
+    }
+    Ok(())
 }
 
 /// Springs come from the material alone.
@@ -125,8 +153,10 @@ fn check_no_masses(masses: Values) -> Result<()> {
 /// What a material makes of a definition.
 #[derive(Debug)]
 pub(crate) struct Made {
-    springs: Vec<[u32; 2]>,
-    stiffnesses: Vec<f32>,
+    /// With their stiffnesses; `None`: the definition's own, none where it gives none.
+    springs: Option<(Vec<[u32; 2]>, Vec<f32>)>,
+    /// What tetrahedra follow, where they are elements.
+    pub law: Option<Law>,
     /// `None`: the definition's own.
     masses: Option<Vec<f32>>,
 }
@@ -136,25 +166,26 @@ impl Made {
     pub fn of(material: &Material, definition: &BodyDefinition) -> Result<Self> {
         let elements = Elements::of(definition, material.thickness)?;
         material.check_poisson_ratio(&elements)?;
-        let (springs, stiffnesses) = match material.model {
-            Model::Springs => springs::of(&elements, material.young_modulus, definition)?,
+        let (springs, law) = match material.model {
+            Model::Springs => (Some(springs::of(&elements, material.young_modulus, definition)?), None),
+            Model::Tetrahedra => (None, Some(Law::new(material.young_modulus, material.poisson_ratio))),
         };
         let masses = match material.density {
             0.0 => None,
             density => Some(masses::of(&elements, density, definition)?),
         };
-        Ok(Self {
-            springs,
-            stiffnesses,
-            masses,
-        })
+        Ok(Self { springs, law, masses })
     }
 
     /// The definition with what was made.
     pub fn complete<'a>(&'a self, definition: &BodyDefinition<'a>) -> BodyDefinition<'a> {
+        let (springs, stiffnesses) = match &self.springs {
+            Some((springs, stiffnesses)) => (&springs[..], Values::Each(stiffnesses)),
+            None => (definition.springs.unwrap_or_default(), definition.stiffnesses),
+        };
         BodyDefinition {
-            springs: Some(&self.springs),
-            stiffnesses: Values::Each(&self.stiffnesses),
+            springs: Some(springs),
+            stiffnesses,
             masses: self.masses.as_deref().map_or(definition.masses, Values::Each),
             material: None,
             ..*definition

@@ -80,6 +80,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
     if body.implicit.is_some() {
         return attempt_implicitly(body, request, team);
     }
+    let of_elements = body.limit_of_elements(team);
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
     let is_worth_estimating = || {
@@ -113,7 +114,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
             },
         };
     }
-    match run_stably(body, request, start, team) {
+    match run_stably(body, request, start, of_elements, team) {
         Err(too_long) => Outcome::Unstable {
             stable_substep: too_long.stable_substep,
             error: 0.0,
@@ -152,7 +153,13 @@ fn run(
 }
 
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
-fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team) -> Result<(u32, Taken), TooLong> {
+fn run_stably(
+    body: &mut Body,
+    request: &StepRequest,
+    start: Carry,
+    of_elements: f32,
+    team: &Team,
+) -> Result<(u32, Taken), TooLong> {
     let limit = start.stability.limit().unwrap_or(f32::INFINITY);
     let is_anywhere = start.stability.is_coarse() || is_better_anywhere(body, &start.stability);
     let mut stable_substep = if is_anywhere {
@@ -160,9 +167,16 @@ fn run_stably(body: &mut Body, request: &StepRequest, start: Carry, team: &Team)
     } else {
         limit
     };
+    stable_substep = stable_substep.min(of_elements);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
-            stable_substep = start.stability.limit_anywhere();
+            let anywhere = start.stability.limit_anywhere();
+            // Where elements go there is no end to how stiff they may be.
+            stable_substep = anywhere.min(if body.elements.is_some() {
+                0.5 * stable_substep
+            } else {
+                anywhere
+            });
         }
         let stability = start.stability.shortened_to(stable_substep);
         if let Some((substeps, masses_for)) = fewer_substeps(body, request, stable_substep) {

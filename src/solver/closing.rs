@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 use super::gravity::GravityKicks;
 use super::kick::{Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors};
+use crate::elements::Shares;
 use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -51,14 +52,16 @@ impl ClosingKick {
 }
 
 /// Whether a step of `body` may be left open. Damping along springs and comparisons need velocities at its end, and forces
-/// from outside end with it.
+/// from outside end with it; those of elements are not worked out by who only reads.
 pub(super) fn may_stay_open(body: &Body) -> bool {
-    body.predicted_velocities.is_none() && body.coarse.is_none() && !body.forces_applied
+    body.elements.is_none() && body.predicted_velocities.is_none() && body.coarse.is_none() && !body.forces_applied
 }
 
 /// Velocities brought up to the time of the positions, to the side.
 pub(super) struct Closed<'a> {
     pub springs: &'a dyn Springs,
+    /// What they give at these positions.
+    pub elements: Option<Shares<'a>>,
     pub kernel: ChosenKernel,
     /// Half of one.
     pub kick: Kick<'a>,
@@ -73,6 +76,9 @@ impl Closed<'_> {
         let forces = &mut forces;
         let damped = self.springs.damped().then_some(self.velocities);
         self.springs.forces(tile, &Motion::at(self.positions, damped), forces);
+        if let Some(elements) = &self.elements {
+            elements.add(tile, forces);
+        }
         let velocities = self.velocities.slices(nodes.clone());
         for (closed, velocities) in closed.iter_mut().zip(velocities) {
             closed.copy_from_slice(velocities);
@@ -104,6 +110,7 @@ pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut 
     let state = body.state.substep();
     let closed = Closed {
         springs: &*body.springs,
+        elements: None,
         kernel: body.kernel,
         kick: closing.kick(gravity.next(closing.fall()), inertia, body.damping.as_ref()),
         positions: state.positions,
@@ -166,6 +173,7 @@ pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> 
     let fall = { body.carry.gravity }.next(closing.fall());
     let closed = Closed {
         springs: &*body.springs,
+        elements: None,
         kernel: body.kernel,
         kick: closing.kick(fall, inertia, body.damping.as_ref()),
         positions: body.state.positions(),

@@ -22,5 +22,6 @@ pub(crate) use kick::Survey;
 pub(crate) use mass_scaling::{Heavier, MassScaling, Sliver};
 pub(crate) use newton::rest_state;
 pub use newton::{RestStateDefinition, RestStateReport};
-pub(crate) use stability::{Masses, Stability};
+pub(crate) use stability::{Masses, Rates, Stability};
+pub(crate) use substep::write_records;
 pub(crate) use watched::Watched;

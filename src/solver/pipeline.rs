@@ -185,6 +185,7 @@ impl Common<'_> {
     fn pass<'a>(&'a self, part: &'a Part, positions: View<'a>) -> Pass<'a> {
         Pass {
             springs: self.springs,
+            elements: None,
             kernel: self.kernel,
             masses: self.masses,
             request: self.request,

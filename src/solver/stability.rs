@@ -26,7 +26,7 @@ const WORTH_LENGTHENING: f32 = 2.0;
 
 /// What bounds the frequencies and the dampings of a node and its springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rates {
+pub(crate) struct Rates {
     /// The highest frequency squared, 1/s².
     pub stiffest: f32,
     /// The highest rate of damping, 1/s.

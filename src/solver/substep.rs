@@ -8,6 +8,7 @@ use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
+use crate::elements::{Elements, Shares};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -119,11 +120,22 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         ..part.kick(request.gravity, inertia, body.damping.as_ref())
     };
     let tiles = tile_count(node_count);
+    let forces_known = part.before == Before::Current && body.forces_current;
+    if let Some(records) = body.records.as_mut().filter(|_| !forces_known) {
+        write_records(body.kernel, state.positions, records, team);
+    }
+    if let (Some(elements), Some(records)) = (&mut body.elements, &body.records)
+        && !forces_known
+    {
+        elements.find_forces(body.kernel, records.as_slice(), team);
+    }
+    let elements = body.elements.as_deref().map(Elements::shares);
     if part.before == Before::Open
         && let Some(predicted) = &mut body.predicted_velocities
     {
         let closed = Closed {
             springs: &*body.springs,
+            elements,
             kernel: body.kernel,
             kick: Kick {
                 duration: 0.5 * part.substep,
@@ -139,12 +151,9 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             closed.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
         });
     }
-    let forces_known = part.before == Before::Current && body.forces_current;
-    if let Some(records) = body.records.as_mut().filter(|_| !forces_known) {
-        write_records(body.kernel, state.positions, records, team);
-    }
     let pass = Pass {
         springs: &*body.springs,
+        elements,
         kernel: body.kernel,
         masses: &body.masses,
         request,
@@ -184,7 +193,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
 }
 
 /// Makes records of vectors, for springs that gather them.
-pub(super) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &mut Records, team: &Team) {
+pub(crate) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &mut Records, team: &Team) {
     let node_count = vectors.len();
     team.pass(tile_count(node_count), records.tiles_mut(), |tile, records| {
         let axes = vectors.slices(tile_nodes(tile, node_count));
@@ -195,6 +204,7 @@ pub(super) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &m
 /// What all tiles of a substep read.
 pub(super) struct Pass<'a> {
     pub springs: &'a dyn Springs,
+    pub elements: Option<Shares<'a>>,
     pub kernel: ChosenKernel,
     pub masses: &'a [f32],
     pub request: &'a StepRequest<'a>,
@@ -237,6 +247,9 @@ impl Pass<'_> {
                 soon: [vx, vy, vz, x, y, z],
             };
             self.springs.forces(tile, &motion, forces);
+            if let Some(elements) = &self.elements {
+                elements.add(tile, forces);
+            }
         }
         if let Some(first_velocities) = self.first_velocities {
             copy(&mut written.velocities, first_velocities.slices(nodes.clone()));

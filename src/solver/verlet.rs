@@ -74,6 +74,19 @@ fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
     }
 }
 
+/// The same for elements, as they were deformed where forces were last worked out.
+fn check_elements(body: &Body, substep: f32) -> Result<(), TooLong> {
+    let stable_substep = body
+        .elements
+        .as_ref()
+        .map_or(f32::INFINITY, |elements| elements.limit());
+    if substep <= stable_substep {
+        Ok(())
+    } else {
+        Err(TooLong { stable_substep })
+    }
+}
+
 /// A step to be taken.
 struct Step<'a> {
     request: &'a StepRequest<'a>,
@@ -150,6 +163,7 @@ impl Step<'_> {
                     .unwrap_or_else(|| body.estimate(body.state.newest().0));
                 check(&carry.stability, substep)?;
             }
+            check_elements(body, substep)?;
         }
         // What a tool touches is closed with it.
         if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
@@ -164,6 +178,7 @@ impl Step<'_> {
                     .next(request.gravity.as_dvec3() * f64::from(0.5 * substep)),
             );
             finite = pass(body, request, &part, &mut carry, team);
+            check_elements(body, substep)?;
         }
         Ok(Some(Taken { carry, finite }))
     }

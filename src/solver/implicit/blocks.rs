@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
+use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
@@ -48,6 +49,21 @@ impl Blocks {
         team.pass(tile_count(node_count), written, |tile, blocks| {
             for (node, block) in tile_nodes(tile, node_count).zip(blocks) {
                 *block = block_of(node, springs, positions, tangent);
+            }
+        });
+    }
+
+    /// Adds elements at these positions.
+    pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
+        let stiffness = &mut self.stiffness;
+        elements.visit_deformed(positions, &mut |corners, gradients, deformed| {
+            for (node, &gradient) in corners.into_iter().zip(gradients) {
+                let matrix = deformed.clamped_stiffness(gradient, gradient);
+                let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+                let entries = [x.x, y.y, z.z, z.y, x.z, y.x];
+                for (entry, more) in stiffness[node as usize].iter_mut().zip(entries) {
+                    *entry += more as f32;
+                }
             }
         });
     }

@@ -4,11 +4,12 @@
 //! once, by a small dense matrix (aggregation, as in Vanek, Mandel, Brezina 1996, without smoothing). Its inverse may be that
 //! of an older state of the body: then it is a worse preconditioner, and still one.
 
-use glam::{Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 
 use super::gradient::add_lanes;
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
+use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{ChosenKernel, Loops, Springs, TILE, Tangent};
@@ -118,6 +119,59 @@ impl Coarse {
                     self.add(node, neighbour, &matrix);
                 }
             });
+        }
+    }
+
+    /// Adds elements at these positions.
+    pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
+        elements.visit_deformed(positions, &mut |corners, gradients, deformed| {
+            let nodes = corners.map(|node| node as usize);
+            let clusters = nodes.map(|node| usize::from(self.clusters[node / BLOCK]));
+            let parts = nodes.map(|node| self.part(node));
+            let is_free = parts.iter().all(|part| part[0] == 1.0);
+            if is_free && clusters.iter().all(|&cluster| cluster == clusters[0]) {
+                // The functions have one gradient each in all of it, and 1 has none.
+                let gradient = |function: usize| -> DVec3 {
+                    let terms = parts.iter().zip(gradients);
+                    terms
+                        .map(|(part, &gradient)| gradient * f64::from(part[function]))
+                        .sum()
+                };
+                let gradients = [1, 2, 3].map(gradient);
+                for (row, &of_row) in (1..).zip(&gradients) {
+                    for (column, &of_column) in (1..).zip(&gradients) {
+                        let matrix = deformed.clamped_stiffness(of_row, of_column);
+                        self.add_block([clusters[0], row], [clusters[0], column], matrix);
+                    }
+                }
+                return;
+            }
+            for (a, &of_a) in gradients.iter().enumerate() {
+                for (b, &of_b) in gradients.iter().enumerate() {
+                    let matrix = deformed.clamped_stiffness(of_a, of_b);
+                    for row in 0..FUNCTIONS {
+                        for column in 0..FUNCTIONS {
+                            let factor = f64::from(parts[a][row] * parts[b][column]);
+                            if factor != 0.0 {
+                                self.add_block([clusters[a], row], [clusters[b], column], matrix * factor);
+                            }
+                        }
+                    }
+                }
+            }
+        });
+    }
+
+    /// Adds what joins two functions of clusters.
+    fn add_block(&mut self, [row_cluster, row]: [usize; 2], [column_cluster, column]: [usize; 2], matrix: DMat3) {
+        let size = self.size();
+        let transposed = matrix.transpose();
+        for axis in 0..3 {
+            let place = (row_cluster * MOTIONS + 3 * row + axis) * size + column_cluster * MOTIONS + 3 * column;
+            let entries = self.stiffness[place..place + 3].iter_mut();
+            for (entry, term) in entries.zip(transposed.col(axis).to_array()) {
+                *entry += term;
+            }
         }
     }
 

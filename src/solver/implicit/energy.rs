@@ -4,6 +4,8 @@ use super::step::Substep;
 use super::{End, Implicit};
 use crate::body::{Body, Records, Vectors};
 use crate::contact::Contacts;
+use crate::elements::Elements;
+use crate::solver::write_records;
 use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -22,6 +24,14 @@ pub(super) struct Before {
     /// Kinetic and elastic, J; the pins are already where the step leads them.
     energy: f64,
     credit: f64,
+}
+
+/// What has energy inside a body.
+struct Inside<'a> {
+    springs: &'a dyn Springs,
+    elements: Option<&'a mut Elements>,
+    records: Option<&'a mut Records>,
+    kernel: ChosenKernel,
 }
 
 impl Substep<'_> {
@@ -43,14 +53,20 @@ impl Substep<'_> {
         };
         let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, body.kernel);
         let from = implicit.place(self.is_first);
-        let mut energy = implicit.elastic(&*body.springs, state.positions, None, from, self.team);
+        let mut inside = Inside {
+            springs: &*body.springs,
+            elements: body.elements.as_deref_mut(),
+            records: body.records.as_mut(),
+            kernel: body.kernel,
+        };
+        let mut energy = implicit.elastic(&mut inside, state.positions, from, self.team);
         if travels {
             let moved = state.next_positions;
             moved.copy_from(state.positions);
             for pin in body.pins.iter() {
                 moved.set(pin.node as usize, pin.place(self.end));
             }
-            energy = energy.max(implicit.elastic(&*body.springs, moved, None, from, self.team));
+            energy = energy.max(implicit.elastic(&mut inside, moved, from, self.team));
         }
         Before {
             energy: kinetic + energy,
@@ -63,9 +79,13 @@ impl Substep<'_> {
         let state = body.state.substep();
         let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
         let next = 1 - implicit.settled;
-        // Records are those of the positions that were looked at last.
-        let records = body.records.as_ref();
-        let elastic = implicit.elastic(&*body.springs, state.next_positions, records, next, self.team);
+        let mut inside = Inside {
+            springs: &*body.springs,
+            elements: body.elements.as_deref_mut(),
+            records: body.records.as_mut(),
+            kernel: body.kernel,
+        };
+        let elastic = implicit.elastic(&mut inside, state.next_positions, next, self.team);
         let work = self.work(body, &implicit.histories[next].ways);
         let after = kinetic + elastic;
         let allowed = before.energy + work + before.credit;
@@ -180,25 +200,28 @@ fn scale(vectors: &mut Vectors, factor: f32) {
 }
 
 impl Implicit {
-    /// The energy of the springs with nodes at `positions`, which lack the remainders of this place where there are some.
-    fn elastic(
-        &mut self,
-        springs: &dyn Springs,
-        positions: &Vectors,
-        records: Option<&Records>,
-        place: usize,
-        team: &Team,
-    ) -> f64 {
+    /// The energy of what is inside a body with nodes at `positions`, which lack the remainders of this place where there are
+    /// some, J.
+    fn elastic(&mut self, inside: &mut Inside, positions: &Vectors, place: usize, team: &Team) -> f64 {
         if let Some(newton) = &self.newton {
-            return newton.elastic(springs, positions, place);
+            return newton.elastic(inside.springs, inside.elements.as_deref(), positions, place);
         }
-        let node_count = positions.len();
+        let (node_count, springs, kernel) = (positions.len(), inside.springs, inside.kernel);
+        if let Some(records) = &mut inside.records {
+            write_records(kernel, positions, records, team);
+        }
+        let records = inside.records.as_deref();
         let view = positions.view().with_records(records);
         let partials = Items::new(&mut self.partials);
         team.pass(tile_count(node_count), partials, |tile, partial| {
             partial.first = springs.half_energy(tile_nodes(tile, node_count), view);
         });
-        self.partials.iter().map(|partial| partial.first).sum()
+        let of_springs: f64 = self.partials.iter().map(|partial| partial.first).sum();
+        let of_elements = match (&mut inside.elements, records) {
+            (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
+            _ => 0.0,
+        };
+        of_springs + of_elements
     }
 }
 

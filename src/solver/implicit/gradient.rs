@@ -96,6 +96,14 @@ impl Implicit {
     /// The matrix times the search direction: the product of both.
     fn multiply(&mut self, body: &Body, positions: &Vectors, tangent: Tangent, team: &Team) -> f64 {
         let node_count = positions.len();
+        if let (Some(elements), Some(changes)) = (&body.elements, &mut self.changes)
+            && let (Some(positions), Some(searches)) = (&body.records, &self.search_records)
+        {
+            let records = [positions.as_slice(), searches.as_slice()];
+            elements.find_changes(body.kernel, records, changes, team);
+        }
+        let elements = body.elements.as_deref().zip(self.changes.as_ref());
+        let elements = elements.map(|(elements, changes)| elements.shares_of(changes));
         let (searches, inertia) = (&self.searches, &self.inertia);
         let course = Course {
             node_count,
@@ -108,6 +116,9 @@ impl Implicit {
             let nodes = tile_nodes(tile, node_count);
             let mut changes = TileForces::ZERO;
             body.springs.changes(tile, &course, &mut changes);
+            if let Some(elements) = &elements {
+                elements.add(tile, &mut changes);
+            }
             partial.first = body.kernel.run(Product {
                 inertia: &inertia[nodes.clone()],
                 searches: searches.slices(nodes.clone()),

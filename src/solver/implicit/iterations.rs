@@ -5,6 +5,7 @@ use super::gradient::Goal;
 use super::loops::{Add, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
 use crate::body::{Body, Vectors};
+use crate::elements::Elements;
 use crate::springs::{ChosenKernel, Motion, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -18,6 +19,10 @@ impl Substep<'_> {
             contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
         }
         let node_count = body.node_count();
+        if let (Some(elements), Some(records)) = (&mut body.elements, &body.records) {
+            elements.find_forces(body.kernel, records.as_slice(), self.team);
+        }
+        let elements = body.elements.as_deref().map(Elements::shares);
         let state = body.state.substep();
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
         let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
@@ -42,6 +47,9 @@ impl Substep<'_> {
                 let nodes = tile_nodes(tile, node_count);
                 let mut forces = TileForces::ZERO;
                 springs.forces(tile, &motion, &mut forces);
+                if let Some(elements) = &elements {
+                    elements.add(tile, &mut forces);
+                }
                 for pin in &mut *pins {
                     let node = pin.node as usize;
                     pin.solved = -(forces.get(node - nodes.start) + gravity * masses[node]);

@@ -23,10 +23,11 @@ pub(super) use step::run;
 
 use crate::body::{Records, Vectors};
 use crate::diagnostics::{SolverReport, StateHasher};
+use crate::elements::{Elements, Sums};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::newton::Newton;
-use crate::springs::tile_count;
+use crate::springs::{Springs, tile_count};
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
 use estimate::Spectrum;
@@ -107,8 +108,10 @@ pub(crate) struct Implicit {
     corrections: Vectors,
     residuals: Vectors,
     searches: Vectors,
-    /// For springs that gather them.
+    /// For springs that gather them, and elements.
     search_records: Option<Records>,
+    /// What elements make of the search direction.
+    changes: Option<Sums>,
     /// The matrix times the search direction, and what the preconditioner makes of the residual.
     products: Vectors,
     preconditioned: Vectors,
@@ -187,6 +190,7 @@ impl Implicit {
             residuals: vectors()?,
             searches: vectors()?,
             search_records: gathers.then(|| Records::zeros(solved_count)).transpose()?,
+            changes: None,
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, solved_count)?,
@@ -208,8 +212,23 @@ impl Implicit {
         })
     }
 
-    /// As [`Self::new`], with the equations solved exactly, for so many springs.
-    pub fn exact(positions: &Vectors, spring_count: usize, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
+    /// Makes room for what elements change by.
+    pub fn join(&mut self, elements: &Elements) -> Result<()> {
+        if self.newton.is_none() {
+            self.changes = Some(elements.room_for_changes()?);
+        }
+        Ok(())
+    }
+
+    /// As [`Self::new`], with the equations solved exactly, for these springs and elements.
+    pub fn exact(
+        positions: &Vectors,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        order: u32,
+        budget: u32,
+        accuracy: f32,
+    ) -> Result<Self> {
         /// As good as nothing, and far above what rounding makes.
         const ACCURACY: f32 = 1e-6;
         /// For bodies of a million nodes.
@@ -217,7 +236,7 @@ impl Implicit {
         let budget = if budget == 0 { BUDGET } else { budget };
         let accuracy = if accuracy == 0.0 { ACCURACY } else { accuracy };
         Ok(Self {
-            newton: Some(Newton::new(positions.len(), spring_count)?),
+            newton: Some(Newton::new(positions.len(), springs, elements)?),
             ..Self::solving(&Vectors::zeros(0)?, positions.len(), false, order, budget, accuracy)?
         })
     }

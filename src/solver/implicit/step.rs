@@ -238,6 +238,10 @@ impl Substep<'_> {
             implicit
                 .coarse
                 .gather(&*body.springs, &body.inverse_masses, positions, self.tangent());
+            if let Some(elements) = &body.elements {
+                implicit.blocks.add_elements(elements, positions);
+                implicit.coarse.add_elements(elements, positions);
+            }
         }
         let time = self.formula.time as f32;
         if time != implicit.prepared || implicit.stale {

@@ -8,6 +8,7 @@ use super::factor;
 use super::gradient::{Gradient, dot, longest};
 use super::matrix::Matrix;
 use super::network::Network;
+use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Springs;
@@ -66,27 +67,30 @@ pub(in crate::solver) struct Found {
 }
 
 impl Descent {
-    pub fn new(node_count: usize, spring_count: usize) -> Result<Self> {
+    /// Of a body as it is.
+    pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
+        let network = Network::new(node_count, springs, elements)?;
+        let pair_count = network.pair_count();
         Ok(Self {
-            network: Network::new(node_count, spring_count)?,
             equation: Equation::new(node_count)?,
             residuals: memory::filled(DVec3::ZERO, node_count)?,
             gradient: Gradient::new(node_count)?,
-            matrix: Matrix::new(node_count, spring_count)?,
-            factor: Matrix::new(node_count, spring_count)?,
+            matrix: Matrix::new(node_count, pair_count)?,
+            factor: Matrix::new(node_count, pair_count)?,
+            network,
         })
     }
 
     /// Makes room for so many springs in all.
     pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
-        self.network.make_room(spring_count)?;
-        self.matrix.make_room(spring_count)?;
-        self.factor.make_room(spring_count)
+        let pair_count = self.network.make_room(spring_count)?;
+        self.matrix.make_room(pair_count)?;
+        self.factor.make_room(pair_count)
     }
 
-    /// Takes the springs as they are now.
-    pub fn read(&mut self, springs: &dyn Springs) {
-        self.network.read(springs);
+    /// Takes springs and elements as they are now.
+    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>) {
+        self.network.read(springs, elements);
     }
 
     /// Writes what acts on each node.

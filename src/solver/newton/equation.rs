@@ -6,8 +6,9 @@
 use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
-use super::network::Network;
+use super::network::{Network, PAIRS, Tetrahedron};
 use crate::contact::Holds;
+use crate::elements::{Deformed, Law};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Link;
@@ -98,6 +99,12 @@ impl Equation {
             residuals[node] += force;
             residuals[link.neighbour as usize] -= force;
         }
+        for (law, tetrahedron) in network.tetrahedra() {
+            let deformed = self.deformed(law, tetrahedron);
+            for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
+                residuals[corner] += deformed.force(gradient);
+            }
+        }
         let way = |node: usize| self.ways[node];
         self.holds.show_forces(way, |node, force| {
             if self.is_free(node) {
@@ -131,6 +138,10 @@ impl Equation {
             let along = more.dot(spring.direction);
             add(0.5 * damping(link) * along * (2.0 * spring.speed + self.rate * along));
         }
+        for (law, tetrahedron) in network.tetrahedra() {
+            let more = edges(&tetrahedron.corners, |node| corrections[node] * part);
+            add(self.deformed(law, tetrahedron).change(&tetrahedron.rest, more));
+        }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
         self.holds.show_changes(way, more, add);
         sums
@@ -145,7 +156,7 @@ impl Equation {
                 DMat3::IDENTITY
             };
         }
-        matrix.beside.resize(network.spring_count(), DMat3::ZERO);
+        matrix.beside.resize(network.pair_count(), DMat3::ZERO);
         for (place, node, link) in network.springs() {
             let neighbour = link.neighbour as usize;
             let block = self.stiffness_of(node, link, tangent);
@@ -157,11 +168,38 @@ impl Equation {
             let joins = self.is_free(node) && self.is_free(neighbour);
             matrix.beside[place] = if joins { -block } else { DMat3::ZERO };
         }
+        for (law, tetrahedron) in network.tetrahedra() {
+            self.add_tetrahedron(law, tetrahedron, tangent, matrix);
+        }
         self.holds.show_blocks(|node, block| {
             if self.is_free(node) {
                 matrix.diagonal[node] += whole(block);
             }
         });
+    }
+
+    fn add_tetrahedron(&self, law: Law, tetrahedron: &Tetrahedron, tangent: Tangent, matrix: &mut Matrix) {
+        let deformed = self.deformed(law, tetrahedron);
+        let gradients = tetrahedron.rest.gradients();
+        let stiffness = |a: usize, b: usize| match tangent {
+            Tangent::Exact => deformed.stiffness(gradients[a], gradients[b]),
+            Tangent::Clamped => deformed.clamped_stiffness(gradients[a], gradients[b]),
+        };
+        let corners = tetrahedron.corners;
+        for corner in (0..4).filter(|&corner| self.is_free(corners[corner])) {
+            matrix.diagonal[corners[corner]] += stiffness(corner, corner);
+        }
+        for ([a, b], place) in PAIRS.into_iter().zip(tetrahedron.places) {
+            if self.is_free(corners[a]) && self.is_free(corners[b]) {
+                let (high, low) = if corners[a] > corners[b] { (a, b) } else { (b, a) };
+                matrix.beside[place] += stiffness(high, low);
+            }
+        }
+    }
+
+    fn deformed(&self, law: Law, tetrahedron: &Tetrahedron) -> Deformed {
+        let edges = edges(&tetrahedron.corners, |node| self.position(node));
+        Deformed::new(law, &tetrahedron.rest, edges)
     }
 
     /// Brings what contacts do up to the ways, of which the matrix is made.
@@ -223,8 +261,12 @@ impl Equation {
             .springs()
             .map(|(_, node, link)| 0.5 * stiffness(link) * (self.spring(node, link).length - rest_length(link)).powi(2))
             .sum();
+        let of_elements: f64 = network
+            .tetrahedra()
+            .map(|(law, tetrahedron)| self.deformed(law, tetrahedron).energy())
+            .sum();
         let loads = self.loads.iter().enumerate();
-        elastic
+        elastic + of_elements
             - loads
                 .map(|(node, load)| load.dot(self.position(node) + origin))
                 .sum::<f64>()
@@ -251,6 +293,12 @@ impl Equation {
             speed,
         }
     }
+}
+
+/// The edges from the first of four corners to the others.
+fn edges([a, b, c, d]: &[usize; 4], at: impl Fn(usize) -> DVec3) -> DMat3 {
+    let first = at(*a);
+    DMat3::from_cols(at(*b) - first, at(*c) - first, at(*d) - first)
 }
 
 fn stiffness(link: &Link) -> f64 {

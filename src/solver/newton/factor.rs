@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::matrix::Matrix;
+use super::matrix::{Matrix, transposed_product};
 use super::network::Network;
 
 /// A pivot that has lost more than this of its block's size is not to be trusted.
@@ -69,12 +69,7 @@ pub(super) fn solve(factor: &Matrix, network: &Network, right: &[DVec3], solutio
         let found = solution[node] - factor.diagonal[node] * sums[node];
         solution[node] = found;
         for place in network.row(node) {
-            let block = &factor.beside[place];
-            sums[network.neighbour(place)] += DVec3::new(
-                block.x_axis.dot(found),
-                block.y_axis.dot(found),
-                block.z_axis.dot(found),
-            );
+            sums[network.neighbour(place)] += transposed_product(&factor.beside[place], found);
         }
     }
 }

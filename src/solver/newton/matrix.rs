@@ -6,7 +6,7 @@ use super::network::Network;
 use crate::error::Result;
 use crate::memory;
 
-/// The blocks on the diagonal, and those below it: all of them are symmetric.
+/// The blocks on the diagonal, and those below it.
 #[derive(Debug)]
 pub(super) struct Matrix {
     pub diagonal: Vec<DMat3>,
@@ -34,10 +34,20 @@ impl Matrix {
             for place in network.row(node) {
                 let (neighbour, beside) = (network.neighbour(place), &self.beside[place]);
                 sum += *beside * vectors[neighbour];
-                products[neighbour] += *beside * vectors[node];
+                products[neighbour] += transposed_product(beside, vectors[node]);
             }
             // What comes from nodes of higher numbers is added to it later.
             products[node] = sum;
         }
     }
+}
+
+/// The transposed of a block times a vector.
+#[inline(always)]
+pub(super) fn transposed_product(block: &DMat3, vector: DVec3) -> DVec3 {
+    DVec3::new(
+        block.x_axis.dot(vector),
+        block.y_axis.dot(vector),
+        block.z_axis.dot(vector),
+    )
 }

@@ -20,8 +20,11 @@ pub(crate) use rest::rest_state;
 pub use rest::{RestStateDefinition, RestStateReport};
 pub(super) use step::Aimed;
 
+use glam::DMat3;
+
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
+use crate::elements::{Deformed, Elements};
 use crate::error::Result;
 use crate::springs::Springs;
 use descent::Descent;
@@ -36,10 +39,10 @@ pub(crate) struct Newton {
 }
 
 impl Newton {
-    /// For so many nodes and springs.
-    pub fn new(node_count: usize, spring_count: usize) -> Result<Self> {
+    /// For a body as it is.
+    pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
         Ok(Self {
-            descent: Descent::new(node_count, spring_count)?,
+            descent: Descent::new(node_count, springs, elements)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
         })
     }
@@ -54,8 +57,14 @@ impl Newton {
         self.remainders[place].clear();
     }
 
-    /// The energy of the springs, J, with nodes at these positions and what they lack.
-    pub fn elastic(&self, springs: &dyn Springs, positions: &Vectors, place: usize) -> f64 {
+    /// The energy of springs and elements, J, with nodes at these positions and what they lack.
+    pub fn elastic(
+        &self,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        positions: &Vectors,
+        place: usize,
+    ) -> f64 {
         let exact = |node: usize| exact(positions.get(node), self.remainders[place].get(node));
         let mut sum = 0.0;
         for node in 0..positions.len() {
@@ -66,6 +75,12 @@ impl Newton {
                     let stretch = position.distance(exact(neighbour)) - f64::from(link.rest_length);
                     sum += 0.5 * f64::from(link.stiffness) * stretch * stretch;
                 }
+            });
+        }
+        if let Some(elements) = elements {
+            elements.visit(&mut |corners, rest| {
+                let [a, b, c, d] = corners.map(|node| exact(node as usize));
+                sum += Deformed::new(elements.law(), rest, DMat3::from_cols(b - a, c - a, d - a)).energy();
             });
         }
         sum

@@ -1,37 +1,83 @@
-//! The springs of a body as rows of a matrix: each once, at its node with the higher number.
+//! The springs and elements of a body as rows of a matrix: each pair of nodes once, at the node with the higher number.
 
 use std::ops::Range;
 
+use crate::elements::{Elements, Law, Rest};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Link, Springs};
 
-/// For each node the springs to nodes of lower numbers, in their order.
+/// For each node the springs to nodes of lower numbers, in their order; edges of elements without a spring are springs of no
+/// stiffness.
 #[derive(Debug)]
 pub(super) struct Network {
     /// Where the row of each node begins, and the end of the last.
     starts: Vec<usize>,
     links: Vec<Link>,
+    tetrahedra: Vec<Tetrahedron>,
+    /// The edges of tetrahedra, the higher number first.
+    edges: Vec<[u32; 2]>,
+    law: Option<Law>,
+}
+
+/// A tetrahedron, and where its pairs of corners are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tetrahedron {
+    pub corners: [usize; 4],
+    pub rest: Rest,
+    /// Of the pairs of [`PAIRS`].
+    pub places: [usize; 6],
+}
+
+/// The pairs of corners.
+pub(super) const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// With the higher number first.
+fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.max(b), a.min(b)]
 }
 
 impl Network {
-    /// With room for so many.
-    pub fn new(node_count: usize, spring_count: usize) -> Result<Self> {
-        Ok(Self {
+    /// That of a body as it is.
+    pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
+        let tetrahedron_count = elements.map_or(0, Elements::count);
+        let mut network = Self {
             starts: memory::filled(0, node_count + 1)?,
-            links: memory::reserved(spring_count)?,
-        })
+            links: memory::reserved(springs.spring_count() + 6 * tetrahedron_count)?,
+            tetrahedra: memory::reserved(tetrahedron_count)?,
+            edges: memory::reserved(6 * tetrahedron_count)?,
+            law: elements.map(Elements::law),
+        };
+        network.read(springs, elements);
+        Ok(network)
     }
 
-    /// Makes room for so many springs in all.
-    pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
-        let more = spring_count.saturating_sub(self.links.len());
-        Ok(self.links.try_reserve(more)?)
+    /// Makes room for so many springs in all: how many pairs of nodes there may be then.
+    pub fn make_room(&mut self, spring_count: usize) -> Result<usize> {
+        let pair_count = spring_count + self.edges.len();
+        self.links.try_reserve(pair_count.saturating_sub(self.links.len()))?;
+        Ok(pair_count)
     }
 
-    /// Takes them from a body's storage, which allocates nothing where there is room for all.
-    pub fn read(&mut self, springs: &dyn Springs) {
+    /// Takes them from a body, which allocates nothing where there is room for all.
+    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>) {
+        self.tetrahedra.clear();
+        self.edges.clear();
+        if let Some(elements) = elements {
+            elements.visit(&mut |corners, rest| {
+                self.edges
+                    .extend(PAIRS.map(|pair| ordered(pair.map(|corner| corners[corner]))));
+                self.tetrahedra.push(Tetrahedron {
+                    corners: corners.map(|corner| corner as usize),
+                    rest: *rest,
+                    places: [0; 6],
+                });
+            });
+            self.edges.sort_unstable();
+            self.edges.dedup();
+        }
         self.links.clear();
+        let mut edges = self.edges.iter().peekable();
         for node in 0..self.node_count() {
             let start = self.links.len();
             springs.visit(node, &mut |link| {
@@ -40,7 +86,29 @@ impl Network {
                 }
             });
             self.links[start..].sort_unstable_by_key(|link| link.neighbour);
+            let end = self.links.len();
+            while let Some(&&[_, neighbour]) = edges.peek().filter(|edge| edge[0] as usize == node) {
+                edges.next();
+                let has_spring = self.links[start..end].binary_search_by_key(&neighbour, |link| link.neighbour);
+                if has_spring.is_err() {
+                    self.links.push(Link {
+                        neighbour,
+                        stiffness: 0.0,
+                        rest_length: 0.0,
+                        damping: 0.0,
+                    });
+                }
+            }
+            self.links[start..].sort_unstable_by_key(|link| link.neighbour);
             self.starts[node + 1] = self.links.len();
+        }
+        let (starts, links) = (&self.starts, &self.links);
+        for tetrahedron in &mut self.tetrahedra {
+            tetrahedron.places = PAIRS.map(|pair| {
+                let [high, low] = ordered(pair.map(|corner| tetrahedron.corners[corner] as u32));
+                let start = starts[high as usize];
+                start + links[start..starts[high as usize + 1]].partition_point(|link| link.neighbour < low)
+            });
         }
     }
 
@@ -48,7 +116,8 @@ impl Network {
         self.starts.len() - 1
     }
 
-    pub fn spring_count(&self) -> usize {
+    /// How many pairs of nodes it has.
+    pub fn pair_count(&self) -> usize {
         self.links.len()
     }
 
@@ -67,5 +136,13 @@ impl Network {
     /// Every spring with its place and its node of the higher number.
     pub fn springs(&self) -> impl Iterator<Item = (usize, usize, &Link)> {
         (0..self.node_count()).flat_map(move |node| self.row(node).map(move |place| (place, node, &self.links[place])))
+    }
+
+    /// Every tetrahedron, and the law that they follow.
+    pub fn tetrahedra(&self) -> impl Iterator<Item = (Law, &Tetrahedron)> {
+        let law = self.law;
+        self.tetrahedra
+            .iter()
+            .filter_map(move |tetrahedron| Some((law?, tetrahedron)))
     }
 }

@@ -56,8 +56,7 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
             definition.tolerance
         )));
     }
-    let mut descent = Descent::new(body.node_count(), body.springs.spring_count())?;
-    descent.read(&*body.springs);
+    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref())?;
     set_up(&mut descent, body, gravity);
     let parts = Parts::new(&descent)?;
     parts.balance(&mut descent, body)?;
@@ -164,7 +163,7 @@ fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> Fo
     found
 }
 
-/// The parts of a body that springs hold together: for each node the lowest node of its part.
+/// The parts of a body that springs and elements hold together: for each node the lowest node of its part.
 struct Parts {
     lowest: Vec<u32>,
 }
@@ -178,6 +177,13 @@ impl Parts {
         for (_, node, link) in descent.network.springs() {
             if link.stiffness > 0.0 {
                 let [a, b] = [node as u32, link.neighbour].map(|end| parts.find(end));
+                parts.lowest[a.max(b) as usize] = a.min(b);
+            }
+        }
+        for (_, tetrahedron) in descent.network.tetrahedra() {
+            let [first, others @ ..] = tetrahedron.corners;
+            for other in others {
+                let [a, b] = [first as u32, other as u32].map(|end| parts.find(end));
                 parts.lowest[a.max(b) as usize] = a.min(b);
             }
         }

@@ -37,7 +37,7 @@ impl Newton {
     /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
     /// there.
     pub(in crate::solver) fn solve(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) -> Found {
-        self.descent.read(&*body.springs);
+        self.descent.read(&*body.springs, body.elements.as_deref());
         self.set_up(body, aimed, pushes);
         if let Some(contacts) = &mut body.contacts {
             self.descent.equation.holds = std::mem::take(&mut contacts.holds);

@@ -65,6 +65,41 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
+    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+        unsafe {
+            let [x, y, z] = vectors.map(|vector| vector.0);
+            let none = _mm256_setzero_ps();
+            let (low_xy, high_xy) = (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
+            let (low_z, high_z) = (_mm256_unpacklo_ps(z, none), _mm256_unpackhi_ps(z, none));
+            let pairs = [
+                _mm256_shuffle_ps::<0b0100_0100>(low_xy, low_z),
+                _mm256_shuffle_ps::<0b1110_1110>(low_xy, low_z),
+                _mm256_shuffle_ps::<0b0100_0100>(high_xy, high_z),
+                _mm256_shuffle_ps::<0b1110_1110>(high_xy, high_z),
+            ];
+            for (lane, pair) in pairs.into_iter().enumerate() {
+                add_record(sums, indices.add(lane), _mm256_castps256_ps128(pair));
+                add_record(sums, indices.add(lane + 4), _mm256_extractf128_ps::<1>(pair));
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
+    }
+
+    #[inline(always)]
+    unsafe fn size(self) -> Self {
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm256_add_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
     unsafe fn subtract(self, other: Self) -> Self {
         Self(unsafe { _mm256_sub_ps(self.0, other.0) })
     }
@@ -156,6 +191,24 @@ impl Lanes for Avx2Lanes {
 pub(super) unsafe fn record(place: *const Record) -> __m128 {
     // SAFETY: the caller promises the instructions and the record.
     unsafe { _mm_load_ps(place.cast()) }
+}
+
+/// The record of half an even index: half a record is as much as an address can be scaled by.
+#[inline(always)]
+pub(super) unsafe fn twice(base: *const Record, index: *const u16) -> *mut Record {
+    // SAFETY: the caller promises a readable index.
+    let halves = unsafe { usize::from(index.read()) };
+    base.cast::<[f32; 2]>().wrapping_add(halves).cast::<Record>().cast_mut()
+}
+
+/// Adds to the record of half an even index.
+#[inline(always)]
+pub(super) unsafe fn add_record(sums: *mut Record, index: *const u16, record: __m128) {
+    // SAFETY: the caller promises the instructions, a readable index and a writable record.
+    unsafe {
+        let place: *mut f32 = twice(sums, index).cast();
+        _mm_store_ps(place, _mm_add_ps(_mm_load_ps(place), record));
+    }
 }
 
 /// The numbers of eight records: four of them at a time in each half.

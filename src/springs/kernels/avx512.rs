@@ -5,7 +5,7 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
-use super::avx2::{Avx2Lanes, four_at, four_near, record};
+use super::avx2::{Avx2Lanes, add_record, four_at, four_near, record, twice};
 use super::eights::{EightLinks, Sight};
 use super::lanes::Lanes;
 use crate::body::Record;
@@ -66,6 +66,43 @@ impl Lanes for Avx512Lanes {
     #[inline(always)]
     unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
         unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) }
+    }
+
+    #[inline(always)]
+    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+        unsafe {
+            let [x, y, z] = vectors.map(|vector| vector.0);
+            let none = _mm512_setzero_ps();
+            let (low_xy, high_xy) = (_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y));
+            let (low_z, high_z) = (_mm512_unpacklo_ps(z, none), _mm512_unpackhi_ps(z, none));
+            let quarters = [
+                _mm512_shuffle_ps::<0b0100_0100>(low_xy, low_z),
+                _mm512_shuffle_ps::<0b1110_1110>(low_xy, low_z),
+                _mm512_shuffle_ps::<0b0100_0100>(high_xy, high_z),
+                _mm512_shuffle_ps::<0b1110_1110>(high_xy, high_z),
+            ];
+            for (lane, quarter) in quarters.into_iter().enumerate() {
+                add_record(sums, indices.add(lane), _mm512_castps512_ps128(quarter));
+                add_record(sums, indices.add(lane + 4), _mm512_extractf32x4_ps::<1>(quarter));
+                add_record(sums, indices.add(lane + 8), _mm512_extractf32x4_ps::<2>(quarter));
+                add_record(sums, indices.add(lane + 12), _mm512_extractf32x4_ps::<3>(quarter));
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
+    }
+
+    #[inline(always)]
+    unsafe fn size(self) -> Self {
+        Self(unsafe { _mm512_abs_ps(self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm512_add_ps(self.0, other.0) })
     }
 
     #[inline(always)]

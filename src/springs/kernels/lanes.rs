@@ -36,6 +36,32 @@ pub(super) trait Lanes: Copy {
     /// The same with small indices.
     unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3];
 
+    /// Adds a vector of each lane to the three numbers of `sums[indices[lane] / 2]`, lane by lane, for `COUNT` readable even indices
+    /// that lead to writable records; indices may be equal.
+    #[inline(always)]
+    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+        let mut axes = [[0.0_f32; 16]; 3];
+        for (axis, vector) in axes.iter_mut().zip(vectors) {
+            // SAFETY: there are no more than sixteen lanes.
+            unsafe { vector.store(axis.as_mut_ptr()) };
+        }
+        for lane in 0..Self::COUNT {
+            // SAFETY: the caller's promise.
+            let Record(sum) = unsafe { &mut *sums.wrapping_add(usize::from(*indices.add(lane) / 2)) };
+            for (sum, axis) in sum.iter_mut().zip(&axes) {
+                *sum += axis[lane];
+            }
+        }
+    }
+
+    unsafe fn add(self, other: Self) -> Self;
+
+    /// The three numbers of `base[indices[lane] / 2]` for `COUNT` readable even indices that lead to readable records.
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3];
+
+    /// Without their signs.
+    unsafe fn size(self) -> Self;
+
     unsafe fn subtract(self, other: Self) -> Self;
 
     unsafe fn multiply(self, other: Self) -> Self;

@@ -16,6 +16,7 @@ mod prefetch;
 mod quantities;
 mod range;
 mod strays;
+mod tetrahedra;
 
 pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
 pub(super) use eights::{EightLinks, Eights, Sight, WithEights};
@@ -23,6 +24,7 @@ use lanes::Lanes;
 pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;
 use range::Ranges;
+pub(crate) use tetrahedra::{GROUP, Group, Groups};
 
 use crate::error::{Error, Result};
 

@@ -77,6 +77,21 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read() / 2))) }
+    }
+
+    #[inline(always)]
+    unsafe fn size(self) -> Self {
+        Self(unsafe { vabsq_f32(self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        Self(unsafe { vaddq_f32(self.0, other.0) })
+    }
+
+    #[inline(always)]
     unsafe fn subtract(self, other: Self) -> Self {
         Self(unsafe { vsubq_f32(self.0, other.0) })
     }

@@ -59,6 +59,23 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+        // SAFETY: the caller's promise.
+        let record = |lane: usize| unsafe { *base.wrapping_add(usize::from(*indices.add(lane) / 2)) };
+        from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
+    }
+
+    #[inline(always)]
+    unsafe fn size(self) -> Self {
+        Self(self.0.map(f32::abs))
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] + other.0[lane]))
+    }
+
+    #[inline(always)]
     unsafe fn subtract(self, other: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] - other.0[lane]))
     }

@@ -1,0 +1,252 @@
+//! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
+
+use glam::{DMat3, DVec3};
+
+/// St Venant and Kirchhoff's law with a signed volume term, Pa: the energy of a tetrahedron is
+/// `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`.
+///
+/// Without the last, a tetrahedron that is pressed flat turns inside out and stays so (Kikuuwe, Tabuchi, Yamamoto 2009 have the energy as
+/// one of squared lengths of edges). What the volume term takes is not in lambda, so that Young's modulus and Poisson's ratio at small
+/// strains stay what they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Law {
+    pub lambda: f32,
+    pub mu: f32,
+    pub kappa: f32,
+}
+
+impl Law {
+    /// That of Young's modulus, Pa, and Poisson's ratio.
+    ///
+    /// Inversion ends where kappa is above some (lambda + 2 mu) / 8; twice that is used, and all of lambda where it is more.
+    pub fn new(young_modulus: f32, poisson_ratio: f32) -> Self {
+        let (e, nu) = (f64::from(young_modulus), f64::from(poisson_ratio));
+        let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
+        let mu = e / (2.0 * (1.0 + nu));
+        let kappa = lambda.max(0.25 * (lambda + 2.0 * mu));
+        Self {
+            lambda: (lambda - kappa) as f32,
+            mu: mu as f32,
+            kappa: kappa as f32,
+        }
+    }
+
+    /// What resists a small stretch with its sides held, Pa: lambda + 2 mu with all of lambda.
+    pub fn whole(&self) -> f32 {
+        self.lambda + 2.0 * self.mu + self.kappa
+    }
+}
+
+/// A tetrahedron at rest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rest {
+    /// The inverse of the edges from its first corner, in a frame where it is upper triangular, 1/m.
+    pub inverse: DMat3,
+    /// m³
+    pub volume: f64,
+}
+
+impl Rest {
+    /// With these edges from its first corner to the others, m, in any order of hands. One without a volume has an inverse that is not
+    /// finite.
+    pub fn of(edges: DMat3) -> Self {
+        // Gram and Schmidt: the edges are a rotation times this.
+        let [a, b, c] = [edges.x_axis, edges.y_axis, edges.z_axis];
+        let x = a.normalize();
+        let across = b - x * b.dot(x);
+        let y = across.normalize();
+        let z = x.cross(y);
+        let upright = DMat3::from_cols(
+            DVec3::new(a.length(), 0.0, 0.0),
+            DVec3::new(b.dot(x), across.length(), 0.0),
+            DVec3::new(c.dot(x), c.dot(y), c.dot(z)),
+        );
+        Self {
+            inverse: upright.inverse(),
+            volume: edges.determinant().abs() / 6.0,
+        }
+    }
+
+    /// How the deformation changes with each corner's place: the gradients of the corners' functions, 1/m.
+    pub fn gradients(&self) -> [DVec3; 4] {
+        let rows = self.inverse.transpose();
+        let others = [rows.x_axis, rows.y_axis, rows.z_axis];
+        [-(others[0] + others[1] + others[2]), others[0], others[1], others[2]]
+    }
+}
+
+/// A tetrahedron as it is deformed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deformed {
+    gradient: DMat3,
+    cofactors: DMat3,
+    /// E.
+    strain: DMat3,
+    /// J - 1.
+    growth: f64,
+    volume: f64,
+    lambda: f64,
+    mu: f64,
+    kappa: f64,
+}
+
+impl Deformed {
+    /// With these edges from its first corner to the others, m.
+    pub fn new(law: Law, rest: &Rest, edges: DMat3) -> Self {
+        let gradient = edges * rest.inverse;
+        let [a, b, c] = [gradient.x_axis, gradient.y_axis, gradient.z_axis];
+        Self {
+            gradient,
+            cofactors: DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b)),
+            strain: (gradient.transpose() * gradient - DMat3::IDENTITY) * 0.5,
+            growth: gradient.determinant() - 1.0,
+            volume: rest.volume,
+            lambda: f64::from(law.lambda),
+            mu: f64::from(law.mu),
+            kappa: f64::from(law.kappa),
+        }
+    }
+
+    fn trace(&self) -> f64 {
+        self.strain.x_axis.x + self.strain.y_axis.y + self.strain.z_axis.z
+    }
+
+    /// The stress S, Pa.
+    fn stress(&self) -> DMat3 {
+        self.strain * (2.0 * self.mu) + DMat3::from_diagonal(DVec3::splat(self.lambda * self.trace()))
+    }
+
+    /// J.
+    pub fn energy(&self) -> f64 {
+        let squares = product(&self.strain, &self.strain);
+        let elastic = 0.5 * self.lambda * self.trace().powi(2) + self.mu * squares;
+        self.volume * (elastic + 0.5 * self.kappa * self.growth.powi(2))
+    }
+
+    /// How the energy changes where the edges become longer by this, J, to the last digits of the change.
+    pub fn change(&self, rest: &Rest, more: DMat3) -> f64 {
+        let more = more * rest.inverse;
+        let [a, b, c] = [more.x_axis, more.y_axis, more.z_axis];
+        let cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
+        let half = self.gradient.transpose() * more;
+        let strain = (half + half.transpose() + more.transpose() * more) * 0.5;
+        let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
+        let growth = product(&self.cofactors, &more) + product(&self.gradient, &cofactors) + more.determinant();
+        let both = self.strain * 2.0 + strain;
+        let elastic = 0.5 * self.lambda * trace * (2.0 * self.trace() + trace) + self.mu * product(&both, &strain);
+        self.volume * (elastic + 0.5 * self.kappa * growth * (2.0 * self.growth + growth))
+    }
+
+    /// The force on a corner whose function has this gradient, N.
+    pub fn force(&self, gradient: DVec3) -> DVec3 {
+        let stress = self.gradient * self.stress() + self.cofactors * (self.kappa * self.growth);
+        -(stress * gradient) * self.volume
+    }
+
+    /// How much the force on one corner lessens with the place of another, N/m, by the gradients of their functions.
+    pub fn stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
+        let v = self.gradient * a.cross(b);
+        let turned = DMat3::from_cols(
+            DVec3::new(0.0, -v.z, v.y),
+            DVec3::new(v.z, 0.0, -v.x),
+            DVec3::new(-v.y, v.x, 0.0),
+        );
+        self.stiffness_under(self.stress(), a, b) + turned * (self.volume * self.kappa * self.growth)
+    }
+
+    /// The same, positive semidefinite: pressure pushes nothing sideways.
+    pub fn clamped_stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
+        let stress = self.stress();
+        let [x, y, z] = [stress.x_axis, stress.y_axis, stress.z_axis].map(DVec3::abs);
+        // Gershgorin's bound on the lowest eigenvalue.
+        let lift = [
+            x.y + x.z - stress.x_axis.x,
+            y.x + y.z - stress.y_axis.y,
+            z.x + z.y - stress.z_axis.z,
+        ];
+        let lift = lift.into_iter().fold(0.0, f64::max);
+        self.stiffness_under(stress + DMat3::from_diagonal(DVec3::splat(lift)), a, b)
+    }
+
+    fn stiffness_under(&self, stress: DMat3, a: DVec3, b: DVec3) -> DMat3 {
+        let [fa, fb] = [self.gradient * a, self.gradient * b];
+        let [ca, cb] = [self.cofactors * a, self.cofactors * b];
+        let squares = self.gradient * self.gradient.transpose();
+        let matrix = squares * (self.mu * a.dot(b))
+            + outer(fb, fa) * self.mu
+            + outer(fa, fb) * self.lambda
+            + outer(ca, cb) * self.kappa
+            + DMat3::from_diagonal(DVec3::splat(a.dot(stress * b)));
+        matrix * self.volume
+    }
+}
+
+/// The sum of the products of entries.
+fn product(a: &DMat3, b: &DMat3) -> f64 {
+    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
+}
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn vector(random: &mut Random) -> DVec3 {
+        DVec3::from_array([0; 3].map(|_| f64::from(random.unit()) * 2.0 - 1.0))
+    }
+
+    #[test]
+    fn forces_and_stiffnesses_are_derivatives_of_the_energy() {
+        let mut random = Random(5);
+        for nu in [0.0, 0.3, 0.49] {
+            let law = Law::new(5000.0, nu);
+            for _ in 0..20 {
+                let rest = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
+                if rest.determinant().abs() < 0.1 {
+                    continue;
+                }
+                let rest = Rest::of(rest);
+                let corners = [0; 4].map(|_| vector(&mut random));
+                let at = |corners: [DVec3; 4]| {
+                    let [a, b, c, d] = corners;
+                    Deformed::new(law, &rest, DMat3::from_cols(b - a, c - a, d - a))
+                };
+                let gradients = rest.gradients();
+                let size = at(corners).energy();
+                let more = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
+                let [a, b, c, d] = corners;
+                let then = [a, b + more.x_axis, c + more.y_axis, d + more.z_axis];
+                let change = at(corners).change(&rest, more);
+                let expected = at(then).energy() - size;
+                assert!(
+                    (change - expected).abs() < 1e-12 * (size + at(then).energy()),
+                    "{change} {expected}"
+                );
+                for corner in 0..4 {
+                    for axis in 0..3 {
+                        const STEP: f64 = 1e-5;
+                        let moved = |by: f64| {
+                            let mut corners = corners;
+                            corners[corner][axis] += by;
+                            at(corners)
+                        };
+                        let (more, less) = (moved(STEP), moved(-STEP));
+                        let force = at(corners).force(gradients[corner])[axis];
+                        let slope = (less.energy() - more.energy()) / (2.0 * STEP);
+                        assert!((force - slope).abs() < 1e-6 * size, "{force} {slope}");
+                        for other in 0..4 {
+                            let change = less.force(gradients[other]) - more.force(gradients[other]);
+                            let expected = change / (2.0 * STEP);
+                            let stiffness = at(corners).stiffness(gradients[other], gradients[corner]);
+                            assert!((stiffness.col(axis) - expected).length() < 1e-5 * size);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

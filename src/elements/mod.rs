@@ -1,0 +1,231 @@
+//! Tetrahedra as finite elements: forces that no spring can give, of any Young's modulus and Poisson's ratio.
+//!
+//! Tetrahedra lie in *parts*, some two thousand each, that any thread may work on: a part adds up forces on its own copies of its nodes,
+//! and the tiles of nodes then add up the copies, in the order of parts. So nothing is worked out twice, and results are the same for
+//! any number of threads.
+
+mod law;
+mod parts;
+mod rates;
+
+use glam::{DMat3, DVec3};
+
+use crate::body::{Record, Vectors};
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::{ChosenKernel, TILE, TileForces};
+use crate::threads::{Items, Ragged, Team};
+pub(crate) use law::{Deformed, Law, Rest};
+use parts::{Copies, Part};
+
+/// The tetrahedra of a body that are elements.
+#[derive(Debug)]
+pub(crate) struct Elements {
+    law: Law,
+    count: usize,
+    parts: Vec<Part>,
+    /// Where the copies of each part's nodes begin.
+    starts: Vec<usize>,
+    copies: Copies,
+    pub forces: Sums,
+    /// A bound on the squares of frequencies where the forces were last worked out, and at the current state, 1/s².
+    highest: f32,
+    settled: f32,
+    /// The highest rate of damping of the springs at their nodes, 1/s.
+    most_damped: f32,
+    /// Room for a number per node.
+    carried: Vec<f32>,
+    /// Whether the bounds at rest are those of the masses and springs there are.
+    rates_known: bool,
+}
+
+/// Sums of a kind on all copies of nodes.
+#[derive(Debug)]
+pub(crate) struct Sums {
+    positions: Vec<Record>,
+    /// Ways of nodes, where sums are made of them.
+    ways: Vec<Record>,
+    sums: Vec<Record>,
+    of_parts: Vec<f64>,
+}
+
+impl Sums {
+    fn new(copies: usize, parts: usize, with_ways: bool) -> Result<Self> {
+        let records = |count| memory::filled(Record::default(), count);
+        Ok(Self {
+            positions: records(copies)?,
+            ways: records(if with_ways { copies } else { 0 })?,
+            sums: records(copies)?,
+            of_parts: memory::filled(0.0, parts)?,
+        })
+    }
+}
+
+/// What is shown the nodes of a tetrahedron, the gradients of their functions, and how it is deformed.
+type See<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &Deformed) + 'a;
+
+/// What the nodes of a tile are given.
+#[derive(Clone, Copy)]
+pub(crate) struct Shares<'a> {
+    copies: &'a Copies,
+    sums: &'a [Record],
+}
+
+impl Shares<'_> {
+    /// Adds what the elements give to the nodes of a tile.
+    pub fn add(&self, tile: usize, forces: &mut TileForces) {
+        let mut sums = [Record::default(); TILE];
+        for copy in self.copies.of_tile(tile) {
+            let Record(sum) = &mut sums[usize::from(copy.place)];
+            for (sum, more) in sum.iter_mut().zip(self.sums[copy.at as usize].0) {
+                *sum += more;
+            }
+        }
+        for (axis, forces) in forces.axes_mut().into_iter().enumerate() {
+            for (force, Record(sum)) in forces.iter_mut().zip(&sums) {
+                *force += sum[axis];
+            }
+        }
+    }
+}
+
+impl Elements {
+    /// Tetrahedra of nodes that are here at rest, in the body's own numbers.
+    pub fn new(law: Law, tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3, node_count: usize) -> Result<Self> {
+        let parts = parts::split(tetrahedra, &rest)?;
+        let mut starts = memory::reserved(parts.len() + 1)?;
+        let mut count = 0;
+        for part in &parts {
+            starts.push(count);
+            count += part.nodes.len();
+        }
+        Ok(Self {
+            law,
+            count: tetrahedra.len(),
+            copies: Copies::new(&parts, node_count)?,
+            forces: Sums::new(count, parts.len(), false)?,
+            parts,
+            starts,
+            carried: memory::filled(0.0, node_count)?,
+            highest: f32::INFINITY,
+            settled: f32::INFINITY,
+            most_damped: 0.0,
+            rates_known: false,
+        })
+    }
+
+    /// Room for sums that are made of ways.
+    pub fn room_for_changes(&self) -> Result<Sums> {
+        Sums::new(self.forces.sums.len(), self.parts.len(), true)
+    }
+
+    /// Works out the forces of all elements with nodes at `positions`.
+    pub fn find_forces(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
+        let (law, parts, starts) = (self.law, &self.parts, &self.starts);
+        let sums = &mut self.forces;
+        let written = (
+            Ragged::new(&mut sums.positions, starts),
+            Ragged::new(&mut sums.sums, starts),
+            Items::new(&mut sums.of_parts),
+        );
+        team.pass(parts.len(), written, |part, (copies, sums, highest)| {
+            let part = &parts[part];
+            part.copy(positions, copies);
+            sums.fill(Record::default());
+            *highest = f64::from(part.groups.forces(kernel, law, copies, sums));
+        });
+        self.highest = sums.of_parts.iter().fold(0.0, |highest: f64, &of| highest.max(of)) as f32;
+    }
+
+    /// Works out how their forces change, to first order, with nodes at `positions` that go these ways.
+    pub fn find_changes(&self, kernel: ChosenKernel, [positions, ways]: [&[Record]; 2], sums: &mut Sums, team: &Team) {
+        let (law, parts, starts) = (self.law, &self.parts, &self.starts);
+        let written = (
+            Ragged::new(&mut sums.positions, starts),
+            Ragged::new(&mut sums.ways, starts),
+            Ragged::new(&mut sums.sums, starts),
+        );
+        team.pass(parts.len(), written, |part, (copies, copied_ways, sums)| {
+            let part = &parts[part];
+            part.copy(positions, copies);
+            part.copy(ways, copied_ways);
+            sums.fill(Record::default());
+            part.groups.changes(kernel, law, copies, copied_ways, sums);
+        });
+    }
+
+    /// Their energy with nodes at `positions`, J.
+    pub fn energy(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
+        let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
+        let written = (
+            Ragged::new(&mut sums.positions, &self.starts),
+            Items::new(&mut sums.of_parts),
+        );
+        team.pass(parts.len(), written, |part, (copies, energy)| {
+            let part = &parts[part];
+            part.copy(positions, copies);
+            *energy = part.groups.energy(kernel, law, copies);
+        });
+        sums.of_parts.iter().sum()
+    }
+
+    /// Where forces were worked out last is the current state.
+    pub fn settle(&mut self) {
+        self.settled = self.highest;
+    }
+
+    /// What the forces that were worked out last give to nodes.
+    pub fn shares(&self) -> Shares<'_> {
+        self.shares_of(&self.forces)
+    }
+
+    /// What sums give to nodes.
+    pub fn shares_of<'a>(&'a self, sums: &'a Sums) -> Shares<'a> {
+        Shares {
+            copies: &self.copies,
+            sums: &sums.sums,
+        }
+    }
+
+    /// Takes away the tetrahedra that have an edge between two nodes: how many.
+    pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
+        let mut removed = 0;
+        for part in &mut self.parts {
+            removed += part.remove_edge(a, b);
+        }
+        self.rates_known &= removed == 0;
+        removed
+    }
+
+    /// Shows each tetrahedron's nodes and the way it is at rest.
+    pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest)) {
+        self.parts.iter().for_each(|part| part.visit(see));
+    }
+
+    /// Shows each tetrahedron's nodes, the gradients of their functions and how it is deformed with nodes at `positions`.
+    pub fn visit_deformed(&self, positions: &Vectors, see: &mut See) {
+        self.visit(&mut |corners, rest| {
+            let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
+            let deformed = Deformed::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
+            see(corners, &rest.gradients(), &deformed);
+        });
+    }
+
+    /// How many there were when the body was made.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The law of all of them.
+    pub fn law(&self) -> Law {
+        self.law
+    }
+
+    /// What may change of them.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for group in self.parts.iter().flat_map(|part| part.groups.as_slice()) {
+            hasher.write_floats(&group.volumes);
+        }
+    }
+}

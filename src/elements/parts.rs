@@ -1,0 +1,169 @@
+//! Parts: some tetrahedra near each other, and copies of their nodes.
+
+use glam::{DMat3, DVec3};
+
+use super::law::Rest;
+use crate::body::Record;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::springs::{GROUP, Group, Groups, TILE, tile_count};
+
+/// Tetrahedra of a part: so few that its nodes stay in the nearest cache, and their numbers are small.
+const PART: usize = 2048;
+
+/// Some tetrahedra, and their nodes.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// In order.
+    pub nodes: Vec<u32>,
+    pub groups: Groups,
+}
+
+/// Cuts tetrahedra into parts.
+pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<Part>> {
+    let mut order: Vec<u32> = memory::reserved(tetrahedra.len())?;
+    order.extend(0..tetrahedra.len() as u32);
+    let lowest = |index: u32| tetrahedra[index as usize].into_iter().min();
+    order.sort_unstable_by_key(|&index| (lowest(index), index));
+    let mut parts = memory::reserved(tetrahedra.len().div_ceil(PART))?;
+    for of_part in order.chunks(PART) {
+        parts.push(Part::new(tetrahedra, of_part, &rest)?);
+    }
+    Ok(parts)
+}
+
+impl Part {
+    fn new(tetrahedra: &[[u32; 4]], of_part: &[u32], rest: impl Fn(u32) -> DVec3) -> Result<Self> {
+        let mut nodes: Vec<u32> = memory::reserved(4 * of_part.len())?;
+        nodes.extend(of_part.iter().flat_map(|&index| tetrahedra[index as usize]));
+        nodes.sort_unstable();
+        nodes.dedup();
+        let group_count = of_part.len().div_ceil(GROUP);
+        let mut groups = memory::filled(Group::EMPTY, group_count)?;
+        for (place, &index) in of_part.iter().enumerate() {
+            // Those that follow each other have nodes in common: they lie in different groups, so that no sum waits for the last.
+            let (group, lane) = (&mut groups[place % group_count], place / group_count);
+            let corners = tetrahedra[index as usize];
+            let [a, b, c, d] = corners.map(&rest);
+            let at_rest = Rest::of(DMat3::from_cols(b - a, c - a, d - a));
+            let entries = upper_entries(at_rest.inverse);
+            let volume = at_rest.volume as f32;
+            if !(volume > 0.0 && entries.iter().all(|entry| entry.is_finite())) {
+                return Err(Error::invalid(format!(
+                    "tetrahedra[{index}] has a volume of {volume} m³ at rest: must be above 0"
+                )));
+            }
+            for (to, node) in group.corners.iter_mut().zip(corners) {
+                to[lane] = 2 * nodes.partition_point(|&other| other < node) as u16;
+            }
+            for (to, entry) in group.inverse.iter_mut().zip(entries) {
+                to[lane] = entry;
+            }
+            group.volumes[lane] = volume;
+        }
+        Ok(Self {
+            groups: Groups::new(groups, nodes.len()),
+            nodes,
+        })
+    }
+
+    /// Copies what its nodes have.
+    pub fn copy(&self, from: &[Record], to: &mut [Record]) {
+        for (to, &node) in to.iter_mut().zip(&self.nodes) {
+            *to = from[node as usize];
+        }
+    }
+
+    /// Shows the tetrahedra there are.
+    pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest)) {
+        for group in self.groups.as_slice() {
+            for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
+                let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
+                let rest = Rest {
+                    inverse: DMat3::from_cols_array(&[xx, 0.0, 0.0, xy, yy, 0.0, xz, yz, zz]),
+                    volume: f64::from(group.volumes[lane]),
+                };
+                let corners = group.corners.map(|corners| self.nodes[usize::from(corners[lane] / 2)]);
+                see(corners, &rest);
+            }
+        }
+    }
+
+    /// Sets what bounds the squared frequencies of each tetrahedron's nodes at rest to the highest of its nodes', 1/s².
+    pub fn set_rates(&mut self, of_node: &[f32]) {
+        let nodes = &self.nodes;
+        self.groups
+            .set_rates(|corner| of_node[nodes[usize::from(corner)] as usize]);
+    }
+
+    /// Takes away the tetrahedra with an edge between two nodes: how many.
+    pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
+        let mut removed = 0;
+        while let Some((group, lane)) = self.find_edge(a, b) {
+            self.groups.remove(group, lane);
+            removed += 1;
+        }
+        removed
+    }
+
+    fn find_edge(&self, a: u32, b: u32) -> Option<(usize, usize)> {
+        let number = |node| self.nodes.binary_search(&node).ok().map(|number| 2 * number as u16);
+        let (a, b) = (number(a)?, number(b)?);
+        let groups = self.groups.as_slice();
+        groups.iter().enumerate().find_map(|(index, group)| {
+            let has = |lane: usize, node: u16| group.corners.iter().any(|corners| corners[lane] == node);
+            let lane = (0..GROUP).find(|&lane| group.volumes[lane] > 0.0 && has(lane, a) && has(lane, b))?;
+            Some((index, lane))
+        })
+    }
+}
+
+/// The entries 00, 01, 02, 11, 12, 22.
+fn upper_entries(matrix: DMat3) -> [f32; 6] {
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+    [x.x, y.x, z.x, y.y, z.y, z.z].map(|entry| entry as f32)
+}
+
+/// A copy of a node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Copy {
+    /// Its place among all copies.
+    pub at: u32,
+    /// The node's place in its tile.
+    pub place: u16,
+}
+
+/// The copies of the nodes of each tile.
+#[derive(Debug)]
+pub(super) struct Copies {
+    copies: Vec<Copy>,
+    starts: Vec<u32>,
+}
+
+impl Copies {
+    pub fn new(parts: &[Part], node_count: usize) -> Result<Self> {
+        let tiles = tile_count(node_count);
+        let mut starts = memory::filled(0_u32, tiles + 1)?;
+        let nodes = || parts.iter().flat_map(|part| &part.nodes).map(|&node| node as usize);
+        nodes().for_each(|node| starts[node / TILE + 1] += 1);
+        for tile in 0..tiles {
+            starts[tile + 1] += starts[tile];
+        }
+        let mut next = memory::copied(&starts)?;
+        let mut copies = memory::filled(Copy::default(), nodes().count())?;
+        for (at, node) in (0..).zip(nodes()) {
+            let to = &mut next[node / TILE];
+            copies[*to as usize] = Copy {
+                at,
+                place: (node % TILE) as u16,
+            };
+            *to += 1;
+        }
+        Ok(Self { copies, starts })
+    }
+
+    /// In the order of parts.
+    pub fn of_tile(&self, tile: usize) -> &[Copy] {
+        &self.copies[self.starts[tile] as usize..self.starts[tile + 1] as usize]
+    }
+}

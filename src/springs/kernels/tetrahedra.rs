@@ -1,0 +1,529 @@
+//! Tetrahedra of St Venant and Kirchhoff's law with a signed volume term, as many at a time as the processor has lanes.
+//!
+//! With F the edges from a tetrahedron's first corner times the inverse of what they are at rest, E = (F^T F - I) / 2 and J = det F, the
+//! energy is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)` and the forces are those of `P = F S + kappa (J - 1) cof F`,
+//! `S = lambda tr E + 2 mu E`. The law is the same in every direction, so each tetrahedron may have its own frame at rest: one in
+//! which that inverse is upper triangular, six numbers instead of nine.
+
+use std::ops::Range;
+
+use super::lanes::Lanes;
+use super::{ChosenKernel, WithLanes};
+use crate::body::Record;
+use crate::elements::Law;
+
+/// Tetrahedra side by side.
+pub(crate) const GROUP: usize = 16;
+
+/// Sixteen tetrahedra side by side; what is missing to sixteen has no volume.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Group {
+    /// Twice the numbers of their nodes in the part, as a record is twice as long as what an address can be scaled by.
+    pub corners: [[u16; GROUP]; 4],
+    /// The inverse at rest, 1/m: its entries 00, 01, 02, 11, 12, 22.
+    pub inverse: [[f32; GROUP]; 6],
+    /// At rest, times how much stiffer it is than the law, m³.
+    pub volumes: [f32; GROUP],
+    /// A bound on the squared frequency of its nodes at rest, 1/s².
+    pub rates: [f32; GROUP],
+}
+
+impl Group {
+    pub const EMPTY: Self = Self {
+        corners: [[0; GROUP]; 4],
+        inverse: [[0.0; GROUP]; 6],
+        volumes: [0.0; GROUP],
+        rates: [0.0; GROUP],
+    };
+}
+
+/// Tetrahedra of nodes below a number.
+#[derive(Debug)]
+pub(crate) struct Groups {
+    groups: Vec<Group>,
+    node_count: usize,
+}
+
+impl Groups {
+    /// # Panics
+    /// Where a corner is not below `node_count`.
+    pub fn new(groups: Vec<Group>, node_count: usize) -> Self {
+        let corners = groups.iter().flat_map(|group| group.corners.as_flattened());
+        assert!(
+            corners
+                .into_iter()
+                .all(|&corner| usize::from(corner / 2) < node_count && corner % 2 == 0)
+        );
+        Self { groups, node_count }
+    }
+
+    pub fn as_slice(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// Sets the bounds on frequencies to the highest of the corners'.
+    pub fn set_rates(&mut self, of_corner: impl Fn(u16) -> f32) {
+        for group in &mut self.groups {
+            for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
+                let rates = group.corners.map(|corners| of_corner(corners[lane] / 2));
+                group.rates[lane] = rates.into_iter().fold(0.0, f32::max);
+            }
+        }
+    }
+
+    /// Takes away a tetrahedron: what is left of it has no volume.
+    pub fn remove(&mut self, group: usize, lane: usize) {
+        let group = &mut self.groups[group];
+        group.volumes[lane] = 0.0;
+        group.rates[lane] = 0.0;
+        group.inverse.iter_mut().for_each(|entry| entry[lane] = 0.0);
+    }
+
+    /// Adds the forces of the tetrahedra, N, with nodes at `positions`: a bound on the squares of frequencies, 1/s².
+    pub fn forces(&self, kernel: ChosenKernel, law: Law, positions: &[Record], sums: &mut [Record]) -> f32 {
+        kernel.run_with_lanes(Forces {
+            law,
+            of: self.checked(positions, sums),
+        })
+    }
+
+    /// Adds how these forces change where nodes go these ways, to first order, N.
+    pub fn changes(&self, kernel: ChosenKernel, law: Law, positions: &[Record], ways: &[Record], sums: &mut [Record]) {
+        assert_eq!(ways.len(), self.node_count);
+        kernel.run_with_lanes(Changes {
+            law,
+            ways: ways.as_ptr(),
+            of: self.checked(positions, sums),
+        });
+    }
+
+    /// The energy of the tetrahedra, J.
+    pub fn energy(&self, kernel: ChosenKernel, law: Law, positions: &[Record]) -> f64 {
+        kernel.run_with_lanes(Energy {
+            law,
+            of: self.checked(positions, &mut []),
+        })
+    }
+
+    fn checked<'a>(&'a self, positions: &'a [Record], sums: &'a mut [Record]) -> Tetrahedra<'a> {
+        assert!(positions.len() == self.node_count && (sums.is_empty() || sums.len() == self.node_count));
+        Tetrahedra {
+            groups: &self.groups,
+            positions: positions.as_ptr(),
+            sums: sums.as_mut_ptr(),
+        }
+    }
+}
+
+/// Tetrahedra whose corners lead to readable positions and, but for their energy, writable sums.
+struct Tetrahedra<'a> {
+    groups: &'a [Group],
+    positions: *const Record,
+    sums: *mut Record,
+}
+
+struct Forces<'a> {
+    law: Law,
+    of: Tetrahedra<'a>,
+}
+
+struct Changes<'a> {
+    law: Law,
+    ways: *const Record,
+    of: Tetrahedra<'a>,
+}
+
+struct Energy<'a> {
+    law: Law,
+    of: Tetrahedra<'a>,
+}
+
+/// A vector per lane.
+type Vector<L> = [L; 3];
+
+/// The columns of a matrix.
+type Matrix<L> = [Vector<L>; 3];
+
+/// The entries 00, 01, 02, 11, 12, 22 of a triangular or symmetric matrix.
+type Six<L> = [L; 6];
+
+// SAFETY of every function here: the processor has the instructions of `L`.
+#[allow(clippy::undocumented_unsafe_blocks)]
+mod algebra {
+    use super::{Lanes, Matrix, Six, Vector};
+
+    #[inline(always)]
+    pub unsafe fn dot<L: Lanes>([ax, ay, az]: Vector<L>, [bx, by, bz]: Vector<L>) -> L {
+        unsafe { az.multiply_add(bz, ay.multiply_add(by, ax.multiply(bx))) }
+    }
+
+    #[inline(always)]
+    pub unsafe fn scaled<L: Lanes>(vector: Vector<L>, factor: L) -> Vector<L> {
+        unsafe {
+            [
+                vector[0].multiply(factor),
+                vector[1].multiply(factor),
+                vector[2].multiply(factor),
+            ]
+        }
+    }
+
+    /// `sum + vector * factor`
+    #[inline(always)]
+    pub unsafe fn add_scaled<L: Lanes>(sum: Vector<L>, vector: Vector<L>, factor: L) -> Vector<L> {
+        unsafe {
+            [
+                vector[0].multiply_add(factor, sum[0]),
+                vector[1].multiply_add(factor, sum[1]),
+                vector[2].multiply_add(factor, sum[2]),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    pub unsafe fn difference<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
+        unsafe { [a[0].subtract(b[0]), a[1].subtract(b[1]), a[2].subtract(b[2])] }
+    }
+
+    #[inline(always)]
+    pub unsafe fn sum<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
+        unsafe { [a[0].add(b[0]), a[1].add(b[1]), a[2].add(b[2])] }
+    }
+
+    #[inline(always)]
+    pub unsafe fn cross<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
+        unsafe {
+            [
+                a[1].multiply(b[2]).subtract(a[2].multiply(b[1])),
+                a[2].multiply(b[0]).subtract(a[0].multiply(b[2])),
+                a[0].multiply(b[1]).subtract(a[1].multiply(b[0])),
+            ]
+        }
+    }
+
+    /// A matrix times an upper triangular one.
+    #[inline(always)]
+    pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matrix<L> {
+        unsafe {
+            [
+                scaled(a, upper[0]),
+                add_scaled(scaled(a, upper[1]), b, upper[3]),
+                add_scaled(add_scaled(scaled(a, upper[2]), b, upper[4]), c, upper[5]),
+            ]
+        }
+    }
+
+    /// A matrix times the transposed of an upper triangular one.
+    #[inline(always)]
+    pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matrix<L> {
+        unsafe {
+            [
+                add_scaled(add_scaled(scaled(a, upper[0]), b, upper[1]), c, upper[2]),
+                add_scaled(scaled(b, upper[3]), c, upper[4]),
+                scaled(c, upper[5]),
+            ]
+        }
+    }
+
+    /// `sum` and a matrix times a symmetric one.
+    #[inline(always)]
+    pub unsafe fn add_times<L: Lanes>(sum: Matrix<L>, [a, b, c]: Matrix<L>, s: Six<L>) -> Matrix<L> {
+        unsafe {
+            let row = |sum, [x, y, z]: [L; 3]| add_scaled(add_scaled(add_scaled(sum, a, x), b, y), c, z);
+            [
+                row(sum[0], [s[0], s[1], s[2]]),
+                row(sum[1], [s[1], s[3], s[4]]),
+                row(sum[2], [s[2], s[4], s[5]]),
+            ]
+        }
+    }
+}
+
+use algebra::{add_times, cross, difference, dot, scaled, sum, times_lower, times_upper};
+
+/// A law's numbers in every lane.
+#[derive(Clone, Copy)]
+struct Constants<L> {
+    lambda: L,
+    mu: L,
+    kappa: L,
+}
+
+/// A tetrahedron as it is deformed.
+struct Deformed<L> {
+    /// F.
+    gradient: Matrix<L>,
+    /// The cofactors of F.
+    cofactors: Matrix<L>,
+    /// 2 E.
+    twice_strain: Six<L>,
+    /// 2 tr E.
+    twice_trace: L,
+    /// J - 1.
+    growth: L,
+}
+
+impl<'a> Tetrahedra<'a> {
+    /// # Safety
+    /// As for the kernel; `lanes` are of a group.
+    #[inline(always)]
+    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> Matrix<L> {
+        // SAFETY: corners lead to records.
+        unsafe {
+            let [a, b, c, d] = group.corners.each_ref().map(|corners| corners.as_ptr().add(first));
+            let a = L::records_twice(from, a);
+            [
+                difference(L::records_twice(from, b), a),
+                difference(L::records_twice(from, c), a),
+                difference(L::records_twice(from, d), a),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn inverse<L: Lanes>(group: &Group, first: usize) -> Six<L> {
+        // SAFETY: the lanes are of a group.
+        unsafe { group.inverse.each_ref().map(|entry| L::load(entry.as_ptr().add(first))) }
+    }
+
+    #[inline(always)]
+    unsafe fn volumes<L: Lanes>(group: &Group, first: usize) -> L {
+        // SAFETY: the lanes are of a group.
+        unsafe { L::load(group.volumes.as_ptr().add(first)) }
+    }
+
+    #[inline(always)]
+    unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> Deformed<L> {
+        // SAFETY: the same contract.
+        unsafe {
+            let gradient = times_upper(Self::edges::<L>(self.positions, group, first), inverse);
+            let [a, b, c] = gradient;
+            let one = L::splat(1.0);
+            let twice_strain = [
+                dot(a, a).subtract(one),
+                dot(a, b),
+                dot(a, c),
+                dot(b, b).subtract(one),
+                dot(b, c),
+                dot(c, c).subtract(one),
+            ];
+            let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
+            Deformed {
+                gradient,
+                cofactors,
+                twice_strain,
+                twice_trace: twice_strain[0].add(twice_strain[3]).add(twice_strain[5]),
+                growth: dot(a, cofactors[0]).subtract(one),
+            }
+        }
+    }
+
+    /// Adds the forces of stresses times minus the volume at rest.
+    #[inline(always)]
+    unsafe fn spread<L: Lanes>(&self, group: &Group, first: usize, stress: Matrix<L>, inverse: Six<L>) {
+        // SAFETY: the same contract.
+        unsafe {
+            let [b, c, d] = times_lower(stress, inverse);
+            let corners = group.corners.each_ref().map(|corners| corners.as_ptr().add(first));
+            L::add_to_records(self.sums, corners[1], b);
+            L::add_to_records(self.sums, corners[2], c);
+            L::add_to_records(self.sums, corners[3], d);
+            let zero = [L::splat(0.0); 3];
+            L::add_to_records(self.sums, corners[0], difference(zero, sum(sum(b, c), d)));
+        }
+    }
+}
+
+/// Where each turn's lanes begin.
+fn turns<L: Lanes>() -> impl Iterator<Item = usize> {
+    Range { start: 0, end: GROUP }.step_by(L::COUNT)
+}
+
+impl<L: Lanes> Constants<L> {
+    #[inline(always)]
+    unsafe fn new(law: Law) -> Self {
+        // SAFETY: the caller promises the instructions.
+        unsafe {
+            Self {
+                lambda: L::splat(law.lambda),
+                mu: L::splat(law.mu),
+                kappa: L::splat(law.kappa),
+            }
+        }
+    }
+
+    /// The stress S of twice a strain.
+    #[inline(always)]
+    unsafe fn stress(self, twice_strain: Six<L>, twice_trace: L) -> Six<L> {
+        // SAFETY: the caller promises the instructions.
+        unsafe {
+            let part = self.lambda.multiply(twice_trace).multiply(L::splat(0.5));
+            let [xx, xy, xz, yy, yz, zz] = twice_strain;
+            [
+                self.mu.multiply_add(xx, part),
+                self.mu.multiply(xy),
+                self.mu.multiply(xz),
+                self.mu.multiply_add(yy, part),
+                self.mu.multiply(yz),
+                self.mu.multiply_add(zz, part),
+            ]
+        }
+    }
+}
+
+impl WithLanes for Forces<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> f32 {
+        let Self { law, of } = self;
+        // SAFETY: the same contract; corners lead to positions and sums.
+        unsafe {
+            let constants = Constants::<L>::new(law);
+            let (one, half) = (L::splat(1.0), L::splat(0.5));
+            let whole = L::splat(1.0 / law.whole());
+            let along = L::splat(law.lambda.max(0.0) + 2.0 * law.mu);
+            let mut highest = L::splat(0.0);
+            for group in of.groups {
+                for first in turns::<L>() {
+                    let inverse = Tetrahedra::inverse::<L>(group, first);
+                    let volumes = Tetrahedra::volumes::<L>(group, first);
+                    let deformed = of.deformed(group, first, inverse);
+                    let Deformed {
+                        gradient,
+                        cofactors,
+                        twice_strain,
+                        twice_trace,
+                        growth,
+                    } = deformed;
+                    let stress = constants.stress(twice_strain, twice_trace);
+                    let minus = L::splat(0.0).subtract(volumes);
+                    let stress = stress.map(|entry| entry.multiply(minus));
+                    let pressure = constants.kappa.multiply(growth);
+                    let load = pressure.multiply(minus);
+                    let first_stress = cofactors.map(|column| scaled(column, load));
+                    of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
+                    // The largest stretch squared is at most the largest sum of a row's sizes (Gershgorin).
+                    let size = |x: L| x.size();
+                    let [xx, xy, xz, yy, yz, zz] = twice_strain;
+                    let (xy, xz, yz) = (size(xy), size(xz), size(yz));
+                    let stretch = xx
+                        .add(xy)
+                        .add(xz)
+                        .greater(yy.add(xy).add(yz))
+                        .greater(zz.add(xz).add(yz));
+                    let stretch = stretch.greater(L::splat(0.0)).add(one);
+                    let tension = constants.mu.multiply(stretch.subtract(one));
+                    let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
+                    let tension = tension.greater(L::splat(0.0));
+                    // 2 sqrt(s) is at most 1 + s.
+                    let pressed = size(pressure).multiply(stretch.add(one));
+                    let swollen = constants.kappa.multiply(stretch);
+                    let stiffness = along.add(swollen).multiply_add(stretch, tension.add(pressed));
+                    let rates = L::load(group.rates.as_ptr().add(first));
+                    highest = highest.greater(stiffness.multiply(whole).multiply(rates));
+                }
+            }
+            let mut all = [0.0_f32; GROUP];
+            highest.store(all.as_mut_ptr());
+            all.into_iter().fold(0.0, f32::max)
+        }
+    }
+}
+
+impl WithLanes for Changes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let Self { law, ways, of } = self;
+        // SAFETY: the same contract; corners lead to positions, ways and sums.
+        unsafe {
+            let constants = Constants::<L>::new(law);
+            let zero = L::splat(0.0);
+            for group in of.groups {
+                for first in turns::<L>() {
+                    let inverse = Tetrahedra::inverse::<L>(group, first);
+                    let volumes = Tetrahedra::volumes::<L>(group, first);
+                    let deformed = of.deformed(group, first, inverse);
+                    let [a, b, c] = deformed.gradient;
+                    let change = times_upper(Tetrahedra::edges::<L>(ways, group, first), inverse);
+                    let [da, db, dc] = change;
+                    let twice = |x: L| x.add(x);
+                    let twice_strain = [
+                        twice(dot(a, da)),
+                        dot(a, db).add(dot(b, da)),
+                        dot(a, dc).add(dot(c, da)),
+                        twice(dot(b, db)),
+                        dot(b, dc).add(dot(c, db)),
+                        twice(dot(c, dc)),
+                    ];
+                    let twice_trace = twice_strain[0].add(twice_strain[3]).add(twice_strain[5]);
+                    let stress_change = constants.stress(twice_strain, twice_trace);
+                    // Pressure is lifted as far as it may push sideways: Gershgorin's bound on the lowest eigenvalue.
+                    let mut stress = constants.stress(deformed.twice_strain, deformed.twice_trace);
+                    let size = |x: L| x.size();
+                    let (xy, xz, yz) = (size(stress[1]), size(stress[2]), size(stress[4]));
+                    let lift = [
+                        xy.add(xz).subtract(stress[0]),
+                        xy.add(yz).subtract(stress[3]),
+                        xz.add(yz).subtract(stress[5]),
+                    ];
+                    let lift = lift[0].greater(lift[1]).greater(lift[2]).greater(zero);
+                    for place in [0, 3, 5] {
+                        stress[place] = stress[place].add(lift);
+                    }
+                    let [ca, cb, cc] = deformed.cofactors;
+                    let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
+                    let load = constants.kappa.multiply(swelling);
+                    let changed = [ca, cb, cc].map(|column| scaled(column, load));
+                    let changed = add_times(changed, deformed.gradient, stress_change);
+                    let changed = add_times(changed, change, stress);
+                    let minus = zero.subtract(volumes);
+                    let changed = changed.map(|column| scaled(column, minus));
+                    of.spread(group, first, changed, inverse);
+                }
+            }
+        }
+    }
+}
+
+impl WithLanes for Energy<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) -> f64 {
+        let Self { law, of } = self;
+        let mut energy = 0.0;
+        // SAFETY: the same contract; corners lead to positions.
+        unsafe {
+            let constants = Constants::<L>::new(law);
+            for group in of.groups {
+                for first in turns::<L>() {
+                    let inverse = Tetrahedra::inverse::<L>(group, first);
+                    let deformed = of.deformed(group, first, inverse);
+                    let [xx, xy, xz, yy, yz, zz] = deformed.twice_strain;
+                    let across = dot([xy, xz, yz], [xy, xz, yz]);
+                    let squares = dot([xx, yy, zz], [xx, yy, zz]).add(across).add(across);
+                    let trace = deformed.twice_trace;
+                    let growth = deformed.growth;
+                    // Of twice the strains: a quarter.
+                    let density = constants
+                        .lambda
+                        .multiply(trace)
+                        .multiply(trace)
+                        .multiply(L::splat(0.125));
+                    let density = constants.mu.multiply(squares).multiply_add(L::splat(0.25), density);
+                    let swollen = constants.kappa.multiply(growth).multiply(growth);
+                    let density = swollen.multiply_add(L::splat(0.5), density);
+                    let energies = density.multiply(Tetrahedra::volumes::<L>(group, first));
+                    let mut all = [0.0_f32; GROUP];
+                    energies.store(all.as_mut_ptr());
+                    energy += all.into_iter().map(f64::from).sum::<f64>();
+                }
+            }
+        }
+        energy
+    }
+}
