@@ -98,7 +98,17 @@ impl Groups {
         });
     }
 
-    /// The energy of the tetrahedra, J.
+    /// Adds to the first number of each node a quarter of what its tetrahedra are larger than at rest, m³, or with ways to first
+    /// order how much larger they become.
+    pub fn growths(&self, kernel: ChosenKernel, positions: &[Record], ways: Option<&[Record]>, sums: &mut [Record]) {
+        assert!(ways.is_none_or(|ways| ways.len() == self.node_count));
+        kernel.run_with_lanes(Growths {
+            ways: ways.map(<[Record]>::as_ptr),
+            of: self.checked(positions, sums),
+        });
+    }
+
+    /// The energy of the tetrahedra, without that of rings, J.
     pub fn energy(&self, kernel: ChosenKernel, law: Law, positions: &[Record]) -> f64 {
         kernel.run_with_lanes(Energy {
             law,
@@ -136,6 +146,11 @@ struct Changes<'a> {
 
 struct Energy<'a> {
     law: Law,
+    of: Tetrahedra<'a>,
+}
+
+struct Growths<'a> {
+    ways: Option<*const Record>,
     of: Tetrahedra<'a>,
 }
 
@@ -262,22 +277,25 @@ struct Deformed<L> {
     twice_trace: L,
     /// J - 1.
     growth: L,
+    /// The mean of its nodes' pressures, where they have any, Pa.
+    pressure: L,
 }
 
 impl<'a> Tetrahedra<'a> {
+    /// The edges from the first corner to the others, and the mean of what the corners have beside their places.
+    ///
     /// # Safety
-    /// As for the kernel; `lanes` are of a group.
+    /// As for the kernel; `first` is a turn's first lane.
     #[inline(always)]
-    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> Matrix<L> {
+    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix<L>, L) {
         // SAFETY: corners lead to records.
         unsafe {
             let [a, b, c, d] = group.corners.each_ref().map(|corners| corners.as_ptr().add(first));
-            let a = L::records_twice(from, a);
-            [
-                difference(L::records_twice(from, b), a),
-                difference(L::records_twice(from, c), a),
-                difference(L::records_twice(from, d), a),
-            ]
+            let [a, b, c, d] = [a, b, c, d].map(|corner| L::records_twice(from, corner));
+            let [xa, ya, za, fourth] = a;
+            let edge = |[x, y, z, _]: [L; 4]| difference([x, y, z], [xa, ya, za]);
+            let fourths = fourth.add(b[3]).add(c[3].add(d[3]));
+            ([edge(b), edge(c), edge(d)], fourths.multiply(L::splat(0.25)))
         }
     }
 
@@ -297,7 +315,8 @@ impl<'a> Tetrahedra<'a> {
     unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> Deformed<L> {
         // SAFETY: the same contract.
         unsafe {
-            let gradient = times_upper(Self::edges::<L>(self.positions, group, first), inverse);
+            let (edges, pressure) = Self::edges::<L>(self.positions, group, first);
+            let gradient = times_upper(edges, inverse);
             let [a, b, c] = gradient;
             let one = L::splat(1.0);
             let twice_strain = [
@@ -315,6 +334,7 @@ impl<'a> Tetrahedra<'a> {
                 twice_strain,
                 twice_trace: twice_strain[0].add(twice_strain[3]).add(twice_strain[5]),
                 growth: dot(a, cofactors[0]).subtract(one),
+                pressure,
             }
         }
     }
@@ -396,11 +416,16 @@ impl WithLanes for Forces<'_> {
                         twice_strain,
                         twice_trace,
                         growth,
+                        pressure,
                     } = deformed;
                     let stress = constants.stress(twice_strain, twice_trace);
                     let minus = L::splat(0.0).subtract(volumes);
                     let stress = stress.map(|entry| entry.multiply(minus));
-                    let pressure = constants.kappa.multiply(growth);
+                    let pressure = if law.rings {
+                        pressure
+                    } else {
+                        constants.kappa.multiply(growth)
+                    };
                     let load = pressure.multiply(minus);
                     let first_stress = cofactors.map(|column| scaled(column, load));
                     of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
@@ -448,7 +473,8 @@ impl WithLanes for Changes<'_> {
                     let volumes = Tetrahedra::volumes::<L>(group, first);
                     let deformed = of.deformed(group, first, inverse);
                     let [a, b, c] = deformed.gradient;
-                    let change = times_upper(Tetrahedra::edges::<L>(ways, group, first), inverse);
+                    let (edges, pressure) = Tetrahedra::edges::<L>(ways, group, first);
+                    let change = times_upper(edges, inverse);
                     let [da, db, dc] = change;
                     let twice = |x: L| x.add(x);
                     let twice_strain = [
@@ -475,14 +501,52 @@ impl WithLanes for Changes<'_> {
                         stress[place] = stress[place].add(lift);
                     }
                     let [ca, cb, cc] = deformed.cofactors;
-                    let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
-                    let load = constants.kappa.multiply(swelling);
+                    let load = if law.rings {
+                        pressure
+                    } else {
+                        let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
+                        constants.kappa.multiply(swelling)
+                    };
                     let changed = [ca, cb, cc].map(|column| scaled(column, load));
                     let changed = add_times(changed, deformed.gradient, stress_change);
                     let changed = add_times(changed, change, stress);
                     let minus = zero.subtract(volumes);
                     let changed = changed.map(|column| scaled(column, minus));
                     of.spread(group, first, changed, inverse);
+                }
+            }
+        }
+    }
+}
+
+impl WithLanes for Growths<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let Self { ways, of } = self;
+        // SAFETY: the same contract; corners lead to positions, ways and sums.
+        unsafe {
+            let (zero, one) = (L::splat(0.0), L::splat(1.0));
+            let quarter = L::splat(0.25);
+            for group in of.groups {
+                for first in turns::<L>() {
+                    let inverse = Tetrahedra::inverse::<L>(group, first);
+                    let (edges, _) = Tetrahedra::edges::<L>(of.positions, group, first);
+                    let [a, b, c] = times_upper(edges, inverse);
+                    let growth = match ways {
+                        None => dot(a, cross(b, c)).subtract(one),
+                        Some(ways) => {
+                            let (edges, _) = Tetrahedra::edges::<L>(ways, group, first);
+                            let [da, db, dc] = times_upper(edges, inverse);
+                            dot(da, cross(b, c)).add(dot(db, cross(c, a))).add(dot(dc, cross(a, b)))
+                        }
+                    };
+                    let volumes = Tetrahedra::volumes::<L>(group, first);
+                    let growth = growth.multiply(volumes).multiply(quarter);
+                    for corners in &group.corners {
+                        L::add_to_records(of.sums, corners.as_ptr().add(first), [growth, zero, zero]);
+                    }
                 }
             }
         }
@@ -498,7 +562,10 @@ impl WithLanes for Energy<'_> {
         let mut energy = 0.0;
         // SAFETY: the same contract; corners lead to positions.
         unsafe {
-            let constants = Constants::<L>::new(law);
+            let mut constants = Constants::<L>::new(law);
+            if law.rings {
+                constants.kappa = L::splat(0.0);
+            }
             for group in of.groups {
                 for first in turns::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
