@@ -161,7 +161,7 @@ fn forces_are_those_of_the_finite_element_formula() {
                 }
                 let mut world = FREE;
                 world.kernel = kernel;
-                if World::new(world.clone()).is_err() {
+                if World::new(world).is_err() {
                     continue;
                 }
                 let mut scene = scene(
@@ -239,7 +239,7 @@ fn a_block_pulled_has_the_length_and_width_that_it_should() {
                         1.0
                     }
                 };
-                let part = f64::from(share(position.y) * share(position.z)) / 16.0;
+                let part = share(position.y) * share(position.z) / 16.0;
                 let pull = Vec3::X * (side as f64 * force * part) as f32;
                 body.apply_force(node as u32, pull).expect("a force");
             }
