@@ -7,6 +7,7 @@ use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::solver::write_records;
 use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
+use crate::terms::Terms;
 use crate::threads::{Items, Team};
 
 /// What rounding may add, as a fraction of the energies involved.
@@ -30,6 +31,7 @@ pub(super) struct Before {
 struct Inside<'a> {
     springs: &'a dyn Springs,
     elements: Option<&'a mut Elements>,
+    terms: Option<&'a Terms>,
     records: Option<&'a mut Records>,
     kernel: ChosenKernel,
 }
@@ -56,6 +58,7 @@ impl Substep<'_> {
         let mut inside = Inside {
             springs: &*body.springs,
             elements: body.elements.as_deref_mut(),
+            terms: body.terms.as_deref(),
             records: body.records.as_mut(),
             kernel: body.kernel,
         };
@@ -82,6 +85,7 @@ impl Substep<'_> {
         let mut inside = Inside {
             springs: &*body.springs,
             elements: body.elements.as_deref_mut(),
+            terms: body.terms.as_deref(),
             records: body.records.as_mut(),
             kernel: body.kernel,
         };
@@ -204,9 +208,10 @@ impl Implicit {
     /// some, J.
     fn elastic(&mut self, inside: &mut Inside, positions: &Vectors, place: usize, team: &Team) -> f64 {
         if let Some(newton) = &mut self.newton {
-            return newton.elastic(inside.springs, inside.elements.as_deref(), positions, place);
+            return newton.elastic(inside.springs, inside.elements.as_deref(), inside.terms, positions, place);
         }
         let (node_count, springs, kernel) = (positions.len(), inside.springs, inside.kernel);
+        let terms = inside.terms;
         if let Some(records) = &mut inside.records {
             write_records(kernel, positions, records, team);
         }
@@ -215,13 +220,16 @@ impl Implicit {
         let partials = Items::new(&mut self.partials);
         team.pass(tile_count(node_count), partials, |tile, partial| {
             partial.first = springs.half_energy(tile_nodes(tile, node_count), view);
+            if let Some(terms) = terms {
+                partial.first += terms.energy_of_tile(tile, &|node| view.get(node).as_dvec3());
+            }
         });
-        let of_springs: f64 = self.partials.iter().map(|partial| partial.first).sum();
+        let of_tiles: f64 = self.partials.iter().map(|partial| partial.first).sum();
         let of_elements = match (&mut inside.elements, records) {
             (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
             _ => 0.0,
         };
-        of_springs + of_elements
+        of_tiles + of_elements
     }
 }
 

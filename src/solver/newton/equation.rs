@@ -115,6 +115,9 @@ impl Equation {
                 residuals[corner] += deformed.force(gradient);
             }
         }
+        if let Some(terms) = &network.terms {
+            terms.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
+        }
         let way = |node: usize| self.ways[node];
         self.holds.show_forces(way, |node, force| {
             if self.is_free(node) {
@@ -166,6 +169,9 @@ impl Equation {
             }
         }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
+        if let Some(terms) = &network.terms {
+            terms.show_changes(&|node| self.position(node), &more, &mut add);
+        }
         self.holds.show_changes(way, more, add);
         sums
     }
@@ -195,6 +201,7 @@ impl Equation {
         for (law, tetrahedron) in network.tetrahedra() {
             self.add_tetrahedron(law, tetrahedron, tangent, matrix);
         }
+        self.add_terms(network, tangent, matrix);
         self.holds.show_blocks(|node, block| {
             if self.is_free(node) {
                 matrix.diagonal[node] += whole(block);
@@ -228,6 +235,26 @@ impl Equation {
                 matrix.beside[place] += stiffness(high, low);
             }
         }
+    }
+
+    fn add_terms(&self, network: &Network, tangent: Tangent, matrix: &mut Matrix) {
+        let Some(terms) = &network.terms else {
+            return;
+        };
+        let is_exact = tangent == Tangent::Exact;
+        terms.show_blocks(&|node| self.position(node), is_exact, &mut |nodes, blocks| {
+            for (a, &of_a) in nodes.iter().enumerate() {
+                if !self.is_free(of_a as usize) {
+                    continue;
+                }
+                matrix.diagonal[of_a as usize] += blocks[a][a];
+                for (b, &of_b) in nodes.iter().enumerate() {
+                    if of_b < of_a && self.is_free(of_b as usize) {
+                        matrix.beside[network.place([of_a, of_b])] += blocks[a][b];
+                    }
+                }
+            }
+        });
     }
 
     /// Brings the pressures of rings up to the ways.
@@ -340,7 +367,7 @@ impl Equation {
         outer * along + DMat3::from_diagonal(DVec3::splat(across))
     }
 
-    /// The energy of springs, elements and loads, J, with the origin of coordinates at `origin`.
+    /// The energy of springs, elements, terms and loads, J, with the origin of coordinates at `origin`.
     pub fn potential(&mut self, network: &Network, origin: DVec3) -> f64 {
         let elastic: f64 = network
             .springs()
@@ -354,8 +381,10 @@ impl Equation {
         for (pressure, volume) in self.pressures.iter().zip(&network.volumes) {
             of_elements += 0.5 * pressure * pressure * volume / network.kappa();
         }
+        let of_terms = network.terms.as_ref();
+        let of_terms = of_terms.map_or(0.0, |terms| terms.energy(&|node| self.position(node)));
         let loads = self.loads.iter().enumerate();
-        elastic + of_elements
+        elastic + of_elements + of_terms
             - loads
                 .map(|(node, load)| load.dot(self.position(node) + origin))
                 .sum::<f64>()
