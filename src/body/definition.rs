@@ -106,9 +106,9 @@ pub struct BodyDefinition<'a> {
     /// modulus E, Poisson's ratio nu and thickness t it is `E t³ / (12 (1 - nu²))`.
     ///
     /// Each edge of two triangles is a hinge that turns back to its angle at rest, whether the surface is flat or curved there; an edge
-    /// of more triangles is refused. The rigidity is what is asked for where triangles are equilateral, and for bending along a
-    /// side where they are squares cut in two; bending along a diagonal of those is twice as stiff, with all cuts the same way three times
-    /// along one and as stiff as asked for along the other.
+    /// of more triangles is refused. Where triangles are equilateral it is rolled up with just this rigidity, whichever way. Where they are
+    /// squares that are cut alternately it has 5/6 of it along a side; where all are cut the same way, it has it along a side and across
+    /// the cuts, and three times as much along them.
     pub bending_stiffness: f32,
     /// How the pull of the springs grows as they are stretched.
     pub spring_law: SpringLaw,

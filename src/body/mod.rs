@@ -30,7 +30,8 @@ use crate::error::Result;
 use crate::material::Made;
 use crate::memory;
 use crate::solver::{
-    Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close, write_records,
+    Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close,
+    write_records,
 };
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::terms::Terms;

@@ -159,8 +159,8 @@ pub struct sinew_body_def {
     pub home_stiffness: f32,
     /// N m, at least 0: the flexural rigidity of the surface that triangles make; default 0: it bends freely. Of a sheet of Young's
     /// modulus E, Poisson's ratio nu and thickness t it is E t^3 / (12 (1 - nu^2)). Each edge of two triangles turns back to its angle
-    /// at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral,
-    /// and along a side where they are squares cut in two. sinew_body_remove_spring takes away the bending of triangles that have the
+    /// at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral;
+    /// 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of triangles that have the
     /// edge, whether or not there is a spring along it.
     pub bending_stiffness: f32,
     /// SINEW_SPRING_LAW_...; LINEAR, the default: the four below are 0. Springs that are added later are linear.
@@ -413,7 +413,11 @@ impl sinew_body_def {
                 )));
             }
         };
-        match numbers.iter().zip(used).find(|((_, value), used)| !used && *value != 0.0) {
+        match numbers
+            .iter()
+            .zip(used)
+            .find(|((_, value), used)| !used && *value != 0.0)
+        {
             None => Ok(law),
             Some(((number, value), _)) => Err(Error::invalid(format!(
                 "{number} is {value} while spring_law is {name}: must be 0"

@@ -11,8 +11,9 @@
 //! Grinspun, Wardetzky, Zorin 2007), but one that is nowhere below 0. `G` turns with the body and is 0 at rest, so momentum is kept and
 //! the rest shape is at rest; nothing is divided by what may become 0, so whatever becomes of a triangle, forces are finite.
 //!
-//! With `k = D |e0|² / (A + A')` the flexural rigidity is D for bending in any direction where triangles are equilateral (Seung,
-//! Nelson 1988), and along a side where they are squares cut in two.
+//! With `k = D |e0|² / (A + A')` the flexural rigidity is D, whichever way it is bent, where triangles are equilateral, and Poisson's
+//! ratio is -1/3 (Seung, Nelson 1988). A sum over hinges cannot have both on every mesh: of squares that are cut alternately every other
+//! node gives way, which leaves 5/6 of D along a side.
 
 use glam::{DMat3, DVec3};
 
@@ -265,8 +266,7 @@ impl Law<4> for Hinges {
         let (edge, across, turn) = (cross(bent.edge), cross(bent.across), cross(bent.turn));
         let difference = [0, 1, 2, 3].map(|node| first[node] - second[node]);
         let rates = [0, 1, 2, 3].map(|node| {
-            DMat3::from_diagonal(DVec3::splat(cosine * (first[node] + second[node])))
-                + across * (sine * EDGE[node])
+            DMat3::from_diagonal(DVec3::splat(cosine * (first[node] + second[node]))) + across * (sine * EDGE[node])
                 - edge * (sine * difference[node])
         });
         [0, 1, 2, 3].map(|a| {
@@ -293,7 +293,9 @@ impl Law<4> for Hinges {
             both * (first[node].abs() + second[node].abs()) + 2.0 * sine * EDGE[node].abs()
         };
         let nodes = inverse_masses.iter().enumerate();
-        nodes.map(|(node, inverse_mass)| bound(node).powi(2) * inverse_mass).sum()
+        nodes
+            .map(|(node, inverse_mass)| bound(node).powi(2) * inverse_mass)
+            .sum()
     }
 
     /// Longer arms and edges raise that bound; and with x the arms' part of it and y the edge's, G adds `|G| x y <= |G| (x + y)²/4`.

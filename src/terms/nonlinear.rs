@@ -118,11 +118,7 @@ impl SpringLaw {
         }
         let [pull, slope, energy] = self.below_limit(limit);
         let more = strain - limit;
-        [
-            pull + slope * more,
-            slope,
-            energy + more * (pull + 0.5 * slope * more),
-        ]
+        [pull + slope * more, slope, energy + more * (pull + 0.5 * slope * more)]
     }
 
     /// How the energy changes where the strain becomes so much larger.
@@ -154,11 +150,7 @@ struct Stiffening {
     stiffest: f64,
 }
 
-pub(super) fn new(
-    definition: &BodyDefinition,
-    springs: &[Spring],
-    order: &NodeOrder,
-) -> Result<Option<Box<dyn Term>>> {
+pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let law = definition.spring_law;
     law.check()?;
     if law == SpringLaw::Linear {
@@ -170,7 +162,9 @@ pub(super) fn new(
     let stiffest = law.stiffest();
     let mut stiffening = memory::reserved(springs.len())?;
     // A spring without a length at rest has no strain.
-    let there = springs.iter().filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
+    let there = springs
+        .iter()
+        .filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
     for spring in there {
         let mut nodes = spring.nodes.map(|node| order.own(node));
         nodes.sort_unstable();
@@ -181,7 +175,11 @@ pub(super) fn new(
         });
     }
     let law = Stiffening { law, stiffest };
-    Ok(Some(Box::new(Stencils::new(law, stiffening, definition.positions.len())?)))
+    Ok(Some(Box::new(Stencils::new(
+        law,
+        stiffening,
+        definition.positions.len(),
+    )?)))
 }
 
 /// A spring where it is.

@@ -98,7 +98,9 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
         }
         visits.sort_unstable();
         let mut visitor_starts = memory::filled(0, count + 1)?;
-        visits.iter().for_each(|(tile, _)| visitor_starts[*tile as usize + 1] += 1);
+        visits
+            .iter()
+            .for_each(|(tile, _)| visitor_starts[*tile as usize + 1] += 1);
         for starts in [&mut starts, &mut visitor_starts] {
             for tile in 1..=count {
                 starts[tile] += starts[tile - 1];
@@ -244,7 +246,10 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         let beginning = self.beginning(tile);
         let visitors = self.visitor_starts[tile] as usize..self.visitor_starts[tile + 1] as usize;
         let Self {
-            law, all, visitors: of_tiles, ..
+            law,
+            all,
+            visitors: of_tiles,
+            ..
         } = self;
         let mut removed = 0;
         let mut look = |stencil: &mut Stencil<L::Shape, N>| {
@@ -258,7 +263,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
             }
         };
         all[beginning].iter_mut().for_each(&mut look);
-        of_tiles[visitors].iter().for_each(|&index| look(&mut all[index as usize]));
+        of_tiles[visitors]
+            .iter()
+            .for_each(|&index| look(&mut all[index as usize]));
         removed
     }
 
@@ -270,9 +277,10 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn holds(&self, node: usize) -> bool {
         // A term of a single node is one between it and the world.
-        N == 1 && self.all[self.beginning(tile_of(node as u32))]
-            .binary_search_by_key(&(node as u32), |stencil| stencil.nodes[0])
-            .is_ok()
+        N == 1
+            && self.all[self.beginning(tile_of(node as u32))]
+                .binary_search_by_key(&(node as u32), |stencil| stencil.nodes[0])
+                .is_ok()
     }
 
     fn hash(&self, hasher: &mut StateHasher) {
@@ -286,7 +294,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 #[inline(always)]
 pub(super) fn weighted(weights: &[f32; 3], [first, others @ ..]: &[DVec3; 4]) -> DVec3 {
     let terms = weights.iter().zip(others);
-    terms.map(|(&weight, &place)| (place - *first) * f64::from(weight)).sum()
+    terms
+        .map(|(&weight, &place)| (place - *first) * f64::from(weight))
+        .sum()
 }
 
 /// The share that each place has in such a sum.

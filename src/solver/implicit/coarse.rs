@@ -170,9 +170,14 @@ impl Coarse {
             let cluster = |node: u32| usize::from(self.clusters[node as usize / BLOCK]);
             let clusters = nodes.iter().map(|&node| cluster(node));
             // Nodes of one cluster share its functions: their blocks are added up first.
-            let is_together = clusters.clone().all(|cluster| cluster == self.clusters[nodes[0] as usize / BLOCK].into());
-            let parts: [[f32; FUNCTIONS]; 4] =
-                std::array::from_fn(|place| nodes.get(place).map_or([0.0; FUNCTIONS], |&node| self.part(node as usize)));
+            let is_together = clusters
+                .clone()
+                .all(|cluster| cluster == self.clusters[nodes[0] as usize / BLOCK].into());
+            let parts: [[f32; FUNCTIONS]; 4] = std::array::from_fn(|place| {
+                nodes
+                    .get(place)
+                    .map_or([0.0; FUNCTIONS], |&node| self.part(node as usize))
+            });
             for row in 0..FUNCTIONS {
                 for column in 0..FUNCTIONS {
                     let mut sum = DMat3::ZERO;
@@ -182,7 +187,8 @@ impl Coarse {
                             if is_together {
                                 sum += blocks[a][b] * factor;
                             } else if factor != 0.0 {
-                                let clusters = [of_a, of_b].map(|node| usize::from(self.clusters[node as usize / BLOCK]));
+                                let clusters =
+                                    [of_a, of_b].map(|node| usize::from(self.clusters[node as usize / BLOCK]));
                                 self.add_block([clusters[0], row], [clusters[1], column], blocks[a][b] * factor);
                             }
                         }

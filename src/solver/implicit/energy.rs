@@ -208,7 +208,13 @@ impl Implicit {
     /// some, J.
     fn elastic(&mut self, inside: &mut Inside, positions: &Vectors, place: usize, team: &Team) -> f64 {
         if let Some(newton) = &mut self.newton {
-            return newton.elastic(inside.springs, inside.elements.as_deref(), inside.terms, positions, place);
+            return newton.elastic(
+                inside.springs,
+                inside.elements.as_deref(),
+                inside.terms,
+                positions,
+                place,
+            );
         }
         let (node_count, springs, kernel) = (positions.len(), inside.springs, inside.kernel);
         let terms = inside.terms;

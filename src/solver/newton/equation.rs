@@ -12,6 +12,7 @@ use crate::elements::{Deformed, Law};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Link;
+use crate::terms::Blocks;
 
 /// The function, and where on it we are.
 #[derive(Debug)]
@@ -243,6 +244,10 @@ impl Equation {
         };
         let is_exact = tangent == Tangent::Exact;
         terms.show_blocks(&|node| self.position(node), is_exact, &mut |nodes, blocks| {
+            if tangent == Tangent::Factor && nodes.len() > 2 {
+                self.add_pairs(network, nodes, blocks, matrix);
+                return;
+            }
             for (a, &of_a) in nodes.iter().enumerate() {
                 if !self.is_free(of_a as usize) {
                     continue;
@@ -255,6 +260,28 @@ impl Equation {
                 }
             }
         });
+    }
+
+    /// Adds to a matrix that is to be factorised a term of several nodes, as springs between those that draw each other: of a matrix
+    /// whose nodes push each other too an incomplete factor may be anything.
+    fn add_pairs(&self, network: &Network, nodes: &[u32], blocks: &Blocks, matrix: &mut Matrix) {
+        for (a, &of_a) in nodes.iter().enumerate() {
+            for (b, &of_b) in nodes[..a].iter().enumerate() {
+                let [x, y, z] = [0, 1, 2].map(|axis| blocks[a][b].col(axis)[axis]);
+                let stiffness = -(x + y + z) / 3.0;
+                if !(stiffness > 0.0) {
+                    continue;
+                }
+                let block = DMat3::from_diagonal(DVec3::splat(stiffness));
+                let ends = [of_a, of_b].map(|node| node as usize);
+                for end in ends.into_iter().filter(|&end| self.is_free(end)) {
+                    matrix.diagonal[end] += block;
+                }
+                if ends.into_iter().all(|end| self.is_free(end)) {
+                    matrix.beside[network.place([of_a, of_b])] -= block;
+                }
+            }
+        }
     }
 
     /// Brings the pressures of rings up to the ways.
