@@ -504,9 +504,10 @@ typedef struct sinew_body_def {
    */
   float thickness;
   /**
-   * 0.
+   * Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
+   * default: they do not. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
    */
-  uint32_t reserved3;
+  float volume_stiffness;
 } sinew_body_def;
 
 /**
