@@ -119,7 +119,8 @@ fn organs_of_springs_that_keep_their_volume_come_back_from_anywhere() {
                     density: 1060.0,
                     ..Material::default()
                 }),
-                volume_stiffness: 10_000.0,
+                // With ten times as much what is folded stays so: no tetrahedron gives way any more.
+                volume_stiffness: 2000.0,
                 node_dampings: Values::Uniform(0.02),
                 solver,
                 ..BodyDefinition::default()
