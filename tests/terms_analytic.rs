@@ -66,13 +66,13 @@ fn springs_pull_along_their_curve() {
     let exponential = |e: f64| if e < 0.0 { e } else { ((12.0 * e).exp() - 1.0) / 12.0 };
     let cubic = |e: f64| e - 2.0 * e * e + 5.0 * e * e * e;
     // What it is at the limit, and how steep.
-    let laws: [(SpringLaw, &dyn Fn(f64) -> f64, f64, f64); 2] = [
+    let laws = [
         (
             SpringLaw::Exponential {
                 steepness: 12.0,
                 limit: 0.25,
             },
-            &exponential,
+            exponential as fn(f64) -> f64,
             0.25,
             3.0_f64.exp(),
         ),
@@ -82,7 +82,7 @@ fn springs_pull_along_their_curve() {
                 cubic: 5.0,
                 limit: 0.5,
             },
-            &cubic,
+            cubic,
             0.5,
             1.0 - 2.0 + 15.0 * 0.25,
         ),

@@ -150,8 +150,9 @@ pub struct sinew_body_def {
     pub density: f32,
     /// m: above 0 where the material fills triangles, else 0.
     pub thickness: f32,
-    /// 0.
-    pub reserved3: u32,
+    /// Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
+    /// default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
+    pub volume_stiffness: f32,
     /// node_count floats, N/m, at least 0: what draws each node back to its rest position, wherever the body is; nullable:
     /// home_stiffness for all.
     pub home_stiffnesses: *const f32,
@@ -160,8 +161,8 @@ pub struct sinew_body_def {
     /// N m, at least 0: the flexural rigidity of the surface that triangles make; default 0: it bends freely. Of a sheet of Young's
     /// modulus E, Poisson's ratio nu and thickness t it is E t^3 / (12 (1 - nu^2)). Each edge of two triangles turns back to its angle
     /// at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral;
-    /// 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of triangles that have the
-    /// edge, whether or not there is a spring along it.
+    /// 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of
+    /// triangles that have the edge, whether or not there is a spring along it.
     pub bending_stiffness: f32,
     /// SINEW_SPRING_LAW_...; LINEAR, the default: the four below are 0. Springs that are added later are linear.
     pub spring_law: u32,
@@ -334,7 +335,7 @@ impl sinew_body_def {
             poisson_ratio: 0.0,
             density: 0.0,
             thickness: 0.0,
-            reserved3: 0,
+            volume_stiffness: 0.0,
             home_stiffnesses: std::ptr::null(),
             home_stiffness: 0.0,
             bending_stiffness: 0.0,
@@ -433,7 +434,6 @@ impl sinew_body_def {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
         memory::reserved("reserved2", self.reserved2)?;
-        memory::reserved("reserved3", self.reserved3)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -487,6 +487,7 @@ impl sinew_body_def {
                 iterations: self.iterations,
                 accuracy: self.accuracy,
                 mass_scaling: self.mass_scaling,
+                volume_stiffness: self.volume_stiffness,
             })
         }
     }

@@ -39,6 +39,16 @@ impl Law {
         }
     }
 
+    /// That of volume alone, Pa.
+    pub fn of_volume(kappa: f32) -> Self {
+        Self {
+            lambda: 0.0,
+            mu: 0.0,
+            kappa,
+            rings: false,
+        }
+    }
+
     /// What resists a small stretch with its sides held, Pa: lambda + 2 mu with all of lambda.
     pub fn whole(&self) -> f32 {
         self.lambda + 2.0 * self.mu + self.kappa

@@ -93,6 +93,11 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, subtrahend.0) })
+    }
+
+    #[inline(always)]
     unsafe fn size(self) -> Self {
         Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
     }

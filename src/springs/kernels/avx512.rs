@@ -99,6 +99,11 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm512_fmsub_ps(self.0, factor.0, subtrahend.0) })
+    }
+
+    #[inline(always)]
     unsafe fn size(self) -> Self {
         Self(unsafe { _mm512_abs_ps(self.0) })
     }

@@ -86,6 +86,11 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { vnegq_f32(vfmsq_f32(subtrahend.0, self.0, factor.0)) })
+    }
+
+    #[inline(always)]
     unsafe fn size(self) -> Self {
         Self(unsafe { vabsq_f32(self.0) })
     }

@@ -66,6 +66,11 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] * factor.0[lane] - subtrahend.0[lane]))
+    }
+
+    #[inline(always)]
     unsafe fn size(self) -> Self {
         Self(self.0.map(f32::abs))
     }
