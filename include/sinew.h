@@ -520,9 +520,10 @@ typedef struct sinew_body_def {
    */
   float thickness;
   /**
-   * 0.
+   * Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
+   * default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
    */
-  uint32_t reserved3;
+  float volume_stiffness;
   /**
    * node_count floats, N/m, at least 0: what draws each node back to its rest position, wherever the body is; nullable:
    * home_stiffness for all.
@@ -535,9 +536,9 @@ typedef struct sinew_body_def {
   /**
    * N m, at least 0: the flexural rigidity of the surface that triangles make; default 0: it bends freely. Of a sheet of Young's
    * modulus E, Poisson's ratio nu and thickness t it is E t^3 / (12 (1 - nu^2)). Each edge of two triangles turns back to its angle
-   * at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral,
-   * and along a side where they are squares cut in two. sinew_body_remove_spring takes away the bending of triangles that have the
-   * edge, whether or not there is a spring along it.
+   * at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral;
+   * 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of
+   * triangles that have the edge, whether or not there is a spring along it.
    */
   float bending_stiffness;
   /**
