@@ -3,11 +3,11 @@
 
 mod support;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, BodyId, Kernel, Material, Model, RestStateDefinition, Solver, Storage, Values, World,
-    WorldDefinition,
+    BodyDefinition, BodyId, Kernel, Material, Model, Pose, RestStateDefinition, Shape, Solver, Storage, ToolDefinition,
+    Values, World, WorldDefinition,
 };
 use support::bodies::{FREE, Random};
 
@@ -436,6 +436,61 @@ fn a_removed_edge_takes_its_tetrahedra_with_it() {
                 .fold(0.0, f64::max);
             assert!(off < 1e-6, "{solver:?}, nu {nu}: {off} m");
         }
+    }
+}
+
+#[test]
+fn a_plate_feels_the_same_whatever_the_solver() {
+    const THICKNESS: f32 = 0.04;
+    let mesh = block([THICKNESS; 3], [4; 3], 13);
+    for nu in [0.3, 0.45] {
+        let forces = [
+            (Solver::Verlet, 1e-3),
+            (Solver::Implicit, 1e-2),
+            (Solver::Newton, 1.0 / 60.0),
+        ]
+        .map(|(solver, dt)| {
+            let mut scene = scene(
+                &mesh,
+                FREE,
+                &BodyDefinition {
+                    material: Some(tissue(nu)),
+                    node_dampings: Values::Uniform(0.02),
+                    solver,
+                    ..BodyDefinition::default()
+                },
+            );
+            scene.pin(|position| position.y < -0.49 * f64::from(THICKNESS));
+            let plate = ToolDefinition {
+                pose: Pose {
+                    position: Vec3::Y * 0.5 * THICKNESS,
+                    orientation: Quat::from_rotation_x(std::f32::consts::PI),
+                },
+                ..ToolDefinition::new(Shape::Plane)
+            };
+            let plate = scene.world.create_tool(&plate).expect("a tool");
+            let (press, hold) = (0.2_f32, 0.6);
+            let mut time = 0.0_f32;
+            while time < press + hold {
+                time += dt;
+                let down = 0.1 * THICKNESS * (time / press).min(1.0);
+                scene
+                    .world
+                    .set_pose(plate, Vec3::Y * (0.5 * THICKNESS - down), None)
+                    .expect("a pose");
+                scene.world.step(dt).expect("a step");
+            }
+            scene.world.wrench(plate).expect("the plate").0.y
+        });
+        for force in forces {
+            assert!((force / forces[0] - 1.0).abs() < 0.01, "nu {nu}: {forces:?}");
+        }
+        // As much as a bar of free sides would take, or more, since its foot is held.
+        let least = YOUNG * 0.1 * THICKNESS * THICKNESS;
+        assert!(
+            forces[0] > 0.9 * least && forces[0] < 2.5 * least,
+            "nu {nu}: {forces:?}, {least} for a free bar"
+        );
     }
 }
 
