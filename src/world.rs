@@ -287,7 +287,8 @@ impl World {
             gravity: definition.gravity,
             substeps: definition.substeps,
             max_substeps: definition.max_substeps,
-            tolerance: definition.tolerance,
+            // Fixed substeps are taken as they are.
+            tolerance: if definition.substeps == 0 { definition.tolerance } else { 0.0 },
             tools: paths,
         };
         let shared = is_worth_sharing(bodies);
