@@ -14,6 +14,9 @@ use crate::threads::{Items, Team};
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 200;
 
+/// How many times as far as a correction says a step of Newton's goes at most, about.
+const LONGEST: f64 = 16.0;
+
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
 
@@ -108,7 +111,7 @@ impl Substep<'_> {
             implicit.corrections.clear();
             square = implicit.precondition(body, 0.0, self.team).first;
             // What a solution has left of it is rounding.
-            if gone == 1.0 && square <= noise.square {
+            if gone >= 1.0 && square <= noise.square {
                 error = solved_error.max(noise.error);
                 is_solved = true;
                 break;
@@ -116,7 +119,7 @@ impl Substep<'_> {
             implicit.spectrum.begin();
             let remaining = square * implicit.spectrum.factor();
             // What rounding leaves is not improved by going all the way again; far above that, it is bends that take so long.
-            let is_in_vain = gone == 1.0 && remaining > 0.5 * error && square <= NEARLY * noise.square;
+            let is_in_vain = gone >= 1.0 && remaining > 0.5 * error && square <= NEARLY * noise.square;
             vain = if is_in_vain { vain + 1 } else { 0 };
             let is_stuck = vain > 2;
             error = remaining;
@@ -187,19 +190,25 @@ impl Substep<'_> {
         square.is_finite()
     }
 
-    /// Goes along the correction, as far as the forces do not turn against it: what part of it.
+    /// Goes along the correction, as far as the forces do not turn against it, and on where they still pull along it, as they do
+    /// where pressed springs buckle: what part of it.
     fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
-        let mut gone = 1.0;
+        let (mut gone, mut may_extend) = (1.0, true);
         add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
         for _ in 0..12 {
             self.place(body, implicit);
             let slope = self.residual(body, implicit);
-            if slope >= -0.5 * work {
+            may_extend &= slope.is_finite() && slope >= -0.5 * work && gone < LONGEST;
+            // To where the slope would be zero if it changed evenly.
+            let next = if may_extend && slope > 0.5 * work {
+                gone * (work / (work - slope).max(0.25 * work))
+            } else if slope >= -0.5 * work {
                 return gone;
-            }
-            // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
-            let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
-            let next = gone * f64::clamp(part, 0.1, 0.7);
+            } else if slope.is_finite() {
+                gone * f64::clamp(work / (work - slope), 0.1, 0.7)
+            } else {
+                0.1 * gone
+            };
             add(
                 &mut implicit.pushes,
                 &implicit.corrections,
