@@ -159,17 +159,18 @@ impl Substep<'_> {
         };
         let (springs, masses, gravity) = (&*body.springs, &body.masses, self.request.gravity);
         let node_count = positions.len();
-        self.team.pass(tile_count(node_count), body.pins.tiles_mut(), |tile, pins| {
-            if pins.is_empty() {
-                return;
-            }
-            let mut forces = TileForces::ZERO;
-            springs.forces(tile, &motion, &mut forces);
-            if let Some(elements) = &elements {
-                elements.add(tile, &mut forces);
-            }
-            show_held(pins, &forces, gravity, masses);
-        });
+        self.team
+            .pass(tile_count(node_count), body.pins.tiles_mut(), |tile, pins| {
+                if pins.is_empty() {
+                    return;
+                }
+                let mut forces = TileForces::ZERO;
+                springs.forces(tile, &motion, &mut forces);
+                if let Some(elements) = &elements {
+                    elements.add(tile, &mut forces);
+                }
+                show_held(pins, &forces, gravity, masses);
+            });
     }
 
     /// What gravity, forces from outside and tools did on these ways, J.
