@@ -508,9 +508,10 @@ typedef struct sinew_body_def {
    */
   float thickness;
   /**
-   * 0.
+   * Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
+   * default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
    */
-  uint32_t reserved3;
+  float volume_stiffness;
 } sinew_body_def;
 
 /**

@@ -96,10 +96,33 @@ fn moduli(nu: f64) -> [f64; 3] {
     [lambda - kappa, mu, kappa]
 }
 
+fn volume(corners: &[u32; 4], at: impl Fn(usize) -> DVec3) -> f64 {
+    let [a, b, c, d] = corners.map(|corner| at(corner as usize));
+    (b - a).cross(c - a).dot(d - a) / 6.0
+}
+
+/// The pressures of nodes, whose rings of tetrahedra resist their growth.
+fn pressures(mesh: &Mesh, positions: &[DVec3], kappa: f64) -> Vec<f64> {
+    let mut volumes = vec![[0.0; 2]; positions.len()];
+    for corners in &mesh.tetrahedra {
+        let before = volume(corners, |node| mesh.positions[node].as_dvec3());
+        let after = volume(corners, |node| positions[node]) * before.signum();
+        for &corner in corners {
+            volumes[corner as usize][0] += before.abs();
+            volumes[corner as usize][1] += after;
+        }
+    }
+    volumes
+        .iter()
+        .map(|[before, after]| kappa * (after / before - 1.0))
+        .collect()
+}
+
 /// The forces of the finite-element formula: minus the first Piola-Kirchhoff stress times the area vectors at rest.
 fn forces(mesh: &Mesh, positions: &[DVec3], nu: f64) -> Vec<DVec3> {
     let [lambda, mu, kappa] = moduli(nu);
     let mut forces = vec![DVec3::ZERO; positions.len()];
+    let pressures = (nu >= 0.4).then(|| pressures(mesh, positions, kappa));
     for corners in &mesh.tetrahedra {
         let edges = |at: &dyn Fn(usize) -> DVec3| {
             let [a, b, c, d] = corners.map(|corner| at(corner as usize));
@@ -111,7 +134,11 @@ fn forces(mesh: &Mesh, positions: &[DVec3], nu: f64) -> Vec<DVec3> {
         let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
         let second = strain * (2.0 * mu) + DMat3::IDENTITY * (lambda * trace);
         let j = gradient.determinant();
-        let stress = gradient * second + gradient.inverse().transpose() * (kappa * (j - 1.0) * j);
+        let pressure = match &pressures {
+            Some(pressures) => corners.iter().map(|&corner| 0.25 * pressures[corner as usize]).sum(),
+            None => kappa * (j - 1.0),
+        };
+        let stress = gradient * second + gradient.inverse().transpose() * (pressure * j);
         let volume = rest.determinant().abs() / 6.0;
         let of_corners = stress * rest.inverse().transpose() * -volume;
         let columns = [of_corners.x_axis, of_corners.y_axis, of_corners.z_axis];
@@ -126,7 +153,7 @@ fn forces(mesh: &Mesh, positions: &[DVec3], nu: f64) -> Vec<DVec3> {
 #[test]
 fn forces_are_those_of_the_finite_element_formula() {
     let mesh = block([0.06, 0.04, 0.05], [6, 4, 5], 3);
-    for nu in [0.0, 0.25, 0.35] {
+    for nu in [0.0, 0.25, 0.35, 0.45, 0.49] {
         for storage in STORAGES {
             for kernel in [Kernel::Best, Kernel::Avx2, Kernel::Portable] {
                 if storage != Storage::Packed && kernel != Kernel::Best {
@@ -134,7 +161,7 @@ fn forces_are_those_of_the_finite_element_formula() {
                 }
                 let mut world = FREE;
                 world.kernel = kernel;
-                if World::new(world.clone()).is_err() {
+                if World::new(world).is_err() {
                     continue;
                 }
                 let mut scene = scene(
@@ -178,8 +205,14 @@ fn forces_are_those_of_the_finite_element_formula() {
 fn a_block_pulled_has_the_length_and_width_that_it_should() {
     // Long, held and pulled at its ends so that these may get thinner.
     const SIZE: [f32; 3] = [0.08, 0.02, 0.02];
-    const STRAIN: f64 = 0.01;
-    for (nu, stretch_error, width_error) in [(0.0, 0.01, 0.02), (0.25, 0.01, 0.02), (0.35, 0.01, 0.02)] {
+    const STRAIN: f64 = 0.002;
+    for (nu, stretch_error, width_error) in [
+        (0.0, 0.01, 0.02),
+        (0.25, 0.01, 0.02),
+        (0.35, 0.01, 0.02),
+        (0.45, 0.01, 0.02),
+        (0.49, 0.01, 0.02),
+    ] {
         let mesh = block(SIZE, [16, 4, 4], 4);
         let mut scene = scene(
             &mesh,
@@ -206,7 +239,7 @@ fn a_block_pulled_has_the_length_and_width_that_it_should() {
                         1.0
                     }
                 };
-                let part = f64::from(share(position.y) * share(position.z)) / 16.0;
+                let part = share(position.y) * share(position.z) / 16.0;
                 let pull = Vec3::X * (side as f64 * force * part) as f32;
                 body.apply_force(node as u32, pull).expect("a force");
             }
@@ -248,7 +281,7 @@ fn every_solver_and_storage_comes_to_the_same_rest() {
         gravity: Vec3::NEG_Y * 9.81,
         ..FREE
     };
-    for nu in [0.3, 0.0] {
+    for nu in [0.3, 0.0, 0.47] {
         let mut expected = None;
         for solver in SOLVERS.into_iter().rev() {
             for storage in STORAGES {
@@ -287,7 +320,6 @@ fn every_solver_and_storage_comes_to_the_same_rest() {
                     .zip(&*expected)
                     .map(|(a, b)| a.distance(*b))
                     .fold(0.0, f64::max);
-                println!("{solver:?} {storage:?} nu {nu} sag {sag} off {off}");
                 assert!(sag > 0.005, "{sag}");
                 assert!(
                     off < 2e-5 * sag,
@@ -324,6 +356,5 @@ fn a_free_body_keeps_its_energy_and_momentum() {
         assert_eq!(report.bodies_restored, 0);
         worst = worst.max((scene.energy(Vec3::ZERO) / before - 1.0).abs());
     }
-    println!("energy {before} worst {worst}");
     assert!(worst < 0.05, "energy changed by {worst}");
 }

@@ -111,11 +111,14 @@ impl Body {
         let mut springs = definition.resolved_springs()?;
         let law = made.as_ref().and_then(|made| made.law);
         let order = match definition.storage {
-            Storage::Packed if law.is_some() => NodeOrder::for_tetrahedra(definition.positions, definition.tetrahedra)?,
+            Storage::Packed if springs.is_empty() && law.is_some() => {
+                NodeOrder::for_tetrahedra(definition.positions, definition.tetrahedra)?
+            }
             Storage::Packed => NodeOrder::for_springs(definition.positions, &springs, definition.rounding())?,
             _ => NodeOrder::default(),
         };
-        let elements = match law {
+        let of_volume = (definition.volume_stiffness > 0.0).then(|| Law::of_volume(definition.volume_stiffness));
+        let elements = match law.or(of_volume) {
             Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
             None => None,
         };

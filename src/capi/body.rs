@@ -142,8 +142,9 @@ pub struct sinew_body_def {
     pub density: f32,
     /// m: above 0 where the material fills triangles, else 0.
     pub thickness: f32,
-    /// 0.
-    pub reserved3: u32,
+    /// Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
+    /// default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
+    pub volume_stiffness: f32,
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
@@ -296,7 +297,7 @@ impl sinew_body_def {
             poisson_ratio: 0.0,
             density: 0.0,
             thickness: 0.0,
-            reserved3: 0,
+            volume_stiffness: 0.0,
         }
     }
 
@@ -340,7 +341,6 @@ impl sinew_body_def {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
         memory::reserved("reserved2", self.reserved2)?;
-        memory::reserved("reserved3", self.reserved3)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -382,6 +382,7 @@ impl sinew_body_def {
                 iterations: self.iterations,
                 accuracy: self.accuracy,
                 mass_scaling: self.mass_scaling,
+                volume_stiffness: self.volume_stiffness,
             })
         }
     }

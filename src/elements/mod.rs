@@ -7,6 +7,7 @@
 mod law;
 mod parts;
 mod rates;
+mod rings;
 
 use glam::{DMat3, DVec3};
 
@@ -18,6 +19,7 @@ use crate::springs::{ChosenKernel, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
 pub(crate) use law::{Deformed, Law, Rest};
 use parts::{Copies, Part};
+use rings::{Pressures, Rings};
 
 /// The tetrahedra of a body that are elements.
 #[derive(Debug)]
@@ -28,7 +30,9 @@ pub(crate) struct Elements {
     /// Where the copies of each part's nodes begin.
     starts: Vec<usize>,
     copies: Copies,
-    pub forces: Sums,
+    forces: Sums,
+    /// Where volume is kept by rings.
+    rings: Option<Rings>,
     /// A bound on the squares of frequencies where the forces were last worked out, and at the current state, 1/s².
     highest: f32,
     settled: f32,
@@ -48,16 +52,19 @@ pub(crate) struct Sums {
     ways: Vec<Record>,
     sums: Vec<Record>,
     of_parts: Vec<f64>,
+    /// Of no nodes where each tetrahedron keeps its own volume.
+    pressures: Pressures,
 }
 
 impl Sums {
-    fn new(copies: usize, parts: usize, with_ways: bool) -> Result<Self> {
+    fn new(copies: usize, parts: usize, with_ways: bool, ring_count: usize) -> Result<Self> {
         let records = |count| memory::filled(Record::default(), count);
         Ok(Self {
             positions: records(copies)?,
             ways: records(if with_ways { copies } else { 0 })?,
             sums: records(copies)?,
             of_parts: memory::filled(0.0, parts)?,
+            pressures: Pressures::new(ring_count)?,
         })
     }
 }
@@ -104,7 +111,12 @@ impl Elements {
             law,
             count: tetrahedra.len(),
             copies: Copies::new(&parts, node_count)?,
-            forces: Sums::new(count, parts.len(), false)?,
+            forces: Sums::new(count, parts.len(), false, if law.rings { node_count } else { 0 })?,
+            rings: if law.rings {
+                Some(rings::of(&parts, node_count)?)
+            } else {
+                None
+            },
             parts,
             starts,
             carried: memory::filled(0.0, node_count)?,
@@ -117,11 +129,14 @@ impl Elements {
 
     /// Room for sums that are made of ways.
     pub fn room_for_changes(&self) -> Result<Sums> {
-        Sums::new(self.forces.sums.len(), self.parts.len(), true)
+        Sums::new(self.forces.sums.len(), self.parts.len(), true, self.ring_count())
     }
 
     /// Works out the forces of all elements with nodes at `positions`.
     pub fn find_forces(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
+        if self.rings.is_some() {
+            self.find_pressures(kernel, positions, team);
+        }
         let (law, parts, starts) = (self.law, &self.parts, &self.starts);
         let sums = &mut self.forces;
         let written = (
@@ -129,9 +144,11 @@ impl Elements {
             Ragged::new(&mut sums.sums, starts),
             Items::new(&mut sums.of_parts),
         );
+        let pressures = &sums.pressures.of_nodes;
         team.pass(parts.len(), written, |part, (copies, sums, highest)| {
             let part = &parts[part];
             part.copy(positions, copies);
+            part.copy_pressures(pressures, copies);
             sums.fill(Record::default());
             *highest = f64::from(part.groups.forces(kernel, law, copies, sums));
         });
@@ -141,15 +158,32 @@ impl Elements {
     /// Works out how their forces change, to first order, with nodes at `positions` that go these ways.
     pub fn find_changes(&self, kernel: ChosenKernel, [positions, ways]: [&[Record]; 2], sums: &mut Sums, team: &Team) {
         let (law, parts, starts) = (self.law, &self.parts, &self.starts);
+        if let Some(rings) = &self.rings {
+            let written = (
+                Ragged::new(&mut sums.positions, starts),
+                Ragged::new(&mut sums.ways, starts),
+                Ragged::new(&mut sums.sums, starts),
+            );
+            team.pass(parts.len(), written, |part, (copies, copied_ways, sums)| {
+                let part = &parts[part];
+                part.copy(positions, copies);
+                part.copy(ways, copied_ways);
+                sums.fill(Record::default());
+                part.groups.growths(kernel, copies, Some(copied_ways), sums);
+            });
+            sums.pressures.find(rings, &self.copies, &sums.sums, law.kappa, team);
+        }
         let written = (
             Ragged::new(&mut sums.positions, starts),
             Ragged::new(&mut sums.ways, starts),
             Ragged::new(&mut sums.sums, starts),
         );
+        let pressures = &sums.pressures.of_nodes;
         team.pass(parts.len(), written, |part, (copies, copied_ways, sums)| {
             let part = &parts[part];
             part.copy(positions, copies);
             part.copy(ways, copied_ways);
+            part.copy_pressures(pressures, copied_ways);
             sums.fill(Record::default());
             part.groups.changes(kernel, law, copies, copied_ways, sums);
         });
@@ -157,6 +191,11 @@ impl Elements {
 
     /// Their energy with nodes at `positions`, J.
     pub fn energy(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
+        let of_rings = if self.rings.is_some() {
+            self.find_pressures(kernel, positions, team)
+        } else {
+            0.0
+        };
         let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
         let written = (
             Ragged::new(&mut sums.positions, &self.starts),
@@ -167,7 +206,27 @@ impl Elements {
             part.copy(positions, copies);
             *energy = part.groups.energy(kernel, law, copies);
         });
-        sums.of_parts.iter().sum()
+        of_rings + sums.of_parts.iter().sum::<f64>()
+    }
+
+    /// Works out the pressures of nodes at `positions`: the energy of all rings, J.
+    fn find_pressures(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
+        let (parts, starts, sums) = (&self.parts, &self.starts, &mut self.forces);
+        let written = (
+            Ragged::new(&mut sums.positions, starts),
+            Ragged::new(&mut sums.sums, starts),
+        );
+        team.pass(parts.len(), written, |part, (copies, sums)| {
+            let part = &parts[part];
+            part.copy(positions, copies);
+            sums.fill(Record::default());
+            part.groups.growths(kernel, copies, None, sums);
+        });
+        let Some(rings) = &self.rings else {
+            return 0.0;
+        };
+        sums.pressures
+            .find(rings, &self.copies, &sums.sums, self.law.kappa, team)
     }
 
     /// Where forces were worked out last is the current state.
@@ -192,7 +251,12 @@ impl Elements {
     pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         let mut removed = 0;
         for part in &mut self.parts {
-            removed += part.remove_edge(a, b);
+            removed += part.remove_edge(a, b, |node, share| {
+                if let Some(rings) = &mut self.rings {
+                    let volume = &mut rings.volumes[node as usize];
+                    *volume = (*volume - share).max(0.0);
+                }
+            });
         }
         self.rates_known &= removed == 0;
         removed
@@ -203,18 +267,55 @@ impl Elements {
         self.parts.iter().for_each(|part| part.visit(see));
     }
 
-    /// Shows each tetrahedron's nodes, the gradients of their functions and how it is deformed with nodes at `positions`.
-    pub fn visit_deformed(&self, positions: &Vectors, see: &mut See) {
+    /// Shows each tetrahedron's nodes, the gradients of their functions and how it is deformed with nodes at `positions`; what rings do
+    /// is shown as if each tetrahedron kept this part of it by itself.
+    pub fn visit_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut See) {
+        let mut law = self.law;
+        if law.rings {
+            law.rings = false;
+            law.kappa *= part_of_rings;
+        }
         self.visit(&mut |corners, rest| {
             let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
-            let deformed = Deformed::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
+            let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
             see(corners, &rest.gradients(), &deformed);
         });
+    }
+
+    /// How many numbers [`Self::exact_energy`] needs.
+    pub fn ring_count(&self) -> usize {
+        self.rings.as_ref().map_or(0, |rings| rings.volumes.len())
+    }
+
+    /// The energy with nodes at `positions`, J, worked out in `f64`; `growths` are for its use.
+    pub fn exact_energy(&self, position: impl Fn(usize) -> DVec3, growths: &mut [f64]) -> f64 {
+        let mut energy = 0.0;
+        growths.fill(0.0);
+        self.visit(&mut |corners, rest| {
+            let [a, b, c, d] = corners.map(|node| position(node as usize));
+            let deformed = Deformed::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
+            energy += deformed.energy();
+            if self.law.rings {
+                for node in corners {
+                    growths[node as usize] += 0.25 * deformed.swelling();
+                }
+            }
+        });
+        let rings = self.rings.iter().flat_map(|rings| &rings.volumes).zip(&*growths);
+        for (&volume, growth) in rings.filter(|(volume, _)| **volume > 0.0) {
+            energy += 0.5 * f64::from(self.law.kappa) * growth * growth / f64::from(volume);
+        }
+        energy
     }
 
     /// How many there were when the body was made.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// A quarter of the volume of the tetrahedra about a node at rest, m³, where volume is kept by rings.
+    pub fn ring_volume(&self, node: usize) -> Option<f64> {
+        self.rings.as_ref().map(|rings| f64::from(rings.volumes[node]))
     }
 
     /// The law of all of them.

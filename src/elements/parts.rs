@@ -9,7 +9,7 @@ use crate::memory;
 use crate::springs::{GROUP, Group, Groups, TILE, tile_count};
 
 /// Tetrahedra of a part: so few that its nodes stay in the nearest cache, and their numbers are small.
-const PART: usize = 2048;
+const PART: usize = 4096;
 
 /// Some tetrahedra, and their nodes.
 #[derive(Debug)]
@@ -96,10 +96,23 @@ impl Part {
             .set_rates(|corner| of_node[nodes[usize::from(corner)] as usize]);
     }
 
-    /// Takes away the tetrahedra with an edge between two nodes: how many.
-    pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
+    /// Writes pressures beside the places of its nodes, where there are any.
+    pub fn copy_pressures(&self, pressures: &[f32], to: &mut [Record]) {
+        if !pressures.is_empty() {
+            for (Record(to), &node) in to.iter_mut().zip(&self.nodes) {
+                to[3] = pressures[node as usize];
+            }
+        }
+    }
+
+    /// Takes away the tetrahedra with an edge between two nodes: how many. Shows what each of their nodes loses of volume, m³.
+    pub fn remove_edge(&mut self, a: u32, b: u32, mut see: impl FnMut(u32, f32)) -> usize {
         let mut removed = 0;
         while let Some((group, lane)) = self.find_edge(a, b) {
+            let of = &self.groups.as_slice()[group];
+            for corners in &of.corners {
+                see(self.nodes[usize::from(corners[lane] / 2)], 0.25 * of.volumes[lane]);
+            }
             self.groups.remove(group, lane);
             removed += 1;
         }

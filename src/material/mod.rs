@@ -113,6 +113,12 @@ fn check_tetrahedra(material: &Material, definition: &BodyDefinition) -> Result<
             "material is of tetrahedra, and the body has none: tetrahedron_count is 0",
         ));
     }
+    if definition.volume_stiffness > 0.0 {
+        return Err(Error::invalid(format!(
+            "volume_stiffness is {} Pa beside a material of tetrahedra, which keeps volume by itself: must be 0",
+            definition.volume_stiffness
+        )));
+    }
     if !(0.0..=HIGHEST).contains(&material.poisson_ratio) {
         return Err(Error::invalid(format!(
             "poisson_ratio is {}: must be from 0 to {HIGHEST}",

@@ -111,8 +111,9 @@ fn grid(xs: &[f32], ys: &[f32], zs: &[f32]) -> Result<Vec<Vec3>> {
 fn cells_of_grid([nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = ([u32; 3], [u32; 8])> {
     let row = nx + 1;
     let layer = row * (ny + 1);
-    let cells = (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
-    cells.map(move |[x, y, z]| {
+    let [across, area] = [nx as usize, nx as usize * ny as usize];
+    (0..area * nz as usize).map(move |cell| {
+        let [x, y, z] = [cell % across, cell % area / across, cell / area].map(|place| place as u32);
         let first = x + y * row + z * layer;
         let corner = |bits: u32| first + (bits & 1) + (bits >> 1 & 1) * row + (bits >> 2) * layer;
         ([x, y, z], std::array::from_fn(|bits| corner(bits as u32)))
@@ -133,15 +134,15 @@ fn check_node_count(cells: &[u32]) -> Result<()> {
 
 /// The places of a grid's nodes along one axis, about 0.
 fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
+    if cells == 0 {
+        return Err(Error::invalid(format!(
+            "cells along {name} is 0: there must be at least 1"
+        )));
+    }
     if !((size as f32).is_finite() && size > 0.0) {
         return Err(Error::invalid(format!(
             "size along {name} is {} m: it must be finite and above 0",
             size as f32
-        )));
-    }
-    if cells == 0 {
-        return Err(Error::invalid(format!(
-            "cells along {name} is 0: there must be at least 1"
         )));
     }
     let coincide = || {

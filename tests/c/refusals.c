@@ -235,7 +235,7 @@ static void materials(void)
         TISSUE(INVALID, "thickness", def.thickness = bad[i]);
     }
     TISSUE(INVALID, "material", def.material = UINT32_MAX);
-    TISSUE(INVALID, "reserved3", def.reserved3 = 1);
+    TISSUE(INVALID, "volume_stiffness is -1", def.volume_stiffness = -1);
     TISSUE(INVALID, "cells", def.cells = NULL);
     TISSUE(INVALID, "cells", def.cells = renumbered(def.cells, 8, 7, 8));
     TISSUE(INVALID, "cells", def.cells = renumbered(def.cells, 8, 7, 0));

@@ -24,6 +24,10 @@ pub(super) struct Noise {
     pub square: f64,
 }
 
+/// What of the stiffness of rings stands on the diagonal, as a part of what it were if each tetrahedron kept its volume: about a node in
+/// the middle of even ones, of which some twenty have it in common.
+const PART_OF_RINGS: f32 = 0.05;
+
 /// The blocks of a body.
 #[derive(Debug)]
 pub(super) struct Blocks {
@@ -56,7 +60,7 @@ impl Blocks {
     /// Adds elements at these positions.
     pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
         let stiffness = &mut self.stiffness;
-        elements.visit_deformed(positions, &mut |corners, gradients, deformed| {
+        elements.visit_deformed(positions, PART_OF_RINGS, &mut |corners, gradients, deformed| {
             for (node, &gradient) in corners.into_iter().zip(gradients) {
                 let matrix = deformed.clamped_stiffness(gradient, gradient);
                 let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];

@@ -124,7 +124,7 @@ impl Coarse {
 
     /// Adds elements at these positions.
     pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
-        elements.visit_deformed(positions, &mut |corners, gradients, deformed| {
+        elements.visit_deformed(positions, 1.0, &mut |corners, gradients, deformed| {
             let nodes = corners.map(|node| node as usize);
             let clusters = nodes.map(|node| usize::from(self.clusters[node / BLOCK]));
             let parts = nodes.map(|node| self.part(node));

@@ -239,7 +239,7 @@ impl Implicit {
     /// The energy of what is inside a body with nodes at `positions`, which lack the remainders of this place where there are
     /// some, J.
     fn elastic(&mut self, inside: &mut Inside, positions: &Vectors, place: usize, team: &Team) -> f64 {
-        if let Some(newton) = &self.newton {
+        if let Some(newton) = &mut self.newton {
             return newton.elastic(inside.springs, inside.elements.as_deref(), positions, place);
         }
         let (node_count, springs, kernel) = (positions.len(), inside.springs, inside.kernel);

@@ -72,9 +72,9 @@ impl Descent {
         let network = Network::new(node_count, springs, elements)?;
         let pair_count = network.pair_count();
         Ok(Self {
-            equation: Equation::new(node_count)?,
+            equation: Equation::new(node_count, network.ring_count())?,
             residuals: memory::filled(DVec3::ZERO, node_count)?,
-            gradient: Gradient::new(node_count)?,
+            gradient: Gradient::new(node_count, network.ring_count())?,
             matrix: Matrix::new(node_count, pair_count)?,
             factor: Matrix::new(node_count, pair_count)?,
             network,
@@ -156,7 +156,7 @@ impl Descent {
     /// one.
     pub fn leave_saddle(&mut self, shift: f64, length: f64, found: &mut Found, budget: u32) -> bool {
         self.equation
-            .assemble(&self.network, Tangent::Clamped, shift, &mut self.factor);
+            .assemble(&self.network, Tangent::Factor, shift, &mut self.factor);
         factor::factorise(&mut self.factor, &self.network);
         self.equation
             .assemble(&self.network, Tangent::Exact, shift, &mut self.matrix);
@@ -218,7 +218,7 @@ impl Descent {
     fn correct(&mut self, tangent: Tangent, shift: f64, goal: &Goal, found: &mut Found) -> bool {
         self.equation.press();
         self.equation
-            .assemble(&self.network, Tangent::Clamped, shift, &mut self.factor);
+            .assemble(&self.network, Tangent::Factor, shift, &mut self.factor);
         factor::factorise(&mut self.factor, &self.network);
         self.equation.assemble(&self.network, tangent, shift, &mut self.matrix);
         let (equation, residuals) = (&self.equation, &self.residuals);

@@ -32,7 +32,12 @@ pub(super) struct Equation {
     pub holds: Holds,
     /// What a way counts as a velocity, 1/s; 0: nothing is damped.
     pub rate: f64,
+    /// Of the nodes where volume is kept by rings, Pa, at the ways of which forces and matrices were made last.
+    pressures: Vec<f64>,
 }
+
+/// What of the stiffness of rings stands in the factor, as a part of what it were if each tetrahedron kept its volume.
+const PART_OF_RINGS: f32 = 0.05;
 
 /// Which matrix is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +46,8 @@ pub(super) enum Tangent {
     Exact,
     /// Without what pressed springs do sideways: positive semidefinite.
     Clamped,
+    /// The same as far as it has the pattern of the network, to be factorised.
+    Factor,
 }
 
 /// A spring where it is.
@@ -53,7 +60,8 @@ struct Spring {
 }
 
 impl Equation {
-    pub fn new(node_count: usize) -> Result<Self> {
+    /// For so many nodes, and rings.
+    pub fn new(node_count: usize, ring_count: usize) -> Result<Self> {
         let vectors = || memory::filled(DVec3::ZERO, node_count);
         Ok(Self {
             anchors: vectors()?,
@@ -64,6 +72,7 @@ impl Equation {
             drifts: vectors()?,
             holds: Holds::default(),
             rate: 0.0,
+            pressures: memory::filled(0.0, ring_count)?,
         })
     }
 
@@ -88,7 +97,8 @@ impl Equation {
     }
 
     /// Minus the slope, N: what acts on each node, held ones too.
-    pub fn residuals(&self, network: &Network, residuals: &mut [DVec3]) {
+    pub fn residuals(&mut self, network: &Network, residuals: &mut [DVec3]) {
+        self.find_pressures(network);
         for (node, residual) in residuals.iter_mut().enumerate() {
             *residual = self.loads[node] - self.ways[node] * self.inertia[node];
         }
@@ -100,7 +110,7 @@ impl Equation {
             residuals[link.neighbour as usize] -= force;
         }
         for (law, tetrahedron) in network.tetrahedra() {
-            let deformed = self.deformed(law, tetrahedron);
+            let deformed = self.deformed(law, tetrahedron).under_mean(&self.pressures, tetrahedron);
             for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
                 residuals[corner] += deformed.force(gradient);
             }
@@ -140,7 +150,20 @@ impl Equation {
         }
         for (law, tetrahedron) in network.tetrahedra() {
             let more = edges(&tetrahedron.corners, |node| corrections[node] * part);
-            add(self.deformed(law, tetrahedron).change(&tetrahedron.rest, more));
+            add(self.deformed(law, tetrahedron).change(&tetrahedron.rest, more).0);
+        }
+        for node in 0..network.ring_count() {
+            let (mut growth, mut more) = (0.0, 0.0);
+            for (law, tetrahedron) in network.ring(node) {
+                let deformed = self.deformed(law, tetrahedron);
+                growth += 0.25 * deformed.swelling();
+                let longer = edges(&tetrahedron.corners, |node| corrections[node] * part);
+                more += 0.25 * deformed.change(&tetrahedron.rest, longer).1;
+            }
+            let volume = network.volumes[node];
+            if volume > 0.0 {
+                add(0.5 * network.kappa() / volume * more * (2.0 * growth + more));
+            }
         }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
         self.holds.show_changes(way, more, add);
@@ -148,7 +171,8 @@ impl Equation {
     }
 
     /// The second derivatives, with `shift` (1/s²) times the mass added.
-    pub fn assemble(&self, network: &Network, tangent: Tangent, shift: f64, matrix: &mut Matrix) {
+    pub fn assemble(&mut self, network: &Network, tangent: Tangent, shift: f64, matrix: &mut Matrix) {
+        self.find_pressures(network);
         for (node, block) in matrix.diagonal.iter_mut().enumerate() {
             *block = if self.is_free(node) {
                 DMat3::from_diagonal(DVec3::splat(self.inertia[node] + shift * self.masses[node]))
@@ -179,11 +203,20 @@ impl Equation {
     }
 
     fn add_tetrahedron(&self, law: Law, tetrahedron: &Tetrahedron, tangent: Tangent, matrix: &mut Matrix) {
+        let law = match tangent {
+            Tangent::Factor if law.rings => Law {
+                rings: false,
+                kappa: PART_OF_RINGS * law.kappa,
+                ..law
+            },
+            _ => law,
+        };
         let deformed = self.deformed(law, tetrahedron);
         let gradients = tetrahedron.rest.gradients();
+        let pressed = deformed.under_mean(&self.pressures, tetrahedron);
         let stiffness = |a: usize, b: usize| match tangent {
-            Tangent::Exact => deformed.stiffness(gradients[a], gradients[b]),
-            Tangent::Clamped => deformed.clamped_stiffness(gradients[a], gradients[b]),
+            Tangent::Exact => pressed.stiffness(gradients[a], gradients[b]),
+            Tangent::Clamped | Tangent::Factor => deformed.clamped_stiffness(gradients[a], gradients[b]),
         };
         let corners = tetrahedron.corners;
         for corner in (0..4).filter(|&corner| self.is_free(corners[corner])) {
@@ -193,6 +226,54 @@ impl Equation {
             if self.is_free(corners[a]) && self.is_free(corners[b]) {
                 let (high, low) = if corners[a] > corners[b] { (a, b) } else { (b, a) };
                 matrix.beside[place] += stiffness(high, low);
+            }
+        }
+    }
+
+    /// Brings the pressures of rings up to the ways.
+    fn find_pressures(&mut self, network: &Network) {
+        for node in 0..self.pressures.len() {
+            let growths = network
+                .ring(node)
+                .map(|(law, of)| 0.25 * self.deformed(law, of).swelling());
+            let growth: f64 = growths.sum();
+            let volume = network.volumes[node];
+            self.pressures[node] = if volume > 0.0 {
+                network.kappa() * growth / volume
+            } else {
+                0.0
+            };
+        }
+    }
+
+    /// Adds to the products with a matrix what rings have beside it; `changes` are for the work.
+    fn add_products_of_rings(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
+        for (node, change) in changes.iter_mut().enumerate() {
+            let mut growth = 0.0;
+            for (law, tetrahedron) in network.ring(node) {
+                let deformed = self.deformed(law, tetrahedron);
+                for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
+                    growth += 0.25 * deformed.area(gradient).dot(vectors[corner]);
+                }
+            }
+            let volume = network.volumes[node];
+            *change = if volume > 0.0 {
+                network.kappa() * growth / volume
+            } else {
+                0.0
+            };
+        }
+        for (law, tetrahedron) in network.tetrahedra() {
+            let deformed = self.deformed(law, tetrahedron);
+            let change = tetrahedron
+                .corners
+                .map(|corner| 0.25 * changes[corner])
+                .iter()
+                .sum::<f64>();
+            for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
+                if self.is_free(corner) {
+                    products[corner] += deformed.area(gradient) * change;
+                }
             }
         }
     }
@@ -208,8 +289,12 @@ impl Equation {
         self.holds.press(|node| ways[node]);
     }
 
-    /// Adds to the products with a matrix what contacts of several nodes have beside its diagonal.
-    pub fn add_products(&self, vectors: &[DVec3], products: &mut [DVec3]) {
+    /// Adds to the products with a matrix what contacts of several nodes have beside its diagonal, and rings; `changes` has a
+    /// number for each of these.
+    pub fn add_products(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
+        if !changes.is_empty() {
+            self.add_products_of_rings(network, vectors, products, changes);
+        }
         let vector = |node: usize| vectors[node];
         self.holds.show_products(vector, |node, product| {
             if self.is_free(node) {
@@ -243,7 +328,7 @@ impl Equation {
         if length > 0.0 {
             across += damping(link) * speed / length;
         }
-        if tangent == Tangent::Clamped {
+        if tangent != Tangent::Exact {
             across = across.max(0.0);
         }
         let along = stiffness + damping(link) * self.rate - across;
@@ -255,16 +340,20 @@ impl Equation {
         outer * along + DMat3::from_diagonal(DVec3::splat(across))
     }
 
-    /// The energy of the springs and of the loads, J, with the origin of coordinates at `origin`.
-    pub fn potential(&self, network: &Network, origin: DVec3) -> f64 {
+    /// The energy of springs, elements and loads, J, with the origin of coordinates at `origin`.
+    pub fn potential(&mut self, network: &Network, origin: DVec3) -> f64 {
         let elastic: f64 = network
             .springs()
             .map(|(_, node, link)| 0.5 * stiffness(link) * (self.spring(node, link).length - rest_length(link)).powi(2))
             .sum();
-        let of_elements: f64 = network
+        let mut of_elements: f64 = network
             .tetrahedra()
             .map(|(law, tetrahedron)| self.deformed(law, tetrahedron).energy())
             .sum();
+        self.find_pressures(network);
+        for (pressure, volume) in self.pressures.iter().zip(&network.volumes) {
+            of_elements += 0.5 * pressure * pressure * volume / network.kappa();
+        }
         let loads = self.loads.iter().enumerate();
         elastic + of_elements
             - loads
@@ -292,6 +381,17 @@ impl Equation {
             direction,
             speed,
         }
+    }
+}
+
+impl Deformed {
+    /// Under the mean of its nodes' pressures, where they have any, Pa.
+    fn under_mean(self, pressures: &[f64], tetrahedron: &Tetrahedron) -> Self {
+        if pressures.is_empty() {
+            return self;
+        }
+        let pressures = tetrahedron.corners.map(|corner| 0.25 * pressures[corner]);
+        self.under(pressures.iter().sum())
     }
 }
 

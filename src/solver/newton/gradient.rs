@@ -26,6 +26,8 @@ pub(super) struct Gradient {
     residuals: Vec<DVec3>,
     preconditioned: Vec<DVec3>,
     products: Vec<DVec3>,
+    /// Of rings.
+    pressure_changes: Vec<f64>,
 }
 
 /// How the iterations ended.
@@ -37,7 +39,8 @@ pub(super) struct Solved {
 }
 
 impl Gradient {
-    pub fn new(node_count: usize) -> Result<Self> {
+    /// For so many nodes, and rings.
+    pub fn new(node_count: usize, ring_count: usize) -> Result<Self> {
         let vectors = || memory::filled(DVec3::ZERO, node_count);
         Ok(Self {
             corrections: vectors()?,
@@ -45,6 +48,7 @@ impl Gradient {
             residuals: vectors()?,
             preconditioned: vectors()?,
             products: vectors()?,
+            pressure_changes: memory::filled(0.0, ring_count)?,
         })
     }
 
@@ -95,7 +99,7 @@ impl Gradient {
                 *search = *preconditioned + *search * carried;
             }
             matrix.multiply(network, &self.searches, &mut self.products);
-            equation.add_products(&self.searches, &mut self.products);
+            equation.add_products(network, &self.searches, &mut self.products, &mut self.pressure_changes);
             let curvature = dot(&self.searches, &self.products);
             let scale: f64 = self
                 .searches

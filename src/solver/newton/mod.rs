@@ -20,12 +20,11 @@ pub(crate) use rest::rest_state;
 pub use rest::{RestStateDefinition, RestStateReport};
 pub(super) use step::Aimed;
 
-use glam::DMat3;
-
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
-use crate::elements::{Deformed, Elements};
+use crate::elements::Elements;
 use crate::error::Result;
+use crate::memory;
 use crate::springs::Springs;
 use descent::Descent;
 use step::exact;
@@ -36,6 +35,8 @@ pub(crate) struct Newton {
     descent: Descent,
     /// What positions lack to be those that were found, m: of the current state and of the step in progress.
     remainders: [Vectors; 2],
+    /// For the energy of elements.
+    growths: Vec<f64>,
 }
 
 impl Newton {
@@ -44,6 +45,7 @@ impl Newton {
         Ok(Self {
             descent: Descent::new(node_count, springs, elements)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
+            growths: memory::filled(0.0, elements.map_or(0, Elements::ring_count))?,
         })
     }
 
@@ -59,7 +61,7 @@ impl Newton {
 
     /// The energy of springs and elements, J, with nodes at these positions and what they lack.
     pub fn elastic(
-        &self,
+        &mut self,
         springs: &dyn Springs,
         elements: Option<&Elements>,
         positions: &Vectors,
@@ -78,10 +80,9 @@ impl Newton {
             });
         }
         if let Some(elements) = elements {
-            elements.visit(&mut |corners, rest| {
-                let [a, b, c, d] = corners.map(|node| exact(node as usize));
-                sum += Deformed::new(elements.law(), rest, DMat3::from_cols(b - a, c - a, d - a)).energy();
-            });
+            let remainders = &self.remainders[place];
+            let position = |node: usize| step::exact(positions.get(node), remainders.get(node));
+            sum += elements.exact_energy(position, &mut self.growths);
         }
         sum
     }

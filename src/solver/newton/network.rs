@@ -18,6 +18,10 @@ pub(super) struct Network {
     /// The edges of tetrahedra, the higher number first.
     edges: Vec<[u32; 2]>,
     law: Option<Law>,
+    /// Where volume is kept by rings: each node's volume at rest, m³, and where the tetrahedra about it begin among all.
+    pub volumes: Vec<f64>,
+    ring_starts: Vec<usize>,
+    ring_members: Vec<u32>,
 }
 
 /// A tetrahedron, and where its pairs of corners are.
@@ -41,12 +45,16 @@ impl Network {
     /// That of a body as it is.
     pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
         let tetrahedron_count = elements.map_or(0, Elements::count);
+        let ring_count = elements.map_or(0, Elements::ring_count);
         let mut network = Self {
             starts: memory::filled(0, node_count + 1)?,
             links: memory::reserved(springs.spring_count() + 6 * tetrahedron_count)?,
             tetrahedra: memory::reserved(tetrahedron_count)?,
             edges: memory::reserved(6 * tetrahedron_count)?,
             law: elements.map(Elements::law),
+            volumes: memory::filled(0.0, ring_count)?,
+            ring_starts: memory::filled(0, if ring_count > 0 { ring_count + 1 } else { 0 })?,
+            ring_members: memory::filled(0, if ring_count > 0 { 4 * tetrahedron_count } else { 0 })?,
         };
         network.read(springs, elements);
         Ok(network)
@@ -75,6 +83,9 @@ impl Network {
             });
             self.edges.sort_unstable();
             self.edges.dedup();
+        }
+        if let Some(elements) = elements.filter(|elements| elements.ring_count() > 0) {
+            self.read_rings(elements);
         }
         self.links.clear();
         let mut edges = self.edges.iter().peekable();
@@ -110,6 +121,54 @@ impl Network {
                 start + links[start..starts[high as usize + 1]].partition_point(|link| link.neighbour < low)
             });
         }
+    }
+
+    /// Finds the tetrahedra about each node.
+    fn read_rings(&mut self, elements: &Elements) {
+        for (node, volume) in self.volumes.iter_mut().enumerate() {
+            *volume = elements.ring_volume(node).unwrap_or(0.0);
+        }
+        let starts = &mut self.ring_starts;
+        starts.fill(0);
+        let corners = || {
+            self.tetrahedra
+                .iter()
+                .enumerate()
+                .flat_map(|(at, of)| of.corners.map(|node| (at, node)))
+        };
+        corners().for_each(|(_, node)| starts[node + 1] += 1);
+        for node in 1..starts.len() {
+            starts[node] += starts[node - 1];
+        }
+        // Filled from the end of each ring, so that its start is where it should be afterwards.
+        for (at, node) in corners() {
+            starts[node + 1] -= 1;
+            self.ring_members[starts[node + 1]] = at as u32;
+        }
+        let count = 4 * self.tetrahedra.len();
+        starts.rotate_left(1);
+        if let Some(last) = starts.last_mut() {
+            *last = count;
+        }
+    }
+
+    /// The tetrahedra about a node, where volume is kept by rings.
+    pub fn ring(&self, node: usize) -> impl Iterator<Item = (Law, &Tetrahedron)> {
+        let law = self.law;
+        let members = &self.ring_members[self.ring_starts[node]..self.ring_starts[node + 1]];
+        members
+            .iter()
+            .filter_map(move |&at| Some((law?, &self.tetrahedra[at as usize])))
+    }
+
+    /// How many nodes have a ring: all, or none.
+    pub fn ring_count(&self) -> usize {
+        self.volumes.len()
+    }
+
+    /// What rings resist growth with, Pa.
+    pub fn kappa(&self) -> f64 {
+        self.law.map_or(0.0, |law| f64::from(law.kappa))
     }
 
     pub fn node_count(&self) -> usize {

@@ -80,10 +80,10 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
         )));
     }
     descent.weigh();
+    let energy_after = descent.equation.potential(&descent.network, origin);
     let equation = &descent.equation;
     let free = (0..body.node_count()).filter(|&node| equation.is_free(node));
     let residual = free.map(|node| descent.residuals[node].length()).fold(0.0, f64::max);
-    let energy_after = equation.potential(&descent.network, origin);
     if !(0..body.node_count()).all(|node| equation.position(node).as_vec3().length_squared().is_finite()) {
         return Err(Error::NotConverged("the state of rest is too far away for f32".into()));
     }

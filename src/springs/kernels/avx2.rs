@@ -56,12 +56,15 @@ impl Lanes for Avx2Lanes {
 
     #[inline(always)]
     unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
-        unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) }
+        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
+        [x, y, z]
     }
 
     #[inline(always)]
     unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) }
+        let [x, y, z, _] =
+            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
+        [x, y, z]
     }
 
     #[inline(always)]
@@ -85,8 +88,13 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
         unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, subtrahend.0) })
     }
 
     #[inline(always)]
@@ -213,7 +221,7 @@ pub(super) unsafe fn add_record(sums: *mut Record, index: *const u16, record: __
 
 /// The numbers of eight records: four of them at a time in each half.
 #[inline(always)]
-unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx2Lanes; 3] {
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx2Lanes; 4] {
     // SAFETY: the caller promises the instructions and the records.
     unsafe {
         let a = eight(record(at(0)), record(at(4)));
@@ -226,6 +234,7 @@ unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx2Lanes; 3] {
             Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
             Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
             Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+            Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
         ]
     }
 }

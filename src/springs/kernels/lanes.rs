@@ -56,8 +56,11 @@ pub(super) trait Lanes: Copy {
 
     unsafe fn add(self, other: Self) -> Self;
 
-    /// The three numbers of `base[indices[lane] / 2]` for `COUNT` readable even indices that lead to readable records.
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3];
+    /// The four numbers of `base[indices[lane] / 2]` for `COUNT` readable even indices that lead to readable records.
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4];
+
+    /// `self * factor - subtrahend`
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self;
 
     /// Without their signs.
     unsafe fn size(self) -> Self;

@@ -18,7 +18,7 @@ unsafe fn spread(mask: u32) -> uint32x4_t {
 
 /// The numbers of four records.
 #[inline(always)]
-unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [NeonLanes; 3] {
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [NeonLanes; 4] {
     // SAFETY: every processor of this kind has the instructions; the caller promises the records.
     unsafe {
         let [a, b, c, d] = [0, 1, 2, 3].map(|lane| vld1q_f32(at(lane).cast()));
@@ -28,6 +28,7 @@ unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [NeonLanes; 3] {
             NeonLanes(vzip1q_f32(low_ac, low_bd)),
             NeonLanes(vzip2q_f32(low_ac, low_bd)),
             NeonLanes(vzip1q_f32(high_ac, high_bd)),
+            NeonLanes(vzip2q_f32(high_ac, high_bd)),
         ]
     }
 }
@@ -68,17 +69,25 @@ impl Lanes for NeonLanes {
 
     #[inline(always)]
     unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
-        unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) }
+        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
+        [x, y, z]
     }
 
     #[inline(always)]
     unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
-        unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) }
+        let [x, y, z, _] =
+            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
+        [x, y, z]
     }
 
     #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
         unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read() / 2))) }
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { vnegq_f32(vfmsq_f32(subtrahend.0, self.0, factor.0)) })
     }
 
     #[inline(always)]

@@ -59,10 +59,15 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
-    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 3] {
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
         // SAFETY: the caller's promise.
         let record = |lane: usize| unsafe { *base.wrapping_add(usize::from(*indices.add(lane) / 2)) };
         from_fn(|axis| Self(from_fn(|lane| record(lane).0[axis])))
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] * factor.0[lane] - subtrahend.0[lane]))
     }
 
     #[inline(always)]

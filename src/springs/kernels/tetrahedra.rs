@@ -82,23 +82,37 @@ impl Groups {
 
     /// Adds the forces of the tetrahedra, N, with nodes at `positions`: a bound on the squares of frequencies, 1/s².
     pub fn forces(&self, kernel: ChosenKernel, law: Law, positions: &[Record], sums: &mut [Record]) -> f32 {
-        kernel.run_with_lanes(Forces {
-            law,
-            of: self.checked(positions, sums),
-        })
+        let of = self.checked(positions, sums);
+        if law.rings {
+            kernel.run_with_lanes(Forces::<true> { law, of })
+        } else {
+            kernel.run_with_lanes(Forces::<false> { law, of })
+        }
     }
 
     /// Adds how these forces change where nodes go these ways, to first order, N.
     pub fn changes(&self, kernel: ChosenKernel, law: Law, positions: &[Record], ways: &[Record], sums: &mut [Record]) {
         assert_eq!(ways.len(), self.node_count);
-        kernel.run_with_lanes(Changes {
-            law,
-            ways: ways.as_ptr(),
+        let ways = ways.as_ptr();
+        let of = self.checked(positions, sums);
+        if law.rings {
+            kernel.run_with_lanes(Changes::<true> { law, ways, of });
+        } else {
+            kernel.run_with_lanes(Changes::<false> { law, ways, of });
+        }
+    }
+
+    /// Adds to the first number of each node a quarter of what its tetrahedra are larger than at rest, m³, or with ways to first
+    /// order how much larger they become.
+    pub fn growths(&self, kernel: ChosenKernel, positions: &[Record], ways: Option<&[Record]>, sums: &mut [Record]) {
+        assert!(ways.is_none_or(|ways| ways.len() == self.node_count));
+        kernel.run_with_lanes(Growths {
+            ways: ways.map(<[Record]>::as_ptr),
             of: self.checked(positions, sums),
         });
     }
 
-    /// The energy of the tetrahedra, J.
+    /// The energy of the tetrahedra, without that of rings, J.
     pub fn energy(&self, kernel: ChosenKernel, law: Law, positions: &[Record]) -> f64 {
         kernel.run_with_lanes(Energy {
             law,
@@ -123,12 +137,13 @@ struct Tetrahedra<'a> {
     sums: *mut Record,
 }
 
-struct Forces<'a> {
+/// With the pressures that their nodes have beside their places, or none.
+struct Forces<'a, const RINGS: bool> {
     law: Law,
     of: Tetrahedra<'a>,
 }
 
-struct Changes<'a> {
+struct Changes<'a, const RINGS: bool> {
     law: Law,
     ways: *const Record,
     of: Tetrahedra<'a>,
@@ -136,6 +151,11 @@ struct Changes<'a> {
 
 struct Energy<'a> {
     law: Law,
+    of: Tetrahedra<'a>,
+}
+
+struct Growths<'a> {
+    ways: Option<*const Record>,
     of: Tetrahedra<'a>,
 }
 
@@ -151,6 +171,8 @@ type Six<L> = [L; 6];
 // SAFETY of every function here: the processor has the instructions of `L`.
 #[allow(clippy::undocumented_unsafe_blocks)]
 mod algebra {
+    // No closures: one may be compiled on its own, without the kernel's instructions.
+
     use super::{Lanes, Matrix, Six, Vector};
 
     #[inline(always)]
@@ -195,9 +217,9 @@ mod algebra {
     pub unsafe fn cross<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
         unsafe {
             [
-                a[1].multiply(b[2]).subtract(a[2].multiply(b[1])),
-                a[2].multiply(b[0]).subtract(a[0].multiply(b[2])),
-                a[0].multiply(b[1]).subtract(a[1].multiply(b[0])),
+                a[1].multiply_subtract(b[2], a[2].multiply(b[1])),
+                a[2].multiply_subtract(b[0], a[0].multiply(b[2])),
+                a[0].multiply_subtract(b[1], a[1].multiply(b[0])),
             ]
         }
     }
@@ -230,17 +252,35 @@ mod algebra {
     #[inline(always)]
     pub unsafe fn add_times<L: Lanes>(sum: Matrix<L>, [a, b, c]: Matrix<L>, s: Six<L>) -> Matrix<L> {
         unsafe {
-            let row = |sum, [x, y, z]: [L; 3]| add_scaled(add_scaled(add_scaled(sum, a, x), b, y), c, z);
             [
-                row(sum[0], [s[0], s[1], s[2]]),
-                row(sum[1], [s[1], s[3], s[4]]),
-                row(sum[2], [s[2], s[4], s[5]]),
+                add_scaled(add_scaled(add_scaled(sum[0], a, s[0]), b, s[1]), c, s[2]),
+                add_scaled(add_scaled(add_scaled(sum[1], a, s[1]), b, s[3]), c, s[4]),
+                add_scaled(add_scaled(add_scaled(sum[2], a, s[2]), b, s[4]), c, s[5]),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    pub unsafe fn scaled_matrix<L: Lanes>([a, b, c]: Matrix<L>, factor: L) -> Matrix<L> {
+        unsafe { [scaled(a, factor), scaled(b, factor), scaled(c, factor)] }
+    }
+
+    #[inline(always)]
+    pub unsafe fn scaled_six<L: Lanes>([a, b, c, d, e, f]: Six<L>, factor: L) -> Six<L> {
+        unsafe {
+            [
+                a.multiply(factor),
+                b.multiply(factor),
+                c.multiply(factor),
+                d.multiply(factor),
+                e.multiply(factor),
+                f.multiply(factor),
             ]
         }
     }
 }
 
-use algebra::{add_times, cross, difference, dot, scaled, sum, times_lower, times_upper};
+use algebra::{add_times, cross, difference, dot, scaled_matrix, scaled_six, sum, times_lower, times_upper};
 
 /// A law's numbers in every lane.
 #[derive(Clone, Copy)]
@@ -262,29 +302,48 @@ struct Deformed<L> {
     twice_trace: L,
     /// J - 1.
     growth: L,
+    /// The mean of its nodes' pressures, where they have any, Pa.
+    pressure: L,
 }
 
 impl<'a> Tetrahedra<'a> {
+    /// The edges from the first corner to the others, and the mean of what the corners have beside their places.
+    ///
     /// # Safety
-    /// As for the kernel; `lanes` are of a group.
+    /// As for the kernel; `first` is a turn's first lane.
     #[inline(always)]
-    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> Matrix<L> {
+    unsafe fn edges<L: Lanes>(from: *const Record, group: &Group, first: usize) -> (Matrix<L>, L) {
         // SAFETY: corners lead to records.
         unsafe {
-            let [a, b, c, d] = group.corners.each_ref().map(|corners| corners.as_ptr().add(first));
-            let a = L::records_twice(from, a);
-            [
-                difference(L::records_twice(from, b), a),
-                difference(L::records_twice(from, c), a),
-                difference(L::records_twice(from, d), a),
-            ]
+            let [a, b, c, d] = &group.corners;
+            let [ax, ay, az, pa] = L::records_twice(from, a.as_ptr().add(first));
+            let [bx, by, bz, pb] = L::records_twice(from, b.as_ptr().add(first));
+            let [cx, cy, cz, pc] = L::records_twice(from, c.as_ptr().add(first));
+            let [dx, dy, dz, pd] = L::records_twice(from, d.as_ptr().add(first));
+            let place = [ax, ay, az];
+            let edges = [
+                difference([bx, by, bz], place),
+                difference([cx, cy, cz], place),
+                difference([dx, dy, dz], place),
+            ];
+            (edges, pa.add(pb).add(pc.add(pd)).multiply(L::splat(0.25)))
         }
     }
 
     #[inline(always)]
     unsafe fn inverse<L: Lanes>(group: &Group, first: usize) -> Six<L> {
         // SAFETY: the lanes are of a group.
-        unsafe { group.inverse.each_ref().map(|entry| L::load(entry.as_ptr().add(first))) }
+        unsafe {
+            let [a, b, c, d, e, f] = &group.inverse;
+            [
+                L::load(a.as_ptr().add(first)),
+                L::load(b.as_ptr().add(first)),
+                L::load(c.as_ptr().add(first)),
+                L::load(d.as_ptr().add(first)),
+                L::load(e.as_ptr().add(first)),
+                L::load(f.as_ptr().add(first)),
+            ]
+        }
     }
 
     #[inline(always)]
@@ -297,7 +356,8 @@ impl<'a> Tetrahedra<'a> {
     unsafe fn deformed<L: Lanes>(&self, group: &Group, first: usize, inverse: Six<L>) -> Deformed<L> {
         // SAFETY: the same contract.
         unsafe {
-            let gradient = times_upper(Self::edges::<L>(self.positions, group, first), inverse);
+            let (edges, pressure) = Self::edges::<L>(self.positions, group, first);
+            let gradient = times_upper(edges, inverse);
             let [a, b, c] = gradient;
             let one = L::splat(1.0);
             let twice_strain = [
@@ -315,6 +375,7 @@ impl<'a> Tetrahedra<'a> {
                 twice_strain,
                 twice_trace: twice_strain[0].add(twice_strain[3]).add(twice_strain[5]),
                 growth: dot(a, cofactors[0]).subtract(one),
+                pressure,
             }
         }
     }
@@ -325,12 +386,13 @@ impl<'a> Tetrahedra<'a> {
         // SAFETY: the same contract.
         unsafe {
             let [b, c, d] = times_lower(stress, inverse);
-            let corners = group.corners.each_ref().map(|corners| corners.as_ptr().add(first));
-            L::add_to_records(self.sums, corners[1], b);
-            L::add_to_records(self.sums, corners[2], c);
-            L::add_to_records(self.sums, corners[3], d);
+            let corners = &group.corners;
+            L::add_to_records(self.sums, corners[1].as_ptr().add(first), b);
+            L::add_to_records(self.sums, corners[2].as_ptr().add(first), c);
+            L::add_to_records(self.sums, corners[3].as_ptr().add(first), d);
             let zero = [L::splat(0.0); 3];
-            L::add_to_records(self.sums, corners[0], difference(zero, sum(sum(b, c), d)));
+            let a = difference(zero, sum(sum(b, c), d));
+            L::add_to_records(self.sums, corners[0].as_ptr().add(first), a);
         }
     }
 }
@@ -372,7 +434,7 @@ impl<L: Lanes> Constants<L> {
     }
 }
 
-impl WithLanes for Forces<'_> {
+impl<const RINGS: bool> WithLanes for Forces<'_, RINGS> {
     type Output = f32;
 
     #[inline(always)]
@@ -396,18 +458,19 @@ impl WithLanes for Forces<'_> {
                         twice_strain,
                         twice_trace,
                         growth,
+                        pressure,
                     } = deformed;
                     let stress = constants.stress(twice_strain, twice_trace);
                     let minus = L::splat(0.0).subtract(volumes);
-                    let stress = stress.map(|entry| entry.multiply(minus));
-                    let pressure = constants.kappa.multiply(growth);
-                    let load = pressure.multiply(minus);
-                    let first_stress = cofactors.map(|column| scaled(column, load));
-                    of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
+                    let stress = scaled_six(stress, minus);
+                    let pressure = if RINGS {
+                        pressure
+                    } else {
+                        constants.kappa.multiply(growth)
+                    };
                     // The largest stretch squared is at most the largest sum of a row's sizes (Gershgorin).
-                    let size = |x: L| x.size();
                     let [xx, xy, xz, yy, yz, zz] = twice_strain;
-                    let (xy, xz, yz) = (size(xy), size(xz), size(yz));
+                    let (xy, xz, yz) = (xy.size(), xz.size(), yz.size());
                     let stretch = xx
                         .add(xy)
                         .add(xz)
@@ -418,11 +481,14 @@ impl WithLanes for Forces<'_> {
                     let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
                     let tension = tension.greater(L::splat(0.0));
                     // 2 sqrt(s) is at most 1 + s.
-                    let pressed = size(pressure).multiply(stretch.add(one));
+                    let pressed = pressure.size().multiply(stretch.add(one));
                     let swollen = constants.kappa.multiply(stretch);
                     let stiffness = along.add(swollen).multiply_add(stretch, tension.add(pressed));
                     let rates = L::load(group.rates.as_ptr().add(first));
                     highest = highest.greater(stiffness.multiply(whole).multiply(rates));
+                    let load = pressure.multiply(minus);
+                    let first_stress = scaled_matrix(cofactors, load);
+                    of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
                 }
             }
             let mut all = [0.0_f32; GROUP];
@@ -432,7 +498,7 @@ impl WithLanes for Forces<'_> {
     }
 }
 
-impl WithLanes for Changes<'_> {
+impl<const RINGS: bool> WithLanes for Changes<'_, RINGS> {
     type Output = ();
 
     #[inline(always)]
@@ -448,23 +514,22 @@ impl WithLanes for Changes<'_> {
                     let volumes = Tetrahedra::volumes::<L>(group, first);
                     let deformed = of.deformed(group, first, inverse);
                     let [a, b, c] = deformed.gradient;
-                    let change = times_upper(Tetrahedra::edges::<L>(ways, group, first), inverse);
+                    let (edges, pressure) = Tetrahedra::edges::<L>(ways, group, first);
+                    let change = times_upper(edges, inverse);
                     let [da, db, dc] = change;
-                    let twice = |x: L| x.add(x);
                     let twice_strain = [
-                        twice(dot(a, da)),
+                        dot(a, da).add(dot(a, da)),
                         dot(a, db).add(dot(b, da)),
                         dot(a, dc).add(dot(c, da)),
-                        twice(dot(b, db)),
+                        dot(b, db).add(dot(b, db)),
                         dot(b, dc).add(dot(c, db)),
-                        twice(dot(c, dc)),
+                        dot(c, dc).add(dot(c, dc)),
                     ];
                     let twice_trace = twice_strain[0].add(twice_strain[3]).add(twice_strain[5]);
                     let stress_change = constants.stress(twice_strain, twice_trace);
                     // Pressure is lifted as far as it may push sideways: Gershgorin's bound on the lowest eigenvalue.
                     let mut stress = constants.stress(deformed.twice_strain, deformed.twice_trace);
-                    let size = |x: L| x.size();
-                    let (xy, xz, yz) = (size(stress[1]), size(stress[2]), size(stress[4]));
+                    let (xy, xz, yz) = (stress[1].size(), stress[2].size(), stress[4].size());
                     let lift = [
                         xy.add(xz).subtract(stress[0]),
                         xy.add(yz).subtract(stress[3]),
@@ -475,14 +540,52 @@ impl WithLanes for Changes<'_> {
                         stress[place] = stress[place].add(lift);
                     }
                     let [ca, cb, cc] = deformed.cofactors;
-                    let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
-                    let load = constants.kappa.multiply(swelling);
-                    let changed = [ca, cb, cc].map(|column| scaled(column, load));
+                    let load = if RINGS {
+                        pressure
+                    } else {
+                        let swelling = dot(ca, da).add(dot(cb, db)).add(dot(cc, dc));
+                        constants.kappa.multiply(swelling)
+                    };
+                    let changed = scaled_matrix(deformed.cofactors, load);
                     let changed = add_times(changed, deformed.gradient, stress_change);
                     let changed = add_times(changed, change, stress);
                     let minus = zero.subtract(volumes);
-                    let changed = changed.map(|column| scaled(column, minus));
+                    let changed = scaled_matrix(changed, minus);
                     of.spread(group, first, changed, inverse);
+                }
+            }
+        }
+    }
+}
+
+impl WithLanes for Growths<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let Self { ways, of } = self;
+        // SAFETY: the same contract; corners lead to positions, ways and sums.
+        unsafe {
+            let (zero, one) = (L::splat(0.0), L::splat(1.0));
+            let quarter = L::splat(0.25);
+            for group in of.groups {
+                for first in turns::<L>() {
+                    let inverse = Tetrahedra::inverse::<L>(group, first);
+                    let (edges, _) = Tetrahedra::edges::<L>(of.positions, group, first);
+                    let [a, b, c] = times_upper(edges, inverse);
+                    let growth = match ways {
+                        None => dot(a, cross(b, c)).subtract(one),
+                        Some(ways) => {
+                            let (edges, _) = Tetrahedra::edges::<L>(ways, group, first);
+                            let [da, db, dc] = times_upper(edges, inverse);
+                            dot(da, cross(b, c)).add(dot(db, cross(c, a))).add(dot(dc, cross(a, b)))
+                        }
+                    };
+                    let volumes = Tetrahedra::volumes::<L>(group, first);
+                    let growth = growth.multiply(volumes).multiply(quarter);
+                    for corners in &group.corners {
+                        L::add_to_records(of.sums, corners.as_ptr().add(first), [growth, zero, zero]);
+                    }
                 }
             }
         }
@@ -498,7 +601,10 @@ impl WithLanes for Energy<'_> {
         let mut energy = 0.0;
         // SAFETY: the same contract; corners lead to positions.
         unsafe {
-            let constants = Constants::<L>::new(law);
+            let mut constants = Constants::<L>::new(law);
+            if law.rings {
+                constants.kappa = L::splat(0.0);
+            }
             for group in of.groups {
                 for first in turns::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
