@@ -1,4 +1,4 @@
-//! What a material costs: the time of a substep of VERLET, and of a frame of IMPLICIT, of one organ as plain springs, as springs from
+//! What a material and the terms beside springs cost: the time of a substep of VERLET, and of a frame of IMPLICIT, of one organ as plain springs, as springs from
 //! Young's modulus, and as finite elements. Throughput is tetrahedra per second; the springs of the plain body are those of the
 //! tetrahedra's edges.
 #![allow(clippy::print_stderr)]
@@ -9,7 +9,7 @@ use std::path::Path;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
-use sinew::{BodyDefinition, Material, Model, Solver, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Values, World, WorldDefinition};
 
 const SUBSTEPS: u32 = 8;
 
@@ -23,6 +23,19 @@ fn organ() -> Mesh {
         Ok(loaded) => loaded.mesh,
         Err(_) => Mesh::organ(0.2, 0.006).expect("an organ"),
     }
+}
+
+/// Its boundary.
+fn surface(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let body = world.create_body(&BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        masses: Values::Uniform(1.0),
+        ..BodyDefinition::default()
+    });
+    let body = world.body(body.expect("a body")).expect("the body");
+    body.surface().to_vec()
 }
 
 fn bench(criterion: &mut Criterion) {
@@ -40,13 +53,46 @@ fn bench(criterion: &mut Criterion) {
         tetrahedra: &mesh.tetrahedra,
         ..BodyDefinition::default()
     };
+    let springs = BodyDefinition {
+        masses: Values::Uniform(1e-5),
+        stiffnesses: Values::Uniform(10.0),
+        ..plain
+    };
+    let surface = surface(&mesh);
+    let directions = vec![Vec3::X; mesh.tetrahedra.len()];
     let bodies = [
+        ("plain springs", springs),
         (
-            "plain springs",
+            "with home springs",
             BodyDefinition {
-                masses: Values::Uniform(1e-5),
-                stiffnesses: Values::Uniform(10.0),
-                ..plain
+                home_stiffnesses: Values::Uniform(1.0),
+                ..springs
+            },
+        ),
+        (
+            "with bending of the surface",
+            BodyDefinition {
+                triangles: &surface,
+                bending_stiffness: 1e-6,
+                ..springs
+            },
+        ),
+        (
+            "with springs that stiffen",
+            BodyDefinition {
+                spring_law: SpringLaw::Exponential {
+                    steepness: 10.0,
+                    limit: 0.2,
+                },
+                ..springs
+            },
+        ),
+        (
+            "with fibres",
+            BodyDefinition {
+                fibre_directions: &directions,
+                fibre_stiffnesses: Values::Uniform(1000.0),
+                ..springs
             },
         ),
         (

@@ -122,6 +122,22 @@
 #define SINEW_MATERIAL_TETRAHEDRA 2
 
 /**
+ * The pull of a spring is stiffness times rest length times its strain e, the part by which it is longer than at rest.
+ */
+#define SINEW_SPRING_LAW_LINEAR 0
+
+/**
+ * Shaped like a J: instead of e, (exp(spring_steepness e) - 1) / spring_steepness for strains from 0 to spring_limit; linear beyond, as
+ * stiff as there.
+ */
+#define SINEW_SPRING_LAW_EXPONENTIAL 1
+
+/**
+ * Instead of e, e + spring_quadratic e^2 + spring_cubic e^3 up to a strain of spring_limit; linear beyond, as stiff as there.
+ */
+#define SINEW_SPRING_LAW_CUBIC 2
+
+/**
  * Healthy liver, E 5.4 kPa.
  */
 #define SINEW_PRESET_LIVER 0
@@ -512,6 +528,57 @@ typedef struct sinew_body_def {
    * default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
    */
   float volume_stiffness;
+  /**
+   * node_count floats, N/m, at least 0: what draws each node back to its rest position, wherever the body is; nullable:
+   * home_stiffness for all.
+   */
+  const float *home_stiffnesses;
+  /**
+   * N/m; default 0: nothing does.
+   */
+  float home_stiffness;
+  /**
+   * N m, at least 0: the flexural rigidity of the surface that triangles make; default 0: it bends freely. Of a sheet of Young's
+   * modulus E, Poisson's ratio nu and thickness t it is E t^3 / (12 (1 - nu^2)). Each edge of two triangles turns back to its angle
+   * at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral;
+   * 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of
+   * triangles that have the edge, whether or not there is a spring along it.
+   */
+  float bending_stiffness;
+  /**
+   * SINEW_SPRING_LAW_...; LINEAR, the default: the four below are 0. Springs that are added later are linear.
+   */
+  uint32_t spring_law;
+  /**
+   * EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
+   */
+  float spring_steepness;
+  /**
+   * CUBIC: any number whose square is at most 3 spring_cubic, so that longer springs pull more; else 0.
+   */
+  float spring_quadratic;
+  /**
+   * CUBIC: at least 0; else 0.
+   */
+  float spring_cubic;
+  /**
+   * EXPONENTIAL, CUBIC: above 0; else 0.
+   */
+  float spring_limit;
+  /**
+   * Pa, at least 0; default 0.
+   */
+  float fibre_stiffness;
+  /**
+   * 3 tetrahedron_count floats: the direction of each tetrahedron's fibres at rest, 1 long within 0.001, or 0: it has none;
+   * nullable: there are none. Fibres pull where they are longer than at rest, by their stiffness times the part by which they are
+   * longer, over the area across them at rest; they never push.
+   */
+  const float *fibre_directions;
+  /**
+   * tetrahedron_count floats, Pa, at least 0; nullable: fibre_stiffness for all.
+   */
+  const float *fibre_stiffnesses;
 } sinew_body_def;
 
 /**

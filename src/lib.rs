@@ -16,6 +16,7 @@ pub mod raster;
 mod slots;
 mod solver;
 mod springs;
+mod terms;
 mod threads;
 mod world;
 
@@ -27,5 +28,6 @@ pub use material::{Material, Model};
 pub use picture::PictureDefinition;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;
+pub use terms::SpringLaw;
 pub use threads::RunTasks;
 pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::memory;
 use crate::springs::Rounding;
+use crate::terms::SpringLaw;
 
 /// One value for all, or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +106,23 @@ pub struct BodyDefinition<'a> {
     /// back to rest from anywhere; with far less tetrahedra stay inside out, with more than some 4 times as much folds stay. Not beside [`Model::Tetrahedra`](crate::Model),
     /// which has a term of its own.
     pub volume_stiffness: f32,
+    /// What draws each node back to its rest position, wherever the body is, in N/m, at least 0: the paper's restoring forces.
+    pub home_stiffnesses: Values<'a>,
+    /// The flexural rigidity of the surface that `triangles` make, in N m, at least 0; 0: it bends freely. Of a sheet of Young's
+    /// modulus E, Poisson's ratio nu and thickness t it is `E t³ / (12 (1 - nu²))`.
+    ///
+    /// Each edge of two triangles is a hinge that turns back to its angle at rest, whether the surface is flat or curved there; an edge
+    /// of more triangles is refused. Where triangles are equilateral it is rolled up with just this rigidity, whichever way. Where they are
+    /// squares that are cut alternately it has 5/6 of it along a side; where all are cut the same way, it has it along a side and across
+    /// the cuts, and three times as much along them.
+    pub bending_stiffness: f32,
+    /// How the pull of the springs grows as they are stretched.
+    pub spring_law: SpringLaw,
+    /// For each tetrahedron the direction of its fibres at rest, 1 long, or 0: it has none. Empty: there are none at all.
+    pub fibre_directions: &'a [Vec3],
+    /// For each tetrahedron how stiff its fibres are, in Pa, at least 0. Fibres pull where they are longer than at rest, by this times
+    /// the part by which they are longer, over the area across them at rest; they never push.
+    pub fibre_stiffnesses: Values<'a>,
     /// How the springs are kept.
     pub storage: Storage,
     /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
@@ -147,6 +165,11 @@ impl Default for BodyDefinition<'_> {
             cells: &[],
             material: None,
             volume_stiffness: 0.0,
+            home_stiffnesses: Values::Uniform(0.0),
+            bending_stiffness: 0.0,
+            spring_law: SpringLaw::Linear,
+            fibre_directions: &[],
+            fibre_stiffnesses: Values::Uniform(0.0),
             storage: Storage::Packed,
             springs_per_node: 0,
             solver: Solver::Verlet,
@@ -375,7 +398,7 @@ pub(crate) fn not_negative(name: &str, value: f32) -> Result<()> {
 }
 
 /// Checks `values` of which each must be finite and at least 0; `name` in the singular.
-fn check_values(name: &str, values: &Values, count: usize) -> Result<()> {
+pub(crate) fn check_values(name: &str, values: &Values, count: usize) -> Result<()> {
     match values {
         Values::Uniform(value) => not_negative(name, *value),
         Values::Each(values) => {

@@ -147,7 +147,7 @@ impl Body {
         Ok(mean_force(pin, closing, &*self.springs, positions, &self.masses))
     }
 
-    /// Joins two nodes by a spring without damping: `stiffness` in N/m, `rest_length` in metres, `None`: the current
+    /// Joins two nodes by a linear spring without damping: `stiffness` in N/m, `rest_length` in metres, `None`: the current
     /// distance.
     ///
     /// # Errors
@@ -186,9 +186,7 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
-        if let Some(elements) = &mut self.elements {
-            elements.forget_rates();
-        }
+        self.forget_rates();
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         self.scale_for_springs(nodes);
         let stability = self.carry.stability;
@@ -202,24 +200,25 @@ impl Body {
     }
 
     /// Removes the spring between two nodes, and with it the tetrahedra of [`Model::Tetrahedra`](crate::Model::Tetrahedra) that
-    /// have this edge, whether or not there is a spring along it.
+    /// have this edge, with their fibres, and the bending of triangles that have it, whether or not there is a spring along it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or neither spring nor tetrahedra between them.
+    /// [`Error::InvalidArgument`]: there is no such node, or nothing of all that between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
         let [own_a, own_b] = self.check_pair(a, b)?;
-        let removed = self
-            .elements
-            .as_mut()
-            .map_or(0, |elements| elements.remove_edge(own_a, own_b));
+        let elements = self.elements.as_mut();
+        let mut removed = elements.map_or(0, |elements| elements.remove_edge(own_a, own_b));
+        let terms = self.terms.as_mut();
+        removed += terms.map_or(0, |terms| terms.remove_edge(own_a, own_b));
         if removed > 0 {
             self.forces_current = false;
+            self.forget_rates();
             if let Some(implicit) = &mut self.implicit {
                 implicit.forget_matrix();
             }
         }
         match self.remove_own_spring([a, b], [own_a, own_b]) {
-            // The edge was one of tetrahedra alone.
+            // The edge was one of tetrahedra or hinges alone.
             Err(Error::InvalidArgument(_)) if removed > 0 => Ok(()),
             result => result,
         }
@@ -235,9 +234,7 @@ impl Body {
         let link = link.ok_or_else(|| not_joined(a, b))?;
         self.springs.remove(own_a, own_b)?;
         self.forces_current = false;
-        if let Some(elements) = &mut self.elements {
-            elements.forget_rates();
-        }
+        self.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -260,12 +257,20 @@ impl Body {
         Ok(())
     }
 
-    /// Other nodes move now.
-    fn forget_matrix(&mut self) {
-        self.carry.stability = Stability::UNKNOWN;
+    /// Masses, pins or springs are not what they were.
+    fn forget_rates(&mut self) {
         if let Some(elements) = &mut self.elements {
             elements.forget_rates();
         }
+        if let Some(terms) = &mut self.terms {
+            terms.forget_rates();
+        }
+    }
+
+    /// Other nodes move now.
+    fn forget_matrix(&mut self) {
+        self.carry.stability = Stability::UNKNOWN;
+        self.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }

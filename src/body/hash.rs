@@ -42,6 +42,9 @@ impl Body {
         if let Some(elements) = &self.elements {
             elements.hash(hasher);
         }
+        if let Some(terms) = &self.terms {
+            terms.hash(hasher);
+        }
         for pin in self.pins.iter() {
             hasher.write_u64(u64::from(pin.node) << 1 | u64::from(pin.target.is_some()));
             if let Some(target) = pin.target {

@@ -18,7 +18,7 @@ use glam::{DVec3, Vec3};
 pub(crate) use coarse::CoarseStep;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
-pub(crate) use definition::{SMALLEST_MASS, Spring, finite_vector, not_negative};
+pub(crate) use definition::{SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
@@ -30,11 +30,13 @@ use crate::error::Result;
 use crate::material::Made;
 use crate::memory;
 use crate::solver::{
-    Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Stability, Survey, Watched, close, write_records,
+    Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close,
+    write_records,
 };
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
+use crate::terms::Terms;
 use crate::threads::Team;
-use order::NodeOrder;
+pub(crate) use order::NodeOrder;
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
@@ -50,6 +52,8 @@ pub struct Body {
     pub(crate) springs: Box<dyn Springs>,
     /// For bodies whose tetrahedra are more than edges.
     pub(crate) elements: Option<Box<Elements>>,
+    /// What a definition asks for beside springs and elements.
+    pub(crate) terms: Option<Box<Terms>>,
     pub(crate) kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
     pub(crate) masses: Vec<f32>,
@@ -122,6 +126,7 @@ impl Body {
             Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
             None => None,
         };
+        let terms = Terms::new(definition, &springs, &order)?;
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
@@ -157,6 +162,7 @@ impl Body {
                 .then(|| Records::zeros(node_count))
                 .transpose()?,
             elements,
+            terms,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
             springs,
             kernel: needs.kernel,
@@ -207,14 +213,15 @@ impl Body {
             )?)),
             Solver::Newton => {
                 let (springs, elements) = (&*body.springs, body.elements.as_deref());
-                let implicit = Implicit::exact(positions, springs, elements, order, iterations, accuracy)?;
+                let terms = body.terms.as_deref();
+                let implicit = Implicit::exact(positions, springs, elements, terms, [order, iterations], accuracy)?;
                 Some(Box::new(implicit))
             }
         };
         if let (Some(implicit), Some(elements)) = (&mut body.implicit, &body.elements) {
             implicit.join(elements)?;
         }
-        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && body.elements.is_none() {
+        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && !body.has_more_than_springs() {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
             body.scaling = scaling.map(Box::new);
@@ -301,22 +308,49 @@ impl Body {
         self.watched.gather(&*self.springs, masses);
     }
 
-    /// The longest substep that elements allow with the nodes as they are, s; infinity where there are none.
-    pub(crate) fn limit_of_elements(&mut self, team: &Team) -> f32 {
+    /// Whether anything holds it in its place.
+    pub(crate) fn is_held(&self) -> bool {
+        self.pins.iter().next().is_some() || self.terms.as_ref().is_some_and(|terms| terms.hold_any())
+    }
+
+    /// Whether forces are made of more than springs.
+    pub(crate) fn has_more_than_springs(&self) -> bool {
+        self.elements.is_some() || self.terms.is_some()
+    }
+
+    /// The longest substep that elements and terms allow with the nodes as they are, s; infinity where there are none.
+    pub(crate) fn limit_beside_springs(&mut self, team: &Team) -> f32 {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
         };
-        let Some(elements) = &mut self.elements else {
-            return f32::INFINITY;
-        };
-        let known = elements.find_rates(&*self.springs, &masses) && self.forces_current;
-        if let Some(records) = self.records.as_mut().filter(|_| !known) {
-            write_records(self.kernel, self.state.positions(), records, team);
-            elements.find_forces(self.kernel, records.as_slice(), team);
-            elements.settle();
+        let mut rates = Rates::ZERO;
+        if let Some(elements) = &mut self.elements {
+            let known = elements.find_rates(&*self.springs, &masses) && self.forces_current;
+            if let Some(records) = self.records.as_mut().filter(|_| !known) {
+                write_records(self.kernel, self.state.positions(), records, team);
+                elements.find_forces(self.kernel, records.as_slice(), team);
+                elements.settle();
+            }
+            rates = elements.settled_rates();
         }
-        elements.settled_limit()
+        if let Some(terms) = &mut self.terms {
+            // With elements their bound has the springs already.
+            let springs = self.elements.is_none().then_some(&*self.springs);
+            terms.find_rates(springs, &masses);
+            if !self.forces_current {
+                terms.settle_at(self.state.positions());
+            }
+            rates = rates.and(terms.settled_rates());
+        }
+        rates.limit()
+    }
+
+    /// The same with the nodes where forces were last worked out.
+    pub(crate) fn newest_limit_beside_springs(&self) -> f32 {
+        let of_elements = self.elements.as_ref().map_or(Rates::ZERO, |elements| elements.rates());
+        let of_terms = self.terms.as_ref().map_or(Rates::ZERO, |terms| terms.rates());
+        of_elements.and(of_terms).limit()
     }
 
     /// The longest stable substep with the nodes at these positions.
@@ -401,6 +435,9 @@ impl Body {
     /// Puts the nodes at these places, in the caller's coordinates.
     fn place(&mut self, positions: &[Vec3]) {
         self.origin = shift_towards(Bounds::of(positions.iter().copied()));
+        if let Some(terms) = &mut self.terms {
+            terms.move_origin(self.origin);
+        }
         let local = self.state.positions_mut();
         for (node, position) in (0..).zip(positions) {
             let own = self.order.own(node) as usize;
@@ -421,6 +458,9 @@ impl Body {
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
         if let Some(elements) = &mut self.elements {
             elements.settle();
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.settle();
         }
         if let Some(implicit) = &mut self.implicit {
             implicit.commit();
@@ -470,6 +510,9 @@ impl Body {
             return;
         }
         self.origin += shift;
+        if let Some(terms) = &mut self.terms {
+            terms.move_origin(self.origin);
+        }
         let positions = self.state.positions_mut();
         for node in 0..positions.len() {
             positions.set(node, (positions.get(node).as_dvec3() - shift).as_vec3());

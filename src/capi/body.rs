@@ -11,6 +11,7 @@ use crate::body::{Body, BodyDefinition, Solver, Storage, Values};
 use crate::error::{Error, Result};
 use crate::material::{Material, Model};
 use crate::slots::SlotId;
+use crate::terms::SpringLaw;
 use crate::world::BodyId;
 
 /// A body: a plain value, all zero is "none".
@@ -48,6 +49,14 @@ pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
 /// up to compressions of some 20 % and stable beyond. There are no springs but those that are given. sinew_body_remove_spring takes
 /// away the tetrahedra that have the edge, whether or not there is a spring along it.
 pub const SINEW_MATERIAL_TETRAHEDRA: u32 = 2;
+
+/// The pull of a spring is stiffness times rest length times its strain e, the part by which it is longer than at rest.
+pub const SINEW_SPRING_LAW_LINEAR: u32 = 0;
+/// Shaped like a J: instead of e, (exp(spring_steepness e) - 1) / spring_steepness for strains from 0 to spring_limit; linear beyond, as
+/// stiff as there.
+pub const SINEW_SPRING_LAW_EXPONENTIAL: u32 = 1;
+/// Instead of e, e + spring_quadratic e^2 + spring_cubic e^3 up to a strain of spring_limit; linear beyond, as stiff as there.
+pub const SINEW_SPRING_LAW_CUBIC: u32 = 2;
 
 /// What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
 #[repr(C)]
@@ -145,6 +154,35 @@ pub struct sinew_body_def {
     /// Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
     /// default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
     pub volume_stiffness: f32,
+    /// node_count floats, N/m, at least 0: what draws each node back to its rest position, wherever the body is; nullable:
+    /// home_stiffness for all.
+    pub home_stiffnesses: *const f32,
+    /// N/m; default 0: nothing does.
+    pub home_stiffness: f32,
+    /// N m, at least 0: the flexural rigidity of the surface that triangles make; default 0: it bends freely. Of a sheet of Young's
+    /// modulus E, Poisson's ratio nu and thickness t it is E t^3 / (12 (1 - nu^2)). Each edge of two triangles turns back to its angle
+    /// at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral;
+    /// 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of
+    /// triangles that have the edge, whether or not there is a spring along it.
+    pub bending_stiffness: f32,
+    /// SINEW_SPRING_LAW_...; LINEAR, the default: the four below are 0. Springs that are added later are linear.
+    pub spring_law: u32,
+    /// EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
+    pub spring_steepness: f32,
+    /// CUBIC: any number whose square is at most 3 spring_cubic, so that longer springs pull more; else 0.
+    pub spring_quadratic: f32,
+    /// CUBIC: at least 0; else 0.
+    pub spring_cubic: f32,
+    /// EXPONENTIAL, CUBIC: above 0; else 0.
+    pub spring_limit: f32,
+    /// Pa, at least 0; default 0.
+    pub fibre_stiffness: f32,
+    /// 3 tetrahedron_count floats: the direction of each tetrahedron's fibres at rest, 1 long within 0.001, or 0: it has none;
+    /// nullable: there are none. Fibres pull where they are longer than at rest, by their stiffness times the part by which they are
+    /// longer, over the area across them at rest; they never push.
+    pub fibre_directions: *const f32,
+    /// tetrahedron_count floats, Pa, at least 0; nullable: fibre_stiffness for all.
+    pub fibre_stiffnesses: *const f32,
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
@@ -216,6 +254,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, order),
         offset_of!(Self, mass_scaling),
         offset_of!(Self, cells),
+        offset_of!(Self, home_stiffnesses),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -298,6 +337,17 @@ impl sinew_body_def {
             density: 0.0,
             thickness: 0.0,
             volume_stiffness: 0.0,
+            home_stiffnesses: std::ptr::null(),
+            home_stiffness: 0.0,
+            bending_stiffness: 0.0,
+            spring_law: SINEW_SPRING_LAW_LINEAR,
+            spring_steepness: 0.0,
+            spring_quadratic: 0.0,
+            spring_cubic: 0.0,
+            spring_limit: 0.0,
+            fibre_stiffness: 0.0,
+            fibre_directions: std::ptr::null(),
+            fibre_stiffnesses: std::ptr::null(),
         }
     }
 
@@ -333,6 +383,50 @@ impl sinew_body_def {
         }))
     }
 
+    fn spring_law(&self) -> Result<SpringLaw> {
+        let numbers = [
+            ("spring_steepness", self.spring_steepness),
+            ("spring_quadratic", self.spring_quadratic),
+            ("spring_cubic", self.spring_cubic),
+            ("spring_limit", self.spring_limit),
+        ];
+        let (law, name, used) = match self.spring_law {
+            SINEW_SPRING_LAW_LINEAR => (SpringLaw::Linear, "SINEW_SPRING_LAW_LINEAR", [false; 4]),
+            SINEW_SPRING_LAW_EXPONENTIAL => (
+                SpringLaw::Exponential {
+                    steepness: self.spring_steepness,
+                    limit: self.spring_limit,
+                },
+                "SINEW_SPRING_LAW_EXPONENTIAL",
+                [true, false, false, true],
+            ),
+            SINEW_SPRING_LAW_CUBIC => (
+                SpringLaw::Cubic {
+                    quadratic: self.spring_quadratic,
+                    cubic: self.spring_cubic,
+                    limit: self.spring_limit,
+                },
+                "SINEW_SPRING_LAW_CUBIC",
+                [false, true, true, true],
+            ),
+            unknown => {
+                return Err(Error::invalid(format!(
+                    "spring_law is {unknown}: no SINEW_SPRING_LAW_..."
+                )));
+            }
+        };
+        match numbers
+            .iter()
+            .zip(used)
+            .find(|((_, value), used)| !used && *value != 0.0)
+        {
+            None => Ok(law),
+            Some(((number, value), _)) => Err(Error::invalid(format!(
+                "{number} is {value} while spring_law is {name}: must be 0"
+            ))),
+        }
+    }
+
     /// The definition with its arrays found.
     ///
     /// # Safety
@@ -349,8 +443,10 @@ impl sinew_body_def {
         }
         let springs = self.spring_count;
         let nodes = self.node_count;
+        let tetrahedra = self.tetrahedron_count;
         // SAFETY: the same contract.
         unsafe {
+            let directions = memory::optional_array("fibre_directions", self.fibre_directions.cast(), tetrahedra)?;
             Ok(BodyDefinition {
                 positions: memory::array("positions", self.positions.cast(), nodes)?,
                 rest_positions: memory::optional_array("rest_positions", self.rest_positions.cast(), nodes)?,
@@ -364,6 +460,16 @@ impl sinew_body_def {
                 tetrahedra: memory::array("tetrahedra", self.tetrahedra.cast(), self.tetrahedron_count)?,
                 cells: memory::array("cells", self.cells.cast(), self.cell_count)?,
                 material: self.material()?,
+                home_stiffnesses: values("home_stiffnesses", self.home_stiffnesses, nodes, self.home_stiffness)?,
+                bending_stiffness: self.bending_stiffness,
+                spring_law: self.spring_law()?,
+                fibre_directions: directions.unwrap_or(&[]),
+                fibre_stiffnesses: values(
+                    "fibre_stiffnesses",
+                    self.fibre_stiffnesses,
+                    tetrahedra,
+                    self.fibre_stiffness,
+                )?,
                 storage: match self.storage {
                     SINEW_STORAGE_PACKED => Storage::Packed,
                     SINEW_STORAGE_EFFICIENT => Storage::Efficient,

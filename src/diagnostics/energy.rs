@@ -9,7 +9,7 @@ use crate::body::Body;
 pub struct Energy {
     /// Of the nodes that are free to move, with what mass scaling adds to them.
     pub kinetic: f64,
-    /// Of the springs, and of tetrahedra that are elements.
+    /// Of the springs, of tetrahedra that are elements, and of every other term.
     pub elastic: f64,
     /// Of all nodes, zero at the origin.
     pub gravitational: f64,
@@ -43,6 +43,9 @@ impl Energy {
         if let Some(elements) = &body.elements {
             let mut growths = vec![0.0; elements.ring_count()];
             energy.elastic += elements.exact_energy(|node| positions.get(node).as_dvec3(), &mut growths);
+        }
+        if let Some(terms) = &body.terms {
+            energy.elastic += terms.energy(&|node| positions.get(node).as_dvec3());
         }
         energy
     }

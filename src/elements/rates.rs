@@ -57,18 +57,18 @@ impl Elements {
         self.rates_known = false;
     }
 
-    /// The longest stable substep with the nodes where forces were last worked out, s.
-    pub fn limit(&self) -> f32 {
-        self.limit_of(self.highest)
+    /// What bounds frequencies with the nodes where forces were last worked out.
+    pub fn rates(&self) -> Rates {
+        self.rates_of(self.highest)
     }
 
     /// The same with the nodes at the current state.
-    pub fn settled_limit(&self) -> f32 {
-        self.limit_of(self.settled)
+    pub fn settled_rates(&self) -> Rates {
+        self.rates_of(self.settled)
     }
 
-    fn limit_of(&self, stiffest: f32) -> f32 {
+    fn rates_of(&self, stiffest: f32) -> Rates {
         let most_damped = self.most_damped;
-        Rates { stiffest, most_damped }.limit()
+        Rates { stiffest, most_damped }
     }
 }

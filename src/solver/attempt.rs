@@ -80,7 +80,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
     if body.implicit.is_some() {
         return attempt_implicitly(body, request, team);
     }
-    let of_elements = body.limit_of_elements(team);
+    let beside_springs = body.limit_beside_springs(team);
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
     let is_worth_estimating = || {
@@ -114,7 +114,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
             },
         };
     }
-    match run_stably(body, request, start, of_elements, team) {
+    match run_stably(body, request, start, beside_springs, team) {
         Err(too_long) => Outcome::Unstable {
             stable_substep: too_long.stable_substep,
             error: 0.0,
@@ -160,7 +160,7 @@ fn run_stably(
     body: &mut Body,
     request: &StepRequest,
     start: Carry,
-    of_elements: f32,
+    beside_springs: f32,
     team: &Team,
 ) -> Result<(u32, Taken), TooLong> {
     let limit = start.stability.limit().unwrap_or(f32::INFINITY);
@@ -170,12 +170,12 @@ fn run_stably(
     } else {
         limit
     };
-    stable_substep = stable_substep.min(of_elements);
+    stable_substep = stable_substep.min(beside_springs);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
-            // Where elements go there is no end to how stiff they may be.
-            stable_substep = anywhere.min(if body.elements.is_some() {
+            // Where elements and terms go there is no end to how stiff they may be.
+            stable_substep = anywhere.min(if body.has_more_than_springs() {
                 0.5 * stable_substep
             } else {
                 anywhere

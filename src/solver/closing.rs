@@ -13,6 +13,7 @@ use super::kick::{Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors};
 use crate::elements::Shares;
 use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
+use crate::terms::Terms;
 use crate::threads::{Items, Team};
 
 /// A half kick that the velocities lack.
@@ -52,9 +53,12 @@ impl ClosingKick {
 }
 
 /// Whether a step of `body` may be left open. Damping along springs and comparisons need velocities at its end, and forces
-/// from outside end with it; those of elements are not worked out by who only reads.
+/// from outside end with it; those of elements and terms are not worked out by who only reads.
 pub(super) fn may_stay_open(body: &Body) -> bool {
-    body.elements.is_none() && body.predicted_velocities.is_none() && body.coarse.is_none() && !body.forces_applied
+    !body.has_more_than_springs()
+        && body.predicted_velocities.is_none()
+        && body.coarse.is_none()
+        && !body.forces_applied
 }
 
 /// Velocities brought up to the time of the positions, to the side.
@@ -62,6 +66,7 @@ pub(super) struct Closed<'a> {
     pub springs: &'a dyn Springs,
     /// What they give at these positions.
     pub elements: Option<Shares<'a>>,
+    pub terms: Option<&'a Terms>,
     pub kernel: ChosenKernel,
     /// Half of one.
     pub kick: Kick<'a>,
@@ -78,6 +83,9 @@ impl Closed<'_> {
         self.springs.forces(tile, &Motion::at(self.positions, damped), forces);
         if let Some(elements) = &self.elements {
             elements.add(tile, forces);
+        }
+        if let Some(terms) = self.terms {
+            terms.add_forces(tile, nodes.clone(), self.positions.view(), forces);
         }
         let velocities = self.velocities.slices(nodes.clone());
         for (closed, velocities) in closed.iter_mut().zip(velocities) {
@@ -111,6 +119,7 @@ pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut 
     let closed = Closed {
         springs: &*body.springs,
         elements: None,
+        terms: None,
         kernel: body.kernel,
         kick: closing.kick(gravity.next(closing.fall()), inertia, body.damping.as_ref()),
         positions: state.positions,
@@ -174,6 +183,7 @@ pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> 
     let closed = Closed {
         springs: &*body.springs,
         elements: None,
+        terms: None,
         kernel: body.kernel,
         kick: closing.kick(fall, inertia, body.damping.as_ref()),
         positions: body.state.positions(),

@@ -186,6 +186,7 @@ impl Common<'_> {
         Pass {
             springs: self.springs,
             elements: None,
+            terms: None,
             kernel: self.kernel,
             masses: self.masses,
             request: self.request,

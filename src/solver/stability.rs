@@ -47,6 +47,14 @@ impl Rates {
         if limit.is_nan() { 0.0 } else { limit }
     }
 
+    /// Those of both together.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            stiffest: self.stiffest + other.stiffest,
+            most_damped: self.most_damped + other.most_damped,
+        }
+    }
+
     /// Those of a node wherever it and its neighbours are; `None`: it is pinned.
     pub fn anywhere(node: usize, springs: &dyn Springs, masses: &Masses) -> Option<Self> {
         let inverse_mass = masses.inverse(node);

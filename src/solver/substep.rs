@@ -10,6 +10,7 @@ use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
 use crate::elements::{Elements, Shares};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
+use crate::terms::Terms;
 use crate::threads::{Items, Team};
 
 /// Where a kick's velocities come from.
@@ -130,12 +131,17 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         elements.find_forces(body.kernel, records.as_slice(), team);
     }
     let elements = body.elements.as_deref().map(Elements::shares);
+    if let Some(terms) = body.terms.as_mut().filter(|_| !forces_known) {
+        terms.begin();
+    }
+    let terms = body.terms.as_deref();
     if part.before == Before::Open
         && let Some(predicted) = &mut body.predicted_velocities
     {
         let closed = Closed {
             springs: &*body.springs,
             elements,
+            terms,
             kernel: body.kernel,
             kick: Kick {
                 duration: 0.5 * part.substep,
@@ -154,6 +160,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
     let pass = Pass {
         springs: &*body.springs,
         elements,
+        terms,
         kernel: body.kernel,
         masses: &body.masses,
         request,
@@ -205,6 +212,7 @@ pub(crate) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &m
 pub(super) struct Pass<'a> {
     pub springs: &'a dyn Springs,
     pub elements: Option<Shares<'a>>,
+    pub terms: Option<&'a Terms>,
     pub kernel: ChosenKernel,
     pub masses: &'a [f32],
     pub request: &'a StepRequest<'a>,
@@ -249,6 +257,9 @@ impl Pass<'_> {
             self.springs.forces(tile, &motion, forces);
             if let Some(elements) = &self.elements {
                 elements.add(tile, forces);
+            }
+            if let Some(terms) = self.terms {
+                terms.add_forces(tile, nodes.clone(), self.positions, forces);
             }
         }
         if let Some(first_velocities) = self.first_velocities {

@@ -74,12 +74,9 @@ fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
     }
 }
 
-/// The same for elements, as they were deformed where forces were last worked out.
-fn check_elements(body: &Body, substep: f32) -> Result<(), TooLong> {
-    let stable_substep = body
-        .elements
-        .as_ref()
-        .map_or(f32::INFINITY, |elements| elements.limit());
+/// The same for elements and terms, as they were deformed where forces were last worked out.
+fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooLong> {
+    let stable_substep = body.newest_limit_beside_springs();
     if substep <= stable_substep {
         Ok(())
     } else {
@@ -163,7 +160,7 @@ impl Step<'_> {
                     .unwrap_or_else(|| body.estimate(body.state.newest().0));
                 check(&carry.stability, substep)?;
             }
-            check_elements(body, substep)?;
+            check_beside_springs(body, substep)?;
         }
         // What a tool touches is closed with it.
         if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
@@ -178,7 +175,7 @@ impl Step<'_> {
                     .next(request.gravity.as_dvec3() * f64::from(0.5 * substep)),
             );
             finite = pass(body, request, &part, &mut carry, team);
-            check_elements(body, substep)?;
+            check_beside_springs(body, substep)?;
         }
         Ok(Some(Taken { carry, finite }))
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{DMat3, Vec3};
 
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
@@ -10,6 +10,7 @@ use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
+use crate::terms::Terms;
 use crate::threads::{Team, Tiles};
 
 /// A symmetric matrix as xx, yy, zz, yz, zx, xy.
@@ -59,17 +60,29 @@ impl Blocks {
 
     /// Adds elements at these positions.
     pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
-        let stiffness = &mut self.stiffness;
         elements.visit_deformed(positions, PART_OF_RINGS, &mut |corners, gradients, deformed| {
             for (node, &gradient) in corners.into_iter().zip(gradients) {
-                let matrix = deformed.clamped_stiffness(gradient, gradient);
-                let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-                let entries = [x.x, y.y, z.z, z.y, x.z, y.x];
-                for (entry, more) in stiffness[node as usize].iter_mut().zip(entries) {
-                    *entry += more as f32;
-                }
+                self.add(node, deformed.clamped_stiffness(gradient, gradient));
             }
         });
+    }
+
+    /// Adds terms at these positions.
+    pub fn add_terms(&mut self, terms: &Terms, positions: &Vectors) {
+        let at = |node: usize| positions.get(node).as_dvec3();
+        terms.show_blocks(&at, false, &mut |nodes, blocks| {
+            for (place, &node) in nodes.iter().enumerate() {
+                self.add(node, blocks[place][place]);
+            }
+        });
+    }
+
+    fn add(&mut self, node: u32, matrix: DMat3) {
+        let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+        let entries = [x.x, y.y, z.z, z.y, x.z, y.x];
+        for (entry, more) in self.stiffness[node as usize].iter_mut().zip(entries) {
+            *entry += more as f32;
+        }
     }
 
     /// All that it was made of.

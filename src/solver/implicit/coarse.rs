@@ -13,6 +13,7 @@ use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{ChosenKernel, Loops, Springs, TILE, Tangent};
+use crate::terms::Terms;
 
 /// Nodes that always belong to one cluster together: as many as are worked on side by side.
 const BLOCK: usize = 16;
@@ -156,6 +157,45 @@ impl Coarse {
                                 self.add_block([clusters[a], row], [clusters[b], column], matrix * factor);
                             }
                         }
+                    }
+                }
+            }
+        });
+    }
+
+    /// Adds terms at these positions.
+    pub fn add_terms(&mut self, terms: &Terms, positions: &Vectors) {
+        let at = |node: usize| positions.get(node).as_dvec3();
+        terms.show_blocks(&at, false, &mut |nodes, blocks| {
+            let cluster = |node: u32| usize::from(self.clusters[node as usize / BLOCK]);
+            let clusters = nodes.iter().map(|&node| cluster(node));
+            // Nodes of one cluster share its functions: their blocks are added up first.
+            let is_together = clusters
+                .clone()
+                .all(|cluster| cluster == self.clusters[nodes[0] as usize / BLOCK].into());
+            let parts: [[f32; FUNCTIONS]; 4] = std::array::from_fn(|place| {
+                nodes
+                    .get(place)
+                    .map_or([0.0; FUNCTIONS], |&node| self.part(node as usize))
+            });
+            for row in 0..FUNCTIONS {
+                for column in 0..FUNCTIONS {
+                    let mut sum = DMat3::ZERO;
+                    for (a, &of_a) in nodes.iter().enumerate() {
+                        for (b, &of_b) in nodes.iter().enumerate() {
+                            let factor = f64::from(parts[a][row] * parts[b][column]);
+                            if is_together {
+                                sum += blocks[a][b] * factor;
+                            } else if factor != 0.0 {
+                                let clusters =
+                                    [of_a, of_b].map(|node| usize::from(self.clusters[node as usize / BLOCK]));
+                                self.add_block([clusters[0], row], [clusters[1], column], blocks[a][b] * factor);
+                            }
+                        }
+                    }
+                    if is_together {
+                        let cluster = usize::from(self.clusters[nodes[0] as usize / BLOCK]);
+                        self.add_block([cluster, row], [cluster, column], sum);
                     }
                 }
             }

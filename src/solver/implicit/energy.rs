@@ -8,6 +8,7 @@ use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::solver::write_records;
 use crate::springs::{ChosenKernel, Loops, Motion, Springs, TileForces, tile_count, tile_nodes};
+use crate::terms::Terms;
 use crate::threads::{Items, Team};
 
 /// What rounding may add, as a fraction of the energies involved.
@@ -31,6 +32,7 @@ pub(super) struct Before {
 struct Inside<'a> {
     springs: &'a dyn Springs,
     elements: Option<&'a mut Elements>,
+    terms: Option<&'a Terms>,
     records: Option<&'a mut Records>,
     kernel: ChosenKernel,
 }
@@ -57,6 +59,7 @@ impl Substep<'_> {
         let mut inside = Inside {
             springs: &*body.springs,
             elements: body.elements.as_deref_mut(),
+            terms: body.terms.as_deref(),
             records: body.records.as_mut(),
             kernel: body.kernel,
         };
@@ -83,6 +86,7 @@ impl Substep<'_> {
         let mut inside = Inside {
             springs: &*body.springs,
             elements: body.elements.as_deref_mut(),
+            terms: body.terms.as_deref(),
             records: body.records.as_mut(),
             kernel: body.kernel,
         };
@@ -153,6 +157,7 @@ impl Substep<'_> {
             elements.find_forces(body.kernel, records.as_slice(), self.team);
         }
         let elements = body.elements.as_deref().map(Elements::shares);
+        let terms = body.terms.as_deref();
         let motion = Motion {
             positions: positions.view().with_records(body.records.as_ref()),
             ..Motion::at(positions, body.predicted_velocities.as_ref())
@@ -168,6 +173,9 @@ impl Substep<'_> {
                 springs.forces(tile, &motion, &mut forces);
                 if let Some(elements) = &elements {
                     elements.add(tile, &mut forces);
+                }
+                if let Some(terms) = terms {
+                    terms.add_forces(tile, tile_nodes(tile, node_count), motion.positions, &mut forces);
                 }
                 show_held(pins, &forces, gravity, masses);
             });
@@ -240,9 +248,16 @@ impl Implicit {
     /// some, J.
     fn elastic(&mut self, inside: &mut Inside, positions: &Vectors, place: usize, team: &Team) -> f64 {
         if let Some(newton) = &mut self.newton {
-            return newton.elastic(inside.springs, inside.elements.as_deref(), positions, place);
+            return newton.elastic(
+                inside.springs,
+                inside.elements.as_deref(),
+                inside.terms,
+                positions,
+                place,
+            );
         }
         let (node_count, springs, kernel) = (positions.len(), inside.springs, inside.kernel);
+        let terms = inside.terms;
         if let Some(records) = &mut inside.records {
             write_records(kernel, positions, records, team);
         }
@@ -251,13 +266,16 @@ impl Implicit {
         let partials = Items::new(&mut self.partials);
         team.pass(tile_count(node_count), partials, |tile, partial| {
             partial.first = springs.half_energy(tile_nodes(tile, node_count), view);
+            if let Some(terms) = terms {
+                partial.first += terms.energy_of_tile(tile, &|node| view.get(node).as_dvec3());
+            }
         });
-        let of_springs: f64 = self.partials.iter().map(|partial| partial.first).sum();
+        let of_tiles: f64 = self.partials.iter().map(|partial| partial.first).sum();
         let of_elements = match (&mut inside.elements, records) {
             (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
             _ => 0.0,
         };
-        of_springs + of_elements
+        of_tiles + of_elements
     }
 }
 

@@ -119,6 +119,9 @@ impl Implicit {
             if let Some(elements) = &elements {
                 elements.add(tile, &mut changes);
             }
+            if let Some(terms) = &body.terms {
+                terms.add_changes(tile, nodes.clone(), [course.positions, course.ways], &mut changes);
+            }
             partial.first = body.kernel.run(Product {
                 inertia: &inertia[nodes.clone()],
                 searches: searches.slices(nodes.clone()),

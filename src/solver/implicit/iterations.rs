@@ -31,6 +31,7 @@ impl Substep<'_> {
             elements.find_forces(body.kernel, records.as_slice(), self.team);
         }
         let elements = body.elements.as_deref().map(Elements::shares);
+        let terms = body.terms.as_deref();
         let state = body.state.substep();
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
         let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
@@ -57,6 +58,9 @@ impl Substep<'_> {
                 springs.forces(tile, &motion, &mut forces);
                 if let Some(elements) = &elements {
                     elements.add(tile, &mut forces);
+                }
+                if let Some(terms) = terms {
+                    terms.add_forces(tile, nodes.clone(), motion.positions, &mut forces);
                 }
                 show_held(pins, &forces, gravity, masses);
                 kernel.run(Residual {
@@ -101,7 +105,7 @@ impl Substep<'_> {
         let mut size = 0.0;
         let mut error = f64::INFINITY;
         let mut is_solved = false;
-        let is_held = body.pins.iter().next().is_some();
+        let is_held = body.is_held();
         self.place(body, implicit);
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);

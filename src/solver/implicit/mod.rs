@@ -28,6 +28,7 @@ use crate::error::Result;
 use crate::memory;
 use crate::solver::newton::Newton;
 use crate::springs::{Springs, tile_count};
+use crate::terms::Terms;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
 use estimate::Spectrum;
@@ -226,13 +227,13 @@ impl Implicit {
         Ok(())
     }
 
-    /// As [`Self::new`], with the equations solved exactly, for these springs and elements.
+    /// As [`Self::new`], with the equations solved exactly, for these springs, elements and terms.
     pub fn exact(
         positions: &Vectors,
         springs: &dyn Springs,
         elements: Option<&Elements>,
-        order: u32,
-        budget: u32,
+        terms: Option<&Terms>,
+        [order, budget]: [u32; 2],
         accuracy: f32,
     ) -> Result<Self> {
         /// As good as nothing, and far above what rounding makes.
@@ -242,7 +243,7 @@ impl Implicit {
         let budget = if budget == 0 { BUDGET } else { budget };
         let accuracy = if accuracy == 0.0 { ACCURACY } else { accuracy };
         Ok(Self {
-            newton: Some(Newton::new(positions.len(), springs, elements)?),
+            newton: Some(Newton::new(positions.len(), springs, elements, terms)?),
             ..Self::solving(&Vectors::zeros(0)?, positions.len(), false, order, budget, accuracy)?
         })
     }

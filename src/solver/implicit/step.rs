@@ -244,6 +244,10 @@ impl Substep<'_> {
                 implicit.blocks.add_elements(elements, positions);
                 implicit.coarse.add_elements(elements, positions);
             }
+            if let Some(terms) = &body.terms {
+                implicit.blocks.add_terms(terms, positions);
+                implicit.coarse.add_terms(terms, positions);
+            }
         }
         let time = self.formula.time as f32;
         if time != implicit.prepared || implicit.stale {

@@ -12,6 +12,7 @@ use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Springs;
+use crate::terms::Terms;
 
 /// What may be missing of the solution of each linearised equation.
 const PART: f64 = 0.01;
@@ -68,8 +69,13 @@ pub(in crate::solver) struct Found {
 
 impl Descent {
     /// Of a body as it is.
-    pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
-        let network = Network::new(node_count, springs, elements)?;
+    pub fn new(
+        node_count: usize,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        terms: Option<&Terms>,
+    ) -> Result<Self> {
+        let network = Network::new(node_count, springs, elements, terms)?;
         let pair_count = network.pair_count();
         Ok(Self {
             equation: Equation::new(node_count, network.ring_count())?,
@@ -88,9 +94,10 @@ impl Descent {
         self.factor.make_room(pair_count)
     }
 
-    /// Takes springs and elements as they are now.
-    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>) {
-        self.network.read(springs, elements);
+    /// Takes springs and elements as they are now, and the terms themselves, until they are given back.
+    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>, terms: Option<Box<Terms>>) {
+        self.network.read(springs, elements, terms.as_deref());
+        self.network.terms = terms;
     }
 
     /// Writes what acts on each node.

@@ -12,6 +12,7 @@ use crate::elements::{Deformed, Law};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Link;
+use crate::terms::Blocks;
 
 /// The function, and where on it we are.
 #[derive(Debug)]
@@ -115,6 +116,9 @@ impl Equation {
                 residuals[corner] += deformed.force(gradient);
             }
         }
+        if let Some(terms) = &network.terms {
+            terms.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
+        }
         let way = |node: usize| self.ways[node];
         self.holds.show_forces(way, |node, force| {
             if self.is_free(node) {
@@ -166,6 +170,9 @@ impl Equation {
             }
         }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
+        if let Some(terms) = &network.terms {
+            terms.show_changes(&|node| self.position(node), &more, &mut add);
+        }
         self.holds.show_changes(way, more, add);
         sums
     }
@@ -195,6 +202,7 @@ impl Equation {
         for (law, tetrahedron) in network.tetrahedra() {
             self.add_tetrahedron(law, tetrahedron, tangent, matrix);
         }
+        self.add_terms(network, tangent, matrix);
         self.holds.show_blocks(|node, block| {
             if self.is_free(node) {
                 matrix.diagonal[node] += whole(block);
@@ -226,6 +234,52 @@ impl Equation {
             if self.is_free(corners[a]) && self.is_free(corners[b]) {
                 let (high, low) = if corners[a] > corners[b] { (a, b) } else { (b, a) };
                 matrix.beside[place] += stiffness(high, low);
+            }
+        }
+    }
+
+    fn add_terms(&self, network: &Network, tangent: Tangent, matrix: &mut Matrix) {
+        let Some(terms) = &network.terms else {
+            return;
+        };
+        let is_exact = tangent == Tangent::Exact;
+        terms.show_blocks(&|node| self.position(node), is_exact, &mut |nodes, blocks| {
+            if tangent == Tangent::Factor && nodes.len() > 2 {
+                self.add_pairs(network, nodes, blocks, matrix);
+                return;
+            }
+            for (a, &of_a) in nodes.iter().enumerate() {
+                if !self.is_free(of_a as usize) {
+                    continue;
+                }
+                matrix.diagonal[of_a as usize] += blocks[a][a];
+                for (b, &of_b) in nodes.iter().enumerate() {
+                    if of_b < of_a && self.is_free(of_b as usize) {
+                        matrix.beside[network.place([of_a, of_b])] += blocks[a][b];
+                    }
+                }
+            }
+        });
+    }
+
+    /// Adds to a matrix that is to be factorised a term of several nodes, as springs between those that draw each other: of a matrix
+    /// whose nodes push each other too an incomplete factor may be anything.
+    fn add_pairs(&self, network: &Network, nodes: &[u32], blocks: &Blocks, matrix: &mut Matrix) {
+        for (a, &of_a) in nodes.iter().enumerate() {
+            for (b, &of_b) in nodes[..a].iter().enumerate() {
+                let [x, y, z] = [0, 1, 2].map(|axis| blocks[a][b].col(axis)[axis]);
+                let stiffness = -(x + y + z) / 3.0;
+                if !(stiffness > 0.0) {
+                    continue;
+                }
+                let block = DMat3::from_diagonal(DVec3::splat(stiffness));
+                let ends = [of_a, of_b].map(|node| node as usize);
+                for end in ends.into_iter().filter(|&end| self.is_free(end)) {
+                    matrix.diagonal[end] += block;
+                }
+                if ends.into_iter().all(|end| self.is_free(end)) {
+                    matrix.beside[network.place([of_a, of_b])] -= block;
+                }
             }
         }
     }
@@ -340,7 +394,7 @@ impl Equation {
         outer * along + DMat3::from_diagonal(DVec3::splat(across))
     }
 
-    /// The energy of springs, elements and loads, J, with the origin of coordinates at `origin`.
+    /// The energy of springs, elements, terms and loads, J, with the origin of coordinates at `origin`.
     pub fn potential(&mut self, network: &Network, origin: DVec3) -> f64 {
         let elastic: f64 = network
             .springs()
@@ -354,8 +408,10 @@ impl Equation {
         for (pressure, volume) in self.pressures.iter().zip(&network.volumes) {
             of_elements += 0.5 * pressure * pressure * volume / network.kappa();
         }
+        let of_terms = network.terms.as_ref();
+        let of_terms = of_terms.map_or(0.0, |terms| terms.energy(&|node| self.position(node)));
         let loads = self.loads.iter().enumerate();
-        elastic + of_elements
+        elastic + of_elements + of_terms
             - loads
                 .map(|(node, load)| load.dot(self.position(node) + origin))
                 .sum::<f64>()

@@ -26,6 +26,7 @@ use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Springs;
+use crate::terms::Terms;
 use descent::Descent;
 use step::exact;
 
@@ -41,9 +42,14 @@ pub(crate) struct Newton {
 
 impl Newton {
     /// For a body as it is.
-    pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
+    pub fn new(
+        node_count: usize,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        terms: Option<&Terms>,
+    ) -> Result<Self> {
         Ok(Self {
-            descent: Descent::new(node_count, springs, elements)?,
+            descent: Descent::new(node_count, springs, elements, terms)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
             growths: memory::filled(0.0, elements.map_or(0, Elements::ring_count))?,
         })
@@ -59,11 +65,12 @@ impl Newton {
         self.remainders[place].clear();
     }
 
-    /// The energy of springs and elements, J, with nodes at these positions and what they lack.
+    /// The energy of springs, elements and terms, J, with nodes at these positions and what they lack.
     pub fn elastic(
         &mut self,
         springs: &dyn Springs,
         elements: Option<&Elements>,
+        terms: Option<&Terms>,
         positions: &Vectors,
         place: usize,
     ) -> f64 {
@@ -83,6 +90,10 @@ impl Newton {
             let remainders = &self.remainders[place];
             let position = |node: usize| step::exact(positions.get(node), remainders.get(node));
             sum += elements.exact_energy(position, &mut self.growths);
+        }
+        if let Some(terms) = terms {
+            let remainders = &self.remainders[place];
+            sum += terms.energy(&|node| step::exact(positions.get(node), remainders.get(node)));
         }
         sum
     }

@@ -1,4 +1,4 @@
-//! The springs and elements of a body as rows of a matrix: each pair of nodes once, at the node with the higher number.
+//! The springs, elements and terms of a body as rows of a matrix: each pair of nodes once, at the node with the higher number.
 
 use std::ops::Range;
 
@@ -6,16 +6,19 @@ use crate::elements::{Elements, Law, Rest};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Link, Springs};
+use crate::terms::Terms;
 
-/// For each node the springs to nodes of lower numbers, in their order; edges of elements without a spring are springs of no
-/// stiffness.
+/// For each node the springs to nodes of lower numbers, in their order; pairs of nodes that only elements or terms join are springs of
+/// no stiffness.
 #[derive(Debug)]
 pub(super) struct Network {
     /// Where the row of each node begins, and the end of the last.
     starts: Vec<usize>,
     links: Vec<Link>,
     tetrahedra: Vec<Tetrahedron>,
-    /// The edges of tetrahedra, the higher number first.
+    /// Lent by the body while it is solved.
+    pub terms: Option<Box<Terms>>,
+    /// The pairs of nodes of tetrahedra and terms, the higher number first.
     edges: Vec<[u32; 2]>,
     law: Option<Law>,
     /// Where volume is kept by rings: each node's volume at rest, m³, and where the tetrahedra about it begin among all.
@@ -41,22 +44,42 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
     [a.max(b), a.min(b)]
 }
 
+/// Shows the pairs of nodes of each term.
+fn show_pairs(terms: Option<&Terms>, see: &mut dyn FnMut([u32; 2])) {
+    let Some(terms) = terms else {
+        return;
+    };
+    terms.show_nodes(&mut |nodes| {
+        for (place, &a) in nodes.iter().enumerate() {
+            nodes[..place].iter().for_each(|&b| see(ordered([a, b])));
+        }
+    });
+}
+
 impl Network {
     /// That of a body as it is.
-    pub fn new(node_count: usize, springs: &dyn Springs, elements: Option<&Elements>) -> Result<Self> {
+    pub fn new(
+        node_count: usize,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        terms: Option<&Terms>,
+    ) -> Result<Self> {
+        let mut pair_count = 6 * elements.map_or(0, Elements::count);
+        show_pairs(terms, &mut |_| pair_count += 1);
         let tetrahedron_count = elements.map_or(0, Elements::count);
         let ring_count = elements.map_or(0, Elements::ring_count);
         let mut network = Self {
             starts: memory::filled(0, node_count + 1)?,
-            links: memory::reserved(springs.spring_count() + 6 * tetrahedron_count)?,
+            links: memory::reserved(springs.spring_count() + pair_count)?,
             tetrahedra: memory::reserved(tetrahedron_count)?,
-            edges: memory::reserved(6 * tetrahedron_count)?,
+            terms: None,
+            edges: memory::reserved(pair_count)?,
             law: elements.map(Elements::law),
             volumes: memory::filled(0.0, ring_count)?,
             ring_starts: memory::filled(0, if ring_count > 0 { ring_count + 1 } else { 0 })?,
             ring_members: memory::filled(0, if ring_count > 0 { 4 * tetrahedron_count } else { 0 })?,
         };
-        network.read(springs, elements);
+        network.read(springs, elements, terms);
         Ok(network)
     }
 
@@ -68,7 +91,7 @@ impl Network {
     }
 
     /// Takes them from a body, which allocates nothing where there is room for all.
-    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>) {
+    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>, terms: Option<&Terms>) {
         self.tetrahedra.clear();
         self.edges.clear();
         if let Some(elements) = elements {
@@ -81,9 +104,10 @@ impl Network {
                     places: [0; 6],
                 });
             });
-            self.edges.sort_unstable();
-            self.edges.dedup();
         }
+        show_pairs(terms, &mut |pair| self.edges.push(pair));
+        self.edges.sort_unstable();
+        self.edges.dedup();
         if let Some(elements) = elements.filter(|elements| elements.ring_count() > 0) {
             self.read_rings(elements);
         }
@@ -113,14 +137,17 @@ impl Network {
             self.links[start..].sort_unstable_by_key(|link| link.neighbour);
             self.starts[node + 1] = self.links.len();
         }
-        let (starts, links) = (&self.starts, &self.links);
-        for tetrahedron in &mut self.tetrahedra {
-            tetrahedron.places = PAIRS.map(|pair| {
-                let [high, low] = ordered(pair.map(|corner| tetrahedron.corners[corner] as u32));
-                let start = starts[high as usize];
-                start + links[start..starts[high as usize + 1]].partition_point(|link| link.neighbour < low)
-            });
+        for index in 0..self.tetrahedra.len() {
+            let corners = self.tetrahedra[index].corners;
+            self.tetrahedra[index].places = PAIRS.map(|pair| self.place(pair.map(|corner| corners[corner] as u32)));
         }
+    }
+
+    /// Where a pair of nodes is.
+    pub fn place(&self, pair: [u32; 2]) -> usize {
+        let [high, low] = ordered(pair);
+        let row = self.row(high as usize);
+        row.start + self.links[row].partition_point(|link| link.neighbour < low)
     }
 
     /// Finds the tetrahedra about each node.

@@ -50,19 +50,36 @@ pub struct RestStateReport {
 
 /// Moves `body` to rest.
 pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
+    let terms = body.terms.as_deref();
+    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), terms)?;
+    descent.network.terms = body.terms.take();
+    let found = find(&mut descent, body, gravity, definition);
+    body.terms = descent.network.terms.take();
+    let report = found?;
+    let held = |node: usize| -descent.residuals[node].as_vec3();
+    body.rest_at(|node| descent.equation.position(node).as_vec3(), held);
+    Ok(report)
+}
+
+/// Finds where `body` is at rest.
+fn find(
+    descent: &mut Descent,
+    body: &Body,
+    gravity: Vec3,
+    definition: &RestStateDefinition,
+) -> Result<RestStateReport> {
     if !(definition.tolerance >= 0.0 && definition.tolerance.is_finite()) {
         return Err(Error::invalid(format!(
             "tolerance is {}: must be at least 0 and finite",
             definition.tolerance
         )));
     }
-    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref())?;
-    set_up(&mut descent, body, gravity);
-    let parts = Parts::new(&descent)?;
-    parts.balance(&mut descent, body)?;
+    set_up(descent, body, gravity);
+    let parts = Parts::new(descent)?;
+    parts.balance(descent, body)?;
     let origin = body.origin;
     let energy_before = descent.equation.potential(&descent.network, origin);
-    let extent = extent(&descent);
+    let extent = extent(descent);
     let tolerance = match definition.tolerance {
         0.0 => TOLERANCE * extent,
         given => f64::from(given),
@@ -71,7 +88,7 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
         0 => BUDGET,
         given => given,
     };
-    let found = settle(&mut descent, tolerance, extent, budget);
+    let found = settle(descent, tolerance, extent, budget);
     if !found.converged {
         return Err(Error::NotConverged(format!(
             "no state of rest was found with {} products, of {budget} allowed: the last correction was {:e} m long, {tolerance:e} m \
@@ -87,8 +104,6 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
     if !(0..body.node_count()).all(|node| equation.position(node).as_vec3().length_squared().is_finite()) {
         return Err(Error::NotConverged("the state of rest is too far away for f32".into()));
     }
-    let held = |node: usize| -descent.residuals[node].as_vec3();
-    body.rest_at(|node| equation.position(node).as_vec3(), held);
     Ok(RestStateReport {
         iterations: found.iterations,
         products: found.products,
@@ -194,6 +209,14 @@ impl Parts {
                 parts.lowest[a.max(b) as usize] = a.min(b);
             }
         }
+        if let Some(terms) = &descent.network.terms {
+            terms.show_nodes(&mut |nodes| {
+                for &other in &nodes[1..] {
+                    let [a, b] = [nodes[0], other].map(|end| parts.find(end));
+                    parts.lowest[a.max(b) as usize] = a.min(b);
+                }
+            });
+        }
         for node in 0..node_count as u32 {
             parts.lowest[node as usize] = parts.find(node);
         }
@@ -226,7 +249,8 @@ impl Parts {
             sums.load += equation.loads[node];
             sums.size += equation.loads[node].length();
             sums.mass += equation.masses[node];
-            sums.is_held |= !equation.is_free(node);
+            let terms = descent.network.terms.as_ref();
+            sums.is_held |= !equation.is_free(node) || terms.is_some_and(|terms| terms.holds(node));
         }
         for (node, &part) in self.lowest.iter().enumerate() {
             let Sums {

@@ -1,0 +1,70 @@
+//! Home springs: the paper's restoring forces, which draw each node back to where it is at rest (Halic et al., section 3).
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::Term;
+use super::stencils::{Law, Stencil, Stencils};
+use crate::body::{BodyDefinition, NodeOrder, check_values};
+use crate::error::Result;
+use crate::memory;
+
+/// Springs of no rest length to a point that stays.
+#[derive(Debug)]
+struct Home;
+
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    /// In the caller's coordinates, m.
+    rest: Vec3,
+    /// In the body's.
+    local: Vec3,
+}
+
+pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
+    let (stiffnesses, node_count) = (&definition.home_stiffnesses, definition.positions.len());
+    check_values("home_stiffness", stiffnesses, node_count)?;
+    if stiffnesses.all_zero() {
+        return Ok(None);
+    }
+    let rest = definition.rest_positions.unwrap_or(definition.positions);
+    let mut springs = memory::reserved(node_count)?;
+    let there = rest.iter().enumerate().filter(|(node, _)| stiffnesses.get(*node) > 0.0);
+    springs.extend(there.map(|(node, &rest)| Stencil {
+        nodes: [order.own(node as u32)],
+        stiffness: stiffnesses.get(node),
+        shape: Shape { rest, local: rest },
+    }));
+    Ok(Some(Box::new(Stencils::new(Home, springs, node_count)?)))
+}
+
+impl Law<1> for Home {
+    type Shape = Shape;
+
+    fn energy(&self, shape: &Shape, [place]: &[DVec3; 1]) -> f64 {
+        0.5 * place.distance_squared(shape.local.as_dvec3())
+    }
+
+    fn change(&self, shape: &Shape, [place]: &[DVec3; 1], [way]: &[DVec3; 1]) -> f64 {
+        way.dot(*place - shape.local.as_dvec3()) + 0.5 * way.length_squared()
+    }
+
+    fn forces(&self, shape: &Shape, [place]: &[DVec3; 1]) -> [DVec3; 1] {
+        [shape.local.as_dvec3() - *place]
+    }
+
+    fn changes(&self, _shape: &Shape, _places: &[DVec3; 1], [way]: &[DVec3; 1]) -> [DVec3; 1] {
+        [-*way]
+    }
+
+    fn blocks(&self, _shape: &Shape, _places: &[DVec3; 1], _is_exact: bool) -> [[DMat3; 1]; 1] {
+        [[DMat3::IDENTITY]]
+    }
+
+    fn rate(&self, _shape: &Shape, [inverse_mass]: [f64; 1]) -> f64 {
+        inverse_mass
+    }
+
+    fn move_origin(&self, shape: &mut Shape, origin: DVec3) {
+        shape.local = (shape.rest.as_dvec3() - origin).as_vec3();
+    }
+}

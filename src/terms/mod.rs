@@ -1,0 +1,249 @@
+//! Terms of a body's energy beside those of springs and elements: each is of a few nodes, and follows one law.
+//!
+//! A tile's forces are made of all terms that have one of its nodes; what belongs to two tiles is worked out in each of them. So there
+//! are no buffers, any thread may take any tile, and results are the same for any number of threads. Terms are worked out in `f64`, by
+//! the same few lines for every solver.
+
+mod bending;
+mod fibres;
+mod home;
+mod nonlinear;
+mod stencils;
+
+use std::fmt::Debug;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{DMat3, DVec3};
+
+use crate::body::{BodyDefinition, NodeOrder, Spring, Vectors, View};
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::memory;
+use crate::solver::{Masses, Rates};
+use crate::springs::{Springs, TileForces, tile_count};
+pub use nonlinear::SpringLaw;
+
+/// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
+pub(crate) type Blocks = [[DMat3; 4]; 4];
+
+/// The terms of a body that follow one law.
+trait Term: Debug + Send + Sync {
+    /// Adds the forces on the nodes of a tile, N: by how much they are stiffer than their rates say, 1: not at all.
+    fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) -> f64;
+
+    /// Adds how the forces on the nodes of a tile change, N, in the first order; nothing is pushed sideways.
+    fn add_changes(&self, tile: usize, nodes: Range<usize>, places: [View; 2], changes: &mut TileForces);
+
+    /// The energy of the terms that begin in a tile, J.
+    fn energy(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64;
+
+    /// Shows the force on each node of each term, N.
+    fn show_forces(&self, at: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(usize, DVec3));
+
+    /// Shows how the energy of each term changes where nodes go so much further, J, to the last digits.
+    fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64));
+
+    /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
+    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks));
+
+    /// Shows the nodes of each term.
+    fn show_nodes(&self, see: &mut dyn FnMut(&[u32]));
+
+    /// By how much the stiffest is stiffer with nodes at `positions` than its rate says, 1: not at all.
+    fn stiffening(&self, positions: &Vectors) -> f64;
+
+    /// Adds what bounds the squares of frequencies to each node, 1/s².
+    fn add_rates(&self, masses: &Masses, rates: &mut [f32]);
+
+    /// Takes away what has an edge between two nodes: how many terms.
+    fn remove_edge(&mut self, a: u32, b: u32) -> usize;
+
+    /// Nodes are given from here on.
+    fn move_origin(&mut self, _origin: DVec3) {}
+
+    /// Whether they hold a node against the world.
+    fn holds(&self, _node: usize) -> bool {
+        false
+    }
+
+    /// What may change of them.
+    fn hash(&self, hasher: &mut StateHasher);
+}
+
+/// All terms of a body.
+#[derive(Debug)]
+pub(crate) struct Terms {
+    laws: Vec<Box<dyn Term>>,
+    /// Whether any node is held against the world.
+    holds_any: bool,
+    /// Room for a number per node.
+    sums: Vec<f32>,
+    /// What bounds their frequencies, with that of the springs where they were given.
+    rates: Rates,
+    rates_known: bool,
+    /// By how much terms are stiffer than that, where forces were last worked out: the bits of an `f32` from 1 on, whose order is
+    /// that of the numbers.
+    stiffening: AtomicU32,
+    /// The same at the current state.
+    settled: f32,
+}
+
+impl Terms {
+    /// Those that a definition asks for; `springs` are its springs. `None`: it asks for none.
+    pub fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<Self>>> {
+        let made = [
+            home::new(definition, order)?,
+            bending::new(definition, order)?,
+            nonlinear::new(definition, springs, order)?,
+            fibres::new(definition, order)?,
+        ];
+        let mut laws: Vec<Box<dyn Term>> = memory::reserved(made.len())?;
+        laws.extend(made.into_iter().flatten());
+        if laws.is_empty() {
+            return Ok(None);
+        }
+        let mut nodes = 0..definition.positions.len();
+        Ok(Some(Box::new(Self {
+            holds_any: nodes.any(|node| laws.iter().any(|law| law.holds(node))),
+            laws,
+            sums: memory::filled(0.0, definition.positions.len())?,
+            rates: Rates::ZERO,
+            rates_known: false,
+            stiffening: AtomicU32::new(1.0_f32.to_bits()),
+            settled: 1.0,
+        })))
+    }
+
+    /// Adds the forces on the nodes of a tile, N.
+    pub fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) {
+        for law in &self.laws {
+            let stiffening = law.add_forces(tile, nodes.clone(), positions, forces) as f32;
+            if stiffening > 1.0 {
+                self.stiffening.fetch_max(stiffening.to_bits(), Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// Adds how the forces on the nodes of a tile change with nodes at the first of `places` that go the ways of the second, N.
+    pub fn add_changes(&self, tile: usize, nodes: Range<usize>, places: [View; 2], changes: &mut TileForces) {
+        for law in &self.laws {
+            law.add_changes(tile, nodes.clone(), places, changes);
+        }
+    }
+
+    /// The energy of the terms that begin in a tile, J.
+    pub fn energy_of_tile(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64 {
+        self.laws.iter().map(|law| law.energy(tile, at)).sum()
+    }
+
+    /// The energy of all, J.
+    pub fn energy(&self, at: &dyn Fn(usize) -> DVec3) -> f64 {
+        (0..tile_count(self.sums.len()))
+            .map(|tile| self.energy_of_tile(tile, at))
+            .sum()
+    }
+
+    /// Shows the force on each node of each term, N.
+    pub fn show_forces(&self, at: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(usize, DVec3)) {
+        self.laws.iter().for_each(|law| law.show_forces(at, see));
+    }
+
+    /// Shows how the energy of each term changes where nodes go so much further, J.
+    pub fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64)) {
+        self.laws.iter().for_each(|law| law.show_changes(at, more, see));
+    }
+
+    /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
+    pub fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks)) {
+        self.laws.iter().for_each(|law| law.show_blocks(at, is_exact, see));
+    }
+
+    /// Shows the nodes of each term.
+    pub fn show_nodes(&self, see: &mut dyn FnMut(&[u32])) {
+        self.laws.iter().for_each(|law| law.show_nodes(see));
+    }
+
+    /// Whether a node is held against the world.
+    pub fn holds(&self, node: usize) -> bool {
+        self.laws.iter().any(|law| law.holds(node))
+    }
+
+    /// Whether any node is.
+    pub fn hold_any(&self) -> bool {
+        self.holds_any
+    }
+
+    /// Takes away what has an edge between two nodes: how many terms.
+    pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
+        self.laws.iter_mut().map(|law| law.remove_edge(a, b)).sum()
+    }
+
+    /// Nodes are given from here on.
+    pub fn move_origin(&mut self, origin: DVec3) {
+        self.laws.iter_mut().for_each(|law| law.move_origin(origin));
+    }
+
+    /// Masses, pins or springs have changed.
+    pub fn forget_rates(&mut self) {
+        self.rates_known = false;
+    }
+
+    /// Makes the bound on frequencies that of these masses, with these springs if they are not part of another bound.
+    pub fn find_rates(&mut self, springs: Option<&dyn Springs>, masses: &Masses) {
+        if self.rates_known {
+            return;
+        }
+        self.sums.fill(0.0);
+        self.laws.iter().for_each(|law| law.add_rates(masses, &mut self.sums));
+        let mut most = Rates::ZERO;
+        for (node, &sum) in self.sums.iter().enumerate() {
+            let of_springs = springs.and_then(|springs| Rates::anywhere(node, springs, masses));
+            let of_springs = of_springs.unwrap_or(Rates::ZERO);
+            most.stiffest = most.stiffest.max(sum + of_springs.stiffest);
+            most.most_damped = most.most_damped.max(of_springs.most_damped);
+        }
+        self.rates = most;
+        self.rates_known = true;
+    }
+
+    /// Forces are about to be worked out for other positions.
+    pub fn begin(&mut self) {
+        *self.stiffening.get_mut() = 1.0_f32.to_bits();
+    }
+
+    /// Makes what bounds frequencies that of nodes at `positions`, which is the current state.
+    pub fn settle_at(&mut self, positions: &Vectors) {
+        let stiffest = self.laws.iter().map(|law| law.stiffening(positions));
+        let stiffest = stiffest.fold(1.0, f64::max) as f32;
+        *self.stiffening.get_mut() = stiffest.to_bits();
+        self.settled = stiffest;
+    }
+
+    /// Where forces were worked out last is the current state.
+    pub fn settle(&mut self) {
+        self.settled = f32::from_bits(*self.stiffening.get_mut());
+    }
+
+    /// What bounds frequencies with the nodes where forces were last worked out.
+    pub fn rates(&self) -> Rates {
+        self.rates_times(f32::from_bits(self.stiffening.load(Ordering::Relaxed)))
+    }
+
+    /// The same with the nodes at the current state.
+    pub fn settled_rates(&self) -> Rates {
+        self.rates_times(self.settled)
+    }
+
+    fn rates_times(&self, stiffening: f32) -> Rates {
+        Rates {
+            stiffest: self.rates.stiffest * stiffening,
+            ..self.rates
+        }
+    }
+
+    /// What may change of them.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        self.laws.iter().for_each(|law| law.hash(hasher));
+    }
+}

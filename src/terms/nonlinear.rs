@@ -1,0 +1,267 @@
+//! Springs that stiffen as they are stretched, as tissue does: what their pull is beyond `k (L - L0)`.
+//!
+//! The linear part stays where springs are kept, so that every storage and kernel has such springs. With e the strain `L/L0 - 1`, what is
+//! beyond is `k L0 p(e)`; every law goes on evenly from a limit of the strain, so that there is a bound to how stiff a spring becomes,
+//! and is convex, so that there is one state of rest.
+
+use glam::{DMat3, DVec3};
+
+use super::Term;
+use super::stencils::{Law, Stencil, Stencils, directed};
+use crate::body::{BodyDefinition, NodeOrder, Spring};
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
+/// the stiffness they are given. Springs that are added later are linear.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum SpringLaw {
+    /// `e`.
+    #[default]
+    Linear,
+    /// Shaped like a J: `(exp(steepness e) - 1) / steepness` for strains from 0 to `limit`; linear beyond, as stiff as there; `e` below 0.
+    /// (Fung 1967 found such a law for soft tissue.)
+    Exponential {
+        /// Above 0; `steepness limit` is at most 13.8: a spring becomes at most a million times as stiff.
+        steepness: f32,
+        /// Above 0.
+        limit: f32,
+    },
+    /// `e + quadratic e² + cubic e³` up to a strain of `limit`, linear beyond, as stiff as there. `quadratic²` is at most `3 cubic`:
+    /// then a spring that is longer always pulls more.
+    Cubic {
+        /// Any number.
+        quadratic: f32,
+        /// At least 0.
+        cubic: f32,
+        /// Above 0.
+        limit: f32,
+    },
+}
+
+/// A million times as stiff.
+const STEEPEST: f32 = 13.8;
+
+impl SpringLaw {
+    fn check(&self) -> Result<()> {
+        let above_zero = |name: &str, value: f32| {
+            if value > 0.0 && value.is_finite() {
+                return Ok(());
+            }
+            Err(Error::invalid(format!(
+                "{name} of spring_law is {value}: must be above 0 and finite"
+            )))
+        };
+        match *self {
+            SpringLaw::Linear => Ok(()),
+            SpringLaw::Exponential { steepness, limit } => {
+                above_zero("steepness", steepness)?;
+                above_zero("limit", limit)?;
+                if steepness * limit > STEEPEST {
+                    return Err(Error::invalid(format!(
+                        "steepness of spring_law is {steepness} and limit {limit}: their product must be at most {STEEPEST}"
+                    )));
+                }
+                Ok(())
+            }
+            SpringLaw::Cubic {
+                quadratic,
+                cubic,
+                limit,
+            } => {
+                above_zero("limit", limit)?;
+                if !(quadratic * quadratic <= 3.0 * cubic && cubic.is_finite()) {
+                    return Err(Error::invalid(format!(
+                        "quadratic of spring_law is {quadratic} and cubic {cubic}: quadratic² must be at most 3 cubic, and finite, \
+                         or longer springs would pull less"
+                    )));
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// What the pull, its slope and the energy are beyond those of a linear spring, up to the limit.
+    fn below_limit(&self, strain: f64) -> [f64; 3] {
+        match *self {
+            SpringLaw::Exponential { steepness, .. } if strain > 0.0 => {
+                let steepness = f64::from(steepness);
+                let slope = libm::expm1(steepness * strain);
+                let pull = slope / steepness - strain;
+                [pull, slope, pull / steepness - 0.5 * strain * strain]
+            }
+            SpringLaw::Cubic { quadratic, cubic, .. } => {
+                let (a, b) = (f64::from(quadratic), f64::from(cubic));
+                let square = strain * strain;
+                [
+                    square * (a + b * strain),
+                    strain * (2.0 * a + 3.0 * b * strain),
+                    square * strain * (a / 3.0 + 0.25 * b * strain),
+                ]
+            }
+            _ => [0.0; 3],
+        }
+    }
+
+    fn limit(&self) -> f64 {
+        match *self {
+            SpringLaw::Linear => f64::INFINITY,
+            SpringLaw::Exponential { limit, .. } | SpringLaw::Cubic { limit, .. } => f64::from(limit),
+        }
+    }
+
+    /// What the pull, its slope and the energy are beyond those of a linear spring.
+    fn beyond(&self, strain: f64) -> [f64; 3] {
+        let limit = self.limit();
+        if strain <= limit {
+            return self.below_limit(strain);
+        }
+        let [pull, slope, energy] = self.below_limit(limit);
+        let more = strain - limit;
+        [pull + slope * more, slope, energy + more * (pull + 0.5 * slope * more)]
+    }
+
+    /// How the energy changes where the strain becomes so much larger.
+    fn change(&self, strain: f64, more: f64) -> f64 {
+        let steepness = match *self {
+            SpringLaw::Exponential { steepness, .. } => f64::from(steepness).max(1.0),
+            _ => 1.0,
+        };
+        if more.abs() * steepness > 0.05 {
+            return self.beyond(strain + more)[2] - self.beyond(strain)[2];
+        }
+        // The pull over the way, by Gauss's rule of three points: a difference of energies would lose the last digits.
+        let points = [0.5 - 0.15_f64.sqrt(), 0.5, 0.5 + 0.15_f64.sqrt()];
+        let [first, middle, last] = points.map(|point| self.beyond(strain + point * more)[0]);
+        more * (5.0 * (first + last) + 8.0 * middle) / 18.0
+    }
+
+    /// The most by which a spring is stiffer than a linear one.
+    fn stiffest(&self) -> f64 {
+        let ends = [-1.0, self.limit()].map(|strain| self.below_limit(strain)[1]);
+        ends.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// What springs of a law do beyond what linear ones do; shapes are their rest lengths, m.
+#[derive(Debug)]
+struct Stiffening {
+    law: SpringLaw,
+    stiffest: f64,
+}
+
+pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
+    let law = definition.spring_law;
+    law.check()?;
+    if law == SpringLaw::Linear {
+        return Ok(None);
+    }
+    if springs.is_empty() {
+        return Err(Error::invalid("spring_law is given while the body has no springs"));
+    }
+    let stiffest = law.stiffest();
+    let mut stiffening = memory::reserved(springs.len())?;
+    // A spring without a length at rest has no strain.
+    let there = springs
+        .iter()
+        .filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
+    for spring in there {
+        let mut nodes = spring.nodes.map(|node| order.own(node));
+        nodes.sort_unstable();
+        stiffening.push(Stencil {
+            nodes,
+            stiffness: spring.stiffness,
+            shape: spring.rest_length,
+        });
+    }
+    let law = Stiffening { law, stiffest };
+    Ok(Some(Box::new(Stencils::new(
+        law,
+        stiffening,
+        definition.positions.len(),
+    )?)))
+}
+
+/// A spring where it is.
+struct Stretched {
+    way: DVec3,
+    length: f64,
+    rest_length: f64,
+    strain: f64,
+}
+
+impl Stretched {
+    fn new(rest_length: f32, [from, to]: &[DVec3; 2]) -> Self {
+        let (way, rest_length) = (*to - *from, f64::from(rest_length));
+        let length = way.length();
+        Self {
+            way,
+            length,
+            rest_length,
+            strain: length / rest_length - 1.0,
+        }
+    }
+
+    /// Where both nodes are at the same place it points along x, from the node with the lower number.
+    fn direction(&self) -> DVec3 {
+        if self.length > 0.0 {
+            self.way / self.length
+        } else {
+            DVec3::X
+        }
+    }
+}
+
+impl Stiffening {
+    fn stiffness(&self, spring: &Stretched, is_exact: bool) -> DMat3 {
+        let [pull, slope, _] = self.law.beyond(spring.strain);
+        // A pressed spring pushes its ends sideways.
+        let across = if spring.length > 0.0 && (is_exact || spring.strain > 0.0) {
+            pull * spring.rest_length / spring.length
+        } else {
+            0.0
+        };
+        directed(spring.direction(), slope, across)
+    }
+}
+
+impl Law<2> for Stiffening {
+    type Shape = f32;
+
+    fn energy(&self, &rest_length: &f32, places: &[DVec3; 2]) -> f64 {
+        let spring = Stretched::new(rest_length, places);
+        spring.rest_length.powi(2) * self.law.beyond(spring.strain)[2]
+    }
+
+    fn change(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
+        let spring = Stretched::new(rest_length, places);
+        let more = ways[1] - ways[0];
+        let then = spring.way + more;
+        let both = spring.length + then.length();
+        if both == 0.0 {
+            return 0.0;
+        }
+        let longer = more.dot(spring.way + then) / both;
+        spring.rest_length.powi(2) * self.law.change(spring.strain, longer / spring.rest_length)
+    }
+
+    fn forces(&self, &rest_length: &f32, places: &[DVec3; 2]) -> [DVec3; 2] {
+        let spring = Stretched::new(rest_length, places);
+        let pull = spring.direction() * (spring.rest_length * self.law.beyond(spring.strain)[0]);
+        [pull, -pull]
+    }
+
+    fn changes(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
+        let change = self.stiffness(&Stretched::new(rest_length, places), false) * (ways[1] - ways[0]);
+        [change, -change]
+    }
+
+    fn blocks(&self, &rest_length: &f32, places: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
+        let block = self.stiffness(&Stretched::new(rest_length, places), is_exact);
+        [[block, -block], [-block, block]]
+    }
+
+    fn rate(&self, _rest_length: &f32, inverse_masses: [f64; 2]) -> f64 {
+        self.stiffest * (inverse_masses[0] + inverse_masses[1])
+    }
+}

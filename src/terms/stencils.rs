@@ -1,0 +1,314 @@
+//! Terms of a few nodes each, kept by the tiles that have one of their nodes.
+
+use std::fmt::Debug;
+use std::ops::Range;
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::{Blocks, Term};
+use crate::body::{Vectors, View};
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::memory;
+use crate::solver::Masses;
+use crate::springs::{TILE, TileForces, tile_count};
+
+/// What a term does whose stiffness is 1.
+pub(super) trait Law<const N: usize>: Debug + Send + Sync {
+    /// What the term of some nodes is at rest.
+    type Shape: Copy + Debug + Send + Sync;
+
+    fn energy(&self, shape: &Self::Shape, places: &[DVec3; N]) -> f64;
+
+    /// How the energy changes where nodes go these ways, to the last digits of the change.
+    fn change(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> f64;
+
+    /// The force on each node.
+    fn forces(&self, shape: &Self::Shape, places: &[DVec3; N]) -> [DVec3; N];
+
+    /// How the forces change where nodes go these ways, in the first order, by the blocks that are positive semidefinite.
+    fn changes(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> [DVec3; N];
+
+    /// How much the force on each node lessens with the place of each: exactly, or what is positive semidefinite of it.
+    fn blocks(&self, shape: &Self::Shape, places: &[DVec3; N], is_exact: bool) -> [[DMat3; N]; N];
+
+    /// What bounds the squares of frequencies as long as it does not stiffen.
+    fn rate(&self, shape: &Self::Shape, inverse_masses: [f64; N]) -> f64;
+
+    /// By how much it is stiffer than that, 1: not at all.
+    fn stiffening(&self, _shape: &Self::Shape, _places: &[DVec3; N]) -> f64 {
+        1.0
+    }
+
+    /// Whether two of its nodes have an edge.
+    fn is_edge(&self, _a: usize, _b: usize) -> bool {
+        N > 1
+    }
+
+    /// Nodes are given from here on.
+    fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
+}
+
+/// A term: some nodes, how stiff it is, and what it is at rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stencil<T, const N: usize> {
+    pub nodes: [u32; N],
+    /// 0: it was taken away.
+    pub stiffness: f32,
+    pub shape: T,
+}
+
+/// Terms of one law.
+#[derive(Debug)]
+pub(super) struct Stencils<L: Law<N>, const N: usize> {
+    law: L,
+    /// By the first of their tiles.
+    all: Vec<Stencil<L::Shape, N>>,
+    /// Where the terms of each tile begin among those that begin in it, and those that only end in it.
+    starts: Vec<u32>,
+    visitor_starts: Vec<u32>,
+    visitors: Vec<u32>,
+}
+
+fn tile_of(node: u32) -> usize {
+    node as usize / TILE
+}
+
+impl<L: Law<N>, const N: usize> Stencils<L, N> {
+    pub fn new(law: L, mut all: Vec<Stencil<L::Shape, N>>, node_count: usize) -> Result<Self> {
+        let tiles = |stencil: &Stencil<L::Shape, N>| {
+            let mut tiles = stencil.nodes.map(tile_of);
+            tiles.sort_unstable();
+            tiles
+        };
+        all.sort_unstable_by_key(|stencil| {
+            let mut nodes = stencil.nodes;
+            nodes.sort_unstable();
+            nodes
+        });
+        let count = tile_count(node_count);
+        let mut starts = memory::filled(0, count + 1)?;
+        let mut visits: Vec<(u32, u32)> = Vec::new();
+        for (index, stencil) in (0..).zip(&all) {
+            let tiles = tiles(stencil);
+            starts[tiles[0] + 1] += 1;
+            for pair in tiles.windows(2).filter(|pair| pair[0] != pair[1]) {
+                memory::push(&mut visits, (pair[1] as u32, index))?;
+            }
+        }
+        visits.sort_unstable();
+        let mut visitor_starts = memory::filled(0, count + 1)?;
+        visits
+            .iter()
+            .for_each(|(tile, _)| visitor_starts[*tile as usize + 1] += 1);
+        for starts in [&mut starts, &mut visitor_starts] {
+            for tile in 1..=count {
+                starts[tile] += starts[tile - 1];
+            }
+        }
+        let mut visitors = memory::reserved(visits.len())?;
+        visitors.extend(visits.iter().map(|&(_, index)| index));
+        Ok(Self {
+            law,
+            all,
+            starts,
+            visitor_starts,
+            visitors,
+        })
+    }
+
+    /// Those that begin in a tile.
+    fn beginning(&self, tile: usize) -> Range<usize> {
+        self.starts[tile] as usize..self.starts[tile + 1] as usize
+    }
+
+    /// All that have a node of a tile.
+    fn of_tile(&self, tile: usize) -> impl Iterator<Item = usize> {
+        let visitors = self.visitor_starts[tile] as usize..self.visitor_starts[tile + 1] as usize;
+        let visitors = self.visitors[visitors].iter().map(|&index| index as usize);
+        self.beginning(tile).chain(visitors)
+    }
+
+    fn there(&self) -> impl Iterator<Item = &Stencil<L::Shape, N>> {
+        self.all.iter().filter(|stencil| stencil.stiffness > 0.0)
+    }
+}
+
+impl<T, const N: usize> Stencil<T, N> {
+    #[inline(always)]
+    fn seen(&self, vectors: &View) -> [DVec3; N] {
+        self.nodes.map(|node| vectors.get(node as usize).as_dvec3())
+    }
+
+    #[inline(always)]
+    fn at(&self, at: &dyn Fn(usize) -> DVec3) -> [DVec3; N] {
+        self.nodes.map(|node| at(node as usize))
+    }
+
+    /// Adds what its nodes of a tile are given by a stiffness of 1.
+    #[inline(always)]
+    fn give(&self, nodes: &Range<usize>, gifts: &[DVec3; N], sums: &mut TileForces) {
+        for (&node, &gift) in self.nodes.iter().zip(gifts) {
+            let place = (node as usize).wrapping_sub(nodes.start);
+            if place < nodes.len() {
+                let more: Vec3 = (gift * f64::from(self.stiffness)).as_vec3();
+                sums.set(place, sums.get(place) + more);
+            }
+        }
+    }
+}
+
+impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
+    fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) -> f64 {
+        let mut stiffening = 1.0_f64;
+        for index in self.of_tile(tile) {
+            let stencil = &self.all[index];
+            if stencil.stiffness > 0.0 {
+                let places = stencil.seen(&positions);
+                stencil.give(&nodes, &self.law.forces(&stencil.shape, &places), forces);
+                stiffening = stiffening.max(self.law.stiffening(&stencil.shape, &places));
+            }
+        }
+        stiffening
+    }
+
+    fn add_changes(&self, tile: usize, nodes: Range<usize>, [positions, ways]: [View; 2], changes: &mut TileForces) {
+        for index in self.of_tile(tile) {
+            let stencil = &self.all[index];
+            if stencil.stiffness > 0.0 {
+                let (places, ways) = (stencil.seen(&positions), stencil.seen(&ways));
+                stencil.give(&nodes, &self.law.changes(&stencil.shape, &places, &ways), changes);
+            }
+        }
+    }
+
+    fn energy(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64 {
+        let there = self.all[self.beginning(tile)].iter();
+        there
+            .filter(|stencil| stencil.stiffness > 0.0)
+            .map(|stencil| f64::from(stencil.stiffness) * self.law.energy(&stencil.shape, &stencil.at(at)))
+            .sum()
+    }
+
+    fn show_forces(&self, at: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(usize, DVec3)) {
+        for stencil in self.there() {
+            let forces = self.law.forces(&stencil.shape, &stencil.at(at));
+            for (&node, force) in stencil.nodes.iter().zip(forces) {
+                see(node as usize, force * f64::from(stencil.stiffness));
+            }
+        }
+    }
+
+    fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64)) {
+        for stencil in self.there() {
+            let change = self.law.change(&stencil.shape, &stencil.at(at), &stencil.at(more));
+            see(f64::from(stencil.stiffness) * change);
+        }
+    }
+
+    fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks)) {
+        let mut shown = Blocks::default();
+        for stencil in self.there() {
+            let blocks = self.law.blocks(&stencil.shape, &stencil.at(at), is_exact);
+            for (shown, blocks) in shown.iter_mut().zip(blocks) {
+                for (shown, block) in shown.iter_mut().zip(blocks) {
+                    *shown = block * f64::from(stencil.stiffness);
+                }
+            }
+            see(&stencil.nodes, &shown);
+        }
+    }
+
+    fn show_nodes(&self, see: &mut dyn FnMut(&[u32])) {
+        self.there().for_each(|stencil| see(&stencil.nodes));
+    }
+
+    fn stiffening(&self, positions: &Vectors) -> f64 {
+        let positions = positions.view();
+        let stiffening = |stencil: &Stencil<_, N>| self.law.stiffening(&stencil.shape, &stencil.seen(&positions));
+        self.there().map(stiffening).fold(1.0, f64::max)
+    }
+
+    fn add_rates(&self, masses: &Masses, rates: &mut [f32]) {
+        for stencil in self.there() {
+            let inverse_masses = stencil.nodes.map(|node| f64::from(masses.inverse(node as usize)));
+            let rate = f64::from(stencil.stiffness) * self.law.rate(&stencil.shape, inverse_masses);
+            for (&node, inverse_mass) in stencil.nodes.iter().zip(inverse_masses) {
+                if inverse_mass > 0.0 {
+                    rates[node as usize] += rate as f32;
+                }
+            }
+        }
+    }
+
+    fn remove_edge(&mut self, a: u32, b: u32) -> usize {
+        let tile = tile_of(a);
+        let beginning = self.beginning(tile);
+        let visitors = self.visitor_starts[tile] as usize..self.visitor_starts[tile + 1] as usize;
+        let Self {
+            law,
+            all,
+            visitors: of_tiles,
+            ..
+        } = self;
+        let mut removed = 0;
+        let mut look = |stencil: &mut Stencil<L::Shape, N>| {
+            let place = |node: u32| stencil.nodes.iter().position(|&other| other == node);
+            if stencil.stiffness > 0.0
+                && let (Some(a), Some(b)) = (place(a), place(b))
+                && law.is_edge(a, b)
+            {
+                stencil.stiffness = 0.0;
+                removed += 1;
+            }
+        };
+        all[beginning].iter_mut().for_each(&mut look);
+        of_tiles[visitors]
+            .iter()
+            .for_each(|&index| look(&mut all[index as usize]));
+        removed
+    }
+
+    fn move_origin(&mut self, origin: DVec3) {
+        for stencil in &mut self.all {
+            self.law.move_origin(&mut stencil.shape, origin);
+        }
+    }
+
+    fn holds(&self, node: usize) -> bool {
+        // A term of a single node is one between it and the world.
+        N == 1
+            && self.all[self.beginning(tile_of(node as u32))]
+                .binary_search_by_key(&(node as u32), |stencil| stencil.nodes[0])
+                .is_ok()
+    }
+
+    fn hash(&self, hasher: &mut StateHasher) {
+        for stencil in &self.all {
+            hasher.write_floats(&[stencil.stiffness]);
+        }
+    }
+}
+
+/// What a sum of places weighted by numbers that add up to 0 is, given the numbers of all but the first.
+#[inline(always)]
+pub(super) fn weighted(weights: &[f32; 3], [first, others @ ..]: &[DVec3; 4]) -> DVec3 {
+    let terms = weights.iter().zip(others);
+    terms
+        .map(|(&weight, &place)| (place - *first) * f64::from(weight))
+        .sum()
+}
+
+/// The share that each place has in such a sum.
+#[inline(always)]
+pub(super) fn shares(weights: &[f32; 3]) -> [f64; 4] {
+    let [a, b, c] = weights.map(f64::from);
+    [-(a + b + c), a, b, c]
+}
+
+/// The matrix that has `along` in a direction, and `across` at right angles to it.
+pub(super) fn directed(direction: DVec3, along: f64, across: f64) -> DMat3 {
+    let scaled = direction * (along - across);
+    DMat3::from_cols(scaled * direction.x, scaled * direction.y, scaled * direction.z)
+        + DMat3::from_diagonal(DVec3::splat(across))
+}

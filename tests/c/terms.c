@@ -1,0 +1,104 @@
+/* What a body may be asked for beside its springs: home springs, bending, springs that stiffen, fibres; and what is refused of it. */
+#include "scene.h"
+
+/* A tetrahedron of 1 m, 0.5 kg a node; its triangles turn about their edges. */
+static const float CORNERS[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+static const uint32_t TETRAHEDRON[] = {0, 1, 2, 3};
+static const uint32_t FACES[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+
+static sinew_body_def a_tetrahedron(void)
+{
+    sinew_body_def def;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    def.positions = CORNERS, def.node_count = 4;
+    def.tetrahedra = TETRAHEDRON, def.tetrahedron_count = 1;
+    def.triangles = FACES, def.triangle_count = 4;
+    def.node_mass = 0.5f;
+    def.stiffness = 10.0f;
+    return def;
+}
+
+static double elastic_energy(const sinew_body_def *def, float factor)
+{
+    sinew_world *world = a_world(0.0f);
+    sinew_body_id body = {0, 0};
+    sinew_energy energy;
+    float positions[12];
+    size_t i;
+    MUST(sinew_body_create(world, def, &body));
+    for (i = 0; i < 12; i++)
+        positions[i] = factor * CORNERS[i];
+    MUST(sinew_body_set_positions(world, body, positions, 4));
+    energy.struct_size = sizeof energy;
+    MUST(sinew_body_get_energy(world, body, &energy));
+    sinew_world_destroy(world);
+    return energy.elastic;
+}
+
+static void each_adds_the_energy_that_it_should(void)
+{
+    static const float along_x[] = {1, 0, 0}, homes[] = {0, 2, 2, 2}, fibres[] = {600};
+    sinew_body_def def = a_tetrahedron();
+    const double springs = elastic_energy(&def, 1.5f);
+    CHECK_NEAR(springs, 0.5 * 10 * 0.25 * (3 * 1 + 3 * 2), 1e-5);
+    def.home_stiffnesses = homes;
+    CHECK_NEAR(elastic_energy(&def, 1.5f) - springs, 3 * 0.5 * 2 * 0.25, 1e-5);
+    def = a_tetrahedron();
+    def.spring_law = SINEW_SPRING_LAW_CUBIC;
+    def.spring_cubic = 4.0f, def.spring_limit = 1.0f;
+    CHECK_NEAR(elastic_energy(&def, 1.5f) - springs, 10.0 * 0.0625 * (3 * 1 + 3 * 2), 1e-5);
+    def = a_tetrahedron();
+    def.fibre_directions = along_x, def.fibre_stiffnesses = fibres;
+    CHECK_NEAR(elastic_energy(&def, 1.5f) - springs, 600.0 / 6 / 2 * 0.25, 1e-4);
+    def = a_tetrahedron();
+    def.bending_stiffness = 3.0f;
+    CHECK_NEAR(elastic_energy(&def, 1.0f), 0.0, 1e-9);
+    CHECK(elastic_energy(&def, 1.5f) > springs);
+}
+
+static void refused(sinew_body_def def, const char *name)
+{
+    sinew_world *world = a_world(0.0f);
+    sinew_body_id body = {0, 0};
+    char message[512];
+    CHECK(sinew_body_create(world, &def, &body) == SINEW_STATUS_INVALID_ARGUMENT);
+    sinew_last_error(message, sizeof message);
+    CHECK(strstr(message, name) != NULL);
+    sinew_world_destroy(world);
+}
+
+static void what_is_wrong_is_named(void)
+{
+    static const float too_long[] = {2, 0, 0};
+    sinew_body_def def = a_tetrahedron();
+    def.home_stiffness = -1.0f;
+    refused(def, "home_stiffness");
+    def = a_tetrahedron(), def.bending_stiffness = -1.0f;
+    refused(def, "bending_stiffness");
+    def = a_tetrahedron(), def.spring_law = 3;
+    refused(def, "spring_law is 3");
+    def = a_tetrahedron(), def.spring_steepness = 3.0f;
+    refused(def, "spring_steepness is 3");
+    def = a_tetrahedron(), def.spring_law = SINEW_SPRING_LAW_EXPONENTIAL, def.spring_cubic = 1.0f;
+    refused(def, "spring_cubic is 1");
+    def = a_tetrahedron(), def.fibre_directions = too_long;
+    refused(def, "fibre_directions[0]");
+    def = a_tetrahedron(), def.fibre_stiffness = 5.0f;
+    refused(def, "fibre_stiffness");
+}
+
+static void an_older_program_knows_none_of_it(void)
+{
+    sinew_body_def def = a_tetrahedron();
+    def.bending_stiffness = -1.0f;
+    def.struct_size = offsetof(sinew_body_def, home_stiffnesses);
+    CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
+}
+
+int main(void)
+{
+    each_adds_the_energy_that_it_should();
+    what_is_wrong_is_named();
+    an_older_program_knows_none_of_it();
+    return checked("terms beside springs are what they say");
+}
