@@ -295,15 +295,17 @@ typedef struct sinew_world_def {
    */
   uint32_t thread_count;
   /**
-   * 0, the default: as many as stability needs; n: exactly n per step.
+   * 0, the default: as many as stability needs; n: exactly n per step, but for bodies of IMPLICIT and NEWTON near a tool,
+   * whose substeps are of 1 ms at most there, and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
    */
   uint32_t substeps;
   /**
-   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE.
+   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, is no
+   * such need: near a tool a long step of theirs takes as many parts, and as much longer.
    */
   uint32_t max_substeps;
   /**
-   * m; 0, the default: off; above 0, with substeps 0: a step's own position error stays below it.
+   * m; 0, the default: off, as it is with fixed substeps; above 0, with substeps 0: a step's own position error stays below it.
    */
   float tolerance;
   /**
@@ -342,7 +344,8 @@ typedef struct sinew_step_report {
    */
   uint32_t substeps;
   /**
-   * s: the longest explicit substep that is stable now, over all bodies; infinity: no limit.
+   * s: the longest explicit substep that is stable now, over all bodies; infinity: no limit, as for bodies of IMPLICIT and
+   * NEWTON.
    */
   float stable_substep;
   /**
@@ -376,7 +379,8 @@ typedef struct sinew_body_def {
    */
   size_t node_count;
   /**
-   * node_count floats, kg, 0: pinned for good; nullable: node_mass for all.
+   * node_count floats, kg, at least 1e-37, or 0: pinned for good; nullable: node_mass for all. With IMPLICIT a body whose masses
+   * over the square of a step's length are no finite floats is put back.
    */
   const float *masses;
   /**
@@ -384,7 +388,7 @@ typedef struct sinew_body_def {
    */
   const float *node_dampings;
   /**
-   * kg, above 0; no default. 0 where density gives each node its mass.
+   * kg, at least 1e-37; no default. 0 where density gives each node its mass.
    */
   float node_mass;
   /**
@@ -463,7 +467,7 @@ typedef struct sinew_body_def {
   /**
    * IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
    * long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
-   * Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least.
+   * Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least. At most 1 000 000.
    */
   uint32_t iterations;
   /**
@@ -593,7 +597,7 @@ typedef struct sinew_body_id {
 
 /**
  * Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
- * set_positions or set_velocities, the next change of topology of that body, or its end.
+ * set_positions, set_velocities or rest_state, the next change of topology of that body, or its end.
  */
 typedef struct sinew_vec3_view {
   /**
@@ -659,7 +663,7 @@ typedef struct sinew_storage_report {
 } sinew_storage_report;
 
 /**
- * How a body's solver took the last step.
+ * How a body's solver took the last step: not one that was refused, or for which the body was put back.
  */
 typedef struct sinew_solver_report {
   /**
@@ -1374,7 +1378,7 @@ sinew_status sinew_rest_state_def_init(struct sinew_rest_state_def *def, size_t 
 /**
  * Moves the free nodes of a body, whatever its solver, to the nearest place downhill where it is at rest under gravity, its
  * pins where they are, and the forces applied since the last step, which stay pending. Velocities become zero, and
- * sinew_body_get_pin_force tells what holds the pins there. It is no step: it takes memory and may take seconds. Tools are not
+ * sinew_body_get_pin_force tells what holds the pins there. Views of the body's positions and velocities end. It is no step: it takes memory and may take seconds. Tools are not
  * taken into account. How a part that no pin holds lies and is turned as a whole is as it happens to be. `def` is nullable: the
  * defaults; `report` is nullable; `report->struct_size` is set by the caller.
  *

@@ -24,9 +24,11 @@ pub struct WorldDefinition {
     pub gravity: Vec3,
     /// 1: the caller's thread alone; 0: one per core; at most 256. What comes of a step is the same for any number.
     pub thread_count: u32,
-    /// 0: as many as stability needs; n: exactly n per step.
+    /// 0: as many as stability needs; n: exactly n per step, but for bodies of [`Solver::Implicit`](crate::Solver::Implicit) and
+    /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, and where a substep of theirs
+    /// gains energy: then they are cut again, to 4096 in all.
     pub substeps: u32,
-    /// A step that needs more is [`Error::Unstable`]; at least 1.
+    /// A step that needs more is [`Error::Unstable`]; at least 1. What is cut as above is no such need.
     pub max_substeps: u32,
     /// Metres; 0: off; above 0, with `substeps` 0: a step's own position error stays below it.
     pub tolerance: f32,
@@ -287,7 +289,12 @@ impl World {
             gravity: definition.gravity,
             substeps: definition.substeps,
             max_substeps: definition.max_substeps,
-            tolerance: definition.tolerance,
+            // Fixed substeps are taken as they are.
+            tolerance: if definition.substeps == 0 {
+                definition.tolerance
+            } else {
+                0.0
+            },
             tools: paths,
         };
         let shared = is_worth_sharing(bodies);

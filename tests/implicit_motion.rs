@@ -340,3 +340,43 @@ fn the_motion_turns_and_moves_with_the_scene() {
         }
     }
 }
+
+/// In a step of one equation a pin without mass is held against the spring at it, as that is at the end: however often the step was
+/// tried, which chains that are flung about in steps of any length have happen.
+#[test]
+fn what_holds_a_pin_is_counted_once() {
+    let mut looked_at = 0;
+    for seed in 0..100 {
+        let mut random = Random::new(seed);
+        let stiffness = 10_f32.powf(1.0 + 2.0 * random.signed());
+        let mut parts = Parts::chain(3 + random.below(6), Vec3::X * 0.1, 0.01, stiffness);
+        parts.masses[0] = 0.0;
+        let solver = SOLVERS[seed as usize % 2];
+        let gravity = if random.below(2) == 0 { DOWN } else { Vec3::ZERO };
+        let mut scene = Scene::with(&parts, under(gravity), |definition| BodyDefinition {
+            solver,
+            ..definition
+        });
+        let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 3.0 * random.vector()).collect();
+        scene.body_mut().set_velocities(&velocities).expect("velocities");
+        let longest = 10_f32.powf(-1.5 + random.signed());
+        for step in 0..60 {
+            let h = longest * (1.0 + 0.6 * random.signed());
+            if scene.step(h).substeps > 1 {
+                continue;
+            }
+            looked_at += 1;
+            let positions = scene.positions();
+            let way = positions[1] - positions[0];
+            let stretch = way.length() - f64::from(parts.rest_lengths[0]);
+            let expected = way.normalize() * (-f64::from(stiffness) * stretch);
+            let found = scene.body().pin_force(0).expect("a pin").as_dvec3();
+            let error = found.distance(expected) / expected.length().max(1e-3);
+            assert!(
+                error < 0.05,
+                "{solver:?}, seed {seed}, step {step}: {found} N for {expected} N"
+            );
+        }
+    }
+    assert!(looked_at > 3000, "{looked_at} steps");
+}

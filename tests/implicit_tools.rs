@@ -206,3 +206,21 @@ fn crushed_flat_a_step_to_a_tolerance_ends() {
         }
     }
 }
+
+/// A plane that goes aside faster than a number holds, under what lies on it with friction: the body is put back.
+#[test]
+fn a_plane_that_jerks_away_puts_the_body_back() {
+    for solver in [Solver::Implicit, Solver::Newton] {
+        let mut press = Press::new(solver, Storage::Packed, 0.5);
+        press.close(1e-3, 0.05, 0.0);
+        let body = |press: &Press| press.world.body(press.body).expect("the body").positions().to_vec();
+        let before = body(&press);
+        for (side, tool) in press.planes {
+            let aside = Vec3::new(3e38, side * 0.025, 0.0);
+            press.world.set_pose(tool, aside, None).expect("a pose");
+        }
+        let report = press.world.step(1e-3).expect("a step");
+        assert_eq!(report.bodies_restored, 1, "{solver:?}: {report:?}");
+        assert_eq!(body(&press), before, "{solver:?}");
+    }
+}

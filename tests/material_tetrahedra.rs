@@ -3,11 +3,11 @@
 
 mod support;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, BodyId, Kernel, Material, Model, RestStateDefinition, Solver, Storage, Values, World,
-    WorldDefinition,
+    BodyDefinition, BodyId, Kernel, Material, Model, Pose, RestStateDefinition, Shape, Solver, Storage, ToolDefinition,
+    Values, World, WorldDefinition,
 };
 use support::bodies::{FREE, Random};
 
@@ -357,4 +357,204 @@ fn a_free_body_keeps_its_energy_and_momentum() {
         worst = worst.max((scene.energy(Vec3::ZERO) / before - 1.0).abs());
     }
     assert!(worst < 0.05, "energy changed by {worst}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    // More than one part, and several tiles.
+    let mesh = block([0.1, 0.1, 0.1], [11, 11, 11], 7);
+    for (solver, nu) in [(Solver::Verlet, 0.3), (Solver::Verlet, 0.45), (Solver::Implicit, 0.45)] {
+        let hashes = [1, 2, 5].map(|thread_count| {
+            let mut scene = scene(
+                &mesh,
+                WorldDefinition {
+                    thread_count,
+                    gravity: Vec3::NEG_Y * 9.81,
+                    ..FREE
+                },
+                &BodyDefinition {
+                    material: Some(tissue(nu)),
+                    solver,
+                    ..BodyDefinition::default()
+                },
+            );
+            scene.pin(|position| position.x < -0.049);
+            for _ in 0..5 {
+                scene.world.step(1e-2).expect("a step");
+            }
+            scene.world.state_hash()
+        });
+        assert_eq!(hashes[0], hashes[1], "{solver:?}, nu {nu}");
+        assert_eq!(hashes[0], hashes[2], "{solver:?}, nu {nu}");
+    }
+}
+
+#[test]
+fn a_removed_edge_takes_its_tetrahedra_with_it() {
+    let mesh = block([0.06, 0.04, 0.04], [6, 4, 4], 10);
+    let edge = [mesh.tetrahedra[200][1], mesh.tetrahedra[200][3]];
+    let has_edge = |corners: &&[u32; 4]| edge.iter().all(|node| corners.contains(node));
+    let mut left = mesh.clone();
+    left.tetrahedra = mesh
+        .tetrahedra
+        .iter()
+        .filter(|corners| !has_edge(corners))
+        .copied()
+        .collect();
+    assert!(left.tetrahedra.len() < mesh.tetrahedra.len());
+    for solver in SOLVERS {
+        for nu in [0.3, 0.45] {
+            let definition = BodyDefinition {
+                material: Some(Material {
+                    density: 0.0,
+                    ..tissue(nu)
+                }),
+                masses: Values::Uniform(1e-3),
+                solver,
+                ..BodyDefinition::default()
+            };
+            let mut cut = scene(&mesh, FREE, &definition);
+            let mut fresh = scene(&left, FREE, &definition);
+            let body = cut.world.body_mut(cut.body).expect("the body");
+            body.remove_spring(edge[0], edge[1]).expect("an edge");
+            assert!(body.remove_spring(edge[0], edge[1]).is_err(), "it is gone");
+            let mut random = Random::new(11);
+            let velocities: Vec<Vec3> = mesh.positions.iter().map(|_| random.vector()).collect();
+            for scene in [&mut cut, &mut fresh] {
+                let body = scene.world.body_mut(scene.body).expect("the body");
+                body.set_velocities(&velocities).expect("velocities");
+                for _ in 0..10 {
+                    scene.world.step(1e-3).expect("a step");
+                }
+            }
+            // Sums are added up in another order.
+            let off = cut
+                .positions()
+                .iter()
+                .zip(fresh.positions())
+                .map(|(a, b)| a.distance(b))
+                .fold(0.0, f64::max);
+            assert!(off < 1e-6, "{solver:?}, nu {nu}: {off} m");
+        }
+    }
+}
+
+#[test]
+fn a_plate_feels_the_same_whatever_the_solver() {
+    const THICKNESS: f32 = 0.04;
+    let mesh = block([THICKNESS; 3], [4; 3], 13);
+    for nu in [0.3, 0.45] {
+        let forces = [
+            (Solver::Verlet, 1e-3),
+            (Solver::Implicit, 1e-2),
+            (Solver::Newton, 1.0 / 60.0),
+        ]
+        .map(|(solver, dt)| {
+            let mut scene = scene(
+                &mesh,
+                FREE,
+                &BodyDefinition {
+                    material: Some(tissue(nu)),
+                    node_dampings: Values::Uniform(0.02),
+                    solver,
+                    ..BodyDefinition::default()
+                },
+            );
+            scene.pin(|position| position.y < -0.49 * f64::from(THICKNESS));
+            let plate = ToolDefinition {
+                pose: Pose {
+                    position: Vec3::Y * 0.5 * THICKNESS,
+                    orientation: Quat::from_rotation_x(std::f32::consts::PI),
+                },
+                ..ToolDefinition::new(Shape::Plane)
+            };
+            let plate = scene.world.create_tool(&plate).expect("a tool");
+            let (press, hold) = (0.2_f32, 0.6);
+            let mut time = 0.0_f32;
+            while time < press + hold {
+                time += dt;
+                let down = 0.1 * THICKNESS * (time / press).min(1.0);
+                scene
+                    .world
+                    .set_pose(plate, Vec3::Y * (0.5 * THICKNESS - down), None)
+                    .expect("a pose");
+                scene.world.step(dt).expect("a step");
+            }
+            scene.world.wrench(plate).expect("the plate").0.y
+        });
+        for force in forces {
+            assert!((force / forces[0] - 1.0).abs() < 0.01, "nu {nu}: {forces:?}");
+        }
+        // As much as a bar of free sides would take, or more, since its foot is held.
+        let least = YOUNG * 0.1 * THICKNESS * THICKNESS;
+        assert!(
+            forces[0] > 0.9 * least && forces[0] < 2.5 * least,
+            "nu {nu}: {forces:?}, {least} for a free bar"
+        );
+    }
+}
+
+#[test]
+fn what_tetrahedra_cannot_be_is_refused() {
+    let mesh = block([0.06, 0.04, 0.04], [3, 2, 2], 1);
+    let definition = BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(tissue(0.3)),
+        ..BodyDefinition::default()
+    };
+    let mut flat = mesh.positions.clone();
+    let corners = mesh.tetrahedra[5].map(|node| node as usize);
+    flat[corners[3]] = (flat[corners[0]] + flat[corners[1]] + flat[corners[2]]) / 3.0;
+    for (named, refused) in [
+        (
+            "poisson_ratio is 0.5",
+            BodyDefinition {
+                material: Some(tissue(0.5)),
+                ..definition
+            },
+        ),
+        (
+            "poisson_ratio is -0.1",
+            BodyDefinition {
+                material: Some(tissue(-0.1)),
+                ..definition
+            },
+        ),
+        (
+            "tetrahedron_count is 0",
+            BodyDefinition {
+                tetrahedra: &[],
+                triangles: &mesh.triangles,
+                ..definition
+            },
+        ),
+        (
+            "volume_stiffness is 1 Pa",
+            BodyDefinition {
+                volume_stiffness: 1.0,
+                ..definition
+            },
+        ),
+        (
+            "tetrahedra[5]",
+            BodyDefinition {
+                positions: &flat,
+                ..definition
+            },
+        ),
+        (
+            "volume_stiffness is -2",
+            BodyDefinition {
+                material: None,
+                masses: Values::Uniform(1.0),
+                volume_stiffness: -2.0,
+                ..definition
+            },
+        ),
+    ] {
+        let mut world = World::new(FREE).expect("a world");
+        let error = world.create_body(&refused).expect_err(named).to_string();
+        assert!(error.contains(named), "{named}: {error}");
+    }
 }

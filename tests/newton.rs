@@ -187,6 +187,12 @@ fn any_number_of_threads_and_a_step_put_back_lead_to_the_same_state() {
         );
         scene.body_mut().pin(0).expect("a node");
         scene.run(1.0 / 60.0, 3);
+        // A way with more energy than a number holds: put back.
+        let before = scene.positions();
+        scene.body_mut().move_pin(0, Vec3::X * 1e30).expect("a pin");
+        assert_eq!(scene.world.step(1.0 / 60.0).expect("a step").bodies_restored, 1);
+        assert_eq!(scene.positions(), before);
+        scene.step(1.0 / 60.0);
         scene.world.state_hash()
     };
     assert!(parts.positions.len() >= 8192, "large enough to be shared");

@@ -285,3 +285,17 @@ fn springs_that_were_removed_hold_nothing() {
         assert!((scene.positions()[3].y + lowest).abs() < 1e-6);
     }
 }
+
+/// A body that lies in one point, on a spring without length, has no extent of its own to go by.
+#[test]
+fn a_bob_hangs_from_the_pin_it_began_in() {
+    for gravity in [Vec3::Y * -9.81, Vec3::new(1.0, -9.0, 0.3), Vec3::ZERO] {
+        let mut parts = Parts::nodes(vec![Vec3::ZERO; 2], 0.1);
+        parts.masses[0] = 0.0;
+        parts.join(0, 1, 50.0);
+        let mut scene = Scene::new(&parts, WorldDefinition { gravity, ..FREE });
+        settle(&mut scene);
+        let off = scene.positions()[1].distance(gravity.as_dvec3() * (0.1 / 50.0));
+        assert!(off <= 1e-8 * f64::from(gravity.length()), "{gravity}: {off} m");
+    }
+}

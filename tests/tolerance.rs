@@ -4,9 +4,11 @@
 mod support;
 
 use glam::Vec3;
-use sinew::{BodyDefinition, Solver, WorldDefinition};
+use sinew::{BodyDefinition, Error, Solver, WorldDefinition};
 use support::bodies::{FREE, Parts, Scene, largest_difference};
 use support::organ::{cloth, gravity, organ};
+
+const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 /// A chain that lies level, held at one end.
 fn level_chain() -> Parts {
@@ -60,5 +62,47 @@ fn a_step_adds_no_more_than_its_tolerance() {
                 }
             }
         }
+    }
+}
+
+/// What is held at its side, with a tolerance that eight substeps do not meet.
+#[test]
+fn a_tolerance_that_cannot_be_met_changes_nothing() {
+    let world = WorldDefinition {
+        gravity: gravity(1.0),
+        tolerance: 1e-5,
+        max_substeps: 8,
+        ..FREE
+    };
+    for solver in SOLVERS {
+        let mut scene = Scene::with(&cloth(0.3, 3, 0.05, 40.0), world, |definition| BodyDefinition {
+            solver,
+            ..definition
+        });
+        let before = scene.world.state_hash();
+        assert!(
+            matches!(scene.world.step(0.1), Err(Error::Unstable { .. })),
+            "{solver:?}"
+        );
+        assert_eq!(scene.world.state_hash(), before, "{solver:?}");
+    }
+}
+
+#[test]
+fn fixed_substeps_know_no_tolerance() {
+    for solver in SOLVERS {
+        let run = |tolerance: f32| {
+            let world = WorldDefinition {
+                gravity: gravity(1.0),
+                substeps: 4,
+                tolerance,
+                ..FREE
+            };
+            let parts = organ(0.2, 0.025, 5000.0);
+            let mut scene = Scene::with(&parts, world, |definition| BodyDefinition { solver, ..definition });
+            scene.run(2e-3, 10);
+            scene.positions()
+        };
+        assert_eq!(run(0.0), run(0.1), "{solver:?}");
     }
 }

@@ -284,7 +284,7 @@ impl Body {
 
     /// How its solver took the last step.
     pub fn solver_report(&self) -> SolverReport {
-        let report = self.implicit.as_ref().map(|implicit| implicit.report);
+        let report = self.implicit.as_ref().map(|implicit| implicit.told);
         SolverReport {
             added_mass: self.scaling.as_ref().map_or(0.0, |scaling| scaling.added_mass()),
             ..report.unwrap_or_default()

@@ -70,11 +70,12 @@ pub struct sinew_body_def {
     pub rest_positions: *const f32,
     /// At least 1.
     pub node_count: usize,
-    /// node_count floats, kg, 0: pinned for good; nullable: node_mass for all.
+    /// node_count floats, kg, at least 1e-37, or 0: pinned for good; nullable: node_mass for all. With IMPLICIT a body whose masses
+    /// over the square of a step's length are no finite floats is put back.
     pub masses: *const f32,
     /// node_count floats, N s/m: the gamma_i of m a = ... - gamma_i v; nullable: node_damping.
     pub node_dampings: *const f32,
-    /// kg, above 0; no default. 0 where density gives each node its mass.
+    /// kg, at least 1e-37; no default. 0 where density gives each node its mass.
     pub node_mass: f32,
     /// N s/m; default 0.
     pub node_damping: f32,
@@ -117,7 +118,7 @@ pub struct sinew_body_def {
     pub order: u32,
     /// IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
     /// long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
-    /// Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least.
+    /// Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least. At most 1 000 000.
     pub iterations: u32,
     /// IMPLICIT, NEWTON: what may be missing of the solution of a step's equation, as a part of what forces change in the step;
     /// from 1e-6 to 1; 0, the default: 0.01, or 1e-6 with NEWTON.
@@ -185,7 +186,7 @@ pub struct sinew_body_def {
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
-/// set_positions or set_velocities, the next change of topology of that body, or its end.
+/// set_positions, set_velocities or rest_state, the next change of topology of that body, or its end.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_vec3_view {
@@ -227,7 +228,7 @@ pub struct sinew_storage_report {
     pub bytes_reserved: usize,
 }
 
-/// How a body's solver took the last step.
+/// How a body's solver took the last step: not one that was refused, or for which the body was put back.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_solver_report {

@@ -75,7 +75,7 @@ pub unsafe extern "C" fn sinew_rest_state_def_init(def: *mut sinew_rest_state_de
 
 /// Moves the free nodes of a body, whatever its solver, to the nearest place downhill where it is at rest under gravity, its
 /// pins where they are, and the forces applied since the last step, which stay pending. Velocities become zero, and
-/// sinew_body_get_pin_force tells what holds the pins there. It is no step: it takes memory and may take seconds. Tools are not
+/// sinew_body_get_pin_force tells what holds the pins there. Views of the body's positions and velocities end. It is no step: it takes memory and may take seconds. Tools are not
 /// taken into account. How a part that no pin holds lies and is turned as a whole is as it happens to be. `def` is nullable: the
 /// defaults; `report` is nullable; `report->struct_size` is set by the caller.
 ///

@@ -50,11 +50,13 @@ pub struct sinew_world_def {
     /// 1, the default: the caller's thread alone; 0: one per core; at most 256. Results are the same for every number. A
     /// world's threads end with it, and sleep while it is not stepped or too small to share.
     pub thread_count: u32,
-    /// 0, the default: as many as stability needs; n: exactly n per step.
+    /// 0, the default: as many as stability needs; n: exactly n per step, but for bodies of IMPLICIT and NEWTON near a tool,
+    /// whose substeps are of 1 ms at most there, and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
     pub substeps: u32,
-    /// Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE.
+    /// Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, is no
+    /// such need: near a tool a long step of theirs takes as many parts, and as much longer.
     pub max_substeps: u32,
-    /// m; 0, the default: off; above 0, with substeps 0: a step's own position error stays below it.
+    /// m; 0, the default: off, as it is with fixed substeps; above 0, with substeps 0: a step's own position error stays below it.
     pub tolerance: f32,
     /// 0.
     pub reserved: u32,
@@ -77,7 +79,8 @@ pub struct sinew_step_report {
     pub struct_size: usize,
     /// The most that any body took.
     pub substeps: u32,
-    /// s: the longest explicit substep that is stable now, over all bodies; infinity: no limit.
+    /// s: the longest explicit substep that is stable now, over all bodies; infinity: no limit, as for bodies of IMPLICIT and
+    /// NEWTON.
     pub stable_substep: f32,
     /// Bodies that would have become non-finite: put back as they were, the others stepped.
     pub bodies_restored: u32,

@@ -259,11 +259,12 @@ impl Holds {
         sum
     }
 
-    /// What the contacts do on the nodes' ways, J.
+    /// What the contacts do on the nodes' ways, J: none does more than on the way of its tool, or what an equation that was not
+    /// solved has them push would pass for energy put in.
     pub fn work(&self, way_of: impl Fn(usize) -> Vec3) -> f64 {
         let way_of = |node: usize| way_of(node).as_dvec3();
-        let works = self.holds.iter().map(|hold| hold.answer.force * hold.weighted(way_of));
-        works.sum()
+        let work = |hold: &Hold| hold.answer.force * hold.weighted(way_of).min(hold.least);
+        self.holds.iter().map(work).sum()
     }
 
     /// What contact number `index` does, N.

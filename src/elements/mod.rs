@@ -38,6 +38,8 @@ pub(crate) struct Elements {
     settled: f32,
     /// The highest rate of damping of the springs at their nodes, 1/s.
     most_damped: f32,
+    /// About how stiff the elements at each node are together, N/m.
+    stiffnesses: Vec<f32>,
     /// Room for a number per node.
     carried: Vec<f32>,
     /// Whether the bounds at rest are those of the masses and springs there are.
@@ -107,7 +109,7 @@ impl Elements {
             starts.push(count);
             count += part.nodes.len();
         }
-        Ok(Self {
+        let mut elements = Self {
             law,
             count: tetrahedra.len(),
             copies: Copies::new(&parts, node_count)?,
@@ -119,12 +121,15 @@ impl Elements {
             },
             parts,
             starts,
+            stiffnesses: memory::filled(0.0, node_count)?,
             carried: memory::filled(0.0, node_count)?,
             highest: f32::INFINITY,
             settled: f32::INFINITY,
             most_damped: 0.0,
             rates_known: false,
-        })
+        };
+        elements.find_stiffnesses();
+        Ok(elements)
     }
 
     /// Room for sums that are made of ways.
@@ -306,6 +311,11 @@ impl Elements {
             energy += 0.5 * f64::from(self.law.kappa) * growth * growth / f64::from(volume);
         }
         energy
+    }
+
+    /// About how stiff the elements at a node are together, as they were made, N/m.
+    pub fn stiffness_of(&self, node: usize) -> f32 {
+        self.stiffnesses[node]
     }
 
     /// How many there were when the body was made.

@@ -12,6 +12,18 @@ use crate::solver::{Masses, Rates};
 use crate::springs::Springs;
 
 impl Elements {
+    /// Adds up how stiff the elements at each node are at rest.
+    pub(super) fn find_stiffnesses(&mut self) {
+        let mut stiffnesses = std::mem::take(&mut self.stiffnesses);
+        let whole = f64::from(self.law.whole());
+        self.visit(&mut |corners, rest| {
+            for (node, gradient) in corners.into_iter().zip(rest.gradients()) {
+                stiffnesses[node as usize] += (rest.volume * whole * gradient.length_squared()) as f32;
+            }
+        });
+        self.stiffnesses = stiffnesses;
+    }
+
     /// Makes the bounds at rest those of these masses and springs: whether they were before.
     pub fn find_rates(&mut self, springs: &dyn Springs, masses: &Masses) -> bool {
         if self.rates_known {

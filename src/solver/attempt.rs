@@ -127,6 +127,9 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
 /// Takes a step that is stable however long it is.
 fn attempt_implicitly(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
     let start = body.carry;
+    if let Some(implicit) = &mut body.implicit {
+        implicit.attempt();
+    }
     let asked = request.substeps.max(1);
     let (substeps, taken) = implicit::run(body, request, asked, middle(asked), start, team);
     if request.tolerance == 0.0 || request.substeps > 0 {

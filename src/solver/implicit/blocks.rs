@@ -16,7 +16,7 @@ use crate::threads::{Team, Tiles};
 /// A symmetric matrix as xx, yy, zz, yz, zx, xy.
 pub(super) type Symmetric = [f32; 6];
 
-/// What rounding leaves, J.
+/// What rounding leaves, J; of the blocks alone, for coordinates that are off by 1 m, N/m.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Noise {
     /// The squared norm of inertia of what nodes are off.
@@ -116,8 +116,8 @@ impl Blocks {
         }
     }
 
-    /// What rounding does to the residual where coordinates are off by `distance`.
-    pub fn noise(&self, inertia: &[f32], distance: f64) -> Noise {
+    /// What rounding does to the residual, for each square of what coordinates are off.
+    pub fn noise(&self, inertia: &[f32]) -> Noise {
         let mut noise = Noise::default();
         for (block, &inertia) in self.stiffness.iter().zip(inertia) {
             let stiffness = f64::from(block[0] + block[1] + block[2]) / 3.0;
@@ -125,8 +125,8 @@ impl Blocks {
             if inertia > 0.0 {
                 // Where springs are weak against inertia they hardly move a node.
                 let share = stiffness / (stiffness + inertia);
-                noise.error += inertia * share * share * distance * distance;
-                noise.square += stiffness * share * distance * distance;
+                noise.error += inertia * share * share;
+                noise.square += stiffness * share;
             }
         }
         noise

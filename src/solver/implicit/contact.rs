@@ -10,7 +10,7 @@ use super::{End, Implicit};
 use crate::body::{Body, Bounds, Mobility, Vectors};
 use crate::contact::{Contacts, Meeting};
 use crate::solver::kick::look;
-use crate::springs::{Springs, tile_count, tile_nodes};
+use crate::springs::{tile_count, tile_nodes};
 
 /// The longest step near a tool, s.
 pub(super) const LONGEST: f64 = 1e-3;
@@ -47,15 +47,13 @@ impl Substep<'_> {
             means.set(pin.node as usize, pin.travel / self.request.dt);
         }
         let per_mass = 1.0 / (self.step * self.step);
-        self.contact(body, means, |contacts, meeting, springs, masses| {
+        self.contact(body, means, |contacts, meeting, stiffness_of| {
             let inverse_masses = meeting.mobility.inverse_masses;
             contacts.foresee(meeting, |node| {
                 if inverse_masses[node] == 0.0 {
                     return f32::INFINITY;
                 }
-                let mut stiffness = (f64::from(masses[node]) * per_mass) as f32;
-                springs.visit(node, &mut |link| stiffness += link.stiffness);
-                stiffness
+                stiffness_of(node, per_mass)
             });
         });
         if body.contacts.as_ref().is_none_or(|contacts| contacts.holds.is_empty()) {
@@ -89,12 +87,13 @@ impl Substep<'_> {
         });
     }
 
-    /// Has the contacts of `body` do something about nodes that move with these velocities.
+    /// Has the contacts of `body` do something about nodes that move with these velocities; also given what resists the moving of a node
+    /// with so much inertia per mass, 1/s², N/m.
     fn contact(
         &self,
         body: &mut Body,
         velocities: &mut Vectors,
-        act: impl FnOnce(&mut Contacts, Meeting, &dyn Springs, &[f32]),
+        act: impl FnOnce(&mut Contacts, Meeting, &dyn Fn(usize, f64) -> f32),
     ) {
         let slack = SLACK * body.extent();
         let Some(contacts) = &mut body.contacts else {
@@ -126,7 +125,12 @@ impl Substep<'_> {
             next_positions: state.next_positions,
             pins: &mut body.pins,
         };
-        act(contacts, meeting, &*body.springs, &body.masses);
+        let (springs, elements, masses) = (&body.springs, &body.elements, &body.masses);
+        act(contacts, meeting, &|node, per_mass| {
+            let mut stiffness = (f64::from(masses[node]) * per_mass) as f32;
+            springs.visit(node, &mut |link| stiffness += link.stiffness);
+            stiffness + elements.as_ref().map_or(0.0, |elements| elements.stiffness_of(node))
+        });
     }
 
     /// Lets tools stop the nodes that would enter them.
@@ -137,7 +141,7 @@ impl Substep<'_> {
         let next = 1 - implicit.settled;
         let (per_step, step) = ((1.0 / self.step) as f32, self.step as f32);
         scaled(&implicit.histories[next].ways, per_step, means);
-        self.contact(body, means, |contacts, meeting, _, _| contacts.resolve(meeting));
+        self.contact(body, means, |contacts, meeting, _| contacts.resolve(meeting));
         let Some(contacts) = &body.contacts else {
             return End::Fine;
         };

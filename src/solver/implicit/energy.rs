@@ -1,12 +1,13 @@
 //! What a step does to the energy: an implicit step loses some and gains none, unless its equation was not solved.
 
+use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::body::{Body, Records, Vectors};
 use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::solver::write_records;
-use crate::springs::{ChosenKernel, Loops, Springs, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Loops, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
 
@@ -93,7 +94,7 @@ impl Substep<'_> {
         let work = self.work(body, &implicit.histories[next].ways);
         let after = kinetic + elastic;
         let allowed = before.energy + work + before.credit;
-        let rounding = ROUNDING * (before.energy + after + work.abs()) + implicit.noise.square;
+        let rounding = ROUNDING * (before.energy + after + work.abs()) + implicit.noise(body.extent()).square;
         if !after.is_finite() {
             return End::NotFinite;
         }
@@ -108,9 +109,9 @@ impl Substep<'_> {
     }
 
     /// Takes off what was gained: first of the velocities; where that is not enough, nothing moves but the pins.
-    pub(super) fn slow_down(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+    pub(super) fn slow_down(&self, body: &mut Body, implicit: &mut Implicit, before: Before) {
         let next = 1 - implicit.settled;
-        let known = implicit.histories[next].energy.filter(|energy| energy.is_finite());
+        let known = implicit.histories[next].energy;
         let state = body.state.substep();
         let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
         let work = self.work(body, &implicit.histories[next].ways);
@@ -133,15 +134,54 @@ impl Substep<'_> {
             state.velocities.clear();
             history.ways.clear();
             history.energy = None;
+            self.hold(body);
         }
+        let history = &mut implicit.histories[next];
         history.gains.clear();
         history.remainders.clear();
         history.step = 0.0;
         history.credit = 0.0;
-        End::Fine
+        implicit.report.converged = false;
     }
 
-    /// What gravity and forces from outside did on these ways, J.
+    /// Finds out what holds the pins where nothing moves.
+    fn hold(&self, body: &mut Body) {
+        if let Some(velocities) = &mut body.predicted_velocities {
+            velocities.clear();
+        }
+        let positions = &*body.state.substep().next_positions;
+        if let Some(records) = &mut body.records {
+            write_records(body.kernel, positions, records, self.team);
+        }
+        if let (Some(elements), Some(records)) = (&mut body.elements, &body.records) {
+            elements.find_forces(body.kernel, records.as_slice(), self.team);
+        }
+        let elements = body.elements.as_deref().map(Elements::shares);
+        let terms = body.terms.as_deref();
+        let motion = Motion {
+            positions: positions.view().with_records(body.records.as_ref()),
+            ..Motion::at(positions, body.predicted_velocities.as_ref())
+        };
+        let (springs, masses, gravity) = (&*body.springs, &body.masses, self.request.gravity);
+        let node_count = positions.len();
+        self.team
+            .pass(tile_count(node_count), body.pins.tiles_mut(), |tile, pins| {
+                if pins.is_empty() {
+                    return;
+                }
+                let mut forces = TileForces::ZERO;
+                springs.forces(tile, &motion, &mut forces);
+                if let Some(elements) = &elements {
+                    elements.add(tile, &mut forces);
+                }
+                if let Some(terms) = terms {
+                    terms.add_forces(tile, tile_nodes(tile, node_count), motion.positions, &mut forces);
+                }
+                show_held(pins, &forces, gravity, masses);
+            });
+    }
+
+    /// What gravity, forces from outside and tools did on these ways, J.
     fn work(&self, body: &Body, ways: &Vectors) -> f64 {
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node));

@@ -1,16 +1,24 @@
 //! Newton's iterations of a step of IMPLICIT: along corrections, to where its equation holds.
 
+use glam::Vec3;
+
 use super::Implicit;
 use super::gradient::Goal;
 use super::loops::{Add, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
-use crate::body::{Body, Vectors};
+use crate::body::{Body, Pin, Vectors};
 use crate::elements::Elements;
-use crate::springs::{ChosenKernel, Motion, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Motion, TILE, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// Linearised equations solved in a step at most.
-const NEWTON: u32 = 40;
+const NEWTON: u32 = 200;
+
+/// How many times as far as a correction says a step of Newton's goes at most, about.
+const LONGEST: f64 = 16.0;
+
+/// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
+const NEARLY: f64 = 100.0;
 
 impl Substep<'_> {
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
@@ -54,10 +62,7 @@ impl Substep<'_> {
                 if let Some(terms) = terms {
                     terms.add_forces(tile, nodes.clone(), motion.positions, &mut forces);
                 }
-                for pin in &mut *pins {
-                    let node = pin.node as usize;
-                    pin.solved = -(forces.get(node - nodes.start) + gravity * masses[node]);
-                }
+                show_held(pins, &forces, gravity, masses);
                 kernel.run(Residual {
                     gravity,
                     forces: &forces,
@@ -86,46 +91,48 @@ impl Substep<'_> {
         implicit.partials.iter().map(|partial| partial.first).sum()
     }
 
-    /// Goes down to where the equation holds, as far as is asked for and the budget reaches.
-    pub(super) fn minimise(&self, body: &mut Body, implicit: &mut Implicit) {
+    /// Goes down to where the equation holds, as far as is asked for and the budget reaches; whether all is finite.
+    pub(super) fn minimise(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
         let all_inertia = implicit.all_inertia;
+        let noise = implicit.noise(body.extent());
         // What each of n equations lacks of its ways goes into the velocity too, and grows as n² by the step's end.
         let part = self.end - self.start;
         let tolerated = 0.1 * f64::from(self.request.tolerance) * part * part;
-        let absolute = f64::max(tolerated.powi(2) * all_inertia, implicit.noise.error);
+        let absolute = f64::max(tolerated.powi(2) * all_inertia, noise.error);
         let relative = f64::from(implicit.accuracy).powi(2);
         let whole_budget = self.budget(implicit);
         let mut products = 0;
         let mut size = 0.0;
         let mut error = f64::INFINITY;
+        let mut is_solved = false;
         let is_held = body.is_held();
         self.place(body, implicit);
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
+        let mut square = 0.0;
         for iteration in 0..NEWTON {
             self.stiffen(body, implicit);
             implicit.corrections.clear();
-            let square = implicit.precondition(body, 0.0, self.team).first;
+            square = implicit.precondition(body, 0.0, self.team).first;
             // What a solution has left of it is rounding.
-            if gone == 1.0 && square <= implicit.noise.square {
-                error = solved_error.max(implicit.noise.error);
+            if gone >= 1.0 && square <= noise.square {
+                error = solved_error.max(noise.error);
+                is_solved = true;
                 break;
             }
             implicit.spectrum.begin();
             let remaining = square * implicit.spectrum.factor();
-            // What rounding leaves is not improved by going all the way again.
-            vain = if gone == 1.0 && remaining > 0.5 * error {
-                vain + 1
-            } else {
-                0
-            };
+            // What rounding leaves is not improved by going all the way again; far above that, it is bends that take so long.
+            let is_in_vain = gone >= 1.0 && remaining > 0.5 * error && square <= NEARLY * noise.square;
+            vain = if is_in_vain { vain + 1 } else { 0 };
             let is_stuck = vain > 2;
             error = remaining;
             let budget = whole_budget - products.min(whole_budget);
             // What all nodes do together may be less than what rounding does to stiff springs: a solution is tried in any case.
             let is_tried = iteration > 0 || square == 0.0;
             let is_found = is_tried && error <= absolute.max(relative * size) && self.is_balanced(body, implicit);
-            if is_found || is_stuck || budget == 0 || !error.is_finite() {
+            is_solved = is_found || is_stuck;
+            if is_solved || budget == 0 || !error.is_finite() {
                 break;
             }
             let goal = Goal {
@@ -141,17 +148,18 @@ impl Substep<'_> {
             if implicit.stiffened.is_empty() {
                 implicit.wear(solved.products);
             }
-            size = f64::max(size, solved.size);
             solved_error = solved.error;
             // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
-            if solved.size <= absolute && is_held && implicit.stiffened.is_empty() {
+            if solved.size.max(solved.error) <= absolute && is_held && implicit.stiffened.is_empty() {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
                 error = solved.error;
+                is_solved = true;
                 break;
             }
             gone = self.go(body, implicit, solved.work);
+            size = f64::max(size, gone * gone * solved.size);
             if iteration < MULTIPLIERS
                 && let Some(contacts) = &mut body.contacts
             {
@@ -163,8 +171,9 @@ impl Substep<'_> {
                     }
                 });
             }
-            if solved.size <= relative * size && self.is_balanced(body, implicit) {
+            if gone == 1.0 && solved.size.max(solved.error) <= relative * size && self.is_balanced(body, implicit) {
                 error = solved.error;
+                is_solved = true;
                 break;
             }
         }
@@ -179,24 +188,31 @@ impl Substep<'_> {
         }
         implicit.report.iterations += products;
         implicit.left = implicit.left.saturating_sub(products);
-        implicit.report.converged &= products < whole_budget && error.is_finite();
+        implicit.report.converged &= is_solved;
         let error = (error / all_inertia).sqrt() as f32;
         implicit.report.error = implicit.report.error.max(error);
+        square.is_finite()
     }
 
-    /// Goes along the correction, as far as the forces do not turn against it: what part of it.
+    /// Goes along the correction, as far as the forces do not turn against it, and on where they still pull along it, as they do
+    /// where pressed springs buckle: what part of it.
     fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
-        let mut gone = 1.0;
+        let (mut gone, mut may_extend) = (1.0, true);
         add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
         for _ in 0..12 {
             self.place(body, implicit);
             let slope = self.residual(body, implicit);
-            if slope >= -0.5 * work {
+            may_extend &= slope.is_finite() && slope >= -0.5 * work && gone < LONGEST;
+            // To where the slope would be zero if it changed evenly.
+            let next = if may_extend && slope > 0.5 * work {
+                gone * (work / (work - slope).max(0.25 * work))
+            } else if slope >= -0.5 * work {
                 return gone;
-            }
-            // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
-            let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
-            let next = gone * f64::clamp(part, 0.1, 0.7);
+            } else if slope.is_finite() {
+                gone * f64::clamp(work / (work - slope), 0.1, 0.7)
+            } else {
+                0.1 * gone
+            };
             add(
                 &mut implicit.pushes,
                 &implicit.corrections,
@@ -209,6 +225,14 @@ impl Substep<'_> {
         self.place(body, implicit);
         self.residual(body, implicit);
         gone
+    }
+}
+
+/// Shows each pin of a tile what holds it against these forces.
+pub(super) fn show_held(pins: &mut [Pin], forces: &TileForces, gravity: Vec3, masses: &[f32]) {
+    for pin in pins {
+        let node = pin.node as usize;
+        pin.solved = -(forces.get(node % TILE) + gravity * masses[node]);
     }
 }
 

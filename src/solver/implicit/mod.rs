@@ -34,6 +34,9 @@ use coarse::Coarse;
 use estimate::Spectrum;
 use gradient::Partial;
 
+/// What rounding makes of a coordinate, as a fraction of the body's extent.
+const ROUNDING: f64 = 1e-7;
+
 /// What the last step leaves to the next, for order 2.
 #[derive(Debug)]
 pub(crate) struct History {
@@ -120,6 +123,7 @@ pub(crate) struct Implicit {
     inertia: Vec<f32>,
     /// The sum of all.
     all_inertia: f64,
+    /// For coordinates that are off by 1 m.
     noise: Noise,
     /// What `inertia` was made for: t, s; 0: nothing.
     prepared: f32,
@@ -140,8 +144,9 @@ pub(crate) struct Implicit {
     kept: Experience,
     /// Where the equations are solved exactly.
     newton: Option<Newton>,
-    /// How the last step was taken.
-    pub report: SolverReport,
+    /// How the step in progress is taken, and how that was which led to the current state.
+    report: SolverReport,
+    pub told: SolverReport,
 }
 
 impl Experience {
@@ -209,7 +214,8 @@ impl Implicit {
             memory: Experience::NONE,
             kept: Experience::NONE,
             newton: None,
-            report: SolverReport::default(),
+            report: SolverReport::BEFORE,
+            told: SolverReport::default(),
         })
     }
 
@@ -261,15 +267,31 @@ impl Implicit {
     /// Makes what the step in progress leaves to the next that of the current state.
     pub fn commit(&mut self) {
         self.settled = 1 - self.settled;
+        self.told = self.report;
         self.kept = self.memory;
         self.kept.smallest = self.spectrum.known_smallest();
         self.stale |= self.kept.worn;
     }
 
+    /// Begins to attempt a step, which may be taken several times.
+    pub fn attempt(&mut self) {
+        self.was_stale = self.stale;
+    }
+
     /// Begins a step anew, from the current state.
     fn begin(&mut self) {
+        (self.report.error, self.report.converged) = (0.0, true);
         self.memory = self.kept;
         self.spectrum.assume(self.kept.smallest);
+    }
+
+    /// What rounding leaves in a body that reaches so far, m.
+    fn noise(&self, extent: f32) -> Noise {
+        let square = (ROUNDING * f64::from(extent)).powi(2);
+        Noise {
+            error: square * self.noise.error,
+            square: square * self.noise.square,
+        }
     }
 
     /// The step in progress is not to be.

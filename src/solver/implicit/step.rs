@@ -15,9 +15,6 @@ use crate::threads::{Items, Team};
 /// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
 const LARGEST_RATIO: f64 = 2.0;
 
-/// What rounding makes of a coordinate, as a fraction of the body's extent.
-const ROUNDING: f64 = 1e-7;
-
 /// The multipliers of contacts are improved so often: then what is left has a function to minimise.
 pub(super) const MULTIPLIERS: u32 = 3;
 
@@ -72,7 +69,6 @@ pub(in crate::solver) fn run(
     let mut parts = 1;
     if let Some(mut implicit) = body.implicit.take() {
         implicit.report = SolverReport::BEFORE;
-        implicit.was_stale = implicit.stale;
         implicit.left = implicit.budget.saturating_mul(request.substeps.max(1));
         let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
@@ -143,6 +139,9 @@ fn run_in_parts(
         if end != End::Fine {
             return end;
         }
+        for pin in body.pins.iter_mut() {
+            pin.force_sum += pin.solved.as_dvec3();
+        }
         body.state.advance();
         if index + 1 == middle
             && let Some(coarse) = &mut body.coarse
@@ -171,22 +170,25 @@ pub(super) struct Substep<'a> {
 
 impl Substep<'_> {
     /// Takes it, with order 1 where that of order 2 gains energy; as a last resort, or where no product is left to try
-    /// anything else, what was gained is taken off again.
+    /// anything else, what was gained is taken off again. Then tools stop what would enter them.
     fn take_safely(self, body: &mut Body, implicit: &mut Implicit, is_last_resort: bool) -> End {
         let before = self.energy_before(body, implicit);
+        let SolverReport { error, converged, .. } = implicit.report;
         let mut end = self.take(body, implicit, before);
         // What a later substep began with has been written over: then the whole step is taken again.
         let has_history = self.formula.carried != 0.0;
         if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first && implicit.left > 0 {
+            (implicit.report.error, implicit.report.converged) = (error, converged);
             end = self.of_order_1().take(body, implicit, before);
         }
-        if matches!(end, End::Gained | End::NotFinite) && (is_last_resort || implicit.left == 0) {
-            end = match self.slow_down(body, implicit, before) {
-                End::Fine => self.meet(body, implicit),
-                end => end,
-            };
+        if end == End::Gained && (is_last_resort || implicit.left == 0) {
+            self.slow_down(body, implicit, before);
+            end = End::Fine;
         }
-        end
+        match end {
+            End::Fine => self.meet(body, implicit),
+            end => end,
+        }
     }
 
     /// The same step by implicit Euler.
@@ -209,14 +211,14 @@ impl Substep<'_> {
         } else {
             self.prepare(body, implicit);
             self.aim(body, implicit);
-            self.minimise(body, implicit);
+            if !self.minimise(body, implicit) {
+                return End::NotFinite;
+            }
         }
-        if !self.finish(body, implicit) {
-            return End::NotFinite;
-        }
-        match self.account(body, implicit, before) {
-            End::Fine => self.meet(body, implicit),
-            end => end,
+        if self.finish(body, implicit) {
+            self.account(body, implicit, before)
+        } else {
+            End::NotFinite
         }
     }
 
@@ -258,7 +260,7 @@ impl Substep<'_> {
                 let mass = f64::from(body.masses[node]);
                 let per_mass = per_mass + rate / self.formula.time;
                 *inertia = if body.inverse_masses[node] > 0.0 {
-                    ((mass * per_mass) as f32).min(f32::MAX)
+                    (mass * per_mass) as f32
                 } else {
                     0.0
                 };
@@ -266,8 +268,7 @@ impl Substep<'_> {
             implicit.all_inertia = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
             implicit.blocks.invert(&implicit.inertia, self.team);
             implicit.coarse.invert(&implicit.inertia);
-            let rounding = ROUNDING * f64::from(body.extent());
-            implicit.noise = implicit.blocks.noise(&implicit.inertia, rounding);
+            implicit.noise = implicit.blocks.noise(&implicit.inertia);
             implicit.prepared = time;
         }
         if implicit.stale {
@@ -487,7 +488,6 @@ impl Substep<'_> {
                         ways[axis][place] = pin.travel[axis] * part;
                         gains[axis][place] = 0.0;
                     }
-                    pin.force_sum += pin.solved.as_dvec3();
                 }
                 let velocities = velocities.map(|axis| &*axis);
                 *survey = look(kernel, velocities, Some(positions.slices(nodes)));

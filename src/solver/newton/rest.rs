@@ -130,13 +130,20 @@ fn set_up(descent: &mut Descent, body: &Body, gravity: Vec3) {
     }
 }
 
-/// How far the body reaches, where it lies in one place at least as far as its longest spring would, m.
+/// How far the body reaches, where it lies in one place at least as far as its longest spring would, and where springs have no
+/// length as far as what its nodes carry stretches one, m.
 fn extent(descent: &Descent) -> f64 {
-    let lengths = descent
-        .network
-        .springs()
-        .map(|(_, _, link)| f64::from(link.rest_length));
-    lengths.fold(descent.equation.extent(), f64::max)
+    let springs = || descent.network.springs();
+    let lengths = springs().map(|(_, _, link)| f64::from(link.rest_length));
+    let extent = lengths.fold(descent.equation.extent(), f64::max);
+    if extent > 0.0 {
+        return extent;
+    }
+    let load = |node: usize| descent.equation.loads[node].length();
+    springs()
+        .filter(|(_, _, link)| link.stiffness > 0.0)
+        .map(|(_, node, link)| load(node).max(load(link.neighbour as usize)) / f64::from(link.stiffness))
+        .fold(0.0, f64::max)
 }
 
 /// Goes down, and on from where it is level without being lowest.
