@@ -353,7 +353,8 @@ typedef struct sinew_step_report {
    */
   uint32_t bodies_restored;
   /**
-   * m: how far a position of this step may be off; 0 where tolerance is off.
+   * m: how far a position of this step may be off; 0 where tolerance is off, infinity where the step is refused before there is
+   * anything to compare.
    */
   float error_estimate;
 } sinew_step_report;

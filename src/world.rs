@@ -62,7 +62,8 @@ pub struct StepReport {
     pub stable_substep: f32,
     /// Bodies that would have become non-finite: put back as they were, the others stepped.
     pub bodies_restored: u32,
-    /// How far a position of this step may be off, m; 0 where the tolerance is off.
+    /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
+    /// anything to compare.
     pub error_estimate: f32,
 }
 

@@ -84,7 +84,8 @@ pub struct sinew_step_report {
     pub stable_substep: f32,
     /// Bodies that would have become non-finite: put back as they were, the others stepped.
     pub bodies_restored: u32,
-    /// m: how far a position of this step may be off; 0 where tolerance is off.
+    /// m: how far a position of this step may be off; 0 where tolerance is off, infinity where the step is refused before there is
+    /// anything to compare.
     pub error_estimate: f32,
 }
 

@@ -70,7 +70,8 @@ pub(crate) enum Outcome {
     Unstable {
         /// s
         stable_substep: f32,
-        /// What was reached where a tolerance needs more, m; 0 where it is stability that does.
+        /// What was reached where a tolerance needs more, m, infinite where not even twice the substeps are allowed; 0 where it is
+        /// stability that does.
         error: f32,
     },
 }
@@ -269,6 +270,8 @@ fn run_to_tolerance(
         substeps = substeps.saturating_mul(2);
         middle = middle.saturating_mul(2);
         if substeps > request.max_substeps || substeps == u32::MAX {
+            // What was never compared may be off by anything.
+            let error = if error > 0.0 { error } else { f32::INFINITY };
             return Outcome::Unstable { stable_substep, error };
         }
         // What was not stable after all may be so with twice the substeps.

@@ -56,7 +56,9 @@ pub enum Stop {
     Unsupported(String),
     /// A step was refused, with nothing changed and for a reason.
     Refused(String),
-    /// Something is not as it should be.
+    /// A figure is larger than it may be.
+    Exceeds { what: String, figure: f64, bound: f64 },
+    /// Something else is not as it should be.
     Fault(String),
 }
 
@@ -79,5 +81,9 @@ pub fn at_most(what: &str, figure: f64, bound: f64) -> Result<(), Stop> {
     if figure <= bound {
         return Ok(());
     }
-    fault(format!("{what} is {figure:.5e}, at most {bound:.5e} is right"))
+    Err(Stop::Exceeds {
+        what: what.into(),
+        figure,
+        bound,
+    })
 }

@@ -224,6 +224,11 @@ impl Watched {
             let booked = ledger.end_step(self.scenes[0].body(), &before, &after, &done, dt, &report);
             booked.map_err(|stop| match stop {
                 Stop::Fault(what) => Stop::Fault(format!("step {} of {dt} s: {what}", self.steps)),
+                Stop::Exceeds { what, figure, bound } => Stop::Exceeds {
+                    what: format!("step {} of {dt} s: {what}", self.steps),
+                    figure,
+                    bound,
+                },
                 stop => stop,
             })?;
         }

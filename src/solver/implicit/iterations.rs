@@ -14,9 +14,6 @@ use crate::threads::{Items, Team};
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 200;
 
-/// How many times as far as a correction says a step of Newton's goes at most, about.
-const LONGEST: f64 = 16.0;
-
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
 
@@ -197,22 +194,17 @@ impl Substep<'_> {
     /// Goes along the correction, as far as the forces do not turn against it, and on where they still pull along it, as they do
     /// where pressed springs buckle: what part of it.
     fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
-        let (mut gone, mut may_extend) = (1.0, true);
+        let mut gone = 1.0;
         add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
         for _ in 0..12 {
             self.place(body, implicit);
             let slope = self.residual(body, implicit);
-            may_extend &= slope.is_finite() && slope >= -0.5 * work && gone < LONGEST;
-            // To where the slope would be zero if it changed evenly.
-            let next = if may_extend && slope > 0.5 * work {
-                gone * (work / (work - slope).max(0.25 * work))
-            } else if slope >= -0.5 * work {
+            if slope >= -0.5 * work {
                 return gone;
-            } else if slope.is_finite() {
-                gone * f64::clamp(work / (work - slope), 0.1, 0.7)
-            } else {
-                0.1 * gone
-            };
+            }
+            // Where the slope would be zero if it changed evenly; far less where it is nothing at all.
+            let part = if slope.is_finite() { work / (work - slope) } else { 0.1 };
+            let next = gone * f64::clamp(part, 0.1, 0.7);
             add(
                 &mut implicit.pushes,
                 &implicit.corrections,
