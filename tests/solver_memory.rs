@@ -52,7 +52,8 @@ fn held(solver: Solver, storage: Storage, node_count: usize) -> usize {
 fn beyond_verlet(solver: Solver, storage: Storage) -> usize {
     let [few, many] =
         [1 << 14, 1 << 15].map(|count| held(solver, storage, count) - held(Solver::Verlet, storage, count));
-    (many - few) >> 14
+    // The test's own thread may take or give back some hundred bytes meanwhile.
+    (many - few + (1 << 13)) >> 14
 }
 
 #[test]
