@@ -14,7 +14,11 @@ mod guard;
 
 pub mod world;
 
+pub mod definition;
+
 pub mod body;
+
+pub mod report;
 
 pub mod material;
 

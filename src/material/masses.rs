@@ -1,21 +1,21 @@
 //! Masses of nodes from a density: each element's mass in equal parts to its nodes.
 
-use super::elements::{Elements, corners, triangle_area};
+use super::filled::{Filled, corners, triangle_area};
 use crate::body::{BodyDefinition, SMALLEST_MASS};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::tetrahedron_volume;
 
 /// The mass of each node, kg; `density` in kg/m³, above 0.
-pub(super) fn of(elements: &Elements, density: f32, definition: &BodyDefinition) -> Result<Vec<f32>> {
+pub(super) fn of(elements: &Filled, density: f32, definition: &BodyDefinition) -> Result<Vec<f32>> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let mut volumes = memory::filled(0.0_f64, rest.len())?;
     match elements {
-        Elements::Tetrahedra(tetrahedra) => share_out(&mut volumes, tetrahedra, |tetrahedron| {
+        Filled::Tetrahedra(tetrahedra) => share_out(&mut volumes, tetrahedra, |tetrahedron| {
             tetrahedron_volume(corners(tetrahedron, rest)).abs()
         }),
-        Elements::Cells(cells, edge) => share_out(&mut volumes, cells, |_| edge.powi(3)),
-        Elements::Triangles(triangles, thickness) => share_out(&mut volumes, triangles, |triangle| {
+        Filled::Cells(cells, edge) => share_out(&mut volumes, cells, |_| edge.powi(3)),
+        Filled::Triangles(triangles, thickness) => share_out(&mut volumes, triangles, |triangle| {
             triangle_area(corners(triangle, rest)) * thickness
         }),
     }

@@ -3,7 +3,7 @@
 //! A material is worked out when a body is made. It becomes stiffnesses and masses of the definition, and a body keeps nothing
 //! else of it.
 
-mod elements;
+mod filled;
 mod masses;
 pub mod presets;
 mod springs;
@@ -11,7 +11,7 @@ mod springs;
 use crate::body::{BodyDefinition, Values, not_negative};
 use crate::elements::Law;
 use crate::error::{Error, Result};
-use elements::Elements;
+use filled::Filled;
 
 /// How a material's numbers become forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -87,7 +87,7 @@ impl Material {
     }
 
     /// Refuses a Poisson's ratio that the model does not have on such elements.
-    fn check_poisson_ratio(&self, elements: &Elements) -> Result<()> {
+    fn check_poisson_ratio(&self, elements: &Filled) -> Result<()> {
         let given = self.poisson_ratio;
         match self.model {
             Model::Tetrahedra => Ok(()),
@@ -170,7 +170,7 @@ pub(crate) struct Made {
 impl Made {
     /// Of a definition that has been checked and whose material this is.
     pub fn of(material: &Material, definition: &BodyDefinition) -> Result<Self> {
-        let elements = Elements::of(definition, material.thickness)?;
+        let elements = Filled::of(definition, material.thickness)?;
         material.check_poisson_ratio(&elements)?;
         let (springs, law) = match material.model {
             Model::Springs => (Some(springs::of(&elements, material.young_modulus, definition)?), None),

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::elements::{Elements, corners, triangle_area};
+use super::filled::{Filled, corners, triangle_area};
 use crate::body::BodyDefinition;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -23,7 +23,7 @@ type Share = (u64, f64);
 
 /// The springs of a material, each once, in ascending order, and their stiffnesses in N/m.
 pub(super) fn of(
-    elements: &Elements,
+    elements: &Filled,
     young_modulus: f32,
     definition: &BodyDefinition,
 ) -> Result<(Vec<[u32; 2]>, Vec<f32>)> {
@@ -37,7 +37,7 @@ pub(super) fn of(
         springs.push(unpack(shares[0].0));
         sums.push(shares.iter().map(|share| share.1).sum::<f64>());
     }
-    if !matches!(elements, Elements::Triangles(..)) {
+    if !matches!(elements, Filled::Triangles(..)) {
         check_surface(&springs, elements, definition)?;
     }
     let stiffnesses = merged(&springs, &sums, definition)?;
@@ -50,12 +50,12 @@ pub(super) fn of(
     }
 }
 
-fn shares(elements: &Elements, young_modulus: f64, definition: &BodyDefinition) -> Result<Vec<Share>> {
+fn shares(elements: &Filled, young_modulus: f64, definition: &BodyDefinition) -> Result<Vec<Share>> {
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let along = |corners: &[DVec3], [a, b]: [usize; 2], energy: f64| energy / corners[a].distance_squared(corners[b]);
     let mut shares;
     match elements {
-        Elements::Tetrahedra(tetrahedra) => {
+        Filled::Tetrahedra(tetrahedra) => {
             shares = memory::reserved(6 * tetrahedra.len())?;
             for tetrahedron in *tetrahedra {
                 let corners = corners(tetrahedron, rest);
@@ -63,7 +63,7 @@ fn shares(elements: &Elements, young_modulus: f64, definition: &BodyDefinition) 
                 shares.extend(TETRAHEDRON_EDGES.map(|ends| (pack(tetrahedron, ends), along(&corners, ends, energy))));
             }
         }
-        Elements::Triangles(triangles, thickness) => {
+        Filled::Triangles(triangles, thickness) => {
             shares = memory::reserved(3 * triangles.len())?;
             for triangle in *triangles {
                 let corners = corners(triangle, rest);
@@ -71,7 +71,7 @@ fn shares(elements: &Elements, young_modulus: f64, definition: &BodyDefinition) 
                 shares.extend(TRIANGLE_EDGES.map(|ends| (pack(triangle, ends), along(&corners, ends, energy))));
             }
         }
-        Elements::Cells(cells, edge) => {
+        Filled::Cells(cells, edge) => {
             shares = memory::reserved(24 * cells.len())?;
             for cell in *cells {
                 shares.extend(CELL_EDGES.map(|ends| (pack(cell, ends), CELL_EDGE * young_modulus * edge)));
@@ -83,7 +83,7 @@ fn shares(elements: &Elements, young_modulus: f64, definition: &BodyDefinition) 
 }
 
 /// Refuses triangles with an edge that no spring joins: beside other elements they are surface, and nothing would hold it.
-fn check_surface(springs: &[[u32; 2]], elements: &Elements, definition: &BodyDefinition) -> Result<()> {
+fn check_surface(springs: &[[u32; 2]], elements: &Filled, definition: &BodyDefinition) -> Result<()> {
     for edge in element_edges(definition.triangles, &[], &[])? {
         if springs.binary_search(&edge).is_err() {
             return Err(Error::invalid(format!(

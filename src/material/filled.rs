@@ -13,7 +13,7 @@ const FLAT: f64 = 1e-7;
 const SAME_EDGE: f64 = 1e-3;
 
 /// The elements of one body, all of one sort, each with a volume.
-pub(super) enum Elements<'a> {
+pub(super) enum Filled<'a> {
     Tetrahedra(&'a [[u32; 4]]),
     /// Cubes of this edge, m.
     Cells(&'a [[u32; 8]], f64),
@@ -21,7 +21,7 @@ pub(super) enum Elements<'a> {
     Triangles(&'a [[u32; 3]], f64),
 }
 
-impl<'a> Elements<'a> {
+impl<'a> Filled<'a> {
     /// Those of a definition. Triangles beside others are surface and no elements.
     pub fn of(definition: &BodyDefinition<'a>, thickness: f32) -> Result<Self> {
         let BodyDefinition {
