@@ -580,6 +580,36 @@ typedef struct sinew_body_def {
    * tetrahedron_count floats, Pa, at least 0; nullable: fibre_stiffness for all.
    */
   const float *fibre_stiffnesses;
+  /**
+   * s, at least 0: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness; default 0:
+   * there is none. Springs that are added later have none.
+   */
+  float retardation_time;
+  /**
+   * s, at least 0: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
+   * E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)): the standard linear solid. 0, the default: the dashpot acts
+   * alone, which is Kelvin and Voigt's solid. Stable whatever the times and the step. A body begins relaxed; what
+   * sinew_body_set_positions does is a deformation at once.
+   */
+  float relaxation_time;
+  /**
+   * The strain of springs from which they yield, stretched or pressed, at least 0; default 0: they do not. What is beyond it stays for
+   * good. SINEW_SPRING_LAW_LINEAR alone; springs that are added later do not yield.
+   */
+  float yield_strain;
+  /**
+   * By what part of its rest length a spring may become longer or shorter for good, above 0 and below 1 where yield_strain is given;
+   * default 0.5. Beyond that it is elastic again.
+   */
+  float largest_set;
+  /**
+   * The strain of springs from which they are stiffer, at least 0; default 0: there is none. Springs that are added later have none.
+   */
+  float strain_limit;
+  /**
+   * How many times their stiffness is added beyond it, above 0, at most 1e6 where strain_limit is given; default 100.
+   */
+  float limit_stiffening;
 } sinew_body_def;
 
 /**

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::error::{Error, Result};
-use crate::material::Material;
+use crate::material::{Material, Viscosity};
 use crate::memory;
 use crate::springs::Rounding;
 use crate::terms::SpringLaw;
@@ -123,6 +123,22 @@ pub struct BodyDefinition<'a> {
     /// For each tetrahedron how stiff its fibres are, in Pa, at least 0. Fibres pull where they are longer than at rest, by this times
     /// the part by which they are longer, over the area across them at rest; they never push.
     pub fibre_stiffnesses: Values<'a>,
+    /// How springs, and tetrahedra that are elements, resist the speed at which they are deformed. With a `retardation_time` alone it is
+    /// damping along the springs, on top of `spring_dampings`; springs that are added later have none. A body begins relaxed; what
+    /// [`Body::set_positions`](crate::Body::set_positions) does is a deformation at once.
+    pub viscosity: Viscosity,
+    /// The strain of springs from which they yield, whether stretched or pressed, at least 0; 0: they do not. What is beyond it stays: they
+    /// are at rest elsewhere from then on (perfect plasticity). Found where a substep ends; [`SpringLaw::Linear`] alone. Springs that are
+    /// added later do not yield.
+    pub yield_strain: f32,
+    /// By what part of its rest length a spring may become longer or shorter for good, above 0 and below 1, where `yield_strain` is given;
+    /// beyond that it is elastic again.
+    pub largest_set: f32,
+    /// The strain of springs from which they are stiffer, at least 0; 0: there is none.
+    pub strain_limit: f32,
+    /// How many times their stiffness is added beyond it, above 0, at most 1e6: a load that would stretch a spring by some strain more
+    /// stretches it by that over 1 + `limit_stiffening`. Springs that are added later have no limit.
+    pub limit_stiffening: f32,
     /// How the springs are kept.
     pub storage: Storage,
     /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
@@ -149,7 +165,8 @@ pub struct BodyDefinition<'a> {
 }
 
 impl Default for BodyDefinition<'_> {
-    /// No nodes, masses or stiffnesses yet; no damping; up to a thousandth of the mass may be added.
+    /// No nodes, masses or stiffnesses yet; no damping; up to a thousandth of the mass may be added. Springs that yield may do so by half of
+    /// their length, and are 101 times as stiff beyond a limit.
     fn default() -> Self {
         Self {
             positions: &[],
@@ -170,6 +187,11 @@ impl Default for BodyDefinition<'_> {
             spring_law: SpringLaw::Linear,
             fibre_directions: &[],
             fibre_stiffnesses: Values::Uniform(0.0),
+            viscosity: Viscosity::default(),
+            yield_strain: 0.0,
+            largest_set: 0.5,
+            strain_limit: 0.0,
+            limit_stiffening: 100.0,
             storage: Storage::Packed,
             springs_per_node: 0,
             solver: Solver::Verlet,
@@ -237,6 +259,7 @@ impl BodyDefinition<'_> {
                 self.volume_stiffness
             )));
         }
+        self.viscosity.check()?;
         if let Some(material) = &self.material {
             material.check(self)?;
         }
@@ -350,7 +373,7 @@ impl BodyDefinition<'_> {
                 nodes,
                 stiffness: self.stiffnesses.get(index),
                 rest_length,
-                damping: self.spring_dampings.get(index),
+                damping: self.spring_dampings.get(index) + self.viscosity.dashpot() * self.stiffnesses.get(index),
             });
         }
         Ok(springs)

@@ -7,6 +7,7 @@ mod edit;
 mod hash;
 mod order;
 mod origin;
+mod past;
 mod pins;
 mod published;
 mod records;
@@ -26,7 +27,7 @@ pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 use crate::contact::Contacts;
 use crate::diagnostics::{Energy, SolverReport, StorageReport};
 use crate::elements::{Elements, Law};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::material::Made;
 use crate::memory;
 use crate::solver::{
@@ -126,6 +127,12 @@ impl Body {
             Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
             None => None,
         };
+        if !definition.viscosity.is_none() && springs.is_empty() && elements.is_none() {
+            return Err(Error::invalid(format!(
+                "retardation_time is {} s, and the body has neither springs nor elements to be viscous",
+                definition.viscosity.retardation_time
+            )));
+        }
         let terms = Terms::new(definition, &springs, &order)?;
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
@@ -198,6 +205,7 @@ impl Body {
             published: Published::new(node_count)?,
         };
         body.place(definition.positions);
+        body.relax();
         let BodyDefinition {
             order,
             iterations,
@@ -335,9 +343,7 @@ impl Body {
             rates = elements.settled_rates();
         }
         if let Some(terms) = &mut self.terms {
-            // With elements their bound has the springs already.
-            let springs = self.elements.is_none().then_some(&*self.springs);
-            terms.find_rates(springs, &masses);
+            terms.find_rates(&*self.springs, &masses);
             if !self.forces_current {
                 terms.settle_at(self.state.positions());
             }
@@ -414,6 +420,7 @@ impl Body {
         for pin in self.pins.iter_mut() {
             pin.force = held(pin.node as usize);
         }
+        self.relax();
         self.forget_motion();
         self.publish(&Team::alone());
         self.follow();
@@ -448,6 +455,7 @@ impl Body {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
         }
         self.published.positions_mut().copy_from_slice(positions);
+        self.jump();
         self.forget_motion();
     }
 
@@ -462,6 +470,7 @@ impl Body {
         if let Some(terms) = &mut self.terms {
             terms.settle();
         }
+        self.keep();
         if let Some(implicit) = &mut self.implicit {
             implicit.commit();
         }
@@ -483,6 +492,7 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.put_back();
         }
+        self.recall();
         self.use_masses_for(self.carry.masses_for);
         if let (Some(damping), Some(closing)) = (&mut self.damping, &self.carry.closing) {
             damping.prepare(closing.substep);
@@ -534,5 +544,6 @@ fn elements_of(law: Law, definition: &BodyDefinition, order: &NodeOrder) -> Resu
     );
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let at_rest = |own: u32| rest[order.caller(own) as usize].as_dvec3();
-    Elements::new(law, &tetrahedra, at_rest, definition.positions.len())
+    let node_count = definition.positions.len();
+    Elements::new(law, definition.viscosity, &tetrahedra, at_rest, node_count)
 }

@@ -7,7 +7,7 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::body::{BodyDefinition, Solver, Storage, Values};
 use crate::error::{Error, Result};
-use crate::material::{Material, Model};
+use crate::material::{Material, Model, Viscosity};
 use crate::terms::SpringLaw;
 
 /// The default: laid out for the processor.
@@ -169,6 +169,24 @@ pub struct sinew_body_def {
     pub fibre_directions: *const f32,
     /// tetrahedron_count floats, Pa, at least 0; nullable: fibre_stiffness for all.
     pub fibre_stiffnesses: *const f32,
+    /// s, at least 0: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness; default 0:
+    /// there is none. Springs that are added later have none.
+    pub retardation_time: f32,
+    /// s, at least 0: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
+    /// E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)): the standard linear solid. 0, the default: the dashpot acts
+    /// alone, which is Kelvin and Voigt's solid. Stable whatever the times and the step. A body begins relaxed; what
+    /// sinew_body_set_positions does is a deformation at once.
+    pub relaxation_time: f32,
+    /// The strain of springs from which they yield, stretched or pressed, at least 0; default 0: they do not. What is beyond it stays for
+    /// good. SINEW_SPRING_LAW_LINEAR alone; springs that are added later do not yield.
+    pub yield_strain: f32,
+    /// By what part of its rest length a spring may become longer or shorter for good, above 0 and below 1 where yield_strain is given;
+    /// default 0.5. Beyond that it is elastic again.
+    pub largest_set: f32,
+    /// The strain of springs from which they are stiffer, at least 0; default 0: there is none. Springs that are added later have none.
+    pub strain_limit: f32,
+    /// How many times their stiffness is added beyond it, above 0, at most 1e6 where strain_limit is given; default 100.
+    pub limit_stiffening: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -178,6 +196,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, mass_scaling),
         offset_of!(Self, cells),
         offset_of!(Self, home_stiffnesses),
+        offset_of!(Self, retardation_time),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -234,6 +253,12 @@ impl sinew_body_def {
             fibre_stiffness: 0.0,
             fibre_directions: std::ptr::null(),
             fibre_stiffnesses: std::ptr::null(),
+            retardation_time: 0.0,
+            relaxation_time: 0.0,
+            yield_strain: 0.0,
+            largest_set: BodyDefinition::default().largest_set,
+            strain_limit: 0.0,
+            limit_stiffening: BodyDefinition::default().limit_stiffening,
         }
     }
 
@@ -356,6 +381,14 @@ impl sinew_body_def {
                     tetrahedra,
                     self.fibre_stiffness,
                 )?,
+                viscosity: Viscosity {
+                    retardation_time: self.retardation_time,
+                    relaxation_time: self.relaxation_time,
+                },
+                yield_strain: self.yield_strain,
+                largest_set: self.largest_set,
+                strain_limit: self.strain_limit,
+                limit_stiffening: self.limit_stiffening,
                 storage: match self.storage {
                     SINEW_STORAGE_PACKED => Storage::Packed,
                     SINEW_STORAGE_EFFICIENT => Storage::Efficient,

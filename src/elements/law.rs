@@ -49,9 +49,57 @@ impl Law {
         }
     }
 
+    /// So many times as stiff.
+    pub fn times(&self, factor: f32) -> Self {
+        Self {
+            lambda: self.lambda * factor,
+            mu: self.mu * factor,
+            kappa: self.kappa * factor,
+            ..*self
+        }
+    }
+
+    /// The energy per volume where these are the stresses, and strains small enough to be the same whichever law they follow, Pa.
+    pub fn energy_of(&self, Load { stress, pressure }: Load) -> f64 {
+        let (lambda, mu, kappa) = (f64::from(self.lambda), f64::from(self.mu), f64::from(self.kappa));
+        let mut energy = 0.0;
+        if mu > 0.0 {
+            let trace = stress.x_axis.x + stress.y_axis.y + stress.z_axis.z;
+            energy += (product(&stress, &stress) - lambda / (3.0 * lambda + 2.0 * mu) * trace * trace) / (4.0 * mu);
+        }
+        if kappa > 0.0 && !self.rings {
+            energy += 0.5 * pressure * pressure / kappa;
+        }
+        energy
+    }
+
     /// What resists a small stretch with its sides held, Pa: lambda + 2 mu with all of lambda.
     pub fn whole(&self) -> f32 {
         self.lambda + 2.0 * self.mu + self.kappa
+    }
+}
+
+/// What acts in a tetrahedron on top of its elastic stresses, Pa.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Load {
+    /// On top of S.
+    pub stress: DMat3,
+    /// On top of the pressure of the volume term.
+    pub pressure: f64,
+}
+
+impl Load {
+    pub const NONE: Self = Self {
+        stress: DMat3::ZERO,
+        pressure: 0.0,
+    };
+
+    /// Of the entries 00, 01, 02, 11, 12, 22 and the pressure.
+    pub fn of([xx, xy, xz, yy, yz, zz, pressure]: [f64; 7]) -> Self {
+        Self {
+            stress: DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+            pressure,
+        }
     }
 }
 
@@ -104,6 +152,7 @@ pub(crate) struct Deformed {
     growth: f64,
     /// Pa
     pressure: f64,
+    load: Load,
     volume: f64,
     lambda: f64,
     mu: f64,
@@ -124,10 +173,28 @@ impl Deformed {
             strain: (gradient.transpose() * gradient - DMat3::IDENTITY) * 0.5,
             growth,
             pressure: kappa * growth,
+            load: Load::NONE,
             volume: rest.volume,
             lambda: f64::from(law.lambda),
             mu: f64::from(law.mu),
             kappa,
+        }
+    }
+
+    /// With these on top of its stresses.
+    pub fn loaded(self, load: Load) -> Self {
+        Self {
+            pressure: self.pressure + load.pressure,
+            load,
+            ..self
+        }
+    }
+
+    /// Its elastic stresses.
+    pub fn elastic(&self) -> Load {
+        Load {
+            stress: self.elastic_stress(),
+            pressure: self.pressure - self.load.pressure,
         }
     }
 
@@ -152,17 +219,21 @@ impl Deformed {
 
     /// The stress S, Pa.
     fn stress(&self) -> DMat3 {
+        self.elastic_stress() + self.load.stress
+    }
+
+    fn elastic_stress(&self) -> DMat3 {
         self.strain * (2.0 * self.mu) + DMat3::from_diagonal(DVec3::splat(self.lambda * self.trace()))
     }
 
-    /// J.
+    /// What is elastic, J.
     pub fn energy(&self) -> f64 {
         let squares = product(&self.strain, &self.strain);
         let elastic = 0.5 * self.lambda * self.trace().powi(2) + self.mu * squares;
         self.volume * (elastic + 0.5 * self.kappa * self.growth.powi(2))
     }
 
-    /// How the energy changes where the edges become longer by this, J, and the volume, m³, to the last digits of the changes.
+    /// How the energy, with that of the load, changes where the edges become longer by this, J, and the volume, m³, to the last digits of the changes.
     pub fn change(&self, rest: &Rest, more: DMat3) -> (f64, f64) {
         let more = more * rest.inverse;
         let [a, b, c] = [more.x_axis, more.y_axis, more.z_axis];
@@ -174,7 +245,8 @@ impl Deformed {
         let both = self.strain * 2.0 + strain;
         let elastic = 0.5 * self.lambda * trace * (2.0 * self.trace() + trace) + self.mu * product(&both, &strain);
         let energy = elastic + 0.5 * self.kappa * growth * (2.0 * self.growth + growth);
-        (self.volume * energy, self.volume * growth)
+        let of_load = product(&self.load.stress, &strain) + self.load.pressure * growth;
+        (self.volume * (energy + of_load), self.volume * growth)
     }
 
     /// The force on a corner whose function has this gradient, N.

@@ -5,6 +5,7 @@
 //! any number of threads.
 
 mod law;
+mod memory;
 mod parts;
 mod rates;
 mod rings;
@@ -14,10 +15,12 @@ use glam::{DMat3, DVec3};
 use crate::body::{Record, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
-use crate::memory;
-use crate::springs::{ChosenKernel, TILE, TileForces};
+use crate::material::{Course, Viscosity};
+use crate::memory::{filled, reserved};
+use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
-pub(crate) use law::{Deformed, Law, Rest};
+pub(crate) use law::{Deformed, Law, Load, Rest};
+use memory::Memory;
 use parts::{Copies, Part};
 use rings::{Pressures, Rings};
 
@@ -33,6 +36,8 @@ pub(crate) struct Elements {
     forces: Sums,
     /// Where volume is kept by rings.
     rings: Option<Rings>,
+    /// Where they are viscous.
+    memory: Option<Box<Memory>>,
     /// A bound on the squares of frequencies where the forces were last worked out, and at the current state, 1/s².
     highest: f32,
     settled: f32,
@@ -60,15 +65,20 @@ pub(crate) struct Sums {
 
 impl Sums {
     fn new(copies: usize, parts: usize, with_ways: bool, ring_count: usize) -> Result<Self> {
-        let records = |count| memory::filled(Record::default(), count);
+        let records = |count| filled(Record::default(), count);
         Ok(Self {
             positions: records(copies)?,
             ways: records(if with_ways { copies } else { 0 })?,
             sums: records(copies)?,
-            of_parts: memory::filled(0.0, parts)?,
+            of_parts: filled(0.0, parts)?,
             pressures: Pressures::new(ring_count)?,
         })
     }
+}
+
+/// The loads on the tetrahedra of a part; none where there is no memory.
+fn loads(memory: Option<&Memory>, part: usize) -> &[Stresses] {
+    memory.map_or(&[], |memory| &memory.parts[part].past.loads)
 }
 
 /// What is shown the nodes of a tetrahedron, the gradients of their functions, and how it is deformed.
@@ -101,19 +111,31 @@ impl Shares<'_> {
 
 impl Elements {
     /// Tetrahedra of nodes that are here at rest, in the body's own numbers.
-    pub fn new(law: Law, tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3, node_count: usize) -> Result<Self> {
+    pub fn new(
+        law: Law,
+        viscosity: Viscosity,
+        tetrahedra: &[[u32; 4]],
+        rest: impl Fn(u32) -> DVec3,
+        node_count: usize,
+    ) -> Result<Self> {
         let parts = parts::split(tetrahedra, &rest)?;
-        let mut starts = memory::reserved(parts.len() + 1)?;
+        let mut starts = reserved(parts.len() + 1)?;
         let mut count = 0;
         for part in &parts {
             starts.push(count);
             count += part.nodes.len();
         }
+        let ring_count = if law.rings { node_count } else { 0 };
         let mut elements = Self {
             law,
             count: tetrahedra.len(),
+            memory: if viscosity.is_none() {
+                None
+            } else {
+                Some(Box::new(Memory::new(viscosity, &parts, ring_count)?))
+            },
             copies: Copies::new(&parts, node_count)?,
-            forces: Sums::new(count, parts.len(), false, if law.rings { node_count } else { 0 })?,
+            forces: Sums::new(count, parts.len(), false, ring_count)?,
             rings: if law.rings {
                 Some(rings::of(&parts, node_count)?)
             } else {
@@ -121,8 +143,8 @@ impl Elements {
             },
             parts,
             starts,
-            stiffnesses: memory::filled(0.0, node_count)?,
-            carried: memory::filled(0.0, node_count)?,
+            stiffnesses: filled(0.0, node_count)?,
+            carried: filled(0.0, node_count)?,
             highest: f32::INFINITY,
             settled: f32::INFINITY,
             most_damped: 0.0,
@@ -140,10 +162,10 @@ impl Elements {
     /// Works out the forces of all elements with nodes at `positions`.
     pub fn find_forces(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
         if self.rings.is_some() {
-            self.find_pressures(kernel, positions, team);
+            self.find_pressures(kernel, positions, true, team);
         }
-        let (law, parts, starts) = (self.law, &self.parts, &self.starts);
-        let sums = &mut self.forces;
+        let (law, parts, starts) = (self.stiffened(), &self.parts, &self.starts);
+        let (sums, memory) = (&mut self.forces, self.memory.as_deref());
         let written = (
             Ragged::new(&mut sums.positions, starts),
             Ragged::new(&mut sums.sums, starts),
@@ -151,18 +173,19 @@ impl Elements {
         );
         let pressures = &sums.pressures.of_nodes;
         team.pass(parts.len(), written, |part, (copies, sums, highest)| {
-            let part = &parts[part];
-            part.copy(positions, copies);
-            part.copy_pressures(pressures, copies);
+            let of = &parts[part];
+            of.copy(positions, copies);
+            of.copy_pressures(pressures, copies);
             sums.fill(Record::default());
-            *highest = f64::from(part.groups.forces(kernel, law, copies, sums));
+            *highest = f64::from(of.groups.forces(kernel, law, loads(memory, part), copies, sums));
         });
         self.highest = sums.of_parts.iter().fold(0.0, |highest: f64, &of| highest.max(of)) as f32;
     }
 
     /// Works out how their forces change, to first order, with nodes at `positions` that go these ways.
     pub fn find_changes(&self, kernel: ChosenKernel, [positions, ways]: [&[Record]; 2], sums: &mut Sums, team: &Team) {
-        let (law, parts, starts) = (self.law, &self.parts, &self.starts);
+        let (law, parts, starts) = (self.stiffened(), &self.parts, &self.starts);
+        let memory = self.memory.as_deref();
         if let Some(rings) = &self.rings {
             let written = (
                 Ragged::new(&mut sums.positions, starts),
@@ -176,7 +199,8 @@ impl Elements {
                 sums.fill(Record::default());
                 part.groups.growths(kernel, copies, Some(copied_ways), sums);
             });
-            sums.pressures.find(rings, &self.copies, &sums.sums, law.kappa, team);
+            sums.pressures
+                .find(rings, &self.copies, &sums.sums, law.kappa, &[], team);
         }
         let written = (
             Ragged::new(&mut sums.positions, starts),
@@ -185,19 +209,20 @@ impl Elements {
         );
         let pressures = &sums.pressures.of_nodes;
         team.pass(parts.len(), written, |part, (copies, copied_ways, sums)| {
-            let part = &parts[part];
-            part.copy(positions, copies);
-            part.copy(ways, copied_ways);
-            part.copy_pressures(pressures, copied_ways);
+            let of = &parts[part];
+            of.copy(positions, copies);
+            of.copy(ways, copied_ways);
+            of.copy_pressures(pressures, copied_ways);
             sums.fill(Record::default());
-            part.groups.changes(kernel, law, copies, copied_ways, sums);
+            of.groups
+                .changes(kernel, law, loads(memory, part), [copies, copied_ways], sums);
         });
     }
 
-    /// Their energy with nodes at `positions`, J.
+    /// Their energy with nodes at `positions`, with that of the arms beside them, J.
     pub fn energy(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
         let of_rings = if self.rings.is_some() {
-            self.find_pressures(kernel, positions, team)
+            self.find_pressures(kernel, positions, false, team)
         } else {
             0.0
         };
@@ -211,11 +236,12 @@ impl Elements {
             part.copy(positions, copies);
             *energy = part.groups.energy(kernel, law, copies);
         });
-        of_rings + sums.of_parts.iter().sum::<f64>()
+        let elastic = of_rings + sums.of_parts.iter().sum::<f64>();
+        elastic + self.energy_of_arms(kernel, positions, team)
     }
 
-    /// Works out the pressures of nodes at `positions`: the energy of all rings, J.
-    fn find_pressures(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
+    /// Works out the pressures of nodes at `positions`, with the loads on them or without: the elastic energy of all rings, J.
+    fn find_pressures(&mut self, kernel: ChosenKernel, positions: &[Record], loaded: bool, team: &Team) -> f64 {
         let (parts, starts, sums) = (&self.parts, &self.starts, &mut self.forces);
         let written = (
             Ragged::new(&mut sums.positions, starts),
@@ -230,8 +256,11 @@ impl Elements {
         let Some(rings) = &self.rings else {
             return 0.0;
         };
+        let memory = self.memory.as_deref().filter(|_| loaded);
+        let loads = memory.map_or(&[][..], |memory| &memory.rings.loads);
+        let law = memory.map_or(self.law, |memory| memory.stiffened(self.law));
         sums.pressures
-            .find(rings, &self.copies, &sums.sums, self.law.kappa, team)
+            .find(rings, &self.copies, &sums.sums, law.kappa, loads, team)
     }
 
     /// Where forces were worked out last is the current state.
@@ -269,21 +298,37 @@ impl Elements {
 
     /// Shows each tetrahedron's nodes and the way it is at rest.
     pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest)) {
-        self.parts.iter().for_each(|part| part.visit(see));
+        for part in &self.parts {
+            part.visit(&mut |corners, rest, _| see(corners, rest));
+        }
+    }
+
+    /// The same with the load on it.
+    pub fn visit_loaded(&self, see: &mut dyn FnMut([u32; 4], &Rest, Load)) {
+        for (index, part) in self.parts.iter().enumerate() {
+            part.visit(&mut |corners, rest, place| {
+                let memory = self.memory.as_deref();
+                see(
+                    corners,
+                    rest,
+                    memory.map_or(Load::NONE, |memory| memory.load(index, place)),
+                );
+            });
+        }
     }
 
     /// Shows each tetrahedron's nodes, the gradients of their functions and how it is deformed with nodes at `positions`; what rings do
     /// is shown as if each tetrahedron kept this part of it by itself.
     pub fn visit_deformed(&self, positions: &Vectors, part_of_rings: f32, see: &mut See) {
-        let mut law = self.law;
+        let mut law = self.stiffened();
         if law.rings {
             law.rings = false;
             law.kappa *= part_of_rings;
         }
-        self.visit(&mut |corners, rest| {
+        self.visit_loaded(&mut |corners, rest, load| {
             let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
             let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
-            see(corners, &rest.gradients(), &deformed);
+            see(corners, &rest.gradients(), &deformed.loaded(load));
         });
     }
 
@@ -294,21 +339,29 @@ impl Elements {
 
     /// The energy with nodes at `positions`, J, worked out in `f64`; `growths` are for its use.
     pub fn exact_energy(&self, position: impl Fn(usize) -> DVec3, growths: &mut [f64]) -> f64 {
-        let mut energy = 0.0;
+        let (mut energy, law) = (0.0, self.law);
+        let (memory, kappa) = (self.memory.as_deref(), f64::from(law.kappa));
         growths.fill(0.0);
-        self.visit(&mut |corners, rest| {
+        self.visit_loaded(&mut |corners, rest, load| {
             let [a, b, c, d] = corners.map(|node| position(node as usize));
-            let deformed = Deformed::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
+            let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
             energy += deformed.energy();
-            if self.law.rings {
+            if let Some(memory) = memory {
+                energy += rest.volume * memory.energy_of(law, load, deformed.elastic());
+            }
+            if law.rings {
                 for node in corners {
                     growths[node as usize] += 0.25 * deformed.swelling();
                 }
             }
         });
         let rings = self.rings.iter().flat_map(|rings| &rings.volumes).zip(&*growths);
-        for (&volume, growth) in rings.filter(|(volume, _)| **volume > 0.0) {
-            energy += 0.5 * f64::from(self.law.kappa) * growth * growth / f64::from(volume);
+        for (node, (&volume, growth)) in rings.enumerate().filter(|(_, (volume, _))| **volume > 0.0) {
+            let volume = f64::from(volume);
+            energy += 0.5 * kappa * growth * growth / volume;
+            if let Some(memory) = memory {
+                energy += memory.energy_of_ring(law, node, kappa * growth / volume, volume);
+            }
         }
         energy
     }
@@ -328,15 +381,118 @@ impl Elements {
         self.rings.as_ref().map(|rings| f64::from(rings.volumes[node]))
     }
 
-    /// The law of all of them.
-    pub fn law(&self) -> Law {
-        self.law
+    /// The law of all of them in the equation that is being solved.
+    pub fn stiffened(&self) -> Law {
+        self.memory
+            .as_ref()
+            .map_or(self.law, |memory| memory.stiffened(self.law))
+    }
+
+    /// The load on the ring of a node, Pa.
+    pub fn load_of_ring(&self, node: usize) -> f64 {
+        let memory = self.memory.as_ref();
+        memory.map_or(0.0, |memory| f64::from(memory.rings.loads[node]))
+    }
+
+    /// Whether they remember anything.
+    pub fn remember(&self) -> bool {
+        self.memory.is_some()
+    }
+
+    /// A step begins, from what is current.
+    pub fn recall(&mut self) {
+        if let Some(memory) = &mut self.memory {
+            memory.recall();
+        }
+    }
+
+    /// The step in progress is the current state.
+    pub fn keep(&mut self) {
+        if let Some(memory) = &mut self.memory {
+            memory.keep();
+        }
+    }
+
+    /// An equation is to be solved for the end of so many seconds.
+    pub fn foresee(&mut self, time: f64) {
+        if let Some(memory) = &mut self.memory {
+            memory.foresee(time);
+        }
+    }
+
+    /// Nodes have come to `positions` along the course that the viscosity leads to.
+    pub fn age(
+        &mut self,
+        kernel: ChosenKernel,
+        positions: &[Record],
+        course: impl Fn(Viscosity) -> Course,
+        team: &Team,
+    ) {
+        let Some(memory) = &self.memory else {
+            return;
+        };
+        let course = course(memory.viscosity);
+        self.find_elastic(kernel, positions, team);
+        if let Some(memory) = &mut self.memory {
+            memory.gain = 0.0;
+            team.pass(memory.parts.len(), Items::new(&mut memory.parts), |_, part| {
+                part.past.age(course, &part.newest);
+            });
+            memory.rings.age(course, &self.forces.pressures.of_nodes);
+        }
+    }
+
+    /// Works out the elastic stresses and pressures with nodes at `positions`.
+    fn find_elastic(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
+        if self.rings.is_some() {
+            self.find_pressures(kernel, positions, false, team);
+        }
+        let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
+        if let Some(memory) = &mut self.memory {
+            let written = (
+                Ragged::new(&mut sums.positions, &self.starts),
+                Items::new(&mut memory.parts),
+            );
+            team.pass(parts.len(), written, |part, (copies, memory)| {
+                let part = &parts[part];
+                part.copy(positions, copies);
+                part.groups.stresses(kernel, law, copies, &mut memory.newest);
+            });
+        }
+    }
+
+    /// The energy of the arms' springs with nodes at `positions`, J.
+    fn energy_of_arms(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
+        if self
+            .memory
+            .as_ref()
+            .is_none_or(|memory| memory.viscosity.stiffening().is_none())
+        {
+            return 0.0;
+        }
+        self.find_elastic(kernel, positions, team);
+        let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
+        let Some(memory) = self.memory.as_deref() else {
+            return 0.0;
+        };
+        team.pass(parts.len(), Items::new(&mut sums.of_parts), |part, energy| {
+            *energy = memory.energy_of_part(law, part, parts[part].groups.as_slice());
+        });
+        let rings = self.rings.iter().flat_map(|rings| &rings.volumes);
+        let rings = rings.zip(&sums.pressures.of_nodes).enumerate();
+        let of_rings = rings.map(|(node, (&volume, &pressure))| {
+            memory.energy_of_ring(law, node, f64::from(pressure), f64::from(volume))
+        });
+        sums.of_parts.iter().sum::<f64>() + of_rings.sum::<f64>()
     }
 
     /// What may change of them.
     pub fn hash(&self, hasher: &mut StateHasher) {
         for group in self.parts.iter().flat_map(|part| part.groups.as_slice()) {
             hasher.write_floats(&group.volumes);
+        }
+        if let Some(memory) = &self.memory {
+            memory.hash(hasher);
         }
     }
 }

@@ -74,9 +74,9 @@ impl Part {
         }
     }
 
-    /// Shows the tetrahedra there are.
-    pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest)) {
-        for group in self.groups.as_slice() {
+    /// Shows the tetrahedra there are, and in which group and lane.
+    pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest, [usize; 2])) {
+        for (index, group) in self.groups.as_slice().iter().enumerate() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
                 let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
                 let rest = Rest {
@@ -84,7 +84,7 @@ impl Part {
                     volume: f64::from(group.volumes[lane]),
                 };
                 let corners = group.corners.map(|corners| self.nodes[usize::from(corners[lane] / 2)]);
-                see(corners, &rest);
+                see(corners, &rest, [index, lane]);
             }
         }
     }

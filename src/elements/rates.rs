@@ -69,6 +69,9 @@ impl Elements {
 
     fn rates_of(&self, stiffest: f32) -> Rates {
         let most_damped = self.most_damped;
-        Rates { stiffest, most_damped }
+        let rates = Rates { stiffest, most_damped };
+        self.memory
+            .as_ref()
+            .map_or(rates, |memory| memory.viscosity.rates(rates))
     }
 }

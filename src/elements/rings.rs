@@ -17,7 +17,7 @@ pub(super) struct Rings {
 pub(super) fn of(parts: &[Part], node_count: usize) -> Result<Rings> {
     let mut volumes = memory::filled(0.0_f32, node_count)?;
     for part in parts {
-        part.visit(&mut |corners, rest| {
+        part.visit(&mut |corners, rest, _| {
             for node in corners {
                 volumes[node as usize] += 0.25 * rest.volume as f32;
             }
@@ -41,8 +41,17 @@ impl Pressures {
         })
     }
 
-    /// Those that growths of the copies, m³, lead to where volume resists with `kappa`, Pa: the energy of all, J.
-    pub fn find(&mut self, rings: &Rings, copies: &Copies, growths: &[Record], kappa: f32, team: &Team) -> f64 {
+    /// Those that growths of the copies, m³, lead to where volume resists with `kappa`, Pa, with `loads` on top where there are any: the
+    /// energy of all without those, J.
+    pub fn find(
+        &mut self,
+        rings: &Rings,
+        copies: &Copies,
+        growths: &[Record],
+        kappa: f32,
+        loads: &[f32],
+        team: &Team,
+    ) -> f64 {
         let node_count = self.of_nodes.len();
         let written = (Tiles::new(&mut self.of_nodes, TILE), Items::new(&mut self.energies));
         team.pass(tile_count(node_count), written, |tile, (pressures, energy)| {
@@ -56,6 +65,13 @@ impl Pressures {
                 let growth = *pressure;
                 *pressure = if volume > 0.0 { kappa * (growth / volume) } else { 0.0 };
                 *energy += 0.5 * f64::from(growth) * f64::from(*pressure);
+            }
+            if !loads.is_empty() {
+                let loads = &loads[tile_nodes(tile, node_count)];
+                pressures
+                    .iter_mut()
+                    .zip(loads)
+                    .for_each(|(pressure, load)| *pressure += load);
             }
         });
         self.energies.iter().sum()

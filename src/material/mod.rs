@@ -7,11 +7,14 @@ mod filled;
 mod masses;
 pub mod presets;
 mod springs;
+mod viscosity;
 
 use crate::body::{BodyDefinition, Values, not_negative};
 use crate::elements::Law;
 use crate::error::{Error, Result};
 use filled::Filled;
+pub(crate) use viscosity::Course;
+pub use viscosity::Viscosity;
 
 /// How a material's numbers become forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

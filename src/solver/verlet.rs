@@ -142,6 +142,7 @@ impl Step<'_> {
                 finite = surveys[depth - 1].finite;
             } else {
                 finite = pass(body, request, &parts[0], &mut carry, team);
+                body.age(f64::from(substep), team);
             }
             for _ in parts {
                 body.state.advance();
@@ -249,6 +250,7 @@ fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, 
 /// Starts the step over, from what is current.
 pub(super) fn begin(body: &mut Body, request: &StepRequest) {
     body.state.begin();
+    body.recall();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);
         pin.goal = match pin.target {

@@ -18,7 +18,7 @@ use std::ops;
 use glam::Vec3;
 
 pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, GROUP, Group, Groups, Loops, Range, prefetch};
+pub(crate) use kernels::{ChosenKernel, GROUP, Group, Groups, Loops, Range, Stresses, prefetch};
 use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;

@@ -4,10 +4,13 @@
 //! are no buffers, any thread may take any tile, and results are the same for any number of threads. Terms are worked out in `f64`, by
 //! the same few lines for every solver.
 
+mod arms;
 mod bending;
 mod fibres;
 mod home;
+mod limit;
 mod nonlinear;
+mod set;
 mod stencils;
 
 use std::fmt::Debug;
@@ -19,6 +22,7 @@ use glam::{DMat3, DVec3};
 use crate::body::{BodyDefinition, NodeOrder, Spring, Vectors, View};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
+use crate::material::{Course, Viscosity};
 use crate::memory;
 use crate::solver::{Masses, Rates};
 use crate::springs::{Springs, TileForces, tile_count};
@@ -26,6 +30,17 @@ pub use nonlinear::SpringLaw;
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
 pub(crate) type Blocks = [[DMat3; 4]; 4];
+
+/// What is done to terms that remember.
+#[derive(Clone, Copy, Debug)]
+enum Moment {
+    /// A step begins, from what is current.
+    Recall,
+    /// The step in progress is the current state.
+    Keep,
+    /// An equation is to be solved for the end of so many seconds.
+    Foresee(f64),
+}
 
 /// The terms of a body that follow one law.
 trait Term: Debug + Send + Sync {
@@ -67,6 +82,14 @@ trait Term: Debug + Send + Sync {
         false
     }
 
+    /// Whether they remember anything.
+    fn remembers(&self) -> bool;
+
+    fn pass(&mut self, moment: Moment);
+
+    /// Nodes have come to `positions`, and what is viscous along this course.
+    fn age(&mut self, positions: View, course: &dyn Fn(Viscosity) -> Course);
+
     /// What may change of them.
     fn hash(&self, hasher: &mut StateHasher);
 }
@@ -77,6 +100,8 @@ pub(crate) struct Terms {
     laws: Vec<Box<dyn Term>>,
     /// Whether any node is held against the world.
     holds_any: bool,
+    /// Of the springs, where they have arms.
+    viscosity: Viscosity,
     /// Room for a number per node.
     sums: Vec<f32>,
     /// What bounds their frequencies, with that of the springs where they were given.
@@ -94,6 +119,9 @@ impl Terms {
     pub fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<Self>>> {
         let made = [
             home::new(definition, order)?,
+            arms::new(definition, springs, order)?,
+            limit::new(definition, springs, order)?,
+            set::new(definition, springs, order)?,
             bending::new(definition, order)?,
             nonlinear::new(definition, springs, order)?,
             fibres::new(definition, order)?,
@@ -105,6 +133,7 @@ impl Terms {
         }
         let mut nodes = 0..definition.positions.len();
         Ok(Some(Box::new(Self {
+            viscosity: definition.viscosity,
             holds_any: nodes.any(|node| laws.iter().any(|law| law.holds(node))),
             laws,
             sums: memory::filled(0.0, definition.positions.len())?,
@@ -189,8 +218,8 @@ impl Terms {
         self.rates_known = false;
     }
 
-    /// Makes the bound on frequencies that of these masses, with these springs if they are not part of another bound.
-    pub fn find_rates(&mut self, springs: Option<&dyn Springs>, masses: &Masses) {
+    /// Makes the bound on frequencies that of these masses and springs, which some terms make stiffer.
+    pub fn find_rates(&mut self, springs: &dyn Springs, masses: &Masses) {
         if self.rates_known {
             return;
         }
@@ -198,8 +227,7 @@ impl Terms {
         self.laws.iter().for_each(|law| law.add_rates(masses, &mut self.sums));
         let mut most = Rates::ZERO;
         for (node, &sum) in self.sums.iter().enumerate() {
-            let of_springs = springs.and_then(|springs| Rates::anywhere(node, springs, masses));
-            let of_springs = of_springs.unwrap_or(Rates::ZERO);
+            let of_springs = Rates::anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
             most.stiffest = most.stiffest.max(sum + of_springs.stiffest);
             most.most_damped = most.most_damped.max(of_springs.most_damped);
         }
@@ -236,10 +264,35 @@ impl Terms {
     }
 
     fn rates_times(&self, stiffening: f32) -> Rates {
-        Rates {
+        self.viscosity.rates(Rates {
             stiffest: self.rates.stiffest * stiffening,
             ..self.rates
-        }
+        })
+    }
+
+    /// Whether any remember anything.
+    pub fn remember(&self) -> bool {
+        self.laws.iter().any(|law| law.remembers())
+    }
+
+    /// A step begins, from what is current.
+    pub fn recall(&mut self) {
+        self.laws.iter_mut().for_each(|law| law.pass(Moment::Recall));
+    }
+
+    /// The step in progress is the current state.
+    pub fn keep(&mut self) {
+        self.laws.iter_mut().for_each(|law| law.pass(Moment::Keep));
+    }
+
+    /// An equation is to be solved for the end of so many seconds.
+    pub fn foresee(&mut self, time: f64) {
+        self.laws.iter_mut().for_each(|law| law.pass(Moment::Foresee(time)));
+    }
+
+    /// Nodes have come to `positions`, and what is viscous along this course.
+    pub fn age(&mut self, positions: &Vectors, course: &dyn Fn(Viscosity) -> Course) {
+        self.laws.iter_mut().for_each(|law| law.age(positions.view(), course));
     }
 
     /// What may change of them.

@@ -111,7 +111,7 @@ impl SpringLaw {
     }
 
     /// What the pull, its slope and the energy are beyond those of a linear spring.
-    fn beyond(&self, strain: f64) -> [f64; 3] {
+    pub(super) fn beyond(&self, strain: f64) -> [f64; 3] {
         let limit = self.limit();
         if strain <= limit {
             return self.below_limit(strain);
@@ -122,7 +122,7 @@ impl SpringLaw {
     }
 
     /// How the energy changes where the strain becomes so much larger.
-    fn change(&self, strain: f64, more: f64) -> f64 {
+    pub(super) fn change(&self, strain: f64, more: f64) -> f64 {
         let steepness = match *self {
             SpringLaw::Exponential { steepness, .. } => f64::from(steepness).max(1.0),
             _ => 1.0,

@@ -5,10 +5,11 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::{Blocks, Term};
+use super::{Blocks, Moment, Term};
 use crate::body::{Vectors, View};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
+use crate::material::{Course, Viscosity};
 use crate::memory;
 use crate::solver::Masses;
 use crate::springs::{TILE, TileForces, tile_count};
@@ -47,6 +48,25 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
 
     /// Nodes are given from here on.
     fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
+
+    /// Whether terms remember anything; what follows is for those.
+    const REMEMBERS: bool = false;
+
+    /// Something is about to be done to all terms.
+    fn begin(&mut self, _moment: Moment) {}
+
+    fn pass(&self, _moment: Moment, _shape: &mut Self::Shape) {}
+
+    /// Nodes have come to `positions`.
+    fn age(
+        &mut self,
+        _stencils: &mut [Stencil<Self::Shape, N>],
+        _positions: View,
+        _course: &dyn Fn(Viscosity) -> Course,
+    ) {
+    }
+
+    fn hash(&self, _shape: &Self::Shape, _hasher: &mut StateHasher) {}
 }
 
 /// A term: some nodes, how stiff it is, and what it is at rest.
@@ -283,9 +303,29 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
                 .is_ok()
     }
 
+    fn remembers(&self) -> bool {
+        L::REMEMBERS
+    }
+
+    fn pass(&mut self, moment: Moment) {
+        if L::REMEMBERS {
+            self.law.begin(moment);
+            for stencil in &mut self.all {
+                self.law.pass(moment, &mut stencil.shape);
+            }
+        }
+    }
+
+    fn age(&mut self, positions: View, course: &dyn Fn(Viscosity) -> Course) {
+        if L::REMEMBERS {
+            self.law.age(&mut self.all, positions, course);
+        }
+    }
+
     fn hash(&self, hasher: &mut StateHasher) {
         for stencil in &self.all {
             hasher.write_floats(&[stencil.stiffness]);
+            self.law.hash(&stencil.shape, hasher);
         }
     }
 }

@@ -14,7 +14,7 @@ mod symmetry;
 mod violence;
 mod watched;
 
-use sinew::{Solver, Storage};
+use sinew::Solver;
 
 pub use setup::{Case, Outcome, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier};
 

@@ -65,6 +65,16 @@ impl Substep<'_> {
         };
         let mut energy = implicit.elastic(&mut inside, state.positions, from, self.team);
         if travels {
+            // With what viscous arms take up on that way.
+            body.foresee(self.step);
+            let state = body.state.substep();
+            let mut inside = Inside {
+                springs: &*body.springs,
+                elements: body.elements.as_deref_mut(),
+                terms: body.terms.as_deref(),
+                records: body.records.as_mut(),
+                kernel: body.kernel,
+            };
             let moved = state.next_positions;
             moved.copy_from(state.positions);
             for pin in body.pins.iter() {

@@ -185,10 +185,13 @@ impl Substep<'_> {
             self.slow_down(body, implicit, before);
             end = End::Fine;
         }
-        match end {
-            End::Fine => self.meet(body, implicit),
-            end => end,
+        if end == End::Fine {
+            end = self.meet(body, implicit);
         }
+        if end == End::Fine {
+            body.age(self.step, self.team);
+        }
+        end
     }
 
     /// The same step by implicit Euler.
@@ -200,6 +203,7 @@ impl Substep<'_> {
     }
 
     fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+        body.foresee(self.step);
         self.foreseeing(body, implicit).take_formula(body, implicit, before)
     }
 

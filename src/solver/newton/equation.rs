@@ -6,9 +6,9 @@
 use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
-use super::network::{Network, PAIRS, Tetrahedron};
+use super::network::{Element, Network, PAIRS, Tetrahedron};
 use crate::contact::Holds;
-use crate::elements::{Deformed, Law};
+use crate::elements::Deformed;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Link;
@@ -110,8 +110,9 @@ impl Equation {
             residuals[node] += force;
             residuals[link.neighbour as usize] -= force;
         }
-        for (law, tetrahedron) in network.tetrahedra() {
-            let deformed = self.deformed(law, tetrahedron).under_mean(&self.pressures, tetrahedron);
+        for element in network.tetrahedra() {
+            let tetrahedron = element.of;
+            let deformed = self.deformed(&element).under_mean(&self.pressures, tetrahedron);
             for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
                 residuals[corner] += deformed.force(gradient);
             }
@@ -152,21 +153,23 @@ impl Equation {
             let along = more.dot(spring.direction);
             add(0.5 * damping(link) * along * (2.0 * spring.speed + self.rate * along));
         }
-        for (law, tetrahedron) in network.tetrahedra() {
+        for element in network.tetrahedra() {
+            let tetrahedron = element.of;
             let more = edges(&tetrahedron.corners, |node| corrections[node] * part);
-            add(self.deformed(law, tetrahedron).change(&tetrahedron.rest, more).0);
+            add(self.deformed(&element).change(&tetrahedron.rest, more).0);
         }
         for node in 0..network.ring_count() {
             let (mut growth, mut more) = (0.0, 0.0);
-            for (law, tetrahedron) in network.ring(node) {
-                let deformed = self.deformed(law, tetrahedron);
+            for element in network.ring(node) {
+                let tetrahedron = element.of;
+                let deformed = self.deformed(&element);
                 growth += 0.25 * deformed.swelling();
                 let longer = edges(&tetrahedron.corners, |node| corrections[node] * part);
                 more += 0.25 * deformed.change(&tetrahedron.rest, longer).1;
             }
             let volume = network.volumes[node];
             if volume > 0.0 {
-                add(0.5 * network.kappa() / volume * more * (2.0 * growth + more));
+                add(0.5 * network.kappa() / volume * more * (2.0 * growth + more) + network.ring_load(node) * more);
             }
         }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
@@ -199,8 +202,8 @@ impl Equation {
             let joins = self.is_free(node) && self.is_free(neighbour);
             matrix.beside[place] = if joins { -block } else { DMat3::ZERO };
         }
-        for (law, tetrahedron) in network.tetrahedra() {
-            self.add_tetrahedron(law, tetrahedron, tangent, matrix);
+        for element in network.tetrahedra() {
+            self.add_tetrahedron(element, tangent, matrix);
         }
         self.add_terms(network, tangent, matrix);
         self.holds.show_blocks(|node, block| {
@@ -210,16 +213,13 @@ impl Equation {
         });
     }
 
-    fn add_tetrahedron(&self, law: Law, tetrahedron: &Tetrahedron, tangent: Tangent, matrix: &mut Matrix) {
-        let law = match tangent {
-            Tangent::Factor if law.rings => Law {
-                rings: false,
-                kappa: PART_OF_RINGS * law.kappa,
-                ..law
-            },
-            _ => law,
-        };
-        let deformed = self.deformed(law, tetrahedron);
+    fn add_tetrahedron(&self, mut element: Element, tangent: Tangent, matrix: &mut Matrix) {
+        let (law, tetrahedron) = (&mut element.law, element.of);
+        if tangent == Tangent::Factor && law.rings {
+            law.rings = false;
+            law.kappa *= PART_OF_RINGS;
+        }
+        let deformed = self.deformed(&element);
         let gradients = tetrahedron.rest.gradients();
         let pressed = deformed.under_mean(&self.pressures, tetrahedron);
         let stiffness = |a: usize, b: usize| match tangent {
@@ -289,11 +289,11 @@ impl Equation {
         for node in 0..self.pressures.len() {
             let growths = network
                 .ring(node)
-                .map(|(law, of)| 0.25 * self.deformed(law, of).swelling());
+                .map(|element| 0.25 * self.deformed(&element).swelling());
             let growth: f64 = growths.sum();
             let volume = network.volumes[node];
             self.pressures[node] = if volume > 0.0 {
-                network.kappa() * growth / volume
+                network.kappa() * growth / volume + network.ring_load(node)
             } else {
                 0.0
             };
@@ -304,8 +304,9 @@ impl Equation {
     fn add_products_of_rings(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
         for (node, change) in changes.iter_mut().enumerate() {
             let mut growth = 0.0;
-            for (law, tetrahedron) in network.ring(node) {
-                let deformed = self.deformed(law, tetrahedron);
+            for element in network.ring(node) {
+                let tetrahedron = element.of;
+                let deformed = self.deformed(&element);
                 for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
                     growth += 0.25 * deformed.area(gradient).dot(vectors[corner]);
                 }
@@ -317,8 +318,9 @@ impl Equation {
                 0.0
             };
         }
-        for (law, tetrahedron) in network.tetrahedra() {
-            let deformed = self.deformed(law, tetrahedron);
+        for element in network.tetrahedra() {
+            let tetrahedron = element.of;
+            let deformed = self.deformed(&element);
             let change = tetrahedron
                 .corners
                 .map(|corner| 0.25 * changes[corner])
@@ -332,9 +334,9 @@ impl Equation {
         }
     }
 
-    fn deformed(&self, law: Law, tetrahedron: &Tetrahedron) -> Deformed {
-        let edges = edges(&tetrahedron.corners, |node| self.position(node));
-        Deformed::new(law, &tetrahedron.rest, edges)
+    fn deformed(&self, element: &Element) -> Deformed {
+        let edges = edges(&element.of.corners, |node| self.position(node));
+        Deformed::new(element.law, &element.of.rest, edges).loaded(element.load)
     }
 
     /// Brings what contacts do up to the ways, of which the matrix is made.
@@ -402,7 +404,7 @@ impl Equation {
             .sum();
         let mut of_elements: f64 = network
             .tetrahedra()
-            .map(|(law, tetrahedron)| self.deformed(law, tetrahedron).energy())
+            .map(|element| self.deformed(&element).energy())
             .sum();
         self.find_pressures(network);
         for (pressure, volume) in self.pressures.iter().zip(&network.volumes) {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::elements::{Elements, Law, Rest};
+use crate::elements::{Elements, Law, Load, Rest};
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Link, Springs};
@@ -16,6 +16,8 @@ pub(super) struct Network {
     starts: Vec<usize>,
     links: Vec<Link>,
     tetrahedra: Vec<Tetrahedron>,
+    /// On each of them, where elements remember; none otherwise.
+    loads: Vec<Load>,
     /// Lent by the body while it is solved.
     pub terms: Option<Box<Terms>>,
     /// The pairs of nodes of tetrahedra and terms, the higher number first.
@@ -23,6 +25,8 @@ pub(super) struct Network {
     law: Option<Law>,
     /// Where volume is kept by rings: each node's volume at rest, m³, and where the tetrahedra about it begin among all.
     pub volumes: Vec<f64>,
+    /// The load on each, Pa, where elements remember; none otherwise.
+    ring_loads: Vec<f64>,
     ring_starts: Vec<usize>,
     ring_members: Vec<u32>,
 }
@@ -34,6 +38,14 @@ pub(super) struct Tetrahedron {
     pub rest: Rest,
     /// Of the pairs of [`PAIRS`].
     pub places: [usize; 6],
+}
+
+/// A tetrahedron with the law and the load of the equation.
+#[derive(Clone, Copy)]
+pub(super) struct Element<'a> {
+    pub law: Law,
+    pub load: Load,
+    pub of: &'a Tetrahedron,
 }
 
 /// The pairs of corners.
@@ -68,13 +80,16 @@ impl Network {
         show_pairs(terms, &mut |_| pair_count += 1);
         let tetrahedron_count = elements.map_or(0, Elements::count);
         let ring_count = elements.map_or(0, Elements::ring_count);
+        let remember = elements.is_some_and(Elements::remember);
         let mut network = Self {
             starts: memory::filled(0, node_count + 1)?,
             links: memory::reserved(springs.spring_count() + pair_count)?,
             tetrahedra: memory::reserved(tetrahedron_count)?,
+            loads: memory::reserved(if remember { tetrahedron_count } else { 0 })?,
+            ring_loads: memory::reserved(if remember { ring_count } else { 0 })?,
             terms: None,
             edges: memory::reserved(pair_count)?,
-            law: elements.map(Elements::law),
+            law: None,
             volumes: memory::filled(0.0, ring_count)?,
             ring_starts: memory::filled(0, if ring_count > 0 { ring_count + 1 } else { 0 })?,
             ring_members: memory::filled(0, if ring_count > 0 { 4 * tetrahedron_count } else { 0 })?,
@@ -93,9 +108,15 @@ impl Network {
     /// Takes them from a body, which allocates nothing where there is room for all.
     pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>, terms: Option<&Terms>) {
         self.tetrahedra.clear();
+        self.loads.clear();
+        self.ring_loads.clear();
         self.edges.clear();
+        self.law = elements.map(Elements::stiffened);
         if let Some(elements) = elements {
-            elements.visit(&mut |corners, rest| {
+            elements.visit_loaded(&mut |corners, rest, load| {
+                if elements.remember() {
+                    self.loads.push(load);
+                }
                 self.edges
                     .extend(PAIRS.map(|pair| ordered(pair.map(|corner| corners[corner]))));
                 self.tetrahedra.push(Tetrahedron {
@@ -155,6 +176,10 @@ impl Network {
         for (node, volume) in self.volumes.iter_mut().enumerate() {
             *volume = elements.ring_volume(node).unwrap_or(0.0);
         }
+        if elements.remember() {
+            let nodes = 0..self.volumes.len();
+            self.ring_loads.extend(nodes.map(|node| elements.load_of_ring(node)));
+        }
         let starts = &mut self.ring_starts;
         starts.fill(0);
         let corners = || {
@@ -180,12 +205,22 @@ impl Network {
     }
 
     /// The tetrahedra about a node, where volume is kept by rings.
-    pub fn ring(&self, node: usize) -> impl Iterator<Item = (Law, &Tetrahedron)> {
-        let law = self.law;
+    pub fn ring(&self, node: usize) -> impl Iterator<Item = Element<'_>> {
         let members = &self.ring_members[self.ring_starts[node]..self.ring_starts[node + 1]];
-        members
-            .iter()
-            .filter_map(move |&at| Some((law?, &self.tetrahedra[at as usize])))
+        members.iter().filter_map(|&at| self.element(at as usize))
+    }
+
+    fn element(&self, at: usize) -> Option<Element<'_>> {
+        Some(Element {
+            law: self.law?,
+            load: self.loads.get(at).copied().unwrap_or(Load::NONE),
+            of: &self.tetrahedra[at],
+        })
+    }
+
+    /// The load on the ring of a node, Pa.
+    pub fn ring_load(&self, node: usize) -> f64 {
+        self.ring_loads.get(node).copied().unwrap_or(0.0)
     }
 
     /// How many nodes have a ring: all, or none.
@@ -224,11 +259,8 @@ impl Network {
         (0..self.node_count()).flat_map(move |node| self.row(node).map(move |place| (place, node, &self.links[place])))
     }
 
-    /// Every tetrahedron, and the law that they follow.
-    pub fn tetrahedra(&self) -> impl Iterator<Item = (Law, &Tetrahedron)> {
-        let law = self.law;
-        self.tetrahedra
-            .iter()
-            .filter_map(move |tetrahedron| Some((law?, tetrahedron)))
+    /// Every tetrahedron.
+    pub fn tetrahedra(&self) -> impl Iterator<Item = Element<'_>> {
+        (0..self.tetrahedra.len()).filter_map(|at| self.element(at))
     }
 }

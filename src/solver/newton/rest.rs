@@ -50,11 +50,16 @@ pub struct RestStateReport {
 
 /// Moves `body` to rest.
 pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
+    // At rest nothing that is viscous holds anything.
+    body.release();
     let terms = body.terms.as_deref();
     let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), terms)?;
     descent.network.terms = body.terms.take();
     let found = find(&mut descent, body, gravity, definition);
     body.terms = descent.network.terms.take();
+    if found.is_err() {
+        body.recall();
+    }
     let report = found?;
     let held = |node: usize| -descent.residuals[node].as_vec3();
     body.rest_at(|node| descent.equation.position(node).as_vec3(), held);
@@ -202,7 +207,7 @@ impl Parts {
                 parts.lowest[a.max(b) as usize] = a.min(b);
             }
         }
-        for (_, tetrahedron) in descent.network.tetrahedra() {
+        for tetrahedron in descent.network.tetrahedra().map(|element| element.of) {
             let [first, others @ ..] = tetrahedron.corners;
             for other in others {
                 let [a, b] = [first as u32, other as u32].map(|end| parts.find(end));

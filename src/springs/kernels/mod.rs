@@ -1,6 +1,7 @@
 //! What is compiled once for each kind of processor, and chosen at run time.
 #![allow(unsafe_code)]
 
+mod algebra;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -24,7 +25,7 @@ use lanes::Lanes;
 pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;
 use range::Ranges;
-pub(crate) use tetrahedra::{GROUP, Group, Groups};
+pub(crate) use tetrahedra::{GROUP, Group, Groups, Stresses};
 
 use crate::error::{Error, Result};
 

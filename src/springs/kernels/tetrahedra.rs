@@ -7,6 +7,10 @@
 
 use std::ops::Range;
 
+use super::algebra::{
+    Matrix, Six, add_times, cross, difference, dot, largest, scaled_matrix, scaled_six, sum, sum_six, times_lower,
+    times_upper,
+};
 use super::lanes::Lanes;
 use super::{ChosenKernel, WithLanes};
 use crate::body::Record;
@@ -36,6 +40,15 @@ impl Group {
         volumes: [0.0; GROUP],
         rates: [0.0; GROUP],
     };
+}
+
+/// Stresses of sixteen tetrahedra, Pa: S with its entries 00, 01, 02, 11, 12, 22, and the pressure of the volume term.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stresses(pub [[f32; GROUP]; 7]);
+
+impl Stresses {
+    pub const ZERO: Self = Self([[0.0; GROUP]; 7]);
 }
 
 /// Tetrahedra of nodes below a number.
@@ -80,26 +93,55 @@ impl Groups {
         group.inverse.iter_mut().for_each(|entry| entry[lane] = 0.0);
     }
 
-    /// Adds the forces of the tetrahedra, N, with nodes at `positions`: a bound on the squares of frequencies, 1/s².
-    pub fn forces(&self, kernel: ChosenKernel, law: Law, positions: &[Record], sums: &mut [Record]) -> f32 {
+    /// Adds the forces of the tetrahedra, N, with nodes at `positions`, and with `loads` on top of their stresses, which may be none: a
+    /// bound on the squares of frequencies, 1/s².
+    pub fn forces(
+        &self,
+        kernel: ChosenKernel,
+        law: Law,
+        loads: &[Stresses],
+        positions: &[Record],
+        sums: &mut [Record],
+    ) -> f32 {
+        assert!(loads.is_empty() || loads.len() == self.groups.len());
         let of = self.checked(positions, sums);
-        if law.rings {
-            kernel.run_with_lanes(Forces::<true> { law, of })
-        } else {
-            kernel.run_with_lanes(Forces::<false> { law, of })
+        match (law.rings, loads) {
+            (true, []) => kernel.run_with_lanes(Forces::<true, false> { law, loads, of }),
+            (false, []) => kernel.run_with_lanes(Forces::<false, false> { law, loads, of }),
+            (true, _) => kernel.run_with_lanes(Forces::<true, true> { law, loads, of }),
+            (false, _) => kernel.run_with_lanes(Forces::<false, true> { law, loads, of }),
         }
     }
 
     /// Adds how these forces change where nodes go these ways, to first order, N.
-    pub fn changes(&self, kernel: ChosenKernel, law: Law, positions: &[Record], ways: &[Record], sums: &mut [Record]) {
+    pub fn changes(
+        &self,
+        kernel: ChosenKernel,
+        law: Law,
+        loads: &[Stresses],
+        [positions, ways]: [&[Record]; 2],
+        sums: &mut [Record],
+    ) {
         assert_eq!(ways.len(), self.node_count);
+        assert!(loads.is_empty() || loads.len() == self.groups.len());
         let ways = ways.as_ptr();
         let of = self.checked(positions, sums);
-        if law.rings {
-            kernel.run_with_lanes(Changes::<true> { law, ways, of });
-        } else {
-            kernel.run_with_lanes(Changes::<false> { law, ways, of });
+        match (law.rings, loads) {
+            (true, []) => kernel.run_with_lanes(Changes::<true, false> { law, loads, ways, of }),
+            (false, []) => kernel.run_with_lanes(Changes::<false, false> { law, loads, ways, of }),
+            (true, _) => kernel.run_with_lanes(Changes::<true, true> { law, loads, ways, of }),
+            (false, _) => kernel.run_with_lanes(Changes::<false, true> { law, loads, ways, of }),
         }
+    }
+
+    /// Writes the stresses of the tetrahedra, without pressures where those are of rings.
+    pub fn stresses(&self, kernel: ChosenKernel, law: Law, positions: &[Record], stresses: &mut [Stresses]) {
+        assert_eq!(stresses.len(), self.groups.len());
+        kernel.run_with_lanes(FindStresses {
+            law,
+            stresses,
+            of: self.checked(positions, &mut []),
+        });
     }
 
     /// Adds to the first number of each node a quarter of what its tetrahedra are larger than at rest, m³, or with ways to first
@@ -137,15 +179,24 @@ struct Tetrahedra<'a> {
     sums: *mut Record,
 }
 
-/// With the pressures that their nodes have beside their places, or none.
-struct Forces<'a, const RINGS: bool> {
+/// With the pressures that their nodes have beside their places, or none, and with as many loads as groups, or none.
+struct Forces<'a, const RINGS: bool, const LOADED: bool> {
     law: Law,
+    loads: &'a [Stresses],
     of: Tetrahedra<'a>,
 }
 
-struct Changes<'a, const RINGS: bool> {
+struct Changes<'a, const RINGS: bool, const LOADED: bool> {
     law: Law,
+    loads: &'a [Stresses],
     ways: *const Record,
+    of: Tetrahedra<'a>,
+}
+
+/// Of as many groups as there are stresses.
+struct FindStresses<'a> {
+    law: Law,
+    stresses: &'a mut [Stresses],
     of: Tetrahedra<'a>,
 }
 
@@ -158,129 +209,6 @@ struct Growths<'a> {
     ways: Option<*const Record>,
     of: Tetrahedra<'a>,
 }
-
-/// A vector per lane.
-type Vector<L> = [L; 3];
-
-/// The columns of a matrix.
-type Matrix<L> = [Vector<L>; 3];
-
-/// The entries 00, 01, 02, 11, 12, 22 of a triangular or symmetric matrix.
-type Six<L> = [L; 6];
-
-// SAFETY of every function here: the processor has the instructions of `L`.
-#[allow(clippy::undocumented_unsafe_blocks)]
-mod algebra {
-    // No closures: one may be compiled on its own, without the kernel's instructions.
-
-    use super::{Lanes, Matrix, Six, Vector};
-
-    #[inline(always)]
-    pub unsafe fn dot<L: Lanes>([ax, ay, az]: Vector<L>, [bx, by, bz]: Vector<L>) -> L {
-        unsafe { az.multiply_add(bz, ay.multiply_add(by, ax.multiply(bx))) }
-    }
-
-    #[inline(always)]
-    pub unsafe fn scaled<L: Lanes>(vector: Vector<L>, factor: L) -> Vector<L> {
-        unsafe {
-            [
-                vector[0].multiply(factor),
-                vector[1].multiply(factor),
-                vector[2].multiply(factor),
-            ]
-        }
-    }
-
-    /// `sum + vector * factor`
-    #[inline(always)]
-    pub unsafe fn add_scaled<L: Lanes>(sum: Vector<L>, vector: Vector<L>, factor: L) -> Vector<L> {
-        unsafe {
-            [
-                vector[0].multiply_add(factor, sum[0]),
-                vector[1].multiply_add(factor, sum[1]),
-                vector[2].multiply_add(factor, sum[2]),
-            ]
-        }
-    }
-
-    #[inline(always)]
-    pub unsafe fn difference<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
-        unsafe { [a[0].subtract(b[0]), a[1].subtract(b[1]), a[2].subtract(b[2])] }
-    }
-
-    #[inline(always)]
-    pub unsafe fn sum<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
-        unsafe { [a[0].add(b[0]), a[1].add(b[1]), a[2].add(b[2])] }
-    }
-
-    #[inline(always)]
-    pub unsafe fn cross<L: Lanes>(a: Vector<L>, b: Vector<L>) -> Vector<L> {
-        unsafe {
-            [
-                a[1].multiply_subtract(b[2], a[2].multiply(b[1])),
-                a[2].multiply_subtract(b[0], a[0].multiply(b[2])),
-                a[0].multiply_subtract(b[1], a[1].multiply(b[0])),
-            ]
-        }
-    }
-
-    /// A matrix times an upper triangular one.
-    #[inline(always)]
-    pub unsafe fn times_upper<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matrix<L> {
-        unsafe {
-            [
-                scaled(a, upper[0]),
-                add_scaled(scaled(a, upper[1]), b, upper[3]),
-                add_scaled(add_scaled(scaled(a, upper[2]), b, upper[4]), c, upper[5]),
-            ]
-        }
-    }
-
-    /// A matrix times the transposed of an upper triangular one.
-    #[inline(always)]
-    pub unsafe fn times_lower<L: Lanes>([a, b, c]: Matrix<L>, upper: Six<L>) -> Matrix<L> {
-        unsafe {
-            [
-                add_scaled(add_scaled(scaled(a, upper[0]), b, upper[1]), c, upper[2]),
-                add_scaled(scaled(b, upper[3]), c, upper[4]),
-                scaled(c, upper[5]),
-            ]
-        }
-    }
-
-    /// `sum` and a matrix times a symmetric one.
-    #[inline(always)]
-    pub unsafe fn add_times<L: Lanes>(sum: Matrix<L>, [a, b, c]: Matrix<L>, s: Six<L>) -> Matrix<L> {
-        unsafe {
-            [
-                add_scaled(add_scaled(add_scaled(sum[0], a, s[0]), b, s[1]), c, s[2]),
-                add_scaled(add_scaled(add_scaled(sum[1], a, s[1]), b, s[3]), c, s[4]),
-                add_scaled(add_scaled(add_scaled(sum[2], a, s[2]), b, s[4]), c, s[5]),
-            ]
-        }
-    }
-
-    #[inline(always)]
-    pub unsafe fn scaled_matrix<L: Lanes>([a, b, c]: Matrix<L>, factor: L) -> Matrix<L> {
-        unsafe { [scaled(a, factor), scaled(b, factor), scaled(c, factor)] }
-    }
-
-    #[inline(always)]
-    pub unsafe fn scaled_six<L: Lanes>([a, b, c, d, e, f]: Six<L>, factor: L) -> Six<L> {
-        unsafe {
-            [
-                a.multiply(factor),
-                b.multiply(factor),
-                c.multiply(factor),
-                d.multiply(factor),
-                e.multiply(factor),
-                f.multiply(factor),
-            ]
-        }
-    }
-}
-
-use algebra::{add_times, cross, difference, dot, scaled_matrix, scaled_six, sum, times_lower, times_upper};
 
 /// A law's numbers in every lane.
 #[derive(Clone, Copy)]
@@ -434,12 +362,40 @@ impl<L: Lanes> Constants<L> {
     }
 }
 
-impl<const RINGS: bool> WithLanes for Forces<'_, RINGS> {
+impl Stresses {
+    /// # Safety
+    /// As for the kernel; `first` is a turn's first lane.
+    #[inline(always)]
+    unsafe fn entries<L: Lanes>(&self, first: usize) -> Six<L> {
+        // SAFETY: the lanes are of a group.
+        unsafe {
+            let [a, b, c, d, e, f, _] = &self.0;
+            [
+                L::load(a.as_ptr().add(first)),
+                L::load(b.as_ptr().add(first)),
+                L::load(c.as_ptr().add(first)),
+                L::load(d.as_ptr().add(first)),
+                L::load(e.as_ptr().add(first)),
+                L::load(f.as_ptr().add(first)),
+            ]
+        }
+    }
+
+    /// # Safety
+    /// As above.
+    #[inline(always)]
+    unsafe fn pressures<L: Lanes>(&self, first: usize) -> L {
+        // SAFETY: the lanes are of a group.
+        unsafe { L::load(self.0[6].as_ptr().add(first)) }
+    }
+}
+
+impl<const RINGS: bool, const LOADED: bool> WithLanes for Forces<'_, RINGS, LOADED> {
     type Output = f32;
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) -> f32 {
-        let Self { law, of } = self;
+        let Self { law, loads, of } = self;
         // SAFETY: the same contract; corners lead to positions and sums.
         unsafe {
             let constants = Constants::<L>::new(law);
@@ -447,7 +403,7 @@ impl<const RINGS: bool> WithLanes for Forces<'_, RINGS> {
             let whole = L::splat(1.0 / law.whole());
             let along = L::splat(law.lambda.max(0.0) + 2.0 * law.mu);
             let mut highest = L::splat(0.0);
-            for group in of.groups {
+            for (index, group) in of.groups.iter().enumerate() {
                 for first in turns::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
                     let volumes = Tetrahedra::volumes::<L>(group, first);
@@ -460,14 +416,23 @@ impl<const RINGS: bool> WithLanes for Forces<'_, RINGS> {
                         growth,
                         pressure,
                     } = deformed;
-                    let stress = constants.stress(twice_strain, twice_trace);
-                    let minus = L::splat(0.0).subtract(volumes);
-                    let stress = scaled_six(stress, minus);
-                    let pressure = if RINGS {
+                    let mut stress = constants.stress(twice_strain, twice_trace);
+                    let mut pressure = if RINGS {
                         pressure
                     } else {
                         constants.kappa.multiply(growth)
                     };
+                    let mut load = L::splat(0.0);
+                    if LOADED {
+                        let entries = loads[index].entries::<L>(first);
+                        stress = sum_six(stress, entries);
+                        load = largest(entries);
+                        if !RINGS {
+                            pressure = pressure.add(loads[index].pressures::<L>(first));
+                        }
+                    }
+                    let minus = L::splat(0.0).subtract(volumes);
+                    let stress = scaled_six(stress, minus);
                     // The largest stretch squared is at most the largest sum of a row's sizes (Gershgorin).
                     let [xx, xy, xz, yy, yz, zz] = twice_strain;
                     let (xy, xz, yz) = (xy.size(), xz.size(), yz.size());
@@ -479,7 +444,7 @@ impl<const RINGS: bool> WithLanes for Forces<'_, RINGS> {
                     let stretch = stretch.greater(L::splat(0.0)).add(one);
                     let tension = constants.mu.multiply(stretch.subtract(one));
                     let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
-                    let tension = tension.greater(L::splat(0.0));
+                    let tension = tension.greater(L::splat(0.0)).add(load);
                     // 2 sqrt(s) is at most 1 + s.
                     let pressed = pressure.size().multiply(stretch.add(one));
                     let swollen = constants.kappa.multiply(stretch);
@@ -498,17 +463,17 @@ impl<const RINGS: bool> WithLanes for Forces<'_, RINGS> {
     }
 }
 
-impl<const RINGS: bool> WithLanes for Changes<'_, RINGS> {
+impl<const RINGS: bool, const LOADED: bool> WithLanes for Changes<'_, RINGS, LOADED> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<L: Lanes>(self) {
-        let Self { law, ways, of } = self;
+        let Self { law, loads, ways, of } = self;
         // SAFETY: the same contract; corners lead to positions, ways and sums.
         unsafe {
             let constants = Constants::<L>::new(law);
             let zero = L::splat(0.0);
-            for group in of.groups {
+            for (index, group) in of.groups.iter().enumerate() {
                 for first in turns::<L>() {
                     let inverse = Tetrahedra::inverse::<L>(group, first);
                     let volumes = Tetrahedra::volumes::<L>(group, first);
@@ -529,6 +494,9 @@ impl<const RINGS: bool> WithLanes for Changes<'_, RINGS> {
                     let stress_change = constants.stress(twice_strain, twice_trace);
                     // Pressure is lifted as far as it may push sideways: Gershgorin's bound on the lowest eigenvalue.
                     let mut stress = constants.stress(deformed.twice_strain, deformed.twice_trace);
+                    if LOADED {
+                        stress = sum_six(stress, loads[index].entries::<L>(first));
+                    }
                     let (xy, xz, yz) = (stress[1].size(), stress[2].size(), stress[4].size());
                     let lift = [
                         xy.add(xz).subtract(stress[0]),
@@ -586,6 +554,38 @@ impl WithLanes for Growths<'_> {
                     for corners in &group.corners {
                         L::add_to_records(of.sums, corners.as_ptr().add(first), [growth, zero, zero]);
                     }
+                }
+            }
+        }
+    }
+}
+
+impl WithLanes for FindStresses<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<L: Lanes>(self) {
+        let Self { law, stresses, of } = self;
+        // SAFETY: the same contract; corners lead to positions, and lanes are of a group.
+        unsafe {
+            let mut constants = Constants::<L>::new(law);
+            if law.rings {
+                constants.kappa = L::splat(0.0);
+            }
+            for (group, stresses) in of.groups.iter().zip(stresses) {
+                for first in turns::<L>() {
+                    let inverse = Tetrahedra::inverse::<L>(group, first);
+                    let deformed = of.deformed(group, first, inverse);
+                    let [a, b, c, d, e, f] = constants.stress(deformed.twice_strain, deformed.twice_trace);
+                    let [to_a, to_b, to_c, to_d, to_e, to_f, pressures] = &mut stresses.0;
+                    a.store(to_a.as_mut_ptr().add(first));
+                    b.store(to_b.as_mut_ptr().add(first));
+                    c.store(to_c.as_mut_ptr().add(first));
+                    d.store(to_d.as_mut_ptr().add(first));
+                    e.store(to_e.as_mut_ptr().add(first));
+                    f.store(to_f.as_mut_ptr().add(first));
+                    let pressure = constants.kappa.multiply(deformed.growth);
+                    pressure.store(pressures.as_mut_ptr().add(first));
                 }
             }
         }

@@ -1,0 +1,105 @@
+//! What a body remembers of how it was deformed: elements and terms that are viscous, or set.
+
+use super::Body;
+use crate::elements::Elements;
+use crate::material::Viscosity;
+use crate::solver::write_records;
+use crate::terms::Terms;
+use crate::threads::Team;
+
+/// How long something took.
+#[derive(Clone, Copy, Debug)]
+enum Lapse {
+    /// s
+    Seconds(f64),
+    AtOnce,
+    /// So long that all is relaxed.
+    Forever,
+}
+
+impl Body {
+    fn remembers(&self) -> bool {
+        self.elements.as_deref().is_some_and(Elements::remember) || self.terms.as_deref().is_some_and(Terms::remember)
+    }
+
+    /// A step begins, from what is current.
+    pub(crate) fn recall(&mut self) {
+        if let Some(elements) = &mut self.elements {
+            elements.recall();
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.recall();
+        }
+    }
+
+    /// The step in progress is the current state.
+    pub(super) fn keep(&mut self) {
+        if let Some(elements) = &mut self.elements {
+            elements.keep();
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.keep();
+        }
+    }
+
+    /// An equation is to be solved for the end of so many seconds.
+    pub(crate) fn foresee(&mut self, time: f64) {
+        if let Some(elements) = &mut self.elements {
+            elements.foresee(time);
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.foresee(time);
+        }
+    }
+
+    /// The substep in progress, of so many seconds, has put nodes where they are next.
+    pub(crate) fn age(&mut self, time: f64, team: &Team) {
+        if self.remembers() {
+            self.lapse(Lapse::Seconds(time), true, team);
+        }
+    }
+
+    /// Nodes have been put where they are at once.
+    pub(super) fn jump(&mut self) {
+        if self.remembers() {
+            self.recall();
+            self.lapse(Lapse::AtOnce, false, &Team::alone());
+            self.keep();
+        }
+    }
+
+    /// Nothing that is viscous holds anything with the nodes where they are.
+    pub(super) fn relax(&mut self) {
+        self.release();
+        self.keep();
+    }
+
+    /// The same until [`Self::recall`].
+    pub(crate) fn release(&mut self) {
+        if self.remembers() {
+            self.lapse(Lapse::Forever, false, &Team::alone());
+        }
+    }
+
+    fn lapse(&mut self, lapse: Lapse, is_next: bool, team: &Team) {
+        let positions = if is_next {
+            self.state.next_positions()
+        } else {
+            self.state.positions()
+        };
+        let course = |viscosity: Viscosity| match lapse {
+            Lapse::Seconds(time) => viscosity.over(time),
+            Lapse::AtOnce => viscosity.at_once(),
+            Lapse::Forever => Viscosity::default().over(1.0),
+        };
+        if let (Some(elements), Some(records)) = (&mut self.elements, &mut self.records)
+            && elements.remember()
+        {
+            write_records(self.kernel, positions, records, team);
+            elements.age(self.kernel, records.as_slice(), course, team);
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.age(positions, &course);
+        }
+    }
+}

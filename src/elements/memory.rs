@@ -1,0 +1,224 @@
+//! What tetrahedra remember of how they were deformed: the stresses of the arms beside them (Simo 1987), which are loads on top of what
+//! is elastic.
+//!
+//! In a time h an arm's stress q becomes `a q + g (S' - S)`, S being the elastic stress. An explicit solver lets it act as it is between
+//! two substeps. An implicit one has `a q - g S` as a load, and g times what is elastic on top of the latter, so that forces are those at
+//! the end of the step. Pressures of rings have arms of their own.
+
+use super::law::{Law, Load};
+use super::parts::Part;
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::material::{Course, Viscosity};
+use crate::memory;
+use crate::springs::{GROUP, Group, Stresses};
+
+#[derive(Debug)]
+pub(super) struct Memory {
+    pub viscosity: Viscosity,
+    /// g of the equation that is being solved; 0 where loads are the arms' stresses as they are.
+    pub gain: f32,
+    pub parts: Vec<OfPart>,
+    pub rings: Past<f32>,
+}
+
+/// What is remembered of the tetrahedra of a part.
+#[derive(Debug)]
+pub(super) struct OfPart {
+    pub past: Past<Stresses>,
+    /// Room for elastic stresses.
+    pub newest: Vec<Stresses>,
+}
+
+/// Stresses of the step in progress, and of the current state.
+#[derive(Debug)]
+pub(super) struct Past<T> {
+    arms: Vec<T>,
+    elastic: Vec<T>,
+    pub loads: Vec<T>,
+    kept_arms: Vec<T>,
+    kept_elastic: Vec<T>,
+}
+
+/// What has the numbers of some tetrahedra, or one.
+pub(super) trait Numbers: Copy {
+    const ZERO: Self;
+
+    fn numbers(&self) -> &[f32];
+
+    fn numbers_mut(&mut self) -> &mut [f32];
+}
+
+impl Numbers for f32 {
+    const ZERO: Self = 0.0;
+
+    fn numbers(&self) -> &[f32] {
+        std::slice::from_ref(self)
+    }
+
+    fn numbers_mut(&mut self) -> &mut [f32] {
+        std::slice::from_mut(self)
+    }
+}
+
+impl Numbers for Stresses {
+    const ZERO: Self = Self::ZERO;
+
+    fn numbers(&self) -> &[f32] {
+        self.0.as_flattened()
+    }
+
+    fn numbers_mut(&mut self) -> &mut [f32] {
+        self.0.as_flattened_mut()
+    }
+}
+
+impl<T: Numbers> Past<T> {
+    fn new(count: usize) -> Result<Self> {
+        let zeros = || memory::filled(T::ZERO, count);
+        Ok(Self {
+            arms: zeros()?,
+            elastic: zeros()?,
+            loads: zeros()?,
+            kept_arms: zeros()?,
+            kept_elastic: zeros()?,
+        })
+    }
+
+    /// Makes loads `decay` times the arms' stresses less `gain` times what is elastic.
+    fn foresee(&mut self, course: Course) {
+        let stresses = self.arms.iter().zip(&self.elastic);
+        for (load, (arm, elastic)) in self.loads.iter_mut().zip(stresses) {
+            let numbers = arm.numbers().iter().zip(elastic.numbers());
+            for (load, (arm, elastic)) in load.numbers_mut().iter_mut().zip(numbers) {
+                *load = course.decay as f32 * arm - course.gain as f32 * elastic;
+            }
+        }
+    }
+
+    /// What is elastic has become this.
+    pub fn age(&mut self, course: Course, newest: &[T]) {
+        let stresses = self.arms.iter_mut().zip(&mut self.elastic).zip(&mut self.loads);
+        for (((arm, elastic), load), newest) in stresses.zip(newest) {
+            let numbers = arm.numbers_mut().iter_mut().zip(elastic.numbers_mut());
+            for ((arm, elastic), newest) in numbers.zip(newest.numbers()) {
+                *arm = course.decay as f32 * *arm + course.gain as f32 * (newest - *elastic);
+                *elastic = *newest;
+            }
+            *load = *arm;
+        }
+    }
+
+    fn recall(&mut self) {
+        self.arms.copy_from_slice(&self.kept_arms);
+        self.elastic.copy_from_slice(&self.kept_elastic);
+        self.loads.copy_from_slice(&self.kept_arms);
+    }
+
+    fn keep(&mut self) {
+        self.kept_arms.copy_from_slice(&self.arms);
+        self.kept_elastic.copy_from_slice(&self.elastic);
+    }
+}
+
+impl Memory {
+    /// For so many rings, or none.
+    pub fn new(viscosity: Viscosity, parts: &[Part], ring_count: usize) -> Result<Self> {
+        let mut of_parts = memory::reserved(parts.len())?;
+        for part in parts {
+            let count = part.groups.as_slice().len();
+            of_parts.push(OfPart {
+                past: Past::new(count)?,
+                newest: memory::filled(Stresses::ZERO, count)?,
+            });
+        }
+        Ok(Self {
+            viscosity,
+            gain: 0.0,
+            parts: of_parts,
+            rings: Past::new(ring_count)?,
+        })
+    }
+
+    /// An equation is to be solved for the end of so many seconds.
+    pub fn foresee(&mut self, time: f64) {
+        let course = self.viscosity.over(time);
+        self.gain = course.gain as f32;
+        self.parts.iter_mut().for_each(|part| part.past.foresee(course));
+        self.rings.foresee(course);
+    }
+
+    /// A step begins, from what is current.
+    pub fn recall(&mut self) {
+        self.gain = 0.0;
+        self.parts.iter_mut().for_each(|part| part.past.recall());
+        self.rings.recall();
+    }
+
+    /// The step in progress is the current state.
+    pub fn keep(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.past.keep());
+        self.rings.keep();
+    }
+
+    /// The load on a tetrahedron.
+    pub fn load(&self, part: usize, [group, lane]: [usize; 2]) -> Load {
+        load_of(&self.parts[part].past.loads[group], lane)
+    }
+
+    /// What stiffens the law where it is multiplied by the gain.
+    pub fn stiffened(&self, law: Law) -> Law {
+        law.times(1.0 + self.gain)
+    }
+
+    /// The energy of an arm's spring per volume, given its load and what is elastic, Pa.
+    pub fn energy_of(&self, law: Law, load: Load, elastic: Load) -> f64 {
+        let Some(stiffening) = self.viscosity.stiffening() else {
+            return 0.0;
+        };
+        let gain = f64::from(self.gain);
+        let arm = Load {
+            stress: load.stress + elastic.stress * gain,
+            pressure: load.pressure + elastic.pressure * gain,
+        };
+        law.energy_of(arm) / stiffening
+    }
+
+    /// That of all arms of a part with the newest elastic stresses, J.
+    pub fn energy_of_part(&self, law: Law, part: usize, groups: &[Group]) -> f64 {
+        let mut energy = 0.0;
+        for (index, group) in groups.iter().enumerate() {
+            for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
+                let elastic = load_of(&self.parts[part].newest[index], lane);
+                let of_arm = self.energy_of(law, self.load(part, [index, lane]), elastic);
+                energy += f64::from(group.volumes[lane]) * of_arm;
+            }
+        }
+        energy
+    }
+
+    /// The same of a ring with this elastic pressure, Pa, and volume, m³.
+    pub fn energy_of_ring(&self, law: Law, node: usize, pressure: f64, volume: f64) -> f64 {
+        let Some(stiffening) = self.viscosity.stiffening() else {
+            return 0.0;
+        };
+        let arm = f64::from(self.rings.loads[node]) + f64::from(self.gain) * pressure;
+        0.5 * volume * arm * arm / (f64::from(law.kappa) * stiffening)
+    }
+
+    /// What may change of it.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for past in self.parts.iter().map(|part| &part.past) {
+            for stresses in past.kept_arms.iter().chain(&past.kept_elastic) {
+                hasher.write_floats(stresses.numbers());
+            }
+        }
+        hasher.write_floats(&self.rings.kept_arms);
+        hasher.write_floats(&self.rings.kept_elastic);
+    }
+}
+
+/// The stresses of a lane.
+fn load_of(Stresses(numbers): &Stresses, lane: usize) -> Load {
+    Load::of(numbers.map(|number| f64::from(number[lane])))
+}

@@ -1,0 +1,210 @@
+//! Springs that relax: what the arms beside them pull with.
+//!
+//! Arms are as those of tetrahedra ([`crate::elements`]): their pull is the load on them and, in an implicit equation, g times what is
+//! elastic on top of it.
+
+use glam::{DMat3, DVec3};
+
+use super::stencils::{Law, Stencil, Stencils, directed};
+use super::{Moment, Term};
+use crate::body::{BodyDefinition, NodeOrder, Spring, View};
+use crate::diagnostics::StateHasher;
+use crate::error::Result;
+use crate::material::{Course, Viscosity};
+use crate::memory;
+use crate::terms::SpringLaw;
+
+/// Beside springs of a law.
+#[derive(Debug)]
+struct Arms {
+    law: SpringLaw,
+    viscosity: Viscosity,
+    stiffening: f64,
+    /// g of the equation that is being solved, 0 where there is none.
+    gain: f64,
+}
+
+/// Stresses are pulls over the spring's stiffness, m.
+#[derive(Clone, Copy, Debug)]
+struct Arm {
+    rest_length: f32,
+    load: f32,
+    stress: f32,
+    elastic: f32,
+    kept_stress: f32,
+    kept_elastic: f32,
+}
+
+pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
+    let viscosity = definition.viscosity;
+    let Some(stiffening) = viscosity.stiffening().filter(|_| !springs.is_empty()) else {
+        return Ok(None);
+    };
+    let mut arms = memory::reserved(springs.len())?;
+    for spring in springs.iter().filter(|spring| spring.stiffness > 0.0) {
+        let mut nodes = spring.nodes.map(|node| order.own(node));
+        nodes.sort_unstable();
+        arms.push(Stencil {
+            nodes,
+            stiffness: spring.stiffness,
+            shape: Arm {
+                rest_length: spring.rest_length,
+                load: 0.0,
+                stress: 0.0,
+                elastic: 0.0,
+                kept_stress: 0.0,
+                kept_elastic: 0.0,
+            },
+        });
+    }
+    let law = Arms {
+        law: definition.spring_law,
+        viscosity,
+        stiffening,
+        gain: 0.0,
+    };
+    Ok(Some(Box::new(Stencils::new(law, arms, definition.positions.len())?)))
+}
+
+/// An arm where it is: the way from its first node to the other, and what is elastic.
+struct Placed {
+    way: DVec3,
+    length: f64,
+    strain: f64,
+    /// m, and how it grows with the length.
+    elastic: f64,
+    slope: f64,
+}
+
+impl Arms {
+    fn place(&self, arm: &Arm, [from, to]: &[DVec3; 2]) -> Placed {
+        let way = *to - *from;
+        let (length, rest_length) = (way.length(), f64::from(arm.rest_length));
+        let mut placed = Placed {
+            way,
+            length,
+            strain: 0.0,
+            elastic: length - rest_length,
+            slope: 1.0,
+        };
+        if rest_length > 0.0 {
+            placed.strain = length / rest_length - 1.0;
+            let [pull, slope, _] = self.law.beyond(placed.strain);
+            placed.elastic += rest_length * pull;
+            placed.slope += slope;
+        }
+        placed
+    }
+
+    fn pull(&self, arm: &Arm, placed: &Placed) -> f64 {
+        f64::from(arm.load) + self.gain * placed.elastic
+    }
+
+    fn stiffness(&self, arm: &Arm, placed: &Placed, is_exact: bool) -> DMat3 {
+        let pull = self.pull(arm, placed);
+        let across = if placed.length > 0.0 && (is_exact || pull > 0.0) {
+            pull / placed.length
+        } else {
+            0.0
+        };
+        directed(placed.direction(), self.gain * placed.slope, across)
+    }
+}
+
+impl Placed {
+    /// Where both nodes are at the same place it points along x, from the node with the lower number.
+    fn direction(&self) -> DVec3 {
+        if self.length > 0.0 {
+            self.way / self.length
+        } else {
+            DVec3::X
+        }
+    }
+}
+
+impl Law<2> for Arms {
+    type Shape = Arm;
+
+    const REMEMBERS: bool = true;
+
+    fn energy(&self, arm: &Arm, places: &[DVec3; 2]) -> f64 {
+        let pull = self.pull(arm, &self.place(arm, places));
+        0.5 * pull * pull / self.stiffening
+    }
+
+    fn change(&self, arm: &Arm, places: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
+        let placed = self.place(arm, places);
+        let more = ways[1] - ways[0];
+        let then = placed.way + more;
+        let both = placed.length + then.length();
+        if both == 0.0 {
+            return 0.0;
+        }
+        let longer = more.dot(placed.way + then) / both;
+        let rest_length = f64::from(arm.rest_length);
+        let mut elastic = 0.5 * longer * (both - 2.0 * rest_length);
+        if rest_length > 0.0 {
+            elastic += rest_length.powi(2) * self.law.change(placed.strain, longer / rest_length);
+        }
+        f64::from(arm.load) * longer + self.gain * elastic
+    }
+
+    fn forces(&self, arm: &Arm, places: &[DVec3; 2]) -> [DVec3; 2] {
+        let placed = self.place(arm, places);
+        let pull = placed.direction() * self.pull(arm, &placed);
+        [pull, -pull]
+    }
+
+    fn changes(&self, arm: &Arm, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
+        let placed = self.place(arm, places);
+        let change = self.stiffness(arm, &placed, false) * (ways[1] - ways[0]);
+        [change, -change]
+    }
+
+    fn blocks(&self, arm: &Arm, places: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
+        let block = self.stiffness(arm, &self.place(arm, places), is_exact);
+        [[block, -block], [-block, block]]
+    }
+
+    /// What viscosity makes of rates is that of all springs and terms together.
+    fn rate(&self, _arm: &Arm, _inverse_masses: [f64; 2]) -> f64 {
+        0.0
+    }
+
+    fn begin(&mut self, moment: Moment) {
+        self.gain = match moment {
+            Moment::Foresee(time) => self.viscosity.over(time).gain,
+            Moment::Recall | Moment::Keep => 0.0,
+        };
+    }
+
+    fn pass(&self, moment: Moment, arm: &mut Arm) {
+        match moment {
+            Moment::Recall => {
+                (arm.stress, arm.elastic, arm.load) = (arm.kept_stress, arm.kept_elastic, arm.kept_stress)
+            }
+            Moment::Keep => (arm.kept_stress, arm.kept_elastic) = (arm.stress, arm.elastic),
+            Moment::Foresee(time) => {
+                let Course { decay, gain } = self.viscosity.over(time);
+                arm.load = (decay * f64::from(arm.stress) - gain * f64::from(arm.elastic)) as f32;
+            }
+        }
+    }
+
+    fn age(&mut self, arms: &mut [Stencil<Arm, 2>], positions: View, course: &dyn Fn(Viscosity) -> Course) {
+        self.gain = 0.0;
+        let Course { decay, gain } = course(self.viscosity);
+        for Stencil { nodes, shape: arm, .. } in arms {
+            let places = nodes.map(|node| positions.get(node as usize).as_dvec3());
+            let elastic = self.place(arm, &places).elastic as f32;
+            let longer = f64::from(elastic) - f64::from(arm.elastic);
+            arm.stress = (decay * f64::from(arm.stress) + gain * longer) as f32;
+            arm.elastic = elastic;
+            arm.load = arm.stress;
+        }
+    }
+
+    fn hash(&self, arm: &Arm, hasher: &mut StateHasher) {
+        hasher.write_floats(&[arm.kept_stress, arm.kept_elastic]);
+    }
+}

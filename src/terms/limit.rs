@@ -1,0 +1,127 @@
+//! A limit on strain: springs that are far stiffer once they are stretched beyond it.
+//!
+//! Provot 1995 moves nodes back where a spring is too long, after each step, which makes and takes energy. As a law it keeps both, in
+//! every solver: what pulls beyond the limit adds to the spring, with an energy of its own.
+
+use glam::{DMat3, DVec3};
+
+use super::Term;
+use super::stencils::{Law, Stencil, Stencils, directed};
+use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.
+#[derive(Debug)]
+struct Limit {
+    strain: f64,
+    /// How much stiffer they are beyond it.
+    stiffening: f64,
+}
+
+/// A spring is never stiffer than this many times.
+const STIFFEST: f32 = 1e6;
+
+pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
+    let (strain, stiffening) = (definition.strain_limit, definition.limit_stiffening);
+    not_negative("strain_limit", strain)?;
+    if strain == 0.0 {
+        return Ok(None);
+    }
+    if !(stiffening > 0.0 && stiffening <= STIFFEST) {
+        return Err(Error::invalid(format!(
+            "limit_stiffening is {stiffening}: must be above 0, and at most {STIFFEST}"
+        )));
+    }
+    if springs.is_empty() {
+        return Err(Error::invalid(format!(
+            "strain_limit is {strain} while the body has no springs"
+        )));
+    }
+    let mut limits = memory::reserved(springs.len())?;
+    // A spring without a length at rest has no strain.
+    let there = springs
+        .iter()
+        .filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
+    for spring in there {
+        let mut nodes = spring.nodes.map(|node| order.own(node));
+        nodes.sort_unstable();
+        limits.push(Stencil {
+            nodes,
+            stiffness: spring.stiffness,
+            shape: spring.rest_length,
+        });
+    }
+    let law = Limit {
+        strain: f64::from(strain),
+        stiffening: f64::from(stiffening),
+    };
+    Ok(Some(Box::new(Stencils::new(law, limits, definition.positions.len())?)))
+}
+
+impl Limit {
+    /// The way between two nodes, its length, and by how much it is too long, m.
+    fn excess(&self, rest_length: f32, [from, to]: &[DVec3; 2]) -> (DVec3, f64, f64) {
+        let way = *to - *from;
+        let length = way.length();
+        let longest = f64::from(rest_length) * (1.0 + self.strain);
+        (way, length, (length - longest).max(0.0))
+    }
+
+    fn stiffness(&self, rest_length: f32, places: &[DVec3; 2]) -> DMat3 {
+        let (way, length, excess) = self.excess(rest_length, places);
+        if excess == 0.0 {
+            return DMat3::ZERO;
+        }
+        directed(way / length, self.stiffening, self.stiffening * excess / length)
+    }
+}
+
+impl Law<2> for Limit {
+    type Shape = f32;
+
+    fn energy(&self, &rest_length: &f32, places: &[DVec3; 2]) -> f64 {
+        0.5 * self.stiffening * self.excess(rest_length, places).2.powi(2)
+    }
+
+    fn change(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
+        let (way, length, before) = self.excess(rest_length, places);
+        let then = way + ways[1] - ways[0];
+        let after = self.excess(rest_length, &[DVec3::ZERO, then]).2;
+        let longer = if before > 0.0 && after > 0.0 {
+            (ways[1] - ways[0]).dot(way + then) / (length + then.length())
+        } else {
+            after - before
+        };
+        0.5 * self.stiffening * longer * (before + after)
+    }
+
+    fn forces(&self, &rest_length: &f32, places: &[DVec3; 2]) -> [DVec3; 2] {
+        let (way, length, excess) = self.excess(rest_length, places);
+        if excess == 0.0 {
+            return [DVec3::ZERO; 2];
+        }
+        let pull = way * (self.stiffening * excess / length);
+        [pull, -pull]
+    }
+
+    fn changes(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
+        let change = self.stiffness(rest_length, places) * (ways[1] - ways[0]);
+        [change, -change]
+    }
+
+    fn blocks(&self, &rest_length: &f32, places: &[DVec3; 2], _is_exact: bool) -> [[DMat3; 2]; 2] {
+        let block = self.stiffness(rest_length, places);
+        [[block, -block], [-block, block]]
+    }
+
+    /// Nothing below the limit; beyond it the spring is so many times as stiff.
+    fn rate(&self, _rest_length: &f32, _inverse_masses: [f64; 2]) -> f64 {
+        0.0
+    }
+
+    fn stiffening(&self, &rest_length: &f32, places: &[DVec3; 2]) -> f64 {
+        let (_, _, excess) = self.excess(rest_length, places);
+        if excess > 0.0 { 1.0 + self.stiffening } else { 1.0 }
+    }
+}
