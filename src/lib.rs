@@ -24,7 +24,7 @@ pub use body::{Body, BodyDefinition, Solver, Storage, Values};
 pub use contact::{Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
-pub use material::{Material, Model, Viscosity};
+pub use material::{Material, Model, Viscosity, Yielding};
 pub use picture::PictureDefinition;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;

@@ -5,7 +5,8 @@ mod support;
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    Body, BodyDefinition, BodyId, RestStateDefinition, Solver, SpringLaw, Storage, Values, World, WorldDefinition,
+    Body, BodyDefinition, BodyId, Material, Model, RestStateDefinition, Solver, SpringLaw, Storage, Values, World,
+    WorldDefinition, Yielding,
 };
 use support::bodies::FREE;
 
@@ -58,6 +59,13 @@ impl Scene {
     }
 }
 
+fn yielding(strain: f32) -> Yielding {
+    Yielding {
+        strain,
+        ..Yielding::default()
+    }
+}
+
 /// A spring between pinned nodes.
 fn pair(masses: &'static [f32; 2]) -> BodyDefinition<'static> {
     BodyDefinition {
@@ -81,7 +89,7 @@ fn a_spring_yields_and_stays_so() {
         .chain([(Solver::Verlet, Storage::DynamicBulk)])
     {
         let definition = BodyDefinition {
-            yield_strain: YIELD as f32,
+            yielding: yielding(YIELD as f32),
             solver,
             storage,
             ..pair(&[0.0, 0.0])
@@ -118,8 +126,10 @@ fn a_spring_yields_and_stays_so() {
 fn a_set_has_its_largest() {
     for solver in SOLVERS {
         let definition = BodyDefinition {
-            yield_strain: 0.1,
-            largest_set: 0.2,
+            yielding: Yielding {
+                strain: 0.1,
+                largest: 0.2,
+            },
             solver,
             ..pair(&[0.0, 0.0])
         };
@@ -144,7 +154,7 @@ fn a_block_that_was_bent_stays_bent() {
                 masses: Values::Uniform(1e-4),
                 node_dampings: Values::Uniform(2.5e-3),
                 stiffnesses: Values::Uniform(20.0),
-                yield_strain,
+                yielding: yielding(yield_strain),
                 solver,
                 storage,
                 ..BodyDefinition::default()
@@ -187,6 +197,122 @@ fn a_block_that_was_bent_stays_bent() {
             ends.push(after[tip].distance(mesh.positions[tip].as_dvec3()));
         }
         assert!(ends[0] < 1e-6 && ends[1] > 2e-3, "{solver:?}: {ends:?}");
+    }
+}
+
+/// A block of tetrahedra whose nodes are all led: sheared evenly, it yields at the stress of von Mises, whatever its Poisson's ratio,
+/// keeps that, and goes back elastically; volume does not yield.
+#[test]
+fn tetrahedra_yield_at_the_stress_of_von_mises() {
+    const YOUNG: f64 = 5000.0;
+    const YIELD: f64 = 0.02;
+    let mesh = Mesh::block([0.04; 3], [2; 3]).expect("a block");
+    let masses = vec![0.0; mesh.positions.len()];
+    for (solver, storage) in SOLVERS.into_iter().zip(STORAGES) {
+        for nu in [0.0, 0.3, 0.45] {
+            let definition = BodyDefinition {
+                positions: &mesh.positions,
+                tetrahedra: &mesh.tetrahedra,
+                masses: Values::Each(&masses),
+                material: Some(Material {
+                    model: Model::Tetrahedra,
+                    young_modulus: YOUNG as f32,
+                    poisson_ratio: nu,
+                    ..Material::default()
+                }),
+                yielding: yielding(YIELD as f32),
+                solver,
+                storage,
+                ..BodyDefinition::default()
+            };
+            let mut scene = Scene::new(FREE, &definition);
+            // The shear stress on the upper side, in steps so small that the side does not turn.
+            let mut shear_at = |shear: f64| {
+                for (node, &p) in (0..).zip(&mesh.positions) {
+                    let place = p + Vec3::X * (shear as f32 * (p.y + 0.02));
+                    scene.body().move_pin(node, place).expect("a pin");
+                }
+                for _ in 0..2 {
+                    scene.world.step(0.01).expect("a step");
+                }
+                let upper = (0..).zip(&mesh.positions).filter(|(_, p)| p.y > 0.019);
+                let force: f32 = upper
+                    .map(|(node, _)| scene.body().pin_force(node).expect("a pin").x)
+                    .sum();
+                f64::from(force) / (0.04 * 0.04)
+            };
+            let mu = YOUNG / (2.0 * (1.0 + f64::from(nu)));
+            let yields = YOUNG * YIELD / 3.0_f64.sqrt();
+            let near = |stress: f64, expected: f64| {
+                // Strains of a few hundredths squared: that is what small strains leave out.
+                assert!(
+                    (stress - expected).abs() < 0.05 * yields,
+                    "{solver:?}, nu {nu}: {stress} {expected}"
+                );
+            };
+            near(shear_at(0.5 * yields / mu), 0.5 * yields);
+            near(shear_at(0.0), 0.0);
+            for part in 1..=20 {
+                shear_at(0.1 * yields / mu * f64::from(part));
+            }
+            near(shear_at(2.0 * yields / mu), yields);
+            near(shear_at(yields / mu), 0.0);
+            near(shear_at(0.5 * yields / mu), -0.5 * yields);
+            // Swollen and back nothing is left.
+            let mut other = Scene::new(FREE, &definition);
+            for factor in [1.1, 1.0] {
+                for (node, &p) in (0..).zip(&mesh.positions) {
+                    other.body().move_pin(node, p * factor).expect("a pin");
+                }
+                other.world.step(0.01).expect("a step");
+            }
+            other.world.step(0.01).expect("a step");
+            let left = other.body().pin_force(0).expect("a pin").length();
+            assert!(left < 1e-4, "{solver:?}, nu {nu}: {left}");
+            assert!(other.energy() < 1e-9);
+        }
+    }
+}
+
+/// What yields loses what it took to deform it: energy never rises while a block of tetrahedra swings, and falls at once.
+#[test]
+fn tetrahedra_that_yield_lose_energy() {
+    let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
+    for solver in SOLVERS {
+        for nu in [0.3, 0.45] {
+            let mut left = Vec::new();
+            for strain in [0.0, 0.02] {
+                let definition = BodyDefinition {
+                    positions: &mesh.positions,
+                    tetrahedra: &mesh.tetrahedra,
+                    material: Some(Material {
+                        model: Model::Tetrahedra,
+                        young_modulus: 5000.0,
+                        poisson_ratio: nu,
+                        density: 1000.0,
+                        ..Material::default()
+                    }),
+                    yielding: yielding(strain),
+                    solver,
+                    ..BodyDefinition::default()
+                };
+                let mut scene = Scene::new(FREE, &definition);
+                let thrown: Vec<Vec3> = mesh
+                    .positions
+                    .iter()
+                    .map(|p| Vec3::new(10.0, -5.0, -5.0) * *p)
+                    .collect();
+                scene.body().set_velocities(&thrown).expect("velocities");
+                let first = scene.energy();
+                for _ in 0..200 {
+                    scene.world.step(2e-4).expect("a step");
+                    let energy = scene.energy();
+                    assert!(energy < 1.01 * first, "{solver:?}, nu {nu}: {energy} of {first}");
+                }
+                left.push(scene.energy() / first);
+            }
+            assert!(left[0] > 0.9 && left[1] < 0.6, "{solver:?}, nu {nu}: {left:?}");
+        }
     }
 }
 
@@ -304,7 +430,7 @@ fn a_refused_step_and_threads_change_nothing() {
         tetrahedra: &mesh.tetrahedra,
         masses: Values::Uniform(1e-4),
         stiffnesses: Values::Uniform(20.0),
-        yield_strain: 0.02,
+        yielding: yielding(0.02),
         strain_limit: 0.1,
         ..BodyDefinition::default()
     };
@@ -343,7 +469,7 @@ fn what_cannot_be_is_refused_by_name() {
     };
     refused(
         &BodyDefinition {
-            yield_strain: -1.0,
+            yielding: yielding(-1.0),
             ..pair
         },
         &["yield_strain", "-1"],
@@ -357,8 +483,10 @@ fn what_cannot_be_is_refused_by_name() {
     );
     for largest_set in [0.0, 1.0, f32::NAN] {
         let definition = BodyDefinition {
-            yield_strain: 0.1,
-            largest_set,
+            yielding: Yielding {
+                strain: 0.1,
+                largest: largest_set,
+            },
             ..pair
         };
         refused(&definition, &["largest_set", &largest_set.to_string()]);
@@ -371,18 +499,18 @@ fn what_cannot_be_is_refused_by_name() {
         };
         refused(&definition, &["limit_stiffening", &limit_stiffening.to_string()]);
     }
-    let yielding = BodyDefinition {
-        yield_strain: 0.1,
+    let yields = BodyDefinition {
+        yielding: yielding(0.1),
         ..bare
     };
-    refused(&yielding, &["yield_strain", "0.1", "springs"]);
+    refused(&yields, &["yield_strain", "0.1", "springs"]);
     let limited = BodyDefinition {
         strain_limit: 0.1,
         ..bare
     };
     refused(&limited, &["strain_limit", "0.1", "springs"]);
     let nonlinear = BodyDefinition {
-        yield_strain: 0.1,
+        yielding: yielding(0.1),
         spring_law: SpringLaw::Exponential {
             steepness: 1.0,
             limit: 1.0,

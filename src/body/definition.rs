@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::error::{Error, Result};
-use crate::material::{Material, Viscosity};
+use crate::material::{Material, Viscosity, Yielding};
 use crate::memory;
 use crate::springs::Rounding;
 use crate::terms::SpringLaw;
@@ -127,13 +127,9 @@ pub struct BodyDefinition<'a> {
     /// damping along the springs, on top of `spring_dampings`; springs that are added later have none. A body begins relaxed; what
     /// [`Body::set_positions`](crate::Body::set_positions) does is a deformation at once.
     pub viscosity: Viscosity,
-    /// The strain of springs from which they yield, whether stretched or pressed, at least 0; 0: they do not. What is beyond it stays: they
-    /// are at rest elsewhere from then on (perfect plasticity). Found where a substep ends; [`SpringLaw::Linear`] alone. Springs that are
-    /// added later do not yield.
-    pub yield_strain: f32,
-    /// By what part of its rest length a spring may become longer or shorter for good, above 0 and below 1, where `yield_strain` is given;
-    /// beyond that it is elastic again.
-    pub largest_set: f32,
+    /// From which strain springs, and tetrahedra that are elements, take a set. Springs that yield are [`SpringLaw::Linear`]; those that
+    /// are added later do not.
+    pub yielding: Yielding,
     /// The strain of springs from which they are stiffer, at least 0; 0: there is none.
     pub strain_limit: f32,
     /// How many times their stiffness is added beyond it, above 0, at most 1e6: a load that would stretch a spring by some strain more
@@ -188,8 +184,7 @@ impl Default for BodyDefinition<'_> {
             fibre_directions: &[],
             fibre_stiffnesses: Values::Uniform(0.0),
             viscosity: Viscosity::default(),
-            yield_strain: 0.0,
-            largest_set: 0.5,
+            yielding: Yielding::default(),
             strain_limit: 0.0,
             limit_stiffening: 100.0,
             storage: Storage::Packed,
@@ -260,6 +255,7 @@ impl BodyDefinition<'_> {
             )));
         }
         self.viscosity.check()?;
+        self.yielding.check()?;
         if let Some(material) = &self.material {
             material.check(self)?;
         }

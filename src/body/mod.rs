@@ -127,11 +127,17 @@ impl Body {
             Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
             None => None,
         };
-        if !definition.viscosity.is_none() && springs.is_empty() && elements.is_none() {
-            return Err(Error::invalid(format!(
-                "retardation_time is {} s, and the body has neither springs nor elements to be viscous",
-                definition.viscosity.retardation_time
-            )));
+        if springs.is_empty() && elements.is_none() {
+            for (name, value) in [
+                ("retardation_time", definition.viscosity.retardation_time),
+                ("yield_strain", definition.yielding.strain),
+            ] {
+                if value > 0.0 {
+                    return Err(Error::invalid(format!(
+                        "{name} is {value}, and the body has neither springs nor elements"
+                    )));
+                }
+            }
         }
         let terms = Terms::new(definition, &springs, &order)?;
         for spring in &mut springs {
@@ -545,5 +551,6 @@ fn elements_of(law: Law, definition: &BodyDefinition, order: &NodeOrder) -> Resu
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let at_rest = |own: u32| rest[order.caller(own) as usize].as_dvec3();
     let node_count = definition.positions.len();
-    Elements::new(law, definition.viscosity, &tetrahedra, at_rest, node_count)
+    let past = (definition.viscosity, definition.yielding);
+    Elements::new(law, past, &tetrahedra, at_rest, node_count)
 }

@@ -7,7 +7,7 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::body::{BodyDefinition, Solver, Storage, Values};
 use crate::error::{Error, Result};
-use crate::material::{Material, Model, Viscosity};
+use crate::material::{Material, Model, Viscosity, Yielding};
 use crate::terms::SpringLaw;
 
 /// The default: laid out for the processor.
@@ -177,11 +177,11 @@ pub struct sinew_body_def {
     /// alone, which is Kelvin and Voigt's solid. Stable whatever the times and the step. A body begins relaxed; what
     /// sinew_body_set_positions does is a deformation at once.
     pub relaxation_time: f32,
-    /// The strain of springs from which they yield, stretched or pressed, at least 0; default 0: they do not. What is beyond it stays for
-    /// good. SINEW_SPRING_LAW_LINEAR alone; springs that are added later do not yield.
+    /// The strain from which springs, and rods of tetrahedra that are elements, yield, stretched or pressed, at least 0; default 0: they do
+    /// not. What is beyond it stays for good. Springs that yield have SINEW_SPRING_LAW_LINEAR; those that are added later do not yield.
     pub yield_strain: f32,
-    /// By what part of its rest length a spring may become longer or shorter for good, above 0 and below 1 where yield_strain is given;
-    /// default 0.5. Beyond that it is elastic again.
+    /// By what part of its rest length it may become longer or shorter for good, above 0 and below 1 where yield_strain is given; default
+    /// 0.5. Beyond that it is elastic again.
     pub largest_set: f32,
     /// The strain of springs from which they are stiffer, at least 0; default 0: there is none. Springs that are added later have none.
     pub strain_limit: f32,
@@ -256,7 +256,7 @@ impl sinew_body_def {
             retardation_time: 0.0,
             relaxation_time: 0.0,
             yield_strain: 0.0,
-            largest_set: BodyDefinition::default().largest_set,
+            largest_set: Yielding::default().largest,
             strain_limit: 0.0,
             limit_stiffening: BodyDefinition::default().limit_stiffening,
         }
@@ -385,8 +385,10 @@ impl sinew_body_def {
                     retardation_time: self.retardation_time,
                     relaxation_time: self.relaxation_time,
                 },
-                yield_strain: self.yield_strain,
-                largest_set: self.largest_set,
+                yielding: Yielding {
+                    strain: self.yield_strain,
+                    largest: self.largest_set,
+                },
                 strain_limit: self.strain_limit,
                 limit_stiffening: self.limit_stiffening,
                 storage: match self.storage {

@@ -7,9 +7,10 @@
 
 use super::law::{Law, Load};
 use super::parts::Part;
+use super::set::{Bounds, Set};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
-use crate::material::{Course, Viscosity};
+use crate::material::{Course, Viscosity, Yielding};
 use crate::memory;
 use crate::springs::{GROUP, Group, Stresses};
 
@@ -18,6 +19,8 @@ pub(super) struct Memory {
     pub viscosity: Viscosity,
     /// g of the equation that is being solved; 0 where loads are the arms' stresses as they are.
     pub gain: f32,
+    /// Where they yield.
+    pub bounds: Option<Bounds>,
     pub parts: Vec<OfPart>,
     pub rings: Past<f32>,
 }
@@ -25,7 +28,8 @@ pub(super) struct Memory {
 /// What is remembered of the tetrahedra of a part.
 #[derive(Debug)]
 pub(super) struct OfPart {
-    pub past: Past<Stresses>,
+    past: Past<Stresses>,
+    set: Option<Set>,
     /// Room for elastic stresses.
     pub newest: Vec<Stresses>,
 }
@@ -121,49 +125,99 @@ impl<T: Numbers> Past<T> {
     }
 }
 
+impl OfPart {
+    /// On top of the elastic stresses.
+    pub fn loads(&self) -> &[Stresses] {
+        self.set.as_ref().map_or(&self.past.loads, |set| &set.loads)
+    }
+
+    /// The newest elastic stresses are those now.
+    pub fn age(&mut self, course: Course, bounds: Option<Bounds>) {
+        self.past.age(course, &self.newest);
+        if let (Some(set), Some(bounds)) = (&mut self.set, bounds) {
+            set.flow(bounds, &self.newest);
+        }
+        self.combine();
+    }
+
+    fn combine(&mut self) {
+        if let Some(set) = &mut self.set {
+            set.combine(&self.past.loads);
+        }
+    }
+}
+
 impl Memory {
     /// For so many rings, or none.
-    pub fn new(viscosity: Viscosity, parts: &[Part], ring_count: usize) -> Result<Self> {
+    pub fn new(
+        law: Law,
+        viscosity: Viscosity,
+        yielding: Yielding,
+        parts: &[Part],
+        ring_count: usize,
+    ) -> Result<Option<Box<Self>>> {
+        // Volume alone does not yield.
+        let yields = !yielding.is_none() && law.mu > 0.0;
+        if viscosity.is_none() && !yields {
+            return Ok(None);
+        }
         let mut of_parts = memory::reserved(parts.len())?;
         for part in parts {
             let count = part.groups.as_slice().len();
             of_parts.push(OfPart {
-                past: Past::new(count)?,
+                past: Past::new(if viscosity.is_none() { 0 } else { count })?,
+                set: if yields { Some(Set::new(count)?) } else { None },
                 newest: memory::filled(Stresses::ZERO, count)?,
             });
         }
-        Ok(Self {
+        Ok(Some(Box::new(Self {
             viscosity,
             gain: 0.0,
+            bounds: yields.then(|| Bounds::new(law, yielding)),
             parts: of_parts,
-            rings: Past::new(ring_count)?,
-        })
+            rings: Past::new(if viscosity.is_none() { 0 } else { ring_count })?,
+        })))
     }
 
     /// An equation is to be solved for the end of so many seconds.
     pub fn foresee(&mut self, time: f64) {
         let course = self.viscosity.over(time);
         self.gain = course.gain as f32;
-        self.parts.iter_mut().for_each(|part| part.past.foresee(course));
+        for part in &mut self.parts {
+            part.past.foresee(course);
+            part.combine();
+        }
         self.rings.foresee(course);
     }
 
     /// A step begins, from what is current.
     pub fn recall(&mut self) {
         self.gain = 0.0;
-        self.parts.iter_mut().for_each(|part| part.past.recall());
+        for part in &mut self.parts {
+            part.past.recall();
+            part.set.iter_mut().for_each(Set::recall);
+            part.combine();
+        }
         self.rings.recall();
     }
 
     /// The step in progress is the current state.
     pub fn keep(&mut self) {
-        self.parts.iter_mut().for_each(|part| part.past.keep());
+        for part in &mut self.parts {
+            part.past.keep();
+            part.set.iter_mut().for_each(Set::keep);
+        }
         self.rings.keep();
     }
 
     /// The load on a tetrahedron.
     pub fn load(&self, part: usize, [group, lane]: [usize; 2]) -> Load {
-        load_of(&self.parts[part].past.loads[group], lane)
+        load_of(&self.parts[part].loads()[group], lane)
+    }
+
+    /// The load on the ring of a node, Pa.
+    pub fn load_of_ring(&self, node: usize) -> f64 {
+        self.rings.loads.get(node).map_or(0.0, |&load| f64::from(load))
     }
 
     /// What stiffens the law where it is multiplied by the gain.
@@ -171,27 +225,36 @@ impl Memory {
         law.times(1.0 + self.gain)
     }
 
-    /// The energy of an arm's spring per volume, given its load and what is elastic, Pa.
-    pub fn energy_of(&self, law: Law, load: Load, elastic: Load) -> f64 {
-        let Some(stiffening) = self.viscosity.stiffening() else {
-            return 0.0;
-        };
-        let gain = f64::from(self.gain);
-        let arm = Load {
-            stress: load.stress + elastic.stress * gain,
-            pressure: load.pressure + elastic.pressure * gain,
-        };
-        law.energy_of(arm) / stiffening
+    /// Whether anything of it has energy.
+    pub fn has_energy(&self) -> bool {
+        self.viscosity.stiffening().is_some() || self.bounds.is_some()
     }
 
-    /// That of all arms of a part with the newest elastic stresses, J.
+    /// The energy per volume of the arm's spring of a tetrahedron, and what it differs by because it has yielded, given what is elastic
+    /// without that, Pa.
+    pub fn energy_of(&self, law: Law, part: usize, [group, lane]: [usize; 2], elastic: Load) -> f64 {
+        let OfPart { past, set, .. } = &self.parts[part];
+        let mut energy = set
+            .as_ref()
+            .map_or(0.0, |set| set.energy(law, [group, lane], elastic.stress));
+        if let Some(stiffening) = self.viscosity.stiffening() {
+            let (load, gain) = (load_of(&past.loads[group], lane), f64::from(self.gain));
+            let arm = Load {
+                stress: load.stress + elastic.stress * gain,
+                pressure: load.pressure + elastic.pressure * gain,
+            };
+            energy += law.energy_of(arm) / stiffening;
+        }
+        energy
+    }
+
+    /// That of all tetrahedra of a part with the newest elastic stresses, J.
     pub fn energy_of_part(&self, law: Law, part: usize, groups: &[Group]) -> f64 {
         let mut energy = 0.0;
         for (index, group) in groups.iter().enumerate() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
                 let elastic = load_of(&self.parts[part].newest[index], lane);
-                let of_arm = self.energy_of(law, self.load(part, [index, lane]), elastic);
-                energy += f64::from(group.volumes[lane]) * of_arm;
+                energy += f64::from(group.volumes[lane]) * self.energy_of(law, part, [index, lane], elastic);
             }
         }
         energy
@@ -208,8 +271,9 @@ impl Memory {
 
     /// What may change of it.
     pub fn hash(&self, hasher: &mut StateHasher) {
-        for past in self.parts.iter().map(|part| &part.past) {
-            for stresses in past.kept_arms.iter().chain(&past.kept_elastic) {
+        for OfPart { past, set, .. } in &self.parts {
+            let left = set.iter().flat_map(Set::kept);
+            for stresses in past.kept_arms.iter().chain(&past.kept_elastic).chain(left) {
                 hasher.write_floats(stresses.numbers());
             }
         }

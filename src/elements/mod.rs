@@ -9,13 +9,14 @@ mod memory;
 mod parts;
 mod rates;
 mod rings;
+mod set;
 
 use glam::{DMat3, DVec3};
 
 use crate::body::{Record, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
-use crate::material::{Course, Viscosity};
+use crate::material::{Course, Viscosity, Yielding};
 use crate::memory::{filled, reserved};
 use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
@@ -78,7 +79,7 @@ impl Sums {
 
 /// The loads on the tetrahedra of a part; none where there is no memory.
 fn loads(memory: Option<&Memory>, part: usize) -> &[Stresses] {
-    memory.map_or(&[], |memory| &memory.parts[part].past.loads)
+    memory.map_or(&[], |memory| memory.parts[part].loads())
 }
 
 /// What is shown the nodes of a tetrahedron, the gradients of their functions, and how it is deformed.
@@ -113,7 +114,7 @@ impl Elements {
     /// Tetrahedra of nodes that are here at rest, in the body's own numbers.
     pub fn new(
         law: Law,
-        viscosity: Viscosity,
+        (viscosity, yielding): (Viscosity, Yielding),
         tetrahedra: &[[u32; 4]],
         rest: impl Fn(u32) -> DVec3,
         node_count: usize,
@@ -129,11 +130,7 @@ impl Elements {
         let mut elements = Self {
             law,
             count: tetrahedra.len(),
-            memory: if viscosity.is_none() {
-                None
-            } else {
-                Some(Box::new(Memory::new(viscosity, &parts, ring_count)?))
-            },
+            memory: Memory::new(law, viscosity, yielding, &parts, ring_count)?,
             copies: Copies::new(&parts, node_count)?,
             forces: Sums::new(count, parts.len(), false, ring_count)?,
             rings: if law.rings {
@@ -305,14 +302,11 @@ impl Elements {
 
     /// The same with the load on it.
     pub fn visit_loaded(&self, see: &mut dyn FnMut([u32; 4], &Rest, Load)) {
+        let memory = self.memory.as_deref();
         for (index, part) in self.parts.iter().enumerate() {
             part.visit(&mut |corners, rest, place| {
-                let memory = self.memory.as_deref();
-                see(
-                    corners,
-                    rest,
-                    memory.map_or(Load::NONE, |memory| memory.load(index, place)),
-                );
+                let load = memory.map_or(Load::NONE, |memory| memory.load(index, place));
+                see(corners, rest, load);
             });
         }
     }
@@ -342,19 +336,21 @@ impl Elements {
         let (mut energy, law) = (0.0, self.law);
         let (memory, kappa) = (self.memory.as_deref(), f64::from(law.kappa));
         growths.fill(0.0);
-        self.visit_loaded(&mut |corners, rest, load| {
-            let [a, b, c, d] = corners.map(|node| position(node as usize));
-            let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
-            energy += deformed.energy();
-            if let Some(memory) = memory {
-                energy += rest.volume * memory.energy_of(law, load, deformed.elastic());
-            }
-            if law.rings {
-                for node in corners {
-                    growths[node as usize] += 0.25 * deformed.swelling();
+        for (index, part) in self.parts.iter().enumerate() {
+            part.visit(&mut |corners, rest, place| {
+                let [a, b, c, d] = corners.map(|node| position(node as usize));
+                let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a));
+                energy += deformed.energy();
+                if let Some(memory) = memory {
+                    energy += rest.volume * memory.energy_of(law, index, place, deformed.elastic());
                 }
-            }
-        });
+                if law.rings {
+                    for node in corners {
+                        growths[node as usize] += 0.25 * deformed.swelling();
+                    }
+                }
+            });
+        }
         let rings = self.rings.iter().flat_map(|rings| &rings.volumes).zip(&*growths);
         for (node, (&volume, growth)) in rings.enumerate().filter(|(_, (volume, _))| **volume > 0.0) {
             let volume = f64::from(volume);
@@ -391,7 +387,7 @@ impl Elements {
     /// The load on the ring of a node, Pa.
     pub fn load_of_ring(&self, node: usize) -> f64 {
         let memory = self.memory.as_ref();
-        memory.map_or(0.0, |memory| f64::from(memory.rings.loads[node]))
+        memory.map_or(0.0, |memory| memory.load_of_ring(node))
     }
 
     /// Whether they remember anything.
@@ -435,8 +431,9 @@ impl Elements {
         self.find_elastic(kernel, positions, team);
         if let Some(memory) = &mut self.memory {
             memory.gain = 0.0;
+            let bounds = memory.bounds;
             team.pass(memory.parts.len(), Items::new(&mut memory.parts), |_, part| {
-                part.past.age(course, &part.newest);
+                part.age(course, bounds);
             });
             memory.rings.age(course, &self.forces.pressures.of_nodes);
         }
@@ -463,11 +460,7 @@ impl Elements {
 
     /// The energy of the arms' springs with nodes at `positions`, J.
     fn energy_of_arms(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
-        if self
-            .memory
-            .as_ref()
-            .is_none_or(|memory| memory.viscosity.stiffening().is_none())
-        {
+        if self.memory.as_ref().is_none_or(|memory| !memory.has_energy()) {
             return 0.0;
         }
         self.find_elastic(kernel, positions, team);

@@ -8,6 +8,7 @@ mod masses;
 pub mod presets;
 mod springs;
 mod viscosity;
+mod yielding;
 
 use crate::body::{BodyDefinition, Values, not_negative};
 use crate::elements::Law;
@@ -15,6 +16,7 @@ use crate::error::{Error, Result};
 use filled::Filled;
 pub(crate) use viscosity::Course;
 pub use viscosity::Viscosity;
+pub use yielding::Yielding;
 
 /// How a material's numbers become forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

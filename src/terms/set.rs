@@ -7,10 +7,10 @@ use glam::{DMat3, DVec3};
 
 use super::stencils::{Law, Stencil, Stencils, directed};
 use super::{Moment, Term};
-use crate::body::{BodyDefinition, NodeOrder, Spring, View, not_negative};
+use crate::body::{BodyDefinition, NodeOrder, Spring, View};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
-use crate::material::{Course, Viscosity};
+use crate::material::{Course, Viscosity, Yielding};
 use crate::memory;
 use crate::terms::SpringLaw;
 
@@ -31,24 +31,13 @@ struct Set {
 }
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
-    let (yield_strain, largest) = (definition.yield_strain, definition.largest_set);
-    not_negative("yield_strain", yield_strain)?;
-    if yield_strain == 0.0 {
+    let Yielding { strain, largest } = definition.yielding;
+    if definition.yielding.is_none() || springs.is_empty() {
         return Ok(None);
-    }
-    if !(largest > 0.0 && largest < 1.0) {
-        return Err(Error::invalid(format!(
-            "largest_set is {largest}: must be above 0 and below 1"
-        )));
     }
     if definition.spring_law != SpringLaw::Linear {
         return Err(Error::invalid(format!(
-            "yield_strain is {yield_strain} while spring_law is not linear: only linear springs yield"
-        )));
-    }
-    if springs.is_empty() {
-        return Err(Error::invalid(format!(
-            "yield_strain is {yield_strain} while the body has no springs"
+            "yield_strain is {strain} while spring_law is not linear: only linear springs yield"
         )));
     }
     let mut sets = memory::reserved(springs.len())?;
@@ -70,7 +59,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         });
     }
     let law = Sets {
-        yield_strain: f64::from(yield_strain),
+        yield_strain: f64::from(strain),
         largest: f64::from(largest),
     };
     Ok(Some(Box::new(Stencils::new(law, sets, definition.positions.len())?)))
