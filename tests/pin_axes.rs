@@ -491,7 +491,12 @@ fn axes_change_while_it_runs() {
     let parts = Parts::nodes(vec![Vec3::ZERO, Vec3::ONE], 0.5);
     let pull = Vec3::new(1.0, 1.0, 0.0);
     for which in each() {
-        let mut scene = scene(&parts, FREE, which);
+        let mut scene = Scene::with(&parts, FREE, |definition| BodyDefinition {
+            solver: which.0,
+            storage: which.1,
+            order: u32::from(which.0 != Solver::Verlet),
+            ..definition
+        });
         let speeds = [Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO];
         scene.body_mut().set_velocities(&speeds).expect("velocities");
         let near = |scene: &Scene, place: [f64; 3], velocity: [f64; 3]| {
@@ -633,7 +638,7 @@ fn a_tool_moves_what_is_free_to_move() {
             let ball = scene.world.create_tool(&ball).expect("a tool");
             let (mut momentum, dt) = (0.0, 1e-3);
             for step in 1..=20 {
-                let place = start + Vec3::X * 3e-4 * step as f32;
+                let place = start + Vec3::X * 5e-4 * step as f32;
                 scene.world.set_pose(ball, place, None).expect("a pose");
                 scene.step(dt);
                 let (wrench, _) = scene.world.wrench(ball).expect("a tool");
@@ -653,7 +658,7 @@ fn a_tool_moves_what_is_free_to_move() {
                 if axes[1] {
                     assert_eq!(scene.positions()[0].y, 0.0);
                 }
-                assert!(scene.velocities()[0].length() < 4.0 * 0.3, "{}", scene.velocities()[0]);
+                assert!(scene.velocities()[0].length() < 4.0 * 0.5, "{}", scene.velocities()[0]);
             }
             assert!(
                 scene.velocities()[0].x > 0.2,
@@ -884,14 +889,9 @@ fn a_step_that_is_not_taken_changes_nothing() {
 }
 
 /// A sheet large enough for all threads and for the pipeline, of which the rims slide on rails and some nodes are led.
-fn rimmed(thread_count: u32, substeps: u32, solver: Solver, side: u32) -> Scene {
+fn rimmed(world: WorldDefinition, solver: Solver, side: u32) -> Scene {
     let mesh = Mesh::cloth([1.0; 2], [side; 2]).expect("a cloth");
-    let mut world = World::new(WorldDefinition {
-        thread_count,
-        substeps,
-        ..HANGING
-    })
-    .expect("a world");
+    let mut world = World::new(world).expect("a world");
     let id = world
         .create_body(&BodyDefinition {
             positions: &mesh.positions,
@@ -921,7 +921,12 @@ fn rimmed(thread_count: u32, substeps: u32, solver: Solver, side: u32) -> Scene 
 fn threads_change_no_bit() {
     for (solver, substeps, side) in [(Solver::Verlet, 12, 179), (Solver::Implicit, 1, 95)] {
         let hashes = [1, 2].map(|threads| {
-            let mut scene = rimmed(threads, substeps, solver, side);
+            let world = WorldDefinition {
+                thread_count: threads,
+                substeps,
+                ..HANGING
+            };
+            let mut scene = rimmed(world, solver, side);
             scene.run(0.006, 2);
             scene.world.state_hash()
         });
@@ -933,8 +938,15 @@ fn threads_change_no_bit() {
 #[test]
 fn the_pipeline_leads_as_single_substeps_do() {
     const H: f32 = 1.0 / 4096.0;
-    let mut together = rimmed(2, 16, Solver::Verlet, 179);
-    let mut one_by_one = rimmed(1, 1, Solver::Verlet, 179);
+    let scene = |thread_count: u32, substeps: u32| {
+        let world = WorldDefinition {
+            thread_count,
+            substeps,
+            ..FREE
+        };
+        rimmed(world, Solver::Verlet, 179)
+    };
+    let (mut together, mut one_by_one) = (scene(2, 16), scene(1, 1));
     for scene in [&mut together, &mut one_by_one] {
         // Nothing is led: a lead is a matter of the step.
         let count = scene.body().node_count() as u32;
@@ -948,6 +960,9 @@ fn the_pipeline_leads_as_single_substeps_do() {
     }
     together.step(16.0 * H);
     one_by_one.run(H, 16);
-    assert_eq!(together.positions(), one_by_one.positions());
-    assert_eq!(together.velocities(), one_by_one.velocities());
+    assert_eq!(largest_difference(&together.positions(), &one_by_one.positions()), 0.0);
+    assert_eq!(
+        largest_difference(&together.velocities(), &one_by_one.velocities()),
+        0.0
+    );
 }
