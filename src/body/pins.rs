@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::springs::TILE;
 use crate::threads::Ragged;
 
-/// A node that is held, along all axes or along some. What is kept along the others means nothing, but for `force`, `goal` and
-/// `travel`: those say that nothing holds or leads it there.
+/// A node that is held, along all axes or along some. Along the others `force` and `travel` are 0, and what else is kept means
+/// nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pin {
     pub node: u32,
