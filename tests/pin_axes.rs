@@ -906,7 +906,10 @@ fn planes_make_an_equation_no_harder() {
         report.iterations
     };
     let (products, of_pinned) = (solve(&eighth, true), solve(&whole, false));
-    assert!(products <= of_pinned, "{products} products, {of_pinned} of the whole");
+    assert!(
+        20 * products <= 19 * of_pinned,
+        "{products} products, {of_pinned} of the whole"
+    );
 }
 
 #[test]
