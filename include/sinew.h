@@ -138,6 +138,21 @@
 #define SINEW_SPRING_LAW_CUBIC 2
 
 /**
+ * The axis x among those that a node is held along.
+ */
+#define SINEW_AXIS_X 1
+
+/**
+ * The axis y.
+ */
+#define SINEW_AXIS_Y 2
+
+/**
+ * The axis z.
+ */
+#define SINEW_AXIS_Z 4
+
+/**
  * Healthy liver, E 5.4 kPa.
  */
 #define SINEW_PRESET_LIVER 0
@@ -1191,7 +1206,7 @@ sinew_status sinew_body_destroy(struct sinew_world *world, struct sinew_body_id 
 
 /**
  * Adds `force`, 3 floats, N, to what acts on a node: constant over the whole next step, cleared when that is
- * SINEW_STATUS_OK; nothing on a pinned node.
+ * SINEW_STATUS_OK; nothing on a pinned node, nor along an axis along which a node is held.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
  *
@@ -1258,7 +1273,8 @@ sinew_status sinew_body_set_positions(struct sinew_world *world,
                                       size_t node_count);
 
 /**
- * Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs.
+ * Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs, as all do along axes along which they
+ * are held.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
  *
@@ -1281,7 +1297,29 @@ sinew_status sinew_body_set_velocities(struct sinew_world *world,
 sinew_status sinew_body_pin(struct sinew_world *world, struct sinew_body_id body, uint32_t node);
 
 /**
- * Lets go of a node, which goes on as it was led in the last step; nothing where it is not held.
+ * Holds a node where it is along some axes, from now on, and along no others: a symmetry plane, a rail, a sliding support.
+ * `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; all three are sinew_body_pin, 0 is sinew_body_unpin.
+ * Along the others the node moves as a free one does, with its mass; velocities and forces that are given to it count
+ * there alone.
+ *
+ * An axis along which it was held already stays as it is, and one that it is let go of goes on as it was led in the last
+ * step. Where the axes change, what sinew_body_move_pin has asked of the node since the last step is forgotten, and so
+ * are forces that act on it along an axis which is held now. A tool acts on it along its free axes alone; what it does
+ * along the others the pin takes.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, or the node has no mass and is pinned for
+ * good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_pin_axes(struct sinew_world *world,
+                                 struct sinew_body_id body,
+                                 uint32_t node,
+                                 uint32_t axes);
+
+/**
+ * Lets go of a node along all axes: it goes on as it was led in the last step; nothing where it is not held.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
  *
@@ -1293,7 +1331,8 @@ sinew_status sinew_body_unpin(struct sinew_world *world,
                               uint32_t node);
 
 /**
- * Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step.
+ * Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step; one that is held
+ * along some axes alone along those.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
  *
@@ -1306,7 +1345,8 @@ sinew_status sinew_body_move_pin(struct sinew_world *world,
                                  const float *position);
 
 /**
- * Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step.
+ * Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step; 0 along axes
+ * along which it is not held.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
  *
@@ -1413,8 +1453,8 @@ sinew_status sinew_rest_state_def_init(struct sinew_rest_state_def *def, size_t 
  * taken into account. How a part that no pin holds lies and is turned as a whole is as it happens to be. `def` is nullable: the
  * defaults; `report` is nullable; `report->struct_size` is set by the caller.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a part that no pin holds is pulled by a net force, and so has no state of
- * rest), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSTABLE (not found in the iterations allowed), SINEW_STATUS_OUT_OF_MEMORY; nothing
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a part is pulled by a net force along an axis along which no pin holds it, and
+ * so has no state of rest), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSTABLE (not found in the iterations allowed), SINEW_STATUS_OUT_OF_MEMORY; nothing
  * has changed then.
  *
  * # Safety

@@ -178,8 +178,8 @@ impl World {
     /// then as it happens to be.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of its range, or a part that no pin holds is pulled by
-    /// a net force. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of its range, or a part is pulled by a net force
+    /// along an axis along which no pin holds it. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
         let gravity = self.definition.gravity;
         rest_state(self.bodies.get_mut(body.0)?, gravity, definition)

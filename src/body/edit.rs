@@ -1,6 +1,6 @@
 //! What a caller does to a body between steps.
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 
 use super::definition::{Spring, distance, expect_count, finite_vector, finite_vectors, not_negative};
 use super::{Body, Bounds, Vectors};
@@ -9,7 +9,8 @@ use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_fo
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
-    /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node.
+    /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node, nor
+    /// along an axis along which a node is held.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or the force is not finite.
@@ -41,6 +42,8 @@ impl Body {
             if self.inverse_masses[node] == 0.0 {
                 continue;
             }
+            let held = self.pins.partial_axes_of(node as u32);
+            let force = Vec3::select(held, Vec3::ZERO, force);
             // Sums of finite forces stay finite.
             let sum = (applied.get(node) + force).clamp(Vec3::MIN, Vec3::MAX);
             applied.set(node, sum);
@@ -61,7 +64,8 @@ impl Body {
         Ok(())
     }
 
-    /// Gives all nodes these velocities, in m/s; a pinned node keeps its own.
+    /// Gives all nodes these velocities, in m/s; a pinned node keeps its own, and along each axis along which it is held any node
+    /// does.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: not one velocity for each node, or one that is not finite.
@@ -70,8 +74,10 @@ impl Body {
         finite_vectors("velocities", velocities)?;
         close(self);
         for (node, &velocity) in (0..).zip(velocities) {
-            if self.inverse_masses[self.order.own(node) as usize] > 0.0 {
-                self.set_velocity(node, velocity);
+            let own = self.order.own(node);
+            if self.inverse_masses[own as usize] > 0.0 {
+                let kept = self.state.velocities().get(own as usize);
+                self.set_velocity(node, Vec3::select(self.pins.partial_axes_of(own), kept, velocity));
             }
         }
         self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
@@ -86,31 +92,63 @@ impl Body {
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node.
     pub fn pin(&mut self, node: u32) -> Result<()> {
+        self.pin_axes(node, [true; 3])
+    }
+
+    /// Holds `node` where it is along those of the axes x, y and z that are `true`, from now on, and no others: a symmetry plane, a
+    /// rail, a sliding support. Along the others it moves as a free node does, with its mass. All `true` is [`Body::pin`], all `false`
+    /// [`Body::unpin`].
+    ///
+    /// An axis along which it was held already stays as it is, and one that it is let go of goes on as it was led in the last step. Where
+    /// the axes change, what [`Body::move_pin`] has asked of the node since the last step is forgotten, and so are forces that act on
+    /// it along an axis which is held now. For stability the node counts as free, so that the longest stable substep is one.
+    ///
+    /// A tool acts on the node along its free axes alone. What it does along the others the pin takes, and [`Body::pin_force`] has; where
+    /// a tool pushes nearly along those only, the node does not give way, and the tool goes in with little force, as it does at a
+    /// pinned node.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: there is no such node, or it has no mass, and is pinned for good along all axes.
+    pub fn pin_axes(&mut self, node: u32, axes: [bool; 3]) -> Result<()> {
+        let axes = BVec3::from(axes);
+        if !axes.any() {
+            return self.unpin(node);
+        }
         self.check_node(&"node", node)?;
         let own = self.order.own(node);
-        if self.pins.get(own).is_none() {
-            self.pins.insert(own)?;
-            self.inverse_masses[own as usize] = 0.0;
-            self.set_velocity(node, Vec3::ZERO);
-            self.scale_masses(self.carry.masses_for);
-            self.forget_matrix();
+        let before = self.pins.axes_of(own);
+        if axes == before {
+            return Ok(());
         }
+        let inverse_mass = if axes.all() {
+            0.0
+        } else {
+            1.0 / self.mass_of_unpinned(node)?
+        };
+        if before.any() {
+            close(self);
+        }
+        self.pins.hold(own, axes)?;
+        self.inverse_masses[own as usize] = inverse_mass;
+        let velocity = self.state.velocities().get(own as usize);
+        self.set_velocity(node, Vec3::select(axes & !before, Vec3::ZERO, velocity));
+        if let Some(applied) = &mut self.applied {
+            let force = applied.get(own as usize);
+            applied.set(own as usize, Vec3::select(axes, Vec3::ZERO, force));
+        }
+        self.scale_masses(self.carry.masses_for);
+        self.forget_matrix();
         Ok(())
     }
 
-    /// Lets go of `node`, which goes on as it was led in the last step; nothing where it is not held.
+    /// Lets go of `node` along all axes: it goes on as it was led in the last step; nothing where it is not held.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
         let own = self.order.own(node);
-        let mass = self.masses[own as usize];
-        if mass == 0.0 {
-            return Err(Error::invalid(format!(
-                "node {node} has no mass: it is pinned for good"
-            )));
-        }
+        let mass = self.mass_of_unpinned(node)?;
         if self.pins.get(own).is_some() {
             close(self);
             self.pins.remove(own);
@@ -121,7 +159,8 @@ impl Body {
         Ok(())
     }
 
-    /// Leads a pinned node on a straight line to `position`, in metres, where it is at the end of the next step.
+    /// Leads a pinned node on a straight line to `position`, in metres, where it is at the end of the next step; one that is held along
+    /// some axes alone along those.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, it is not pinned, or the position is not finite.
@@ -135,7 +174,8 @@ impl Body {
         Ok(())
     }
 
-    /// What holds a pinned node against its springs and its weight, in newtons, mean over the last step.
+    /// What holds a pinned node against its springs and its weight, in newtons, mean over the last step; 0 along axes along which it
+    /// is not held.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or it is not pinned.
@@ -302,6 +342,17 @@ impl Body {
             }
         }
         self.scale_masses(self.carry.masses_for);
+    }
+
+    /// The mass of a node that is to move, kg.
+    fn mass_of_unpinned(&self, node: u32) -> Result<f32> {
+        let mass = self.masses[self.order.own(node) as usize];
+        if mass == 0.0 {
+            return Err(Error::invalid(format!(
+                "node {node} has no mass: it is pinned for good"
+            )));
+        }
+        Ok(mass)
     }
 
     fn set_velocity(&mut self, node: u32, velocity: Vec3) {

@@ -46,7 +46,8 @@ impl Body {
             terms.hash(hasher);
         }
         for pin in self.pins.iter() {
-            hasher.write_u64(u64::from(pin.node) << 1 | u64::from(pin.target.is_some()));
+            let led = u64::from(pin.target.is_some());
+            hasher.write_u64(u64::from(pin.node) << 4 | u64::from(pin.axes.bitmask()) << 1 | led);
             if let Some(target) = pin.target {
                 hasher.write_floats(&target.to_array());
             }

@@ -14,7 +14,7 @@ mod records;
 mod state;
 mod vectors;
 
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 pub(crate) use coarse::CoarseStep;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
@@ -152,7 +152,7 @@ impl Body {
             masses.push(mass);
             inverse_masses.push(if mass > 0.0 { 1.0 / mass } else { 0.0 });
             if mass == 0.0 {
-                pins.insert(node)?;
+                pins.hold(node, BVec3::TRUE)?;
             }
         }
         let damping = if definition.node_dampings.all_zero() {
@@ -322,9 +322,12 @@ impl Body {
         self.watched.gather(&*self.springs, masses);
     }
 
-    /// Whether anything holds it in its place.
-    pub(crate) fn is_held(&self) -> bool {
-        self.pins.iter().next().is_some() || self.terms.as_ref().is_some_and(|terms| terms.hold_any())
+    /// The axes along which anything holds it in its place.
+    pub(crate) fn held_axes(&self) -> BVec3 {
+        if self.terms.as_ref().is_some_and(|terms| terms.hold_any()) {
+            return BVec3::TRUE;
+        }
+        self.pins.iter().fold(BVec3::FALSE, |axes, pin| axes | pin.axes)
     }
 
     /// Whether forces are made of more than springs.
@@ -424,7 +427,7 @@ impl Body {
             max: Vec3::ZERO,
         });
         for pin in self.pins.iter_mut() {
-            pin.force = held(pin.node as usize);
+            pin.force = pin.held(held(pin.node as usize));
         }
         self.relax();
         self.forget_motion();
@@ -482,7 +485,7 @@ impl Body {
         }
         self.published.forget_velocities();
         for pin in self.pins.iter_mut() {
-            pin.force = (pin.force_sum / f64::from(substeps)).as_vec3();
+            pin.force = pin.held((pin.force_sum / f64::from(substeps)).as_vec3());
             pin.closing_share = carry.closing.map_or(0.0, |_| 0.5 / substeps as f32);
         }
         if let Some(contacts) = &mut self.contacts {

@@ -1,12 +1,14 @@
 //! Nodes that are held: where they are led, and the force it takes.
 
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
+use super::vectors::Vectors;
 use crate::error::Result;
 use crate::springs::TILE;
 use crate::threads::Ragged;
 
-/// A node that is held.
+/// A node that is held, along all axes or along some. Along the others `force` and `travel` are 0, and what else is kept means
+/// nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pin {
     pub node: u32,
@@ -23,6 +25,8 @@ pub(crate) struct Pin {
     pub force_sum: DVec3,
     /// What holds it with the nodes where an implicit step has them, N.
     pub solved: Vec3,
+    /// The axes along which it is held, at least one; along the others it moves as free nodes do.
+    pub axes: BVec3,
 }
 
 impl Pin {
@@ -32,6 +36,39 @@ impl Pin {
         // From the end of the step, so that roundings do not add up.
         self.goal - self.travel * (1.0 - fraction) as f32
     }
+
+    /// Whether it is held along some axes alone.
+    pub fn is_partial(&self) -> bool {
+        !self.axes.all()
+    }
+
+    /// The components of a vector along the axes that it is held along; 0 along the others.
+    #[inline]
+    pub fn held(&self, vector: Vec3) -> Vec3 {
+        Vec3::select(self.axes, vector, Vec3::ZERO)
+    }
+
+    /// A vector with those of its components that belong to axes it is held along.
+    #[inline]
+    pub fn leading(&self, vector: Vec3, held: Vec3) -> Vec3 {
+        Vec3::select(self.axes, held, vector)
+    }
+
+    /// Puts these components of a vector among those of a tile, of which it is in this place.
+    #[inline]
+    pub fn put(&self, vectors: &mut [&mut [f32]; 3], place: usize, held: Vec3) {
+        for axis in 0..3 {
+            if self.axes.test(axis) {
+                vectors[axis][place] = held[axis];
+            }
+        }
+    }
+
+    /// Puts these components of a vector among those of all nodes.
+    pub fn put_among(&self, vectors: &mut Vectors, held: Vec3) {
+        let node = self.node as usize;
+        vectors.set(node, self.leading(vectors.get(node), held));
+    }
 }
 
 /// The pins of a body, in the order of their nodes.
@@ -40,6 +77,8 @@ pub(crate) struct Pins {
     pins: Vec<Pin>,
     /// Where the pins of each tile begin, up to the last tile that has some.
     tiles: Vec<usize>,
+    /// How many are held along some axes alone.
+    partial_count: usize,
 }
 
 impl Pins {
@@ -79,28 +118,70 @@ impl Pins {
         self.find(node).ok().map(|index| &mut self.pins[index])
     }
 
-    /// Holds `node`; nothing where it is held already.
-    pub fn insert(&mut self, node: u32) -> Result<()> {
-        if let Err(index) = self.find(node) {
-            self.pins.try_reserve(1)?;
-            let pin = Pin {
-                node,
-                target: None,
-                force: Vec3::ZERO,
-                closing_share: 0.0,
-                goal: Vec3::ZERO,
-                travel: Vec3::ZERO,
-                force_sum: DVec3::ZERO,
-                solved: Vec3::ZERO,
-            };
-            let tiles = node as usize / TILE + 1;
-            self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?;
-            self.pins.insert(index, pin);
-            if tiles > self.tiles.len() {
-                self.tiles.resize(tiles, index);
-            }
-            self.tiles[tiles..].iter_mut().for_each(|start| *start += 1);
+    /// The axes along which a node is held.
+    #[inline]
+    pub fn axes_of(&self, node: u32) -> BVec3 {
+        self.get(node).map_or(BVec3::FALSE, |pin| pin.axes)
+    }
+
+    /// The axes along which a node that moves is held.
+    #[inline]
+    pub fn partial_axes_of(&self, node: u32) -> BVec3 {
+        if self.partial_count == 0 {
+            BVec3::FALSE
+        } else {
+            self.axes_of(node)
         }
+    }
+
+    /// Whether nodes are held along some axes alone.
+    pub fn are_partial(&self) -> bool {
+        self.partial_count > 0
+    }
+
+    /// Those that are held along some axes alone.
+    pub fn partial(&self) -> impl Iterator<Item = &Pin> {
+        let pins = if self.are_partial() { &*self.pins } else { &[] };
+        pins.iter().filter(|pin| pin.is_partial())
+    }
+
+    /// Holds `node` along these axes, at least one, and no others; if that is a change it is not led any more.
+    pub fn hold(&mut self, node: u32, axes: BVec3) -> Result<()> {
+        match self.find(node) {
+            Ok(index) if self.pins[index].axes == axes => return Ok(()),
+            Ok(index) => {
+                let pin = &mut self.pins[index];
+                self.partial_count -= usize::from(pin.is_partial());
+                pin.axes = axes;
+                pin.target = None;
+                pin.force = pin.held(pin.force);
+            }
+            Err(index) => self.insert(index, node, axes)?,
+        }
+        self.partial_count += usize::from(!axes.all());
+        Ok(())
+    }
+
+    fn insert(&mut self, index: usize, node: u32, axes: BVec3) -> Result<()> {
+        self.pins.try_reserve(1)?;
+        let pin = Pin {
+            node,
+            target: None,
+            force: Vec3::ZERO,
+            closing_share: 0.0,
+            goal: Vec3::ZERO,
+            travel: Vec3::ZERO,
+            force_sum: DVec3::ZERO,
+            solved: Vec3::ZERO,
+            axes,
+        };
+        let tiles = node as usize / TILE + 1;
+        self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?;
+        self.pins.insert(index, pin);
+        if tiles > self.tiles.len() {
+            self.tiles.resize(tiles, index);
+        }
+        self.tiles[tiles..].iter_mut().for_each(|start| *start += 1);
         Ok(())
     }
 
@@ -108,7 +189,8 @@ impl Pins {
     pub fn remove(&mut self, node: u32) -> bool {
         let found = self.find(node);
         if let Ok(index) = found {
-            self.pins.remove(index);
+            let pin = self.pins.remove(index);
+            self.partial_count -= usize::from(pin.is_partial());
             self.tiles[node as usize / TILE + 1..]
                 .iter_mut()
                 .for_each(|start| *start -= 1);
@@ -134,7 +216,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             let node = (seed >> 33) as u32 % (8 * TILE as u32);
             if seed >> 32 & 1 == 0 {
-                pins.insert(node).expect("memory");
+                pins.hold(node, BVec3::TRUE).expect("memory");
             } else {
                 pins.remove(node);
             }

@@ -7,9 +7,16 @@ use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
 use crate::body::Body;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::slots::SlotId;
 use crate::world::BodyId;
+
+/// The axis x among those that a node is held along.
+pub const SINEW_AXIS_X: u32 = 1;
+/// The axis y.
+pub const SINEW_AXIS_Y: u32 = 2;
+/// The axis z.
+pub const SINEW_AXIS_Z: u32 = 4;
 
 /// A body: a plain value, all zero is "none".
 #[repr(C)]
@@ -121,7 +128,7 @@ pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew
 }
 
 /// Adds `force`, 3 floats, N, to what acts on a node: constant over the whole next step, cleared when that is
-/// SINEW_STATUS_OK; nothing on a pinned node.
+/// SINEW_STATUS_OK; nothing on a pinned node, nor along an axis along which a node is held.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
 ///
@@ -233,7 +240,8 @@ pub unsafe extern "C" fn sinew_body_set_positions(
     }
 }
 
-/// Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs.
+/// Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs, as all do along axes along which they
+/// are held.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
 ///
@@ -268,7 +276,43 @@ pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_bod
     unsafe { with_body_mut(world, body, |body| body.pin(node)) }
 }
 
-/// Lets go of a node, which goes on as it was led in the last step; nothing where it is not held.
+/// Holds a node where it is along some axes, from now on, and along no others: a symmetry plane, a rail, a sliding support.
+/// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; all three are sinew_body_pin, 0 is sinew_body_unpin.
+/// Along the others the node moves as a free one does, with its mass; velocities and forces that are given to it count
+/// there alone.
+///
+/// An axis along which it was held already stays as it is, and one that it is let go of goes on as it was led in the last
+/// step. Where the axes change, what sinew_body_move_pin has asked of the node since the last step is forgotten, and so
+/// are forces that act on it along an axis which is held now. A tool acts on it along its free axes alone; what it does
+/// along the others the pin takes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, or the node has no mass and is pinned for
+/// good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_pin_axes(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    node: u32,
+    axes: u32,
+) -> sinew_status {
+    const AXES: [u32; 3] = [SINEW_AXIS_X, SINEW_AXIS_Y, SINEW_AXIS_Z];
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            if axes & !AXES.iter().sum::<u32>() != 0 {
+                return Err(Error::invalid(format!(
+                    "axes is {axes}: must be a sum of SINEW_AXIS_X, _Y and _Z"
+                )));
+            }
+            body.pin_axes(node, AXES.map(|axis| axes & axis != 0))
+        })
+    }
+}
+
+/// Lets go of a node along all axes: it goes on as it was led in the last step; nothing where it is not held.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
 ///
@@ -280,7 +324,8 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
     unsafe { with_body_mut(world, body, |body| body.unpin(node)) }
 }
 
-/// Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step.
+/// Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step; one that is held
+/// along some axes alone along those.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
 ///
@@ -301,7 +346,8 @@ pub unsafe extern "C" fn sinew_body_move_pin(
     }
 }
 
-/// Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step.
+/// Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step; 0 along axes
+/// along which it is not held.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
 ///

@@ -79,8 +79,8 @@ pub unsafe extern "C" fn sinew_rest_state_def_init(def: *mut sinew_rest_state_de
 /// taken into account. How a part that no pin holds lies and is turned as a whole is as it happens to be. `def` is nullable: the
 /// defaults; `report` is nullable; `report->struct_size` is set by the caller.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a part that no pin holds is pulled by a net force, and so has no state of
-/// rest), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSTABLE (not found in the iterations allowed), SINEW_STATUS_OUT_OF_MEMORY; nothing
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a part is pulled by a net force along an axis along which no pin holds it, and
+/// so has no state of rest), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSTABLE (not found in the iterations allowed), SINEW_STATUS_OUT_OF_MEMORY; nothing
 /// has changed then.
 ///
 /// # Safety

@@ -1,6 +1,6 @@
 //! One contact: a node, edge or face that a tool does not let pass.
 
-use glam::Vec3;
+use glam::{BVec3, Vec3};
 
 use super::features::Feature;
 use crate::body::{Mobility, Vectors};
@@ -20,8 +20,8 @@ pub(super) struct Constraint {
     pub starts: [Vec3; 3],
     /// Weights of the feature's nodes, 1 in sum.
     pub weights: [f32; 3],
-    /// How much each node's velocity changes for an impulse at the contact, 1/kg.
-    answers: [f32; 3],
+    /// How much each node's velocity changes along each axis for an impulse at the contact, 1/kg.
+    answers: [Vec3; 3],
     /// Away from the tool, of unit length.
     pub normal: Vec3,
     least_speed: f32,
@@ -34,8 +34,10 @@ pub(super) struct Constraint {
     pub friction: f32,
     /// The tool's place among those near the body.
     pub tool: usize,
-    /// The mass that an impulse at the contact moves, kg.
+    /// The mass that an impulse at the contact moves, kg; less where its nodes are held along axes near the normal.
     effective_mass: f32,
+    /// The least that it moves along any direction.
+    free_mass: f32,
     /// How far the contact gives way, 0 to 1: 0 but near pinned nodes, where it would fling away the free ones.
     give: f32,
     /// What it has given so far, N s, at least 0.
@@ -45,25 +47,35 @@ pub(super) struct Constraint {
 }
 
 impl Constraint {
-    /// A contact that has given nothing yet; `None` where all of its nodes are pinned.
+    /// A contact that has given nothing yet, of nodes that are held along these axes but have a mobility; `None` where none of them can
+    /// move along the normal.
     pub fn new(
         feature: Feature,
         starts: [Vec3; 3],
         weights: [f32; 3],
         normal: Vec3,
         mobility: &Mobility,
+        held: [BVec3; 3],
     ) -> Option<Self> {
-        let mut answers = [0.0; 3];
-        for (answer, (&node, weight)) in answers.iter_mut().zip(feature.nodes().iter().zip(weights)) {
-            *answer = mobility.of(node as usize) * weight;
+        let mut answers = [Vec3::ZERO; 3];
+        // Along the normal, and along a direction in which all nodes are free.
+        let (mut rigid, mut free, mut leverage) = (0.0, 0.0, 0.0_f32);
+        for (corner, (&node, weight)) in feature.nodes().iter().zip(weights).enumerate() {
+            let answer = mobility.of(node as usize) * weight;
+            answers[corner] = Vec3::select(held[corner], Vec3::ZERO, Vec3::splat(answer));
+            let along = if held[corner].any() {
+                Vec3::select(held[corner], Vec3::ZERO, normal).length_squared()
+            } else {
+                1.0
+            };
+            rigid += answer * along * weight;
+            free += answer * weight;
+            leverage = leverage.max(answer / LEVERAGE);
         }
-        let rigid: f32 = answers
-            .iter()
-            .zip(weights)
-            .map(|(answer, weight)| answer * weight)
-            .sum();
-        let inverse_mass = answers.iter().fold(rigid, |most, answer| most.max(answer / LEVERAGE));
-        (inverse_mass > 0.0).then(|| Self {
+        let inverse_mass = leverage.max(rigid);
+        // The nearer the normal is to axes that nodes are held along, the less is given, down to nothing.
+        let fading = (rigid / leverage.min(free)).min(1.0);
+        (rigid > 0.0).then(|| Self {
             feature,
             starts,
             weights,
@@ -75,7 +87,8 @@ impl Constraint {
             depth: 0.0,
             friction: 0.0,
             tool: 0,
-            effective_mass: 1.0 / inverse_mass,
+            effective_mass: fading / inverse_mass,
+            free_mass: 1.0 / leverage.max(free),
             give: 1.0 - rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
@@ -113,7 +126,7 @@ impl Constraint {
         let mut given = self.normal * change;
         if self.friction > 0.0 {
             let slip = (velocity - self.surface_velocity).reject_from_normalized(self.normal);
-            let wanted = self.friction_impulse - slip * self.effective_mass;
+            let wanted = self.friction_impulse - slip * self.free_mass;
             let friction = wanted.clamp_length_max(self.friction * impulse);
             given += friction - self.friction_impulse;
             self.friction_impulse = friction;
@@ -123,7 +136,7 @@ impl Constraint {
             let velocity = velocities.get(node) + given * answer;
             velocities.set(node, velocity);
         }
-        given.length() / self.effective_mass
+        given.length() / self.free_mass
     }
 
     /// What the tissue received, N s.

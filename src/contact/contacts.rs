@@ -4,7 +4,7 @@
 //! speculative contact; sequential impulses, Catto 2005). Nothing is stored as a penalty, so that contact neither
 //! shortens the substep nor gives energy back, and the impulses are the tool's force.
 
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 use super::candidates::Candidates;
 use super::constraint::Constraint;
@@ -359,14 +359,19 @@ impl Contacts {
         for (&node, (&start, weight)) in constraint.feature.nodes().iter().zip(corners) {
             if let Some(pin) = meeting.pins.get_mut(node) {
                 pin.force_sum += received * f64::from(weight / meeting.substep);
-                continue;
+                if !pin.is_partial() {
+                    continue;
+                }
             }
             let velocity = meeting.velocities.get(node as usize);
             self.given = self.given.with(velocity);
             if meeting.drifts {
+                let held = meeting.pins.partial_axes_of(node);
+                let led = meeting.next_positions.get(node as usize);
+                let moved = start + velocity * slice.remains;
                 meeting
                     .next_positions
-                    .set(node as usize, start + velocity * slice.remains);
+                    .set(node as usize, Vec3::select(held, led, moved));
             }
         }
     }
@@ -405,6 +410,15 @@ impl Slice {
 }
 
 impl Meeting<'_> {
+    /// The axes along which nodes of a feature are held that are free along others.
+    fn held_axes(&self, feature: Feature) -> [BVec3; 3] {
+        let mut held = [BVec3::FALSE; 3];
+        for (held, &node) in held.iter_mut().zip(feature.nodes()) {
+            *held = self.pins.partial_axes_of(node);
+        }
+        held
+    }
+
     /// Where a node is when the slice begins.
     fn position(&self, slice: &Slice, node: usize) -> Vec3 {
         if slice.first {
@@ -465,7 +479,8 @@ fn meet_plane(meeting: &Meeting, slice: &Slice, motion: &Motion, feature: Featur
         return None;
     }
     let starts = [position, Vec3::ZERO, Vec3::ZERO];
-    let mut constraint = Constraint::new(feature, starts, [1.0, 0.0, 0.0], normal, &meeting.mobility)?;
+    let held = meeting.held_axes(feature);
+    let mut constraint = Constraint::new(feature, starts, [1.0, 0.0, 0.0], normal, &meeting.mobility, held)?;
     constraint.surface_velocity = surface_velocity;
     constraint.arm = foot - motion.centre;
     constraint.friction = motion.friction;
@@ -503,7 +518,8 @@ fn meet_rounded(
         .or_else(|| step.try_normalize())
         .unwrap_or(Vec3::Y);
     let weights = separation.weights;
-    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility)?;
+    let held = meeting.held_axes(feature);
+    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility, held)?;
     let points = corners.points.iter().zip(weights);
     let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
     let surface = normal * segment.radius;

@@ -7,7 +7,7 @@ use crate::body::Body;
 /// Energy in joules, at the time of the positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of the nodes that are free to move, with what mass scaling adds to them.
+    /// Of the nodes that are free to move, along the axes along which they are, with what mass scaling adds to them.
     pub kinetic: f64,
     /// Of the springs, of tetrahedra that are elements, and of every other term.
     pub elastic: f64,
@@ -27,7 +27,9 @@ impl Energy {
             let added = heavier.next_if(|sliver| sliver.node as usize == node);
             if body.inverse_masses[node] > 0.0 {
                 let inertia = mass + added.map_or(0.0, |sliver| f64::from(sliver.added));
-                energy.kinetic += 0.5 * inertia * velocities[body.callers(node)].as_dvec3().length_squared();
+                let held = body.pins.partial_axes_of(node as u32);
+                let velocity = Vec3::select(held, Vec3::ZERO, velocities[body.callers(node)]);
+                energy.kinetic += 0.5 * inertia * velocity.as_dvec3().length_squared();
             }
             energy.gravitational -= mass * gravity.dot(position + body.origin);
             body.springs.visit(node, &mut |link| {

@@ -101,9 +101,8 @@ impl Closed<'_> {
         });
         for pin in pins {
             let place = pin.node as usize - first;
-            for (closed, velocities) in closed.iter_mut().zip(velocities) {
-                closed[place] = velocities[place];
-            }
+            let kept = velocities.map(|axis| axis[place]);
+            pin.put(closed, place, kept.into());
         }
     }
 }
@@ -206,13 +205,16 @@ pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> 
 
 /// Changes the velocity of `node` so that closing it gives what it would give with `force` on top, N: for a spring that has
 /// just been removed, or with its force turned round for one that has just been added.
-pub(crate) fn make_up_for(body: &mut Body, node: u32, force: Vec3) {
+pub(crate) fn make_up_for(body: &mut Body, node: u32, mut force: Vec3) {
     let Some(closing) = body.carry.closing else {
         return;
     };
     if let Some(pin) = body.pins.get_mut(node) {
-        pin.force -= force * pin.closing_share;
-        return;
+        pin.force -= pin.held(force) * pin.closing_share;
+        force -= pin.held(force);
+        if !pin.is_partial() {
+            return;
+        }
     }
     let node = node as usize;
     // Where damping takes nearly all of it within the half kick, there is nothing to make up for.
@@ -248,6 +250,6 @@ pub(crate) fn mean_force(
             None,
         );
     });
-    let force = pin.force - force * pin.closing_share;
+    let force = pin.force - pin.held(force) * pin.closing_share;
     if force.is_finite() { force } else { pin.force }
 }

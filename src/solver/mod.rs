@@ -3,6 +3,7 @@
 mod attempt;
 mod closing;
 mod gravity;
+mod held;
 mod implicit;
 mod kick;
 mod mass_scaling;

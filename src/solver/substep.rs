@@ -111,7 +111,7 @@ impl Part {
 }
 
 /// Changes the velocities by the forces at the latest positions, moves the nodes by them, and puts the pinned ones where
-/// they are led.
+/// they are led, along the axes that they are held along.
 pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, team: &Team) -> Survey {
     let node_count = body.node_count();
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
@@ -308,9 +308,9 @@ impl Pass<'_> {
         for pin in &*written.pins {
             let place = pin.node as usize - nodes.start;
             let velocity = pin.travel / self.request.dt;
-            set(&mut written.velocities, place, velocity);
+            pin.put(&mut written.velocities, place, velocity);
             if self.part.drifts {
-                set(&mut written.next_positions, place, pin.place(self.part.end));
+                pin.put(&mut written.next_positions, place, pin.place(self.part.end));
             }
         }
     }
@@ -319,11 +319,5 @@ impl Pass<'_> {
 fn copy(to: &mut [&mut [f32]; 3], from: [&[f32]; 3]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.copy_from_slice(from);
-    }
-}
-
-fn set(axes: &mut [&mut [f32]; 3], place: usize, value: Vec3) {
-    for (axis, value) in axes.iter_mut().zip(value.to_array()) {
-        axis[place] = value;
     }
 }

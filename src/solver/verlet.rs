@@ -254,7 +254,7 @@ pub(super) fn begin(body: &mut Body, request: &StepRequest) {
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);
         pin.goal = match pin.target {
-            Some(target) => (target.as_dvec3() - body.origin).as_vec3(),
+            Some(target) => pin.leading(position, (target.as_dvec3() - body.origin).as_vec3()),
             None => position,
         };
         pin.travel = pin.goal - position;

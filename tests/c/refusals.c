@@ -354,16 +354,21 @@ static void pins(void)
     int i;
     size_t axis;
     REFUSES_NO_BODY(sinew_body_pin(world, body, 8));
+    REFUSES_NO_BODY(sinew_body_pin_axes(world, body, 8, SINEW_AXIS_X));
     REFUSES_NO_BODY(sinew_body_unpin(world, body, 0));
     REFUSES_NO_BODY(sinew_body_move_pin(world, body, 0, fine));
     REFUSES_NO_BODY(sinew_body_get_pin_force(world, body, 0, out.force));
     REFUSES_NO_NODE("node", sinew_body_pin(the.world, the.body, node));
+    REFUSES_NO_NODE("node", sinew_body_pin_axes(the.world, the.body, node, SINEW_AXIS_X));
     REFUSES_NO_NODE("node", sinew_body_unpin(the.world, the.body, node));
     REFUSES_NO_NODE("node", sinew_body_move_pin(the.world, the.body, node, fine));
     REFUSES_NO_NODE("node", sinew_body_get_pin_force(the.world, the.body, node, out.force));
     REFUSED(INVALID, "node", sinew_body_move_pin(the.world, the.body, 8, fine));
     REFUSED(INVALID, "node", sinew_body_get_pin_force(the.world, the.body, 8, out.force));
     REFUSED(INVALID, "node", sinew_body_unpin(the.world, the.body, 2)); /* without mass: pinned for good */
+    REFUSED(INVALID, "node", sinew_body_pin_axes(the.world, the.body, 2, SINEW_AXIS_X));
+    REFUSED(INVALID, "node", sinew_body_pin_axes(the.world, the.body, 2, 0));
+    REFUSED(INVALID, "axes", sinew_body_pin_axes(the.world, the.body, 8, 8));
     REFUSED(INVALID, "position", sinew_body_move_pin(the.world, the.body, 0, NULL));
     REFUSED(INVALID, "force", sinew_body_get_pin_force(the.world, the.body, 0, NULL));
     for (i = 0; i < NOT_FINITE; i++)

@@ -70,6 +70,8 @@ static void what_is_seen(void)
     SEEN(sinew_body_set_velocities(world, body, speeds, 4));
     SEEN(sinew_body_pin(world, body, 0));
     SEEN(sinew_body_move_pin(world, body, 0, up));
+    SEEN(sinew_body_pin_axes(world, body, 0, SINEW_AXIS_X));
+    SEEN(sinew_body_pin_axes(world, body, 0, SINEW_AXIS_Y));
     SEEN(sinew_body_unpin(world, body, 0));
     SEEN(sinew_body_add_spring(world, body, 0, 2, 10.0f, -1.0f));
     SEEN(sinew_body_remove_spring(world, body, 0, 2));

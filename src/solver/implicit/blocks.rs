@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, Vec3};
+use glam::{BVec3, DMat3, Vec3};
 
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
@@ -82,6 +82,17 @@ impl Blocks {
         let entries = [x.x, y.y, z.z, z.y, x.z, y.x];
         for (entry, more) in self.stiffness[node as usize].iter_mut().zip(entries) {
             *entry += more as f32;
+        }
+    }
+
+    /// Leaves a node that is held along some axes no stiffness along those: its inverse keeps the others apart from them.
+    pub fn hold(&mut self, node: usize, axes: BVec3) {
+        let BVec3 { x, y, z } = axes;
+        let held = [x, y, z, y | z, z | x, x | y];
+        for (entry, held) in self.stiffness[node].iter_mut().zip(held) {
+            if held {
+                *entry = 0.0;
+            }
         }
     }
 

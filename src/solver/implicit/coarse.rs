@@ -4,14 +4,15 @@
 //! once, by a small dense matrix (aggregation, as in Vanek, Mandel, Brezina 1996, without smoothing). Its inverse may be that
 //! of an older state of the body: then it is a worse preconditioner, and still one.
 
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use glam::{BVec3, DMat3, DVec3, Mat3, Vec3};
 
 use super::gradient::add_lanes;
-use crate::body::Vectors;
+use crate::body::{Pins, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::memory;
+use crate::solver::held::without_held;
 use crate::springs::{ChosenKernel, Loops, Springs, TILE, Tangent};
 use crate::terms::Terms;
 
@@ -85,8 +86,15 @@ impl Coarse {
         self.count * MOTIONS
     }
 
-    /// Takes in the springs at these positions, and which nodes move.
-    pub fn gather(&mut self, springs: &dyn Springs, inverse_masses: &[f32], positions: &Vectors, tangent: Tangent) {
+    /// Takes in the springs at these positions, and which nodes move. A node that is held along some axes takes part along the others.
+    pub fn gather(
+        &mut self,
+        springs: &dyn Springs,
+        inverse_masses: &[f32],
+        pins: &Pins,
+        positions: &Vectors,
+        tangent: Tangent,
+    ) {
         let node_count = positions.len();
         let mut centres = [(Vec3::ZERO, 0.0_f32); CLUSTERS];
         for node in 0..node_count {
@@ -117,19 +125,25 @@ impl Coarse {
                     let way = positions.get(neighbour) - positions.get(node);
                     let (direction, matrix) = tangent.of(node, &link, way);
                     let matrix = outer(direction) * matrix.x + Mat3::from_diagonal(Vec3::splat(matrix.y));
-                    self.add(node, neighbour, &matrix);
+                    let held = [node, neighbour].map(|node| pins.partial_axes_of(node as u32));
+                    if (held[0] | held[1]).any() {
+                        self.add_held([node, neighbour], held, matrix.as_dmat3());
+                    } else {
+                        self.add(node, neighbour, &matrix);
+                    }
                 }
             });
         }
     }
 
     /// Adds elements at these positions.
-    pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
+    pub fn add_elements(&mut self, elements: &Elements, pins: &Pins, positions: &Vectors) {
         elements.visit_deformed(positions, 1.0, &mut |corners, gradients, deformed| {
             let nodes = corners.map(|node| node as usize);
             let clusters = nodes.map(|node| usize::from(self.clusters[node / BLOCK]));
             let parts = nodes.map(|node| self.part(node));
-            let is_free = parts.iter().all(|part| part[0] == 1.0);
+            let held = corners.map(|node| pins.partial_axes_of(node));
+            let is_free = parts.iter().all(|part| part[0] == 1.0) && !held.iter().any(|held| held.any());
             if is_free && clusters.iter().all(|&cluster| cluster == clusters[0]) {
                 // The functions have one gradient each in all of it, and 1 has none.
                 let gradient = |function: usize| -> DVec3 {
@@ -149,7 +163,7 @@ impl Coarse {
             }
             for (a, &of_a) in gradients.iter().enumerate() {
                 for (b, &of_b) in gradients.iter().enumerate() {
-                    let matrix = deformed.clamped_stiffness(of_a, of_b);
+                    let matrix = without_held(deformed.clamped_stiffness(of_a, of_b), [held[a], held[b]]);
                     for row in 0..FUNCTIONS {
                         for column in 0..FUNCTIONS {
                             let factor = f64::from(parts[a][row] * parts[b][column]);
@@ -164,7 +178,7 @@ impl Coarse {
     }
 
     /// Adds terms at these positions.
-    pub fn add_terms(&mut self, terms: &Terms, positions: &Vectors) {
+    pub fn add_terms(&mut self, terms: &Terms, pins: &Pins, positions: &Vectors) {
         let at = |node: usize| positions.get(node).as_dvec3();
         terms.show_blocks(&at, false, &mut |nodes, blocks| {
             let cluster = |node: u32| usize::from(self.clusters[node as usize / BLOCK]);
@@ -178,6 +192,15 @@ impl Coarse {
                     .get(place)
                     .map_or([0.0; FUNCTIONS], |&node| self.part(node as usize))
             });
+            let mut blocks = *blocks;
+            if pins.are_partial() {
+                for (a, &of_a) in nodes.iter().enumerate() {
+                    for (b, &of_b) in nodes.iter().enumerate() {
+                        let held = [of_a, of_b].map(|node| pins.partial_axes_of(node));
+                        blocks[a][b] = without_held(blocks[a][b], held);
+                    }
+                }
+            }
             for row in 0..FUNCTIONS {
                 for column in 0..FUNCTIONS {
                     let mut sum = DMat3::ZERO;
@@ -266,18 +289,37 @@ impl Coarse {
         }
     }
 
+    /// Adds a spring between two nodes that are held along some axes.
+    fn add_held(&mut self, nodes: [usize; 2], held: [BVec3; 2], matrix: DMat3) {
+        let clusters = nodes.map(|node| usize::from(self.clusters[node / BLOCK]));
+        let parts = nodes.map(|node| self.part(node));
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let sign = if a == b { 1.0 } else { -1.0 };
+            let block = without_held(matrix, [held[a], held[b]]) * sign;
+            for row in 0..FUNCTIONS {
+                for column in 0..FUNCTIONS {
+                    let factor = f64::from(parts[a][row] * parts[b][column]);
+                    if factor != 0.0 {
+                        self.add_block([clusters[a], row], [clusters[b], column], block * factor);
+                    }
+                }
+            }
+        }
+    }
+
     /// Makes the inverse, with this inertia of each node, N/m. Where it has none, the level does nothing.
-    pub fn invert(&mut self, inertia: &[f32]) {
+    pub fn invert(&mut self, inertia: &[f32], pins: &Pins) {
         let size = self.size();
         self.inverse.copy_from_slice(&self.stiffness);
         for (node, &inertia) in inertia.iter().enumerate() {
             let place = self.places.get(node);
             let values = [self.free[node], place.x, place.y, place.z];
             let first = usize::from(self.clusters[node / BLOCK]) * MOTIONS;
+            let held = pins.partial_axes_of(node as u32);
             for row in 0..FUNCTIONS {
                 for column in 0..FUNCTIONS {
                     let value = f64::from(values[row] * values[column] * inertia) * f64::from(self.free[node]);
-                    for axis in 0..3 {
+                    for axis in (0..3).filter(|&axis| !held.test(axis)) {
                         self.inverse[(first + 3 * row + axis) * size + first + 3 * column + axis] += value;
                     }
                 }

@@ -44,7 +44,7 @@ impl Substep<'_> {
         };
         means.copy_from(velocities);
         for pin in body.pins.iter() {
-            means.set(pin.node as usize, pin.travel / self.request.dt);
+            pin.put_among(means, pin.travel / self.request.dt);
         }
         let per_mass = 1.0 / (self.step * self.step);
         self.contact(body, means, |contacts, meeting, stiffness_of| {
@@ -175,6 +175,9 @@ impl Substep<'_> {
             let left = normal.map_or(Vec3::ZERO, |normal| gain.reject_from_normalized(normal));
             history.gains.set(node, left);
         });
+        for pin in body.pins.partial() {
+            pin.put_among(&mut history.gains, Vec3::ZERO);
+        }
         history.energy = None;
         if body.state.next_is_finite() {
             End::Fine

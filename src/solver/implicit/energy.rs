@@ -3,7 +3,7 @@
 use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, Implicit};
-use crate::body::{Body, Records, Vectors};
+use crate::body::{Body, Pins, Records, Vectors};
 use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::solver::write_records;
@@ -54,7 +54,7 @@ impl Substep<'_> {
         } else {
             &*state.velocities
         };
-        let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, body.kernel);
+        let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, &body.pins, body.kernel);
         let from = implicit.place(self.is_first);
         let mut inside = Inside {
             springs: &*body.springs,
@@ -78,7 +78,7 @@ impl Substep<'_> {
             let moved = state.next_positions;
             moved.copy_from(state.positions);
             for pin in body.pins.iter() {
-                moved.set(pin.node as usize, pin.place(self.end));
+                pin.put_among(moved, pin.place(self.end));
             }
             energy = energy.max(implicit.elastic(&mut inside, moved, from, self.team));
         }
@@ -91,7 +91,13 @@ impl Substep<'_> {
     /// Compares the energy after the step with what there was and what was put in.
     pub(super) fn account(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
         let state = body.state.substep();
-        let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
+        let kinetic = kinetic(
+            state.velocities,
+            &body.masses,
+            &body.inverse_masses,
+            &body.pins,
+            body.kernel,
+        );
         let next = 1 - implicit.settled;
         let mut inside = Inside {
             springs: &*body.springs,
@@ -123,7 +129,13 @@ impl Substep<'_> {
         let next = 1 - implicit.settled;
         let known = implicit.histories[next].energy;
         let state = body.state.substep();
-        let kinetic = kinetic(state.velocities, &body.masses, &body.inverse_masses, body.kernel);
+        let kinetic = kinetic(
+            state.velocities,
+            &body.masses,
+            &body.inverse_masses,
+            &body.pins,
+            body.kernel,
+        );
         let work = self.work(body, &implicit.histories[next].ways);
         let state = body.state.substep();
         let history = &mut implicit.histories[next];
@@ -139,7 +151,7 @@ impl Substep<'_> {
         } else {
             state.next_positions.copy_from(state.positions);
             for pin in body.pins.iter() {
-                state.next_positions.set(pin.node as usize, pin.place(self.end));
+                pin.put_among(state.next_positions, pin.place(self.end));
             }
             state.velocities.clear();
             history.ways.clear();
@@ -215,6 +227,11 @@ impl Substep<'_> {
                 });
             }
         }
+        // The way that a node is led is none of theirs.
+        for pin in body.pins.partial() {
+            let (mass, way) = (f64::from(body.masses[pin.node as usize]), ways.get(pin.node as usize));
+            work -= mass * pin.held(way).as_dvec3().dot(self.request.gravity.as_dvec3());
+        }
         work
     }
 }
@@ -289,8 +306,13 @@ impl Implicit {
     }
 }
 
-fn kinetic(velocities: &Vectors, masses: &[f32], inverse_masses: &[f32], kernel: ChosenKernel) -> f64 {
-    (0..tile_count(masses.len()))
+/// The kinetic energy of what is free to move, J: not of what is led, though it be along some axes alone.
+fn kinetic(velocities: &Vectors, masses: &[f32], inverse_masses: &[f32], pins: &Pins, kernel: ChosenKernel) -> f64 {
+    let led = pins.partial().map(|pin| {
+        let node = pin.node as usize;
+        0.5 * f64::from(masses[node]) * pin.held(velocities.get(node)).as_dvec3().length_squared()
+    });
+    let moving: f64 = (0..tile_count(masses.len()))
         .map(|tile| {
             let nodes = tile_nodes(tile, masses.len());
             kernel.run(Kinetic {
@@ -299,7 +321,8 @@ fn kinetic(velocities: &Vectors, masses: &[f32], inverse_masses: &[f32], kernel:
                 inverse_masses: &inverse_masses[nodes],
             })
         })
-        .sum()
+        .sum();
+    moving - led.sum::<f64>()
 }
 
 struct Kinetic<'a> {

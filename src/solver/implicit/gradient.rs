@@ -3,6 +3,8 @@
 //! The matrix is never made: its product with a vector is a sum over springs, tile by tile, as forces are. Sums over nodes
 //! are made tile by tile too and added up in the order of tiles, so that they are the same for any number of threads.
 
+use glam::Vec3;
+
 use super::Implicit;
 use super::coarse::Coarse;
 use crate::body::{Body, Pins, Records, Vectors, WriteRecords};
@@ -207,12 +209,10 @@ impl Implicit {
     }
 }
 
-/// What is pinned takes no part.
+/// What is held takes no part (the filter of Baraff, Witkin 1998, section 5.3).
 fn hold(pins: &Pins, tile: usize, first: usize, vectors: &mut [&mut [f32]; 3]) {
     for pin in pins.of_tile(tile) {
-        for axis in &mut *vectors {
-            axis[pin.node as usize - first] = 0.0;
-        }
+        pin.put(vectors, pin.node as usize - first, Vec3::ZERO);
     }
 }
 

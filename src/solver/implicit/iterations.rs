@@ -75,9 +75,7 @@ impl Substep<'_> {
                     holds.add_forces(&nodes, &mut residuals);
                 }
                 for pin in &*pins {
-                    for axis in &mut residuals {
-                        axis[pin.node as usize - nodes.start] = 0.0;
-                    }
+                    pin.put(&mut residuals, pin.node as usize - nodes.start, Vec3::ZERO);
                 }
                 partial.first = kernel.run(Slope {
                     residuals: residuals.map(|axis| &*axis),
@@ -102,7 +100,8 @@ impl Substep<'_> {
         let mut size = 0.0;
         let mut error = f64::INFINITY;
         let mut is_solved = false;
-        let is_held = body.is_held();
+        let held = body.held_axes();
+        let is_held = held.all();
         self.place(body, implicit);
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
@@ -167,6 +166,9 @@ impl Substep<'_> {
                         residuals.set(node, residuals.get(node) + more.as_vec3());
                     }
                 });
+                for pin in body.pins.partial() {
+                    pin.put_among(residuals, Vec3::ZERO);
+                }
             }
             if gone == 1.0 && solved.size.max(solved.error) <= relative * size && self.is_balanced(body, implicit) {
                 error = solved.error;
@@ -180,7 +182,7 @@ impl Substep<'_> {
             .as_ref()
             .is_some_and(|contacts| contacts.holds.are_pressed());
         if !is_held && !is_touched {
-            implicit.balance(body.state.next_positions());
+            implicit.balance(body.state.next_positions(), held);
             self.place(body, implicit);
         }
         implicit.report.iterations += products;

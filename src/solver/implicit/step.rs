@@ -1,5 +1,7 @@
 //! A step of IMPLICIT: in how many parts it is taken, where each aims, and what is made of what Newton's iterations find.
 
+use glam::Vec3;
+
 use super::energy::Before;
 use super::loops::{Add, Finish, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
@@ -241,16 +243,23 @@ impl Substep<'_> {
             implicit
                 .blocks
                 .gather(&*body.springs, positions, self.tangent(), self.team);
-            implicit
-                .coarse
-                .gather(&*body.springs, &body.inverse_masses, positions, self.tangent());
+            implicit.coarse.gather(
+                &*body.springs,
+                &body.inverse_masses,
+                &body.pins,
+                positions,
+                self.tangent(),
+            );
             if let Some(elements) = &body.elements {
                 implicit.blocks.add_elements(elements, positions);
-                implicit.coarse.add_elements(elements, positions);
+                implicit.coarse.add_elements(elements, &body.pins, positions);
             }
             if let Some(terms) = &body.terms {
                 implicit.blocks.add_terms(terms, positions);
-                implicit.coarse.add_terms(terms, positions);
+                implicit.coarse.add_terms(terms, &body.pins, positions);
+            }
+            for pin in body.pins.partial() {
+                implicit.blocks.hold(pin.node as usize, pin.axes);
             }
         }
         let time = self.formula.time as f32;
@@ -271,7 +280,7 @@ impl Substep<'_> {
             }
             implicit.all_inertia = implicit.inertia.iter().map(|&inertia| f64::from(inertia)).sum();
             implicit.blocks.invert(&implicit.inertia, self.team);
-            implicit.coarse.invert(&implicit.inertia);
+            implicit.coarse.invert(&implicit.inertia, &body.pins);
             implicit.noise = implicit.blocks.noise(&implicit.inertia);
             implicit.prepared = time;
         }
@@ -308,10 +317,7 @@ impl Substep<'_> {
                 });
                 for pin in pins {
                     let place = pin.node as usize - nodes.start;
-                    let velocity = pin.travel / dt;
-                    for (axis, value) in velocities.iter_mut().zip(velocity.to_array()) {
-                        axis[place] = value;
-                    }
+                    pin.put(&mut velocities, place, pin.travel / dt);
                 }
             });
     }
@@ -357,11 +363,7 @@ impl Substep<'_> {
                     });
                 }
                 for pin in pins {
-                    let position = pin.place(end);
-                    let place = pin.node as usize - nodes.start;
-                    for (axis, value) in next.iter_mut().zip(position.to_array()) {
-                        axis[place] = value;
-                    }
+                    pin.put(&mut next, pin.node as usize - nodes.start, pin.place(end));
                 }
                 if let Some(records) = records {
                     let axes = next.each_ref().map(|axis| &**axis);
@@ -479,19 +481,14 @@ impl Substep<'_> {
                         remainders: &mut remainders,
                     });
                     for pin in &*pins {
-                        for axis in &mut remainders {
-                            axis[pin.node as usize - nodes.start] = 0.0;
-                        }
+                        pin.put(&mut remainders, pin.node as usize - nodes.start, Vec3::ZERO);
                     }
                 }
                 for pin in pins {
                     let place = pin.node as usize - nodes.start;
-                    let velocity = pin.travel / dt;
-                    for axis in 0..3 {
-                        velocities[axis][place] = velocity[axis];
-                        ways[axis][place] = pin.travel[axis] * part;
-                        gains[axis][place] = 0.0;
-                    }
+                    pin.put(&mut velocities, place, pin.travel / dt);
+                    pin.put(&mut ways, place, pin.travel * part);
+                    pin.put(&mut gains, place, Vec3::ZERO);
                 }
                 let velocities = velocities.map(|axis| &*axis);
                 *survey = look(kernel, velocities, Some(positions.slices(nodes)));

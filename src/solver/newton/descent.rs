@@ -178,7 +178,7 @@ impl Descent {
         };
         let right = |node: usize| {
             let vector = DVec3::new(number(), number(), number());
-            if equation.is_free(node) { vector } else { DVec3::ZERO }
+            equation.free_part(node, vector)
         };
         let solved = self.gradient.solve(
             &self.network,
@@ -229,13 +229,7 @@ impl Descent {
         factor::factorise(&mut self.factor, &self.network);
         self.equation.assemble(&self.network, tangent, shift, &mut self.matrix);
         let (equation, residuals) = (&self.equation, &self.residuals);
-        let right = |node: usize| {
-            if equation.is_free(node) {
-                residuals[node]
-            } else {
-                DVec3::ZERO
-            }
-        };
+        let right = |node: usize| equation.free_part(node, residuals[node]);
         let budget = goal.budget.saturating_sub(found.products);
         let solved = self.gradient.solve(
             &self.network,

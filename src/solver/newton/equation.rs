@@ -7,10 +7,12 @@ use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
 use super::network::{Element, Network, PAIRS, Tetrahedron};
+use crate::body::Pins;
 use crate::contact::Holds;
 use crate::elements::Deformed;
 use crate::error::Result;
 use crate::memory;
+use crate::solver::held::without_held;
 use crate::springs::Link;
 use crate::terms::Blocks;
 
@@ -31,6 +33,8 @@ pub(super) struct Equation {
     pub drifts: Vec<DVec3>,
     /// What tools do.
     pub holds: Holds,
+    /// Lent by the body while it is solved: along the axes that a node is held along its way is 0.
+    pub pins: Pins,
     /// What a way counts as a velocity, 1/s; 0: nothing is damped.
     pub rate: f64,
     /// Of the nodes where volume is kept by rings, Pa, at the ways of which forces and matrices were made last.
@@ -72,6 +76,7 @@ impl Equation {
             masses: memory::filled(0.0, node_count)?,
             drifts: vectors()?,
             holds: Holds::default(),
+            pins: Pins::default(),
             rate: 0.0,
             pressures: memory::filled(0.0, ring_count)?,
         })
@@ -80,6 +85,16 @@ impl Equation {
     #[inline(always)]
     pub fn is_free(&self, node: usize) -> bool {
         self.masses[node] > 0.0
+    }
+
+    /// The part of a node's vector along axes along which it is free to move.
+    #[inline]
+    pub fn free_part(&self, node: usize, vector: DVec3) -> DVec3 {
+        if self.is_free(node) {
+            DVec3::select(self.pins.partial_axes_of(node as u32), DVec3::ZERO, vector)
+        } else {
+            DVec3::ZERO
+        }
     }
 
     #[inline(always)]
@@ -121,11 +136,8 @@ impl Equation {
             terms.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
         }
         let way = |node: usize| self.ways[node];
-        self.holds.show_forces(way, |node, force| {
-            if self.is_free(node) {
-                residuals[node] += force;
-            }
-        });
+        self.holds
+            .show_forces(way, |node, force| residuals[node] += self.free_part(node, force));
     }
 
     /// How the function changes where the ways become longer by `part` of `corrections`, and the sum of what it changes by
@@ -211,6 +223,27 @@ impl Equation {
                 matrix.diagonal[node] += whole(block);
             }
         });
+        if self.pins.are_partial() {
+            self.leave_out_held(network, matrix);
+        }
+    }
+
+    /// Takes out of a matrix the rows and columns of axes that nodes are held along, but for the diagonal, which stays positive.
+    fn leave_out_held(&self, network: &Network, matrix: &mut Matrix) {
+        let held = |node: usize| self.pins.partial_axes_of(node as u32);
+        for node in 0..network.node_count() {
+            for place in network.row(node) {
+                let nodes = [node, network.neighbour(place)];
+                matrix.beside[place] = without_held(matrix.beside[place], nodes.map(held));
+            }
+        }
+        for pin in self.pins.partial() {
+            let block = &mut matrix.diagonal[pin.node as usize];
+            *block = without_held(*block, [pin.axes; 2]);
+            let size = block.x_axis.x + block.y_axis.y + block.z_axis.z;
+            let size = if size > 0.0 { size } else { 1.0 };
+            *block += DMat3::from_diagonal(DVec3::select(pin.axes, DVec3::splat(size), DVec3::ZERO));
+        }
     }
 
     fn add_tetrahedron(&self, mut element: Element, tangent: Tangent, matrix: &mut Matrix) {
@@ -327,9 +360,7 @@ impl Equation {
                 .iter()
                 .sum::<f64>();
             for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
-                if self.is_free(corner) {
-                    products[corner] += deformed.area(gradient) * change;
-                }
+                products[corner] += self.free_part(corner, deformed.area(gradient) * change);
             }
         }
     }
@@ -353,14 +384,10 @@ impl Equation {
         }
         let vector = |node: usize| vectors[node];
         self.holds.show_products(vector, |node, product| {
-            if self.is_free(node) {
-                products[node] += product;
-            }
+            products[node] += self.free_part(node, product);
         });
         self.holds.show_blocks(|node, block| {
-            if self.is_free(node) {
-                products[node] -= whole(block) * vectors[node];
-            }
+            products[node] -= self.free_part(node, whole(block) * vectors[node]);
         });
     }
 

@@ -1,6 +1,6 @@
 //! Where a body is at rest: the nearest place downhill where its potential energy is smallest.
 
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 use super::descent::{Descent, Found, Goal};
 use crate::body::Body;
@@ -38,7 +38,7 @@ pub struct RestStateReport {
     pub iterations: u32,
     /// Products with their matrices.
     pub products: u32,
-    /// The largest force left on a node that is not pinned, before positions were rounded to `f32`, N.
+    /// The largest force left on a node, without what pins take, before positions were rounded to `f32`, N.
     pub residual: f64,
     /// How far a node may be from where it is at rest, before positions were rounded to `f32`, m.
     pub error: f64,
@@ -55,8 +55,10 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
     let terms = body.terms.as_deref();
     let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), terms)?;
     descent.network.terms = body.terms.take();
+    descent.equation.pins = std::mem::take(&mut body.pins);
     let found = find(&mut descent, body, gravity, definition);
     body.terms = descent.network.terms.take();
+    body.pins = std::mem::take(&mut descent.equation.pins);
     if found.is_err() {
         body.recall();
     }
@@ -104,8 +106,8 @@ fn find(
     descent.weigh();
     let energy_after = descent.equation.potential(&descent.network, origin);
     let equation = &descent.equation;
-    let free = (0..body.node_count()).filter(|&node| equation.is_free(node));
-    let residual = free.map(|node| descent.residuals[node].length()).fold(0.0, f64::max);
+    let free = |node: usize| equation.free_part(node, descent.residuals[node]).length();
+    let residual = (0..body.node_count()).map(free).fold(0.0, f64::max);
     if !(0..body.node_count()).all(|node| equation.position(node).as_vec3().length_squared().is_finite()) {
         return Err(Error::NotConverged("the state of rest is too far away for f32".into()));
     }
@@ -157,7 +159,7 @@ fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> Fo
     let equation = &descent.equation;
     let free = (0..descent.residuals.len()).filter(|&node| equation.is_free(node));
     let fastest = free
-        .map(|node| descent.residuals[node].length() / equation.masses[node])
+        .map(|node| equation.free_part(node, descent.residuals[node]).length() / equation.masses[node])
         .fold(0.0, f64::max);
     // A body that falls freely goes as far as it is long in such a time: nodes are held back by so much at first.
     let mut shift = fastest / extent;
@@ -237,15 +239,15 @@ impl Parts {
         node
     }
 
-    /// Refuses a part that nothing holds against the forces on it. Where they cancel but for rounding, the rest is taken off
-    /// them, by mass: it would carry the part away.
+    /// Refuses a part that nothing holds against the forces on it, along any axis. Where they cancel but for rounding, the rest is taken
+    /// off them, by mass: it would carry the part away.
     fn balance(&self, descent: &mut Descent, body: &Body) -> Result<()> {
         #[derive(Clone, Copy, Default)]
         struct Sums {
             load: DVec3,
             size: f64,
             mass: f64,
-            is_held: bool,
+            held: BVec3,
         }
         let equation = &mut descent.equation;
         let mut sums = memory::filled(Sums::default(), self.lowest.len())?;
@@ -255,18 +257,15 @@ impl Parts {
             sums.size += equation.loads[node].length();
             sums.mass += equation.masses[node];
             let terms = descent.network.terms.as_ref();
-            sums.is_held |= !equation.is_free(node) || terms.is_some_and(|terms| terms.holds(node));
+            let is_held = !equation.is_free(node) || terms.is_some_and(|terms| terms.holds(node));
+            sums.held |= BVec3::splat(is_held) | equation.pins.partial_axes_of(node as u32);
         }
         for (node, &part) in self.lowest.iter().enumerate() {
-            let Sums {
-                load,
-                size,
-                mass,
-                is_held,
-            } = sums[part as usize];
-            if is_held {
+            let Sums { load, size, mass, held } = sums[part as usize];
+            if held.all() {
                 continue;
             }
+            let load = DVec3::select(held, DVec3::ZERO, load);
             if load.length() > CANCELS * size {
                 return Err(Error::invalid(format!(
                     "there is no state of rest: nothing holds node {} and what it is joined to against {:e} N",

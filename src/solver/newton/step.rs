@@ -40,6 +40,7 @@ impl Newton {
         let terms = body.terms.take();
         self.descent.read(&*body.springs, body.elements.as_deref(), terms);
         self.set_up(body, aimed, pushes);
+        self.descent.equation.pins = std::mem::take(&mut body.pins);
         if let Some(contacts) = &mut body.contacts {
             self.descent.equation.holds = std::mem::take(&mut contacts.holds);
         }
@@ -58,6 +59,7 @@ impl Newton {
         self.descent.weigh();
         self.descent.equation.press();
         body.terms = self.descent.network.terms.take();
+        body.pins = std::mem::take(&mut self.descent.equation.pins);
         if let Some(contacts) = &mut body.contacts {
             contacts.holds = std::mem::take(&mut self.descent.equation.holds);
         }
@@ -97,7 +99,11 @@ impl Newton {
             }
         }
         for pin in body.pins.iter() {
-            equation.anchors[pin.node as usize] = pin.place(aimed.end).as_dvec3();
+            let node = pin.node as usize;
+            equation.anchors[node] = DVec3::select(pin.axes, pin.place(aimed.end).as_dvec3(), equation.anchors[node]);
+            // What holds it is told without what damping does along these axes.
+            let weight = gravity * f64::from(body.masses[node]);
+            equation.loads[node] = DVec3::select(pin.axes, weight, equation.loads[node]);
         }
     }
 
