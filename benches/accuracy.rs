@@ -1,0 +1,52 @@
+//! Tetrahedra against the theory of elasticity, all of it: meshes of every fineness, each beside the same mesh in `f64`.
+//!
+//! `cargo bench --bench accuracy [-- part of a table's name]` writes `target/report/accuracy.md`.
+#![allow(clippy::print_stderr)]
+
+#[path = "../tests/accuracy/mod.rs"]
+mod accuracy;
+#[path = "../tests/support/mod.rs"]
+mod support;
+
+use std::fmt::Write;
+
+use accuracy::cantilever::{Cantilever, refined};
+
+/// What writes a table, by its name.
+const TABLES: [(&str, fn(&mut String)); 1] = [("cantilever", cantilever)];
+
+fn main() {
+    let asked = std::env::args().skip(1).find(|argument| argument != "--bench");
+    let folder = support::report_folder();
+    std::fs::create_dir_all(&folder).expect("a folder for reports");
+    let mut report = String::from("# Accuracy of tetrahedra\n\n");
+    for (name, write) in TABLES {
+        if asked.as_ref().is_none_or(|asked| name.contains(asked.as_str())) {
+            eprintln!("{name}");
+            write(&mut report);
+        }
+    }
+    let path = folder.join("accuracy.md");
+    std::fs::write(&path, &report).expect("a report");
+    eprintln!("{report}{}", path.display());
+}
+
+fn cantilever(report: &mut String) {
+    report.push_str(
+        "## Cantilever\n\nHow far the end comes, over P L³ / 3 E I + P L / kappa G A: cubes cut in five, eight times as long as thick.\n\n\
+         | nu | 2 thick | 4 | 8 | refined | order | off from the same mesh in f64, at most |\n|---|---|---|---|---|---|---|\n",
+    );
+    for nu in [0.0, 0.25, 0.4, 0.49] {
+        let beams = [2, 4, 8].map(|thick| Cantilever::new(thick, nu));
+        let found = beams.each_ref().map(Cantilever::found);
+        let off = |(beam, found): (&Cantilever, f64)| (found / beam.exact() - 1.0).abs();
+        let worst = beams.iter().zip(found).map(off).fold(0.0, f64::max);
+        let (limit, order) = refined(found);
+        let [coarse, middle, fine] = found;
+        let _ = writeln!(
+            report,
+            "| {nu} | {coarse:.3} | {middle:.3} | {fine:.3} | {limit:.3} | {order:.2} | {worst:.1e} |"
+        );
+    }
+    report.push('\n');
+}
