@@ -11,9 +11,10 @@ mod support;
 use std::fmt::Write;
 
 use accuracy::cantilever::{Cantilever, refined};
+use accuracy::press::Block;
 
 /// What writes a table, by its name.
-const TABLES: [(&str, fn(&mut String)); 1] = [("cantilever", cantilever)];
+const TABLES: [(&str, fn(&mut String)); 2] = [("cantilever", cantilever), ("press", press)];
 
 fn main() {
     let asked = std::env::args().skip(1).find(|argument| argument != "--bench");
@@ -46,6 +47,43 @@ fn cantilever(report: &mut String) {
         let _ = writeln!(
             report,
             "| {nu} | {coarse:.3} | {middle:.3} | {fine:.3} | {limit:.3} | {order:.2} | {worst:.1e} |"
+        );
+    }
+    report.push('\n');
+}
+
+fn press(report: &mut String) {
+    report.push_str(
+        "## Pressed block\n\nA cube between plates. Sliding: what the volume becomes, by the law and as found, and the force over the law's.\n\n\
+         | nu | pressed by | by the law | found | about nodes, RMS off | force |\n|---|---|---|---|---|---|\n",
+    );
+    for nu in [0.0, 0.3, 0.45, 0.49] {
+        for by in [0.2, 0.35, 0.5] {
+            let block = Block::new(4, nu, by);
+            let (side, force) = block.even();
+            let expected = side * side * (1.0 - by);
+            let found = block.sliding();
+            let (whole, off) = found.volume(&block, expected);
+            let _ = writeln!(
+                report,
+                "| {nu} | {by} | {expected:.6} | {whole:.6} | {off:.1e} | {:.5} |",
+                found.force / force
+            );
+        }
+    }
+    report.push_str(
+        "\nBonded, 2, 4 and 8 cubes thick that are cut in five: force, N, what the volume becomes, and about nodes RMS off 1.\n\n\
+         | nu | pressed by | force, 2 thick | 4 | 8 | refined | order | volume, 8 thick | about nodes |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (nu, by) in [(0.3, 0.2), (0.3, 0.5), (0.49, 0.2), (0.49, 0.5)] {
+        let blocks = [2, 4, 8].map(|thick| Block::new(thick, nu, by));
+        let found = blocks.each_ref().map(Block::bonded);
+        let [coarse, middle, fine] = found.each_ref().map(|pressed| pressed.force);
+        let (limit, order) = refined([coarse, middle, fine]);
+        let (whole, off) = found[2].volume(&blocks[2], 1.0);
+        let _ = writeln!(
+            report,
+            "| {nu} | {by} | {coarse:.3} | {middle:.3} | {fine:.3} | {limit:.3} | {order:.2} | {whole:.4} | {off:.4} |"
         );
     }
     report.push('\n');

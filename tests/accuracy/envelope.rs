@@ -1,4 +1,4 @@
-//! A symmetric matrix kept from the first entry of each row to its diagonal, and its Cholesky factor, which needs no more room.
+//! A symmetric matrix kept from the first entry of each row to its diagonal, and its Cholesky factor, which needs no more room than that.
 
 /// Rows of the lower triangle.
 #[derive(Clone)]
@@ -35,8 +35,17 @@ impl Envelope {
         *self.rows[unknown].last_mut().expect("a diagonal") = 1.0;
     }
 
-    /// Becomes its own factor; false where it is not positive definite.
-    pub fn factor(&mut self) -> bool {
+    /// The same with diagonals larger by this part.
+    pub fn lifted(&self, part: f64) -> Self {
+        let mut lifted = self.clone();
+        for row in &mut lifted.rows {
+            *row.last_mut().expect("a diagonal") *= 1.0 + part;
+        }
+        lifted
+    }
+
+    /// Its factor; `None` where it is not positive definite.
+    pub fn factor(mut self) -> Option<Factor> {
         for i in 0..self.rows.len() {
             let (before, rest) = self.rows.split_at_mut(i);
             let row = &mut rest[0];
@@ -52,21 +61,27 @@ impl Envelope {
             }
             let square = row[i - first] - dot(&row[..i - first], &row[..i - first]);
             if !(square > 0.0) {
-                return false;
+                return None;
             }
             row[i - first] = square.sqrt();
         }
-        true
+        Some(Factor(self))
     }
+}
 
-    /// Solves in place with the factor that it has become.
+/// The lower triangle whose product with its transpose is the matrix.
+pub struct Factor(Envelope);
+
+impl Factor {
+    /// Solves in place.
     pub fn solve(&self, vector: &mut [f64]) {
-        for (i, row) in self.rows.iter().enumerate() {
-            let (first, last) = (self.firsts[i], row.len() - 1);
+        let Envelope { rows, firsts } = &self.0;
+        for (i, row) in rows.iter().enumerate() {
+            let (first, last) = (firsts[i], row.len() - 1);
             vector[i] = (vector[i] - dot(&row[..last], &vector[first..i])) / row[last];
         }
-        for (i, row) in self.rows.iter().enumerate().rev() {
-            let (first, last) = (self.firsts[i], row.len() - 1);
+        for (i, row) in rows.iter().enumerate().rev() {
+            let (first, last) = (firsts[i], row.len() - 1);
             vector[i] /= row[last];
             let value = vector[i];
             for (entry, factor) in vector[first..i].iter_mut().zip(row) {

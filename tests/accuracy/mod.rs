@@ -4,4 +4,5 @@
 
 pub mod cantilever;
 pub mod envelope;
+pub mod press;
 pub mod solid;

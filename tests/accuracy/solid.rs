@@ -271,9 +271,16 @@ impl Solid {
                     way[unknown] = 0.0;
                 }
             }
-            assert!(matrix.factor(), "not stable after {count} corrections");
+            // Where the energy bends down nodes are held back.
+            let mut lift = 0.0;
+            let factor = loop {
+                match matrix.lifted(lift).factor() {
+                    Some(factor) => break factor,
+                    None => lift = f64::max(1e-3, 4.0 * lift),
+                }
+            };
             let down: Vec<f64> = way.clone();
-            matrix.solve(&mut way);
+            factor.solve(&mut way);
             let slope: f64 = way.iter().zip(&down).map(|(a, b)| a * b).sum();
             let longest = way.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             // Back where the energy does not fall as it should.
@@ -292,7 +299,7 @@ impl Solid {
                 }
                 part *= 0.5;
             }
-            if longest < SOLVED * farthest {
+            if longest < SOLVED * farthest && lift == 0.0 {
                 return count;
             }
         }
