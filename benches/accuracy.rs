@@ -11,10 +11,12 @@ mod support;
 use std::fmt::Write;
 
 use accuracy::cantilever::{Cantilever, refined};
+use accuracy::hertz::{DEEPEST, Layer, RADIUS};
 use accuracy::press::Block;
+use sinew::Solver;
 
 /// What writes a table, by its name.
-const TABLES: [(&str, fn(&mut String)); 2] = [("cantilever", cantilever), ("press", press)];
+const TABLES: [(&str, fn(&mut String)); 3] = [("cantilever", cantilever), ("press", press), ("hertz", hertz)];
 
 fn main() {
     let asked = std::env::args().skip(1).find(|argument| argument != "--bench");
@@ -84,6 +86,38 @@ fn press(report: &mut String) {
         let _ = writeln!(
             report,
             "| {nu} | {by} | {coarse:.3} | {middle:.3} | {fine:.3} | {limit:.3} | {order:.2} | {whole:.4} | {off:.4} |"
+        );
+    }
+    report.push('\n');
+}
+
+fn hertz(report: &mut String) {
+    report.push_str(
+        "## Indentation by a sphere\n\nThe force over that of Hertz with the correction for the thickness (Dimitriadis et al. 2002), by depth over the \
+         sphere's radius, and the exponent of the depth once the correction is taken off; a layer four radii of the deepest contact thick, \
+         bonded, and twelve wide.\n\n\
+         | nu | cells in that radius | nodes | 0.003 | 0.0055 | 0.01 | exponent | the same mesh in f64 | \n|---|---|---|---|---|---|---|---|\n",
+    );
+    for (cells, nu) in [(3, 0.3), (4, 0.3), (8, 0.3), (8, 0.45)] {
+        let layer = Layer::new(cells, nu);
+        let depths = [0.003, 0.0055, DEEPEST].map(|part| part * RADIUS);
+        let found = layer.found(Solver::Verlet, &depths);
+        let ratio = |which: usize| found[which] / layer.theory(depths[which]).0;
+        let plain = |which: usize| found[which] / layer.theory(depths[which]).1;
+        let exponent = (plain(2) / plain(0)).ln() / (depths[2] / depths[0]).ln();
+        // A larger matrix takes minutes to factor.
+        let exact = if cells < 8 {
+            format!("{:.5}", found[2] / layer.exact(depths[2]))
+        } else {
+            String::new()
+        };
+        let _ = writeln!(
+            report,
+            "| {nu} | {cells} | {} | {:.3} | {:.3} | {:.3} | {exponent:.3} | {exact} |",
+            layer.mesh.positions.len(),
+            ratio(0),
+            ratio(1),
+            ratio(2)
         );
     }
     report.push('\n');

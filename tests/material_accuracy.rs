@@ -5,7 +5,9 @@ mod accuracy;
 mod support;
 
 use accuracy::cantilever::{Cantilever, refined};
+use accuracy::hertz::{DEEPEST, Layer, RADIUS};
 use accuracy::press::{Block, SIDE};
+use sinew::Solver;
 use support::bodies::largest_difference;
 
 /// Poisson's ratio, and how far the end of a beam comes over what beam theory says, with cubes without end (Richardson, from beams 2, 4 and
@@ -98,4 +100,20 @@ fn a_block_bonded_to_plates_nears_what_finer_ones_do() {
     for force in [middle, fine] {
         assert!((force / limit - 1.0).abs() < 0.1, "{force} N for {limit} N");
     }
+}
+
+/// A contact three cells in radius. Eight of them, where theory is the measure, are in the bench.
+#[test]
+fn a_sphere_feels_what_the_same_mesh_in_f64_does() {
+    let layer = Layer::new(3, 0.3);
+    let depth = DEEPEST * RADIUS;
+    let found = layer.found(Solver::Verlet, &[depth])[0];
+    let exact = layer.exact(depth);
+    assert!((found / exact - 1.0).abs() < 1e-3, "{found} N for {exact} N");
+    // Linear tetrahedra and a contact of few faces are too stiff, by 11 % here, 7 % with four cells.
+    let (theory, _) = layer.theory(depth);
+    assert!(
+        (1.0..1.15).contains(&(found / theory)),
+        "{found} N, and {theory} N by theory"
+    );
 }

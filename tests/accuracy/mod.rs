@@ -4,5 +4,6 @@
 
 pub mod cantilever;
 pub mod envelope;
+pub mod hertz;
 pub mod press;
 pub mod solid;

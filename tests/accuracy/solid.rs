@@ -113,6 +113,17 @@ impl Solid {
         }
     }
 
+    /// What belongs to each node at rest, m³.
+    pub fn node_volumes(&self) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.rest.len()];
+        for element in &self.elements {
+            for &corner in &element.corners {
+                volumes[corner] += 0.25 * element.volume;
+            }
+        }
+        volumes
+    }
+
     fn deformed(&self, element: &Element, at: &[DVec3]) -> Deformed {
         let [a, b, c, d] = element.corners.map(|corner| at[corner]);
         let gradient = DMat3::from_cols(b - a, c - a, d - a) * element.inverse;
@@ -256,10 +267,15 @@ impl Solid {
         }
     }
 
-    /// Moves nodes that are not held to where they are at rest, by Newton's method; how many corrections that took.
-    pub fn settle(&self, at: &mut Vec<DVec3>, is_held: &[bool], load: Load) -> usize {
+    /// Moves nodes that are not held to where they are at rest, by Newton's method.
+    pub fn settle(&self, at: &mut Vec<DVec3>, is_held: &[bool], load: Load) {
+        self.settle_to(SOLVED, at, is_held, load);
+    }
+
+    /// The same until a correction is no longer than this part of the body.
+    pub fn settle_to(&self, part_of_it: f64, at: &mut Vec<DVec3>, is_held: &[bool], load: Load) {
         let farthest = self.rest.iter().map(|p| p.length()).fold(0.0, f64::max);
-        for count in 1..=60 {
+        for _ in 0..60 {
             let mut forces = vec![DVec3::ZERO; at.len()];
             let energy = self.forces(at, &mut forces) + load(at, &mut forces, None);
             let mut matrix = self.stiffness(at);
@@ -299,8 +315,8 @@ impl Solid {
                 }
                 part *= 0.5;
             }
-            if longest < SOLVED * farthest && lift == 0.0 {
-                return count;
+            if longest < part_of_it * farthest && lift == 0.0 {
+                return;
             }
         }
         panic!("not at rest after sixty corrections");
