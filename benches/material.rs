@@ -7,6 +7,7 @@
 #![allow(clippy::print_stderr)]
 
 #[path = "storage/clock.rs"]
+#[allow(dead_code)] // the storage bench uses the rest
 mod clock;
 
 use std::alloc::{GlobalAlloc, Layout, System};
