@@ -15,8 +15,11 @@ use accuracy::hertz::{DEEPEST, Layer, RADIUS};
 use accuracy::press::Block;
 use sinew::Solver;
 
-/// What writes a table, by its name.
-const TABLES: [(&str, fn(&mut String)); 3] = [("cantilever", cantilever), ("press", press), ("hertz", hertz)];
+/// What writes a table.
+type WriteTable = fn(&mut String);
+
+/// By their names.
+const TABLES: [(&str, WriteTable); 3] = [("cantilever", cantilever), ("press", press), ("hertz", hertz)];
 
 fn main() {
     let asked = std::env::args().skip(1).find(|argument| argument != "--bench");

@@ -282,10 +282,8 @@ impl Solid {
             load(at, &mut vec![DVec3::ZERO; at.len()], Some(&mut matrix));
             let mut way: Vec<f64> = forces.iter().flat_map(|force| force.to_array()).collect();
             for node in (0..at.len()).filter(|&node| is_held[node]) {
-                for unknown in 3 * node..3 * node + 3 {
-                    matrix.hold(unknown);
-                    way[unknown] = 0.0;
-                }
+                (3 * node..3 * node + 3).for_each(|unknown| matrix.hold(unknown));
+                way[3 * node..3 * node + 3].fill(0.0);
             }
             // Where the energy bends down nodes are held back.
             let mut lift = 0.0;
