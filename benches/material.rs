@@ -1,20 +1,59 @@
-//! What a material and the terms beside springs cost: the time of a substep of VERLET, and of a frame of IMPLICIT, of one organ as plain springs, as springs from
-//! Young's modulus, and as finite elements. Throughput is tetrahedra per second; the springs of the plain body are those of the
-//! tetrahedra's edges.
+//! What a body pays for what it asks for, and that it pays nothing for what it does not: one organ as plain springs, the same with every
+//! option given and off, with each option alone, and as finite elements.
+//!
+//! `cargo bench --bench material [-- part of a name]` writes `target/report/material.md`: the time of a substep of VERLET by spring, that of a frame of
+//! IMPLICIT, and the memory of the whole body, in one run, in turns, and as ratios to plain springs. Times are the processor's, the least of
+//! all turns. It fails where the body with every option off has other bytes or moves otherwise than the plain one.
 #![allow(clippy::print_stderr)]
 
-use std::hint::black_box;
-use std::path::Path;
+#[path = "storage/clock.rs"]
+#[allow(dead_code)] // the storage bench uses the rest
+mod clock;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::fmt::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
-use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, World, WorldDefinition};
 
-const SUBSTEPS: u32 = 8;
+const SUBSTEPS: u32 = 16;
 
 /// Short enough for every body here, s.
 const SUBSTEP: f32 = 1e-5;
+
+/// s
+const FRAME: f32 = 1.0 / 60.0;
+
+/// How often each body has its turn.
+const TURNS: usize = 25;
+
+/// The system's allocator, counting what is held.
+struct Held;
+
+static HELD: AtomicUsize = AtomicUsize::new(0);
+
+#[global_allocator]
+static ALLOCATOR: Held = Held;
+
+// SAFETY: every call goes to the system's allocator unchanged.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Held {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        HELD.fetch_add(layout.size(), Ordering::Relaxed);
+        // SAFETY: the same contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the same contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
 
 /// A stomach where there is one, else a filled organ of as many nodes.
 fn organ() -> Mesh {
@@ -38,9 +77,61 @@ fn surface(mesh: &Mesh) -> Vec<[u32; 3]> {
     body.surface().to_vec()
 }
 
-fn bench(criterion: &mut Criterion) {
+/// A body in a world of its own.
+struct Contender<'a> {
+    name: &'a str,
+    world: World,
+    body: BodyId,
+    /// Of the body and what its world holds for it.
+    bytes: usize,
+    /// The least of all turns, s.
+    least: f64,
+}
+
+impl<'a> Contender<'a> {
+    fn new(name: &'a str, definition: &BodyDefinition, solver: Solver) -> Self {
+        let mut world = World::new(WorldDefinition {
+            substeps: if solver == Solver::Verlet { SUBSTEPS } else { 0 },
+            gravity: Vec3::ZERO,
+            ..WorldDefinition::default()
+        })
+        .expect("a world");
+        let before = HELD.load(Ordering::Relaxed);
+        let body = world
+            .create_body(&BodyDefinition { solver, ..*definition })
+            .expect("a body");
+        let bytes = HELD.load(Ordering::Relaxed) - before;
+        // Every node trembles a little, so that something is worked out.
+        let trembling =
+            (0..definition.positions.len()).map(|node| 1e-3 * Vec3::new((node as f32).sin(), 0.5, (node as f32).cos()));
+        let velocities: Vec<Vec3> = trembling.collect();
+        world
+            .body_mut(body)
+            .expect("the body")
+            .set_velocities(&velocities)
+            .expect("velocities");
+        Self {
+            name,
+            bytes,
+            world,
+            body,
+            least: f64::INFINITY,
+        }
+    }
+
+    /// Steps once.
+    fn turn(&mut self, dt: f32) {
+        let elapsed = clock::time(|| {
+            self.world.step(dt).expect("a step");
+        });
+        self.least = self.least.min(elapsed.processor);
+    }
+}
+
+fn main() -> ExitCode {
+    let asked = std::env::args().skip(1).find(|argument| argument != "--bench");
     let mesh = organ();
-    eprintln!("{} nodes, {} tetrahedra", mesh.positions.len(), mesh.tetrahedra.len());
+    let (node_count, tetrahedron_count) = (mesh.positions.len(), mesh.tetrahedra.len());
     let tissue = |model, poisson_ratio| Material {
         model,
         young_modulus: 5000.0,
@@ -48,9 +139,11 @@ fn bench(criterion: &mut Criterion) {
         density: 1060.0,
         ..Material::default()
     };
+    let surface = surface(&mesh);
     let plain = BodyDefinition {
         positions: &mesh.positions,
         tetrahedra: &mesh.tetrahedra,
+        triangles: &surface,
         ..BodyDefinition::default()
     };
     let springs = BodyDefinition {
@@ -58,27 +151,67 @@ fn bench(criterion: &mut Criterion) {
         stiffnesses: Values::Uniform(10.0),
         ..plain
     };
-    let surface = surface(&mesh);
-    let directions = vec![Vec3::X; mesh.tetrahedra.len()];
-    let bodies = [
+    let directions = vec![Vec3::X; tetrahedron_count];
+    let (nowhere, none) = (
+        vec![Vec3::ZERO; tetrahedron_count],
+        vec![0.0; node_count.max(tetrahedron_count)],
+    );
+    // What is asked for, one a line; the first is what all are compared with, the second must not differ from it.
+    let bodies: &[(&str, BodyDefinition)] = &[
         ("plain springs", springs),
         (
-            "with home springs",
+            "every option given, and off",
+            BodyDefinition {
+                rest_positions: Some(&mesh.positions),
+                material: None,
+                node_dampings: Values::Each(&none[..node_count]),
+                spring_dampings: Values::Uniform(0.0),
+                volume_stiffness: 0.0,
+                home_stiffnesses: Values::Each(&none[..node_count]),
+                bending_stiffness: 0.0,
+                spring_law: SpringLaw::Linear,
+                fibre_directions: &nowhere,
+                fibre_stiffnesses: Values::Each(&none[..tetrahedron_count]),
+                ..springs
+            },
+        ),
+        (
+            "damping of nodes",
+            BodyDefinition {
+                node_dampings: Values::Uniform(1e-4),
+                ..springs
+            },
+        ),
+        (
+            "damping along springs",
+            BodyDefinition {
+                spring_dampings: Values::Uniform(1e-4),
+                ..springs
+            },
+        ),
+        (
+            "volume of tetrahedra",
+            BodyDefinition {
+                volume_stiffness: 2000.0,
+                ..springs
+            },
+        ),
+        (
+            "home springs",
             BodyDefinition {
                 home_stiffnesses: Values::Uniform(1.0),
                 ..springs
             },
         ),
         (
-            "with bending of the surface",
+            "bending of the surface",
             BodyDefinition {
-                triangles: &surface,
                 bending_stiffness: 1e-6,
                 ..springs
             },
         ),
         (
-            "with springs that stiffen",
+            "springs that stiffen",
             BodyDefinition {
                 spring_law: SpringLaw::Exponential {
                     steepness: 10.0,
@@ -88,7 +221,7 @@ fn bench(criterion: &mut Criterion) {
             },
         ),
         (
-            "with fibres",
+            "fibres in all tetrahedra",
             BodyDefinition {
                 fibre_directions: &directions,
                 fibre_stiffnesses: Values::Uniform(1000.0),
@@ -103,7 +236,7 @@ fn bench(criterion: &mut Criterion) {
             },
         ),
         (
-            "tetrahedra",
+            "tetrahedra, nu 0.3",
             BodyDefinition {
                 material: Some(tissue(Model::Tetrahedra, 0.3)),
                 ..plain
@@ -117,39 +250,82 @@ fn bench(criterion: &mut Criterion) {
             },
         ),
     ];
-    for (solver, substeps, dt, name) in [
+    let is_asked =
+        |place: usize, name: &str| place < 2 || asked.as_ref().is_none_or(|asked| name.contains(asked.as_str()));
+    let mut report = String::from("# What materials and terms cost\n\n");
+    let mut is_free = true;
+    for (solver, dt, unit) in [
         (
             Solver::Verlet,
-            SUBSTEPS,
             SUBSTEP * SUBSTEPS as f32,
-            "substeps of VERLET",
+            "ns a spring and substep of VERLET",
         ),
-        (Solver::Implicit, 0, 1.0 / 60.0, "a frame of IMPLICIT"),
+        (Solver::Implicit, FRAME, "ms a frame of IMPLICIT"),
     ] {
-        let mut group = criterion.benchmark_group(name);
-        group.throughput(Throughput::Elements(
-            u64::from(substeps.max(1)) * mesh.tetrahedra.len() as u64,
-        ));
-        for (name, body) in &bodies {
-            let mut world = World::new(WorldDefinition {
-                substeps,
-                gravity: Vec3::ZERO,
-                ..WorldDefinition::default()
-            })
-            .expect("a world");
-            world.create_body(&BodyDefinition { solver, ..*body }).expect("a body");
-            group.bench_function(*name, |bencher| {
-                bencher.iter(|| black_box(world.step(dt)).expect("a step"))
-            });
+        let contenders = bodies
+            .iter()
+            .enumerate()
+            .filter(|(place, (name, _))| is_asked(*place, name));
+        let mut contenders: Vec<Contender> = contenders
+            .map(|(_, (name, definition))| Contender::new(name, definition, solver))
+            .collect();
+        let spring_count = {
+            let plain = &contenders[0];
+            plain
+                .world
+                .body(plain.body)
+                .expect("the body")
+                .storage_report()
+                .spring_count
+        };
+        for _ in 0..TURNS {
+            for contender in &mut contenders {
+                contender.turn(dt);
+            }
         }
-        group.finish();
+        if solver == Solver::Verlet {
+            let _ = writeln!(
+                report,
+                "{node_count} nodes, {spring_count} springs, {tetrahedron_count} tetrahedra, one thread.\n"
+            );
+        }
+        let _ = writeln!(
+            report,
+            "| | {unit} | of plain springs | bytes a node | of plain springs |\n|---|---|---|---|---|"
+        );
+        let scale = match solver {
+            Solver::Verlet => 1e9 / (spring_count as f64 * f64::from(SUBSTEPS)),
+            _ => 1e3,
+        };
+        let (least, bytes) = (contenders[0].least, contenders[0].bytes);
+        for contender in &contenders {
+            let _ = writeln!(
+                report,
+                "| {} | {:.3} | {:.2} | {:.0} | {:.2} |",
+                contender.name,
+                contender.least * scale,
+                contender.least / least,
+                contender.bytes as f64 / node_count as f64,
+                contender.bytes as f64 / bytes as f64,
+            );
+        }
+        report.push('\n');
+        let hashes = [0, 1].map(|which| contenders[which].world.state_hash());
+        if hashes[0] != hashes[1] || contenders[1].bytes != bytes {
+            let _ = writeln!(
+                report,
+                "**What is off is not free**: {} bytes instead of {bytes}, {hashes:x?}.\n",
+                contenders[1].bytes
+            );
+            is_free = false;
+        }
     }
+    eprintln!("{report}");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report");
+    let path = folder.join("material.md");
+    if let Err(error) = std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&path, report)) {
+        eprintln!("{}: {error}", path.display());
+        return ExitCode::FAILURE;
+    }
+    if is_free { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
-
-criterion_group! {
-    name = benches;
-    config = Criterion::default().sample_size(20).warm_up_time(std::time::Duration::from_millis(300))
-        .measurement_time(std::time::Duration::from_secs(2));
-    targets = bench
-}
-criterion_main!(benches);

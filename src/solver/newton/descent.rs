@@ -78,7 +78,7 @@ impl Descent {
         let network = Network::new(node_count, springs, elements, terms)?;
         let pair_count = network.pair_count();
         Ok(Self {
-            equation: Equation::new(node_count, network.ring_count())?,
+            equation: Equation::new(node_count, network.ring_count(), network.member_count())?,
             residuals: memory::filled(DVec3::ZERO, node_count)?,
             gradient: Gradient::new(node_count, network.ring_count())?,
             matrix: Matrix::new(node_count, pair_count)?,

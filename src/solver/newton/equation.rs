@@ -39,6 +39,8 @@ pub(super) struct Equation {
     pub rate: f64,
     /// Of the nodes where volume is kept by rings, Pa, at the ways of which forces and matrices were made last.
     pressures: Vec<f64>,
+    /// There too, of each tetrahedron: how its volume grows with the place of each corner, m².
+    areas: Vec<[DVec3; 4]>,
 }
 
 /// What of the stiffness of rings stands in the factor, as a part of what it were if each tetrahedron kept its volume.
@@ -65,8 +67,8 @@ struct Spring {
 }
 
 impl Equation {
-    /// For so many nodes, and rings.
-    pub fn new(node_count: usize, ring_count: usize) -> Result<Self> {
+    /// For so many nodes, rings, and tetrahedra in rings.
+    pub fn new(node_count: usize, ring_count: usize, member_count: usize) -> Result<Self> {
         let vectors = || memory::filled(DVec3::ZERO, node_count);
         Ok(Self {
             anchors: vectors()?,
@@ -79,6 +81,7 @@ impl Equation {
             pins: Pins::default(),
             rate: 0.0,
             pressures: memory::filled(0.0, ring_count)?,
+            areas: memory::reserved(member_count)?,
         })
     }
 
@@ -317,50 +320,43 @@ impl Equation {
         }
     }
 
-    /// Brings the pressures of rings up to the ways.
+    /// Brings the pressures of rings up to the ways, and what their changes depend on.
     fn find_pressures(&mut self, network: &Network) {
-        for node in 0..self.pressures.len() {
-            let growths = network
-                .ring(node)
-                .map(|element| 0.25 * self.deformed(&element).swelling());
-            let growth: f64 = growths.sum();
-            let volume = network.volumes[node];
-            self.pressures[node] = if volume > 0.0 {
-                network.kappa() * growth / volume + network.ring_load(node)
-            } else {
-                0.0
-            };
+        if self.pressures.is_empty() {
+            return;
+        }
+        self.pressures.fill(0.0);
+        self.areas.clear();
+        for element in network.tetrahedra() {
+            let (deformed, tetrahedron) = (self.deformed(&element), element.of);
+            for corner in tetrahedron.corners {
+                self.pressures[corner] += 0.25 * deformed.swelling();
+            }
+            let areas = tetrahedron.rest.gradients().map(|gradient| deformed.area(gradient));
+            self.areas.push(areas);
+        }
+        network.press(&mut self.pressures);
+        for (node, pressure) in self.pressures.iter_mut().enumerate() {
+            *pressure += network.ring_load(node);
         }
     }
 
     /// Adds to the products with a matrix what rings have beside it; `changes` are for the work.
     fn add_products_of_rings(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
-        for (node, change) in changes.iter_mut().enumerate() {
-            let mut growth = 0.0;
-            for element in network.ring(node) {
-                let tetrahedron = element.of;
-                let deformed = self.deformed(&element);
-                for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
-                    growth += 0.25 * deformed.area(gradient).dot(vectors[corner]);
-                }
+        changes.fill(0.0);
+        let tetrahedra = || network.tetrahedra().map(|element| element.of.corners).zip(&self.areas);
+        for (corners, areas) in tetrahedra() {
+            let grows = |(corner, area): (usize, &DVec3)| 0.25 * area.dot(vectors[corner]);
+            let growth: f64 = corners.into_iter().zip(areas).map(grows).sum();
+            for corner in corners {
+                changes[corner] += growth;
             }
-            let volume = network.volumes[node];
-            *change = if volume > 0.0 {
-                network.kappa() * growth / volume
-            } else {
-                0.0
-            };
         }
-        for element in network.tetrahedra() {
-            let tetrahedron = element.of;
-            let deformed = self.deformed(&element);
-            let change = tetrahedron
-                .corners
-                .map(|corner| 0.25 * changes[corner])
-                .iter()
-                .sum::<f64>();
-            for (corner, gradient) in tetrahedron.corners.into_iter().zip(tetrahedron.rest.gradients()) {
-                products[corner] += self.free_part(corner, deformed.area(gradient) * change);
+        network.press(changes);
+        for (corners, areas) in tetrahedra() {
+            let change: f64 = corners.iter().map(|&corner| 0.25 * changes[corner]).sum();
+            for (corner, area) in corners.into_iter().zip(areas) {
+                products[corner] += self.free_part(corner, *area * change);
             }
         }
     }

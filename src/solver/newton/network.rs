@@ -233,6 +233,22 @@ impl Network {
         self.law.map_or(0.0, |law| f64::from(law.kappa))
     }
 
+    /// Makes pressures, Pa, of how much the volume of each node's ring has grown, m³.
+    pub fn press(&self, growths: &mut [f64]) {
+        for (growth, &volume) in growths.iter_mut().zip(&self.volumes) {
+            *growth = if volume > 0.0 {
+                self.kappa() * *growth / volume
+            } else {
+                0.0
+            };
+        }
+    }
+
+    /// How many tetrahedra are in rings: all, or none.
+    pub fn member_count(&self) -> usize {
+        self.ring_members.len() / 4
+    }
+
     pub fn node_count(&self) -> usize {
         self.starts.len() - 1
     }

@@ -1,0 +1,9 @@
+//! Scenes of elasticity whose answers are known, each beside the same mesh in `f64`.
+
+#![allow(dead_code, reason = "the tests and the bench take a part of it each")]
+
+pub mod cantilever;
+pub mod envelope;
+pub mod hertz;
+pub mod press;
+pub mod solid;
