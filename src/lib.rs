@@ -20,7 +20,7 @@ mod terms;
 mod threads;
 mod world;
 
-pub use body::{Body, BodyDefinition, Solver, Storage, Values};
+pub use body::{Body, BodyDefinition, Solver, SpringState, Storage, Values};
 pub use contact::{Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};

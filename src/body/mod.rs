@@ -11,6 +11,7 @@ mod pins;
 mod published;
 mod records;
 mod state;
+mod tune;
 mod vectors;
 
 use glam::{DVec3, Vec3};
@@ -21,6 +22,7 @@ pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, not_negative};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
+pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
 use crate::contact::Contacts;

@@ -18,6 +18,8 @@ pub mod definition;
 
 pub mod body;
 
+pub mod springs;
+
 pub mod report;
 
 pub mod material;

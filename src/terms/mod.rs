@@ -21,7 +21,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{Masses, Rates};
-use crate::springs::{Springs, TileForces, tile_count};
+use crate::springs::{Change, Springs, TileForces, tile_count};
 pub use nonlinear::SpringLaw;
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
@@ -47,8 +47,8 @@ trait Term: Debug + Send + Sync {
     /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
     fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks));
 
-    /// Shows the nodes of each term.
-    fn show_nodes(&self, see: &mut dyn FnMut(&[u32]));
+    /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
+    fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32));
 
     /// By how much the stiffest is stiffer with nodes at `positions` than its rate says, 1: not at all.
     fn stiffening(&self, positions: &Vectors) -> f64;
@@ -58,6 +58,9 @@ trait Term: Debug + Send + Sync {
 
     /// Takes away what has an edge between two nodes: how many terms.
     fn remove_edge(&mut self, a: u32, b: u32) -> usize;
+
+    /// The spring between two nodes has another stiffness and rest length.
+    fn set_spring(&mut self, _change: &Change) {}
 
     /// Nodes are given from here on.
     fn move_origin(&mut self, _origin: DVec3) {}
@@ -159,8 +162,8 @@ impl Terms {
         self.laws.iter().for_each(|law| law.show_blocks(at, is_exact, see));
     }
 
-    /// Shows the nodes of each term.
-    pub fn show_nodes(&self, see: &mut dyn FnMut(&[u32])) {
+    /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
+    pub fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32)) {
         self.laws.iter().for_each(|law| law.show_nodes(see));
     }
 
@@ -177,6 +180,11 @@ impl Terms {
     /// Takes away what has an edge between two nodes: how many terms.
     pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         self.laws.iter_mut().map(|law| law.remove_edge(a, b)).sum()
+    }
+
+    /// The spring between two nodes has another stiffness and rest length.
+    pub fn set_spring(&mut self, change: &Change) {
+        self.laws.iter_mut().for_each(|law| law.set_spring(change));
     }
 
     /// Nodes are given from here on.

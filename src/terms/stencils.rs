@@ -11,7 +11,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 use crate::solver::Masses;
-use crate::springs::{TILE, TileForces, tile_count};
+use crate::springs::{Change, TILE, TileForces, tile_count};
 
 /// What a term does whose stiffness is 1.
 pub(super) trait Law<const N: usize>: Debug + Send + Sync {
@@ -45,6 +45,16 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
         N > 1
     }
 
+    /// What the term of a spring of this length is, where its terms are springs'; `None`: it has none.
+    fn shape_of_spring(&self, _rest_length: f32) -> Option<Self::Shape> {
+        None
+    }
+
+    /// Whether its terms are springs'.
+    fn is_of_springs(&self) -> bool {
+        false
+    }
+
     /// Nodes are given from here on.
     fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
 }
@@ -53,7 +63,7 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stencil<T, const N: usize> {
     pub nodes: [u32; N],
-    /// 0: it was taken away.
+    /// 0: it does nothing; below 0: it was taken away.
     pub stiffness: f32,
     pub shape: T,
 }
@@ -219,8 +229,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         }
     }
 
-    fn show_nodes(&self, see: &mut dyn FnMut(&[u32])) {
-        self.there().for_each(|stencil| see(&stencil.nodes));
+    fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32)) {
+        let kept = self.all.iter().filter(|stencil| stencil.stiffness >= 0.0);
+        kept.for_each(|stencil| see(&stencil.nodes, stencil.stiffness));
     }
 
     fn stiffening(&self, positions: &Vectors) -> f64 {
@@ -254,11 +265,11 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         let mut removed = 0;
         let mut look = |stencil: &mut Stencil<L::Shape, N>| {
             let place = |node: u32| stencil.nodes.iter().position(|&other| other == node);
-            if stencil.stiffness > 0.0
+            if stencil.stiffness >= 0.0
                 && let (Some(a), Some(b)) = (place(a), place(b))
                 && law.is_edge(a, b)
             {
-                stencil.stiffness = 0.0;
+                stencil.stiffness = -1.0;
                 removed += 1;
             }
         };
@@ -267,6 +278,23 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
             .iter()
             .for_each(|&index| look(&mut all[index as usize]));
         removed
+    }
+
+    fn set_spring(&mut self, change: &Change) {
+        if !self.law.is_of_springs() {
+            return;
+        }
+        let nodes = [change.node, change.after.neighbour];
+        let place = self.all.binary_search_by(|stencil| stencil.nodes[..].cmp(&nodes));
+        if let Ok(place) = place
+            && let stencil = &mut self.all[place]
+            && stencil.stiffness >= 0.0
+        {
+            match self.law.shape_of_spring(change.after.rest_length) {
+                Some(shape) => (stencil.stiffness, stencil.shape) = (change.after.stiffness, shape),
+                None => stencil.stiffness = 0.0,
+            }
+        }
     }
 
     fn move_origin(&mut self, origin: DVec3) {

@@ -411,19 +411,62 @@ impl Columns {
         });
     }
 
-    /// Takes out the link from `node` to `neighbour`; whether there was one.
-    pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
+    /// Whether the link from `node` to `neighbour`, which there is, shares its parameters with others: then it would have to leave
+    /// its column to have others.
+    pub fn is_shared(&self, node: usize, neighbour: usize) -> bool {
+        matches!(self.find(node, neighbour), Some((_, None)))
+    }
+
+    /// Makes room for springs in columns to have any of these stiffnesses.
+    pub fn room_for_stiffnesses(&mut self, mut stiffnesses: impl Iterator<Item = f32>) -> Result<()> {
+        let uniform = self.own_stiffness;
+        if !uniform.is_nan() && stiffnesses.any(|stiffness| stiffness != uniform) {
+            self.own_stiffnesses = memory::filled(Line([uniform; LANES]), self.own_rest_lengths.len())?;
+            self.own_stiffness = f32::NAN;
+        }
+        Ok(())
+    }
+
+    /// Gives a link of `node` another stiffness and rest length, for which there is room; one that shares its parameters goes beside
+    /// the columns.
+    pub fn set(&mut self, node: usize, link: &Link) {
+        if self.strays.set(node, link) {
+            return;
+        }
+        match self.find(node, link.neighbour as usize) {
+            Some((_, Some(own))) => {
+                let lane = (node - self.first) % LANES;
+                self.own_rest_lengths[own].0[lane] = link.rest_length;
+                if let Some(line) = self.own_stiffnesses.get_mut(own) {
+                    line.0[lane] = link.stiffness;
+                }
+            }
+            Some((_, None)) => {
+                self.remove(node, link.neighbour as usize);
+                self.insert_stray(node, link);
+            }
+            None => {}
+        }
+    }
+
+    /// The column in which there is a link, and its place among those with parameters of their own; `None`: in none.
+    fn find(&self, node: usize, neighbour: usize) -> Option<(Found, Option<usize>)> {
         let mut place = None;
-        self.columns_of(node, &mut |found, _, _, other| {
+        self.columns_of(node, &mut |found, material, own, other| {
             if other == neighbour {
-                place = Some(found);
+                place = Some((found, material.is_none().then_some(own)));
             }
         });
-        let lanes = match place {
-            Some(Found::Run(run)) => &mut self.runs[run].lanes,
-            Some(Found::OwnRun(run)) => &mut self.own_runs[run].lanes,
-            Some(Found::Near(near)) => &mut self.near[near].lanes,
-            Some(Found::Far(far)) => &mut self.far[far].lanes,
+        place
+    }
+
+    /// Takes out the link from `node` to `neighbour`; whether there was one.
+    pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
+        let lanes = match self.find(node, neighbour) {
+            Some((Found::Run(run), _)) => &mut self.runs[run].lanes,
+            Some((Found::OwnRun(run), _)) => &mut self.own_runs[run].lanes,
+            Some((Found::Near(near), _)) => &mut self.near[near].lanes,
+            Some((Found::Far(far), _)) => &mut self.far[far].lanes,
             None => return self.strays.remove(node, neighbour),
         };
         *lanes &= !(1 << ((node - self.first) % LANES));

@@ -78,11 +78,19 @@ impl Strays {
         }
     }
 
+    /// Gives the link from `node` another stiffness and rest length, where it is here: whether it is.
+    pub fn set(&mut self, node: usize, link: &Link) -> bool {
+        let found = self.find(node, link.neighbour as usize);
+        if let Some(index) = found {
+            self.stiffnesses[index] = link.stiffness;
+            self.rest_lengths[index] = link.rest_length;
+        }
+        found.is_some()
+    }
+
     /// Takes out the link from `node` to `neighbour`; whether there was one.
     pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
-        let found = self
-            .of(node)
-            .find(|&index| self.neighbours[index] as usize == neighbour);
+        let found = self.find(node, neighbour);
         if let Some(index) = found {
             self.places.remove(index);
             self.neighbours.remove(index);
@@ -119,6 +127,11 @@ impl Strays {
             + self.neighbours.capacity() * size_of::<u32>()
             + floats * size_of::<f32>();
         (used, held)
+    }
+
+    fn find(&self, node: usize, neighbour: usize) -> Option<usize> {
+        self.of(node)
+            .find(|&index| self.neighbours[index] as usize == neighbour)
     }
 
     /// The indices of a node's.
