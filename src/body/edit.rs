@@ -314,7 +314,7 @@ impl Body {
         }
     }
 
-    fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+    pub(super) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
         if (node as usize) < self.node_count() {
             return Ok(());
         }

@@ -75,7 +75,7 @@ impl Body {
     }
 
     /// Changes springs, each once. Changes nothing where it fails.
-    fn change_springs(&mut self, changes: &[Change]) -> Result<()> {
+    pub(super) fn change_springs(&mut self, changes: &[Change]) -> Result<()> {
         let mut nodes = memory::reserved(2 * changes.len())?;
         nodes.extend(changes.iter().flat_map(Change::ends).map(|(node, _)| node));
         nodes.sort_unstable();

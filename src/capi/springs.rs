@@ -1,4 +1,4 @@
-//! Springs of a body, read and changed while it runs.
+//! Springs and regions of a body, read and changed while it runs.
 
 use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::sinew_world;
@@ -95,6 +95,38 @@ pub unsafe extern "C" fn sinew_body_set_springs(
             let stiffnesses = memory::optional_array("stiffnesses", stiffnesses, count)?;
             let rest_lengths = memory::optional_array("rest_lengths", rest_lengths, count)?;
             body.set_springs(pairs, stiffnesses.map(Values::Each), rest_lengths.map(Values::Each))
+        })
+    }
+}
+
+/// Makes what lies between `node_count` nodes alone `stiffness_factor` times as stiff and `length_factor` times as long at rest, as
+/// cautery stiffens and shrinks, and as tissue swells: springs of two of them, tetrahedra of SINEW_MATERIAL_TETRAHEDRA or with a
+/// volume_stiffness with all corners among them, bending and fibres alike. Home springs become stiffer, and draw where they did. What
+/// reaches beyond the region stays as it is, and so do masses, damping, positions and velocities: the body moves to its new shape by
+/// itself.
+///
+/// `stiffness_factor` is at least 0, `length_factor` above 0. Factors multiply those of calls before; a stiffness of 0 is for good, and
+/// takes tetrahedra away. `nodes` may name a node more than once. It takes as long as the region is large.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where something would become so stiff, long or small that it is no number),
+/// SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then nothing is changed.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `nodes` is NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_scale_region(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    node_count: usize,
+    stiffness_factor: f32,
+    length_factor: f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            let nodes = memory::array("nodes", nodes, node_count)?;
+            body.scale_region(nodes, stiffness_factor, length_factor)
         })
     }
 }

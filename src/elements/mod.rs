@@ -8,6 +8,7 @@ mod law;
 mod parts;
 mod rates;
 mod rings;
+mod scale;
 
 use glam::{DMat3, DVec3};
 
@@ -337,6 +338,7 @@ impl Elements {
     pub fn hash(&self, hasher: &mut StateHasher) {
         for group in self.parts.iter().flat_map(|part| part.groups.as_slice()) {
             hasher.write_floats(&group.volumes);
+            hasher.write_floats(group.inverse.as_flattened());
         }
     }
 }

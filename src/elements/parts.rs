@@ -9,7 +9,7 @@ use crate::memory;
 use crate::springs::{GROUP, Group, Groups, TILE, tile_count};
 
 /// Tetrahedra of a part: so few that its nodes stay in the nearest cache, and their numbers are small.
-const PART: usize = 4096;
+pub(super) const PART: usize = 4096;
 
 /// Some tetrahedra, and their nodes.
 #[derive(Debug)]
@@ -76,6 +76,11 @@ impl Part {
 
     /// Shows the tetrahedra there are.
     pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest)) {
+        self.visit_places(&mut |corners, _, rest| see(corners, rest));
+    }
+
+    /// The same with the places of their corners among the part's nodes.
+    pub fn visit_places(&self, see: &mut dyn FnMut([u32; 4], [usize; 4], &Rest)) {
         for group in self.groups.as_slice() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
                 let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
@@ -83,8 +88,8 @@ impl Part {
                     inverse: DMat3::from_cols_array(&[xx, 0.0, 0.0, xy, yy, 0.0, xz, yz, zz]),
                     volume: f64::from(group.volumes[lane]),
                 };
-                let corners = group.corners.map(|corners| self.nodes[usize::from(corners[lane] / 2)]);
-                see(corners, &rest);
+                let places = group.corners.map(|corners| usize::from(corners[lane] / 2));
+                see(places.map(|place| self.nodes[place]), places, &rest);
             }
         }
     }

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DMat3, DVec3};
 
-use crate::body::{BodyDefinition, NodeOrder, Spring, Vectors, View};
+use crate::body::{BodyDefinition, NodeOrder, Region, Scale, Spring, Vectors, View};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
@@ -61,6 +61,12 @@ trait Term: Debug + Send + Sync {
 
     /// The spring between two nodes has another stiffness and rest length.
     fn set_spring(&mut self, _change: &Change) {}
+
+    /// Refuses to scale what would have a number that is none. Terms of springs go with those.
+    fn check_scale(&self, region: &Region, scale: Scale) -> Result<()>;
+
+    /// Scales the terms with all nodes in a region, which must not be refused: how many.
+    fn scale(&mut self, region: &Region, scale: Scale) -> usize;
 
     /// Nodes are given from here on.
     fn move_origin(&mut self, _origin: DVec3) {}
@@ -185,6 +191,20 @@ impl Terms {
     /// The spring between two nodes has another stiffness and rest length.
     pub fn set_spring(&mut self, change: &Change) {
         self.laws.iter_mut().for_each(|law| law.set_spring(change));
+    }
+
+    /// Refuses to scale what would have a number that is none. Terms of springs go with those.
+    pub fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
+        self.laws.iter().try_for_each(|law| law.check_scale(region, scale))
+    }
+
+    /// Scales the terms with all nodes in a region, which must not be refused: how many.
+    pub fn scale(&mut self, region: &Region, scale: Scale) -> usize {
+        let count = self.laws.iter_mut().map(|law| law.scale(region, scale)).sum();
+        if scale.stiffness == 0.0 && self.holds_any {
+            self.holds_any = (0..self.sums.len()).any(|node| self.holds(node));
+        }
+        count
     }
 
     /// Nodes are given from here on.

@@ -6,9 +6,9 @@ use std::ops::Range;
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{Blocks, Term};
-use crate::body::{Vectors, View};
+use crate::body::{Region, Scale, Vectors, View};
 use crate::diagnostics::StateHasher;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memory;
 use crate::solver::Masses;
 use crate::springs::{Change, TILE, TileForces, tile_count};
@@ -43,6 +43,17 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     /// Whether two of its nodes have an edge.
     fn is_edge(&self, _a: usize, _b: usize) -> bool {
         N > 1
+    }
+
+    /// What it is where everything is so many times as long at rest, and how many times as stiff it is then.
+    fn scaled(&self, shape: &Self::Shape, length: f64) -> (Self::Shape, f64);
+
+    /// Whether what it is at rest is a number.
+    fn is_finite(&self, shape: &Self::Shape) -> bool;
+
+    /// What changes of it as it is scaled.
+    fn size(&self, _shape: &Self::Shape) -> f32 {
+        0.0
     }
 
     /// What the term of a spring of this length is, where its terms are springs'; `None`: it has none.
@@ -141,6 +152,27 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
 
     fn there(&self) -> impl Iterator<Item = &Stencil<L::Shape, N>> {
         self.all.iter().filter(|stencil| stencil.stiffness > 0.0)
+    }
+}
+
+impl<L: Law<N>, const N: usize> Stencils<L, N> {
+    /// Where the terms are that a region has all nodes of.
+    fn within(&self, region: &Region) -> impl Iterator<Item = usize> {
+        let tiles = region.tiles().filter(|_| !self.law.is_of_springs());
+        tiles
+            .flat_map(|tile| self.beginning(tile))
+            .filter(|&index| self.all[index].stiffness > 0.0 && region.has_all(&self.all[index].nodes))
+    }
+
+    fn scaled(&self, index: usize, scale: Scale) -> Stencil<L::Shape, N> {
+        let stencil = &self.all[index];
+        let (shape, factor) = self.law.scaled(&stencil.shape, f64::from(scale.length));
+        let stiffness = f64::from(stencil.stiffness) * f64::from(scale.stiffness) * factor;
+        Stencil {
+            nodes: stencil.nodes,
+            stiffness: stiffness as f32,
+            shape,
+        }
     }
 }
 
@@ -297,6 +329,33 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         }
     }
 
+    fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
+        for index in self.within(region) {
+            let Stencil { stiffness, shape, .. } = self.scaled(index, scale);
+            if !(stiffness.is_finite() && self.law.is_finite(&shape)) {
+                return Err(Error::invalid(format!(
+                    "stiffness_factor is {} and length_factor {}: a stiffness of {stiffness}, or a length, would be too much or too little",
+                    scale.stiffness, scale.length
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn scale(&mut self, region: &Region, scale: Scale) -> usize {
+        let mut count = 0;
+        for tile in region.tiles().filter(|_| !self.law.is_of_springs()) {
+            for index in self.beginning(tile) {
+                let stencil = &self.all[index];
+                if stencil.stiffness > 0.0 && region.has_all(&stencil.nodes) {
+                    self.all[index] = self.scaled(index, scale);
+                    count += 1;
+                }
+            }
+        }
+        count
+    }
+
     fn move_origin(&mut self, origin: DVec3) {
         for stencil in &mut self.all {
             self.law.move_origin(&mut stencil.shape, origin);
@@ -305,15 +364,16 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn holds(&self, node: usize) -> bool {
         // A term of a single node is one between it and the world.
+        let springs = &self.all[self.beginning(tile_of(node as u32))];
         N == 1
-            && self.all[self.beginning(tile_of(node as u32))]
+            && springs
                 .binary_search_by_key(&(node as u32), |stencil| stencil.nodes[0])
-                .is_ok()
+                .is_ok_and(|place| springs[place].stiffness > 0.0)
     }
 
     fn hash(&self, hasher: &mut StateHasher) {
         for stencil in &self.all {
-            hasher.write_floats(&[stencil.stiffness]);
+            hasher.write_floats(&[stencil.stiffness, self.law.size(&stencil.shape)]);
         }
     }
 }
