@@ -190,7 +190,7 @@ fn one_of_two_is_scaled(asked: Asked, kept: (Storage, Solver), stiffness: f32, l
     let (first, second) = (Block::new([3, 3, 4], 1), Block::new([4, 3, 3], 2));
     let both = first.and(&second);
     let count = first.mesh.positions.len();
-    let substeps = if kept.1 == Solver::Verlet { 16 } else { 0 };
+    let substeps = if kept.1 == Solver::Verlet { 50 } else { 0 };
     let definition = WorldDefinition { substeps, ..FREE };
     let mut random = Random::new(9);
     let mut world = World::new(definition).expect("a world");
