@@ -91,7 +91,7 @@ static void step(trial *of, const sinew_mesh_view *shape, float height, double r
   of->growth = volume(shape, nodes) / rest - 1;
 }
 
-/* The tissue coloured by its smallest principal strain, from none to a half. */
+/* The tissue coloured by its smallest principal strain, from none to as much as the plate goes down. */
 static void save_strain(const trial *of, const sinew_mesh_view *shape, const sinew_picture_def *picture, const char *directory) {
   sinew_strain *strains = (sinew_strain *)allocate(shape->tetrahedron_count, sizeof *strains);
   float *pressed = (float *)allocate(shape->tetrahedron_count, sizeof *pressed);
@@ -105,7 +105,7 @@ static void save_strain(const trial *of, const sinew_mesh_view *shape, const sin
   CHECK(sinew_mean_at_nodes(shape->tetrahedra, 4, pressed, shape->tetrahedron_count, at_nodes, shape->node_count));
   memset(&values, 0, sizeof values);
   values.body = of->liver, values.values = at_nodes, values.node_count = shape->node_count;
-  values.high = 0.5f, values.colours = SINEW_COLOURS_SEQUENTIAL;
+  values.high = (float)DEPTH, values.colours = SINEW_COLOURS_SEQUENTIAL;
   CHECK(sinew_world_save_picture_of_values(of->world, picture, &values, 1, path));
   free(path), free(at_nodes), free(pressed), free(strains);
 }

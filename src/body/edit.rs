@@ -279,7 +279,7 @@ impl Body {
 
     /// Keeps the velocities at the time of the positions as they are after a spring has come (sign -1) or gone (1), given
     /// as each of its nodes sees it.
-    pub(super) fn make_up_for_spring(&mut self, [a, b]: [Link; 2], sign: f32) {
+    fn make_up_for_spring(&mut self, [a, b]: [Link; 2], sign: f32) {
         if self.carry.closing.is_none() {
             return;
         }

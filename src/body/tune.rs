@@ -4,8 +4,8 @@ use super::definition::check_values;
 use super::{Body, Values};
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::solver::Stability;
-use crate::springs::{Change, Link, not_joined};
+use crate::solver::{Stability, make_up_for};
+use crate::springs::{Change, Link, not_joined, pull};
 
 /// A spring as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,15 +95,7 @@ impl Body {
             implicit.forget_matrix();
         }
         self.forget_rates();
-        for change in changes {
-            for (link, sign) in [(change.before, 1.0), (change.after, -1.0)] {
-                let other = Link {
-                    neighbour: change.node,
-                    ..link
-                };
-                self.make_up_for_spring([link, other], sign);
-            }
-        }
+        self.make_up_for_changes(changes);
         self.scale_for_springs(&nodes);
         let limit = self.watched.limit();
         self.see_stability_of(&nodes);
@@ -112,6 +104,20 @@ impl Body {
             self.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
+    }
+
+    /// Keeps the velocities at the time of the positions as they are.
+    fn make_up_for_changes(&mut self, changes: &[Change]) {
+        if self.carry.closing.is_none() {
+            return;
+        }
+        self.published.forget_velocities();
+        for &Change { node, before, after } in changes {
+            let [here, there] = [node, after.neighbour].map(|node| self.state.positions().get(node as usize));
+            let [before, after_it] = [before, after].map(|link| pull(node as usize, &link, there - here, None));
+            make_up_for(self, node, before - after_it);
+            make_up_for(self, after.neighbour, after_it - before);
+        }
     }
 
     /// The node of a pair with the lower number of the body's own, and what it sees of the pair's spring.

@@ -80,15 +80,16 @@ impl Coloured<'_> {
     }
 }
 
-/// Lightness, from green to red, from blue to yellow.
+/// Lightness, from green to red, from blue to yellow: all that lies between is a colour of screens, and not so dark that light and
+/// shadow are lost.
 const GREY: Vec3 = Vec3::new(0.93, 0.0, 0.0);
 const BLUE: Vec3 = Vec3::new(0.45, -0.03, -0.16);
 const RED: Vec3 = Vec3::new(0.48, 0.17, 0.08);
 const STOPS: [Vec3; 4] = [
-    Vec3::new(0.28, 0.05, -0.11),
-    Vec3::new(0.50, -0.05, -0.06),
-    Vec3::new(0.71, -0.12, 0.06),
-    Vec3::new(0.92, -0.04, 0.17),
+    Vec3::new(0.38, 0.06, -0.13),
+    Vec3::new(0.57, -0.05, -0.06),
+    Vec3::new(0.76, -0.12, 0.07),
+    Vec3::new(0.94, -0.04, 0.16),
 ];
 
 /// A colour of OKLab as light.

@@ -20,6 +20,9 @@ pub(crate) const LANES: usize = 16;
 /// How far ahead a gather with small indices reaches.
 const WINDOW: usize = 1 << 16;
 
+/// How many links of a node are looked for at a time.
+const AT_ONCE: usize = 16;
+
 /// Of a column whose springs bring their own parameters.
 const OWN: u16 = u16::MAX;
 
@@ -411,10 +414,17 @@ impl Columns {
         });
     }
 
-    /// Whether the link from `node` to `neighbour`, which there is, shares its parameters with others: then it would have to leave
-    /// its column to have others.
-    pub fn is_shared(&self, node: usize, neighbour: usize) -> bool {
-        matches!(self.find(node, neighbour), Some((_, None)))
+    /// How many of some links of a node share their parameters with others: they would have to leave their columns to have others.
+    pub fn shared(&self, links: &[(u32, Link)]) -> usize {
+        let chunks = links.chunks(AT_ONCE);
+        chunks
+            .map(|links| {
+                self.find_all(links)
+                    .iter()
+                    .filter(|place| **place == Some(None))
+                    .count()
+            })
+            .sum()
     }
 
     /// Makes room for springs in columns to have any of these stiffnesses.
@@ -427,46 +437,63 @@ impl Columns {
         Ok(())
     }
 
-    /// Gives a link of `node` another stiffness and rest length, for which there is room; one that shares its parameters goes beside
-    /// the columns.
-    pub fn set(&mut self, node: usize, link: &Link) {
-        if self.strays.set(node, link) {
-            return;
-        }
-        match self.find(node, link.neighbour as usize) {
-            Some((_, Some(own))) => {
-                let lane = (node - self.first) % LANES;
-                self.own_rest_lengths[own].0[lane] = link.rest_length;
-                if let Some(line) = self.own_stiffnesses.get_mut(own) {
-                    line.0[lane] = link.stiffness;
+    /// Gives links of a node, in the order of their neighbours, other stiffnesses and rest lengths, for which there is room; those that
+    /// share their parameters go beside the columns: how many.
+    pub fn set(&mut self, links: &[(u32, Link)]) -> usize {
+        let mut left = 0;
+        for links in links.chunks(AT_ONCE) {
+            let places = self.find_all(links);
+            for (&(node, link), place) in links.iter().zip(places) {
+                let node = node as usize;
+                match place {
+                    Some(Some(own)) => {
+                        let lane = (node - self.first) % LANES;
+                        self.own_rest_lengths[own].0[lane] = link.rest_length;
+                        if let Some(line) = self.own_stiffnesses.get_mut(own) {
+                            line.0[lane] = link.stiffness;
+                        }
+                    }
+                    Some(None) => {
+                        self.remove(node, link.neighbour as usize);
+                        self.insert_stray(node, &link);
+                        left += 1;
+                    }
+                    None => {
+                        self.strays.set(node, &link);
+                    }
                 }
             }
-            Some((_, None)) => {
-                self.remove(node, link.neighbour as usize);
-                self.insert_stray(node, link);
-            }
-            None => {}
         }
+        left
     }
 
-    /// The column in which there is a link, and its place among those with parameters of their own; `None`: in none.
-    fn find(&self, node: usize, neighbour: usize) -> Option<(Found, Option<usize>)> {
-        let mut place = None;
-        self.columns_of(node, &mut |found, material, own, other| {
-            if other == neighbour {
-                place = Some((found, material.is_none().then_some(own)));
-            }
-        });
-        place
+    /// Where in columns links of a node are, a few in the order of their neighbours: their places among those with parameters of their
+    /// own, `Some(None)`: they share theirs; `None`: in no column.
+    fn find_all(&self, links: &[(u32, Link)]) -> [Option<Option<usize>>; AT_ONCE] {
+        let mut places = [None; AT_ONCE];
+        if let Some((node, _)) = links.first() {
+            self.columns_of(*node as usize, &mut |_, material, own, other| {
+                if let Ok(index) = links.binary_search_by_key(&other, |(_, link)| link.neighbour as usize) {
+                    places[index] = Some(material.is_none().then_some(own));
+                }
+            });
+        }
+        places
     }
 
     /// Takes out the link from `node` to `neighbour`; whether there was one.
     pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
-        let lanes = match self.find(node, neighbour) {
-            Some((Found::Run(run), _)) => &mut self.runs[run].lanes,
-            Some((Found::OwnRun(run), _)) => &mut self.own_runs[run].lanes,
-            Some((Found::Near(near), _)) => &mut self.near[near].lanes,
-            Some((Found::Far(far), _)) => &mut self.far[far].lanes,
+        let mut place = None;
+        self.columns_of(node, &mut |found, _, _, other| {
+            if other == neighbour {
+                place = Some(found);
+            }
+        });
+        let lanes = match place {
+            Some(Found::Run(run)) => &mut self.runs[run].lanes,
+            Some(Found::OwnRun(run)) => &mut self.own_runs[run].lanes,
+            Some(Found::Near(near)) => &mut self.near[near].lanes,
+            Some(Found::Far(far)) => &mut self.far[far].lanes,
             None => return self.strays.remove(node, neighbour),
         };
         *lanes &= !(1 << ((node - self.first) % LANES));

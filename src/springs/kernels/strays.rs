@@ -78,14 +78,12 @@ impl Strays {
         }
     }
 
-    /// Gives the link from `node` another stiffness and rest length, where it is here: whether it is.
-    pub fn set(&mut self, node: usize, link: &Link) -> bool {
-        let found = self.find(node, link.neighbour as usize);
-        if let Some(index) = found {
+    /// Gives the link from `node` another stiffness and rest length, where it is here.
+    pub fn set(&mut self, node: usize, link: &Link) {
+        if let Some(index) = self.find(node, link.neighbour as usize) {
             self.stiffnesses[index] = link.stiffness;
             self.rest_lengths[index] = link.rest_length;
         }
-        found.is_some()
     }
 
     /// Takes out the link from `node` to `neighbour`; whether there was one.

@@ -269,14 +269,14 @@ impl Springs for Packed {
         let mut ends = memory::reserved(2 * changes.len())?;
         ends.extend(changes.iter().flat_map(Change::ends));
         ends.sort_unstable_by_key(|(node, link)| (*node, link.neighbour));
+        let same_node = |(a, _): &(u32, Link), (b, _): &(u32, Link)| a == b;
         let same_tile = |(a, _): &(u32, Link), (b, _): &(u32, Link)| *a as usize / TILE == *b as usize / TILE;
         // Those with too many links that would leave their columns.
         let mut anew = Vec::new();
         for ends in ends.chunk_by(same_tile) {
             let tile = ends[0].0 as usize / TILE;
             let columns = &mut self.tiles[tile].columns;
-            let is_shared = |(node, link): &&(u32, Link)| columns.is_shared(*node as usize, link.neighbour as usize);
-            let leaving = ends.iter().filter(is_shared).count();
+            let leaving: usize = ends.chunk_by(same_node).map(|links| columns.shared(links)).sum();
             if leaving > ADDED {
                 memory::push(&mut anew, (tile, self.repacked(tile, ends)?))?;
             } else {
@@ -292,11 +292,9 @@ impl Springs for Packed {
                 *tile = packed;
                 continue;
             }
-            let strays = tile.columns.strays().len();
-            for (node, link) in ends {
-                tile.columns.set(*node as usize, link);
+            for links in ends.chunk_by(same_node) {
+                tile.removed += tile.columns.set(links);
             }
-            tile.removed += tile.columns.strays().len() - strays;
             self.mend(ends[0].0);
         }
         Ok(())
