@@ -99,10 +99,6 @@ impl Block {
         }
     }
 
-    fn shifted(nodes: &[u32], by: u32) -> Vec<u32> {
-        nodes.iter().map(|node| node + by).collect()
-    }
-
     /// Both side by side, which nothing joins.
     fn and(&self, other: &Self) -> Self {
         let first = self.mesh.positions.len() as u32;

@@ -363,3 +363,91 @@ fn what_is_refused_changes_nothing() {
         }
     }
 }
+
+#[test]
+fn mass_is_added_as_where_springs_were_removed_and_added_again() {
+    let mut parts = lattice();
+    let indices = [7, 500, 900];
+    for index in indices {
+        parts.stiffnesses[index] *= 300.0;
+    }
+    let make = || {
+        Scene::with(&parts, FREE, |definition| sinew::BodyDefinition {
+            mass_scaling: 0.1,
+            ..definition
+        })
+    };
+    let (mut set, mut again) = (make(), make());
+    let dt = 1e-2;
+    set.step(dt);
+    again.step(dt);
+    let before = set.body().solver_report().added_mass;
+    let pairs = indices.map(|index| parts.springs[index]);
+    let stiffnesses = indices.map(|index| 1.5 * parts.stiffnesses[index]);
+    let body = set.body_mut();
+    body.set_springs(&pairs, Some(Values::Each(&stiffnesses)), None)
+        .expect("springs");
+    for (index, stiffness) in indices.into_iter().zip(stiffnesses) {
+        let ([a, b], length) = (parts.springs[index], parts.rest_lengths[index]);
+        let body = again.body_mut();
+        body.remove_spring(a, b).expect("a spring");
+        body.add_spring(a, b, stiffness, Some(length)).expect("room");
+    }
+    let [ours, theirs] = [&mut set, &mut again].map(|scene| {
+        let substeps = scene.step(dt).substeps;
+        (substeps, scene.body().solver_report().added_mass)
+    });
+    assert!(
+        (theirs.1 - before).abs() > 0.01 * before && before > 0.0,
+        "{before} {theirs:?}"
+    );
+    assert_eq!(ours.0, theirs.0);
+    assert!((ours.1 - theirs.1).abs() < 1e-5 * theirs.1, "{ours:?} {theirs:?}");
+}
+
+#[test]
+fn terms_and_elements_see_that_springs_became_stiffer() {
+    let mesh = Mesh::block([0.06, 0.04, 0.04], [6, 4, 4]).expect("a block");
+    let mut random = Random::new(19);
+    let velocities: Vec<Vec3> = mesh.positions.iter().map(|_| 0.1 * random.vector()).collect();
+    // The law makes springs up to 400 times as stiff as their storage knows.
+    let steep = SpringLaw::Exponential {
+        steepness: 30.0,
+        limit: 0.2,
+    };
+    for (spring_law, volume_stiffness) in [(steep, 0.0), (SpringLaw::Linear, 1000.0), (steep, 1000.0)] {
+        let mut world = sinew::World::new(FREE).expect("a world");
+        let id = world.create_body(&sinew::BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            masses: Values::Uniform(1e-4),
+            stiffnesses: Values::Uniform(4.0),
+            spring_law,
+            volume_stiffness,
+            ..Default::default()
+        });
+        let mut scene = Scene {
+            id: id.expect("a body"),
+            world,
+        };
+        scene.body_mut().set_velocities(&velocities).expect("velocities");
+        let substeps = scene.step(1e-3).substeps;
+        let pairs = scene.body().spring_pairs().expect("springs");
+        let body = scene.body_mut();
+        body.set_springs(&pairs, Some(Values::Uniform(400.0)), None)
+            .expect("springs");
+        let energy = scene.energy();
+        for _ in 0..5 {
+            let now = scene.step(1e-3).substeps;
+            assert!(
+                now > 4 * substeps,
+                "{spring_law:?} {volume_stiffness}: {now}, before {substeps}"
+            );
+            let now = scene.energy();
+            assert!(
+                now < 1.05 * energy,
+                "{spring_law:?} {volume_stiffness}: {now} of {energy} J"
+            );
+        }
+    }
+}
