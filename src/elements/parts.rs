@@ -19,6 +19,9 @@ pub(super) struct Part {
     pub groups: Groups,
 }
 
+/// What is shown the nodes of a tetrahedron, their places among the part's, and the way it is at rest.
+pub(super) type See<'a> = dyn FnMut([u32; 4], [usize; 4], &Rest) + 'a;
+
 /// Cuts tetrahedra into parts.
 pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<Part>> {
     let mut order: Vec<u32> = memory::reserved(tetrahedra.len())?;
@@ -80,7 +83,7 @@ impl Part {
     }
 
     /// The same with the places of their corners among the part's nodes.
-    pub fn visit_places(&self, see: &mut dyn FnMut([u32; 4], [usize; 4], &Rest)) {
+    pub fn visit_places(&self, see: &mut See) {
         for group in self.groups.as_slice() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
                 let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
