@@ -4,7 +4,8 @@
  *   tissue [-o DIRECTORY] [-n FRAMES] [FILE [SCALE]]
  *
  * FILE is a tetrahedral mesh (.vtk .msh .node), SCALE what one of its units is in metres (1; 0.001 for millimetres). Without a file an
- * organ is made. Leaves tissue_springs.png and tissue_tetrahedra.png, pressed as far as it goes, and tissue.csv in the directory. */
+ * organ is made. Leaves tissue_springs.png and tissue_tetrahedra.png, pressed as far as it goes, each with a _strain.png of how much
+ * shorter the tissue is in the direction in which it is pressed most, and tissue.csv in the directory. */
 #include "example.h"
 
 #define DAMPING 2e-3f /* N s/m: how a node is slowed down; the tissue follows the plate without swinging */
@@ -13,7 +14,7 @@
 #define HOLD 0.5      /* s: and stays */
 
 typedef struct trial {
-  const char *name, *picture;
+  const char *name, *picture, *strain_picture;
   uint32_t material;
   float poisson_ratio;
   sinew_world *world;
@@ -90,14 +91,33 @@ static void step(trial *of, const sinew_mesh_view *shape, float height, double r
   of->growth = volume(shape, nodes) / rest - 1;
 }
 
+/* The tissue coloured by its smallest principal strain, from none to as much as the plate goes down. */
+static void save_strain(const trial *of, const sinew_mesh_view *shape, const sinew_picture_def *picture, const char *directory) {
+  sinew_strain *strains = (sinew_strain *)allocate(shape->tetrahedron_count, sizeof *strains);
+  float *pressed = (float *)allocate(shape->tetrahedron_count, sizeof *pressed);
+  float *at_nodes = (float *)allocate(shape->node_count, sizeof *at_nodes);
+  char *path = path_in(directory, of->strain_picture);
+  sinew_body_values values;
+  size_t i;
+  CHECK(sinew_body_get_tetrahedron_strains(of->world, of->liver, shape->positions, shape->node_count, shape->tetrahedra,
+                                           shape->tetrahedron_count, strains));
+  for (i = 0; i < shape->tetrahedron_count; i++) pressed[i] = -strains[i].smallest;
+  CHECK(sinew_mean_at_nodes(shape->tetrahedra, 4, pressed, shape->tetrahedron_count, at_nodes, shape->node_count));
+  memset(&values, 0, sizeof values);
+  values.body = of->liver, values.values = at_nodes, values.node_count = shape->node_count;
+  values.high = (float)DEPTH, values.colours = SINEW_COLOURS_SEQUENTIAL;
+  CHECK(sinew_world_save_picture_of_values(of->world, picture, &values, 1, path));
+  free(path), free(at_nodes), free(pressed), free(strains);
+}
+
 int main(int argc, char **argv) {
   const options chosen = read_options(argc, argv, 2);
   const double scale = chosen.argument_count > 1 ? atof(chosen.arguments[1]) : 1;
   const int all_frames = (int)lround((PRESS + HOLD) / FRAME);
   const int frame_count = chosen.frame_count > 0 ? chosen.frame_count : all_frames;
   trial trials[] = {
-      {"springs", "tissue_springs.png", SINEW_MATERIAL_SPRINGS, 0, NULL, {0, 0}, {0, 0}, 0, 0},
-      {"tetrahedra", "tissue_tetrahedra.png", SINEW_MATERIAL_TETRAHEDRA, 0.45f, NULL, {0, 0}, {0, 0}, 0, 0},
+      {"springs", "tissue_springs.png", "tissue_springs_strain.png", SINEW_MATERIAL_SPRINGS, 0, NULL, {0, 0}, {0, 0}, 0, 0},
+      {"tetrahedra", "tissue_tetrahedra.png", "tissue_tetrahedra_strain.png", SINEW_MATERIAL_TETRAHEDRA, 0.45f, NULL, {0, 0}, {0, 0}, 0, 0},
   };
   const size_t trial_count = sizeof trials / sizeof *trials;
   sinew_material_preset liver;
@@ -158,6 +178,7 @@ int main(int argc, char **argv) {
   picture = camera(low, high, 1);
   for (i = 0; i < trial_count; i++) {
     save_picture(trials[i].world, &picture, chosen.directory, trials[i].picture);
+    save_strain(trials + i, &shape, &picture, chosen.directory);
     sinew_world_destroy(trials[i].world);
   }
   fclose(curve);

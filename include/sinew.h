@@ -258,6 +258,16 @@
 #define SINEW_NO_NODE UINT32_MAX
 
 /**
+ * From blue by a light grey, in the middle, to red: for values with a sign.
+ */
+#define SINEW_COLOURS_DIVERGING 0
+
+/**
+ * From a dark violet by green to a light yellow.
+ */
+#define SINEW_COLOURS_SEQUENTIAL 1
+
+/**
  * A mesh: positions, triangles, tetrahedra and cells. It belongs to the caller, never changes, and may be read by any number of
  * threads at once.
  */
@@ -661,6 +671,25 @@ typedef struct sinew_vec3_view {
 } sinew_vec3_view;
 
 /**
+ * How a triangle or tetrahedron is strained, as a part of its lengths at rest: 0 wherever it is moved and turned, 0.1 where it is a
+ * tenth longer. What has no area or volume at rest has no strain: 0.
+ */
+typedef struct sinew_strain {
+  /**
+   * Along the direction in which it is longest: the largest principal stretch, less 1.
+   */
+  float largest;
+  /**
+   * Along the direction in which it is shortest: the smallest principal stretch, less 1; from -1 on.
+   */
+  float smallest;
+  /**
+   * Of its area or volume: J - 1; below -1 for a tetrahedron that is inside out.
+   */
+  float growth;
+} sinew_strain;
+
+/**
  * J, at the time of the positions.
  */
 typedef struct sinew_energy {
@@ -1034,6 +1063,40 @@ typedef struct sinew_picture_def {
 } sinew_picture_def;
 
 /**
+ * A body that is coloured by a number for each of its nodes, such as strain or a force. Equal steps of a number look equally far apart.
+ */
+typedef struct sinew_body_values {
+  /**
+   * Which.
+   */
+  struct sinew_body_id body;
+  /**
+   * `node_count` floats, finite, in the caller's order.
+   */
+  const float *values;
+  /**
+   * The body's.
+   */
+  size_t node_count;
+  /**
+   * What has the first colour, as has what is below.
+   */
+  float low;
+  /**
+   * What has the last colour, as has what is above; above `low`.
+   */
+  float high;
+  /**
+   * SINEW_COLOURS_...
+   */
+  uint32_t colours;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_body_values;
+
+/**
  * Done.
  */
 #define SINEW_STATUS_OK 0
@@ -1389,6 +1452,148 @@ sinew_status sinew_body_remove_spring(struct sinew_world *world,
                                       uint32_t b);
 
 /**
+ * Writes the two nodes of each spring, each spring once, the lower node first: `pairs` are 2 `count` indices, `count` how many springs
+ * the body has (`spring_count` of sinew_body_get_storage_report). The order is the same until springs are added or removed.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `count` is not the body's), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `pairs` is NULL or as long as stated.
+ */
+sinew_status sinew_body_get_spring_pairs(const struct sinew_world *world,
+                                         struct sinew_body_id body,
+                                         uint32_t *pairs,
+                                         size_t count);
+
+/**
+ * Writes what the springs of `count` pairs of nodes are like now: `pairs` are 2 `count` indices; `stiffnesses`, N/m, and
+ * `rest_lengths`, m, are `count` floats each, nullable. PACKED keeps rest lengths that come from positions merged where these are
+ * rounded to the same.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
+ */
+sinew_status sinew_body_get_springs(const struct sinew_world *world,
+                                    struct sinew_body_id body,
+                                    const uint32_t *pairs,
+                                    size_t count,
+                                    float *stiffnesses,
+                                    float *rest_lengths);
+
+/**
+ * Gives the springs of `count` pairs of nodes other stiffnesses, N/m, or rest lengths, m, or both: `pairs` are 2 `count` indices,
+ * `stiffnesses` and `rest_lengths` `count` floats each, NULL: they stay. Damping stays, and the law by which springs stiffen. Of a
+ * pair that is named more than once the last counts. Positions and velocities stay, so the energy changes by what the springs then
+ * hold. It takes as long as the springs are many, however large the body.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then no
+ * spring is changed.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_set_springs(struct sinew_world *world,
+                                    struct sinew_body_id body,
+                                    const uint32_t *pairs,
+                                    size_t count,
+                                    const float *stiffnesses,
+                                    const float *rest_lengths);
+
+/**
+ * Makes what lies between `node_count` nodes alone `stiffness_factor` times as stiff and `length_factor` times as long at rest, as
+ * cautery stiffens and shrinks, and as tissue swells: springs of two of them, tetrahedra of SINEW_MATERIAL_TETRAHEDRA or with a
+ * volume_stiffness with all corners among them, bending and fibres alike. Home springs become stiffer, and draw where they did. What
+ * reaches beyond the region stays as it is, and so do masses, damping, positions and velocities: the body moves to its new shape by
+ * itself.
+ *
+ * `stiffness_factor` is at least 0, `length_factor` above 0. Factors multiply those of calls before; a stiffness of 0 is for good, and
+ * takes tetrahedra away. `nodes` may name a node more than once. It takes as long as the region is large.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where something would become so stiff, long or small that it is no number),
+ * SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then nothing is changed.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `nodes` is NULL or as long as stated.
+ */
+sinew_status sinew_body_scale_region(struct sinew_world *world,
+                                     struct sinew_body_id body,
+                                     const uint32_t *nodes,
+                                     size_t node_count,
+                                     float stiffness_factor,
+                                     float length_factor);
+
+/**
+ * Writes the strain L/L0 - 1 of `count` pairs of nodes, 0 where L0 is 0: `pairs` are 2 `count` indices, `rest_lengths` `count` floats,
+ * m, NULL: those of the springs that the pairs have (which takes longer), `strains` `count` floats.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring and `rest_lengths` is NULL), SINEW_STATUS_STALE_ID,
+ * SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
+ */
+sinew_status sinew_body_get_spring_strains(const struct sinew_world *world,
+                                           struct sinew_body_id body,
+                                           const uint32_t *pairs,
+                                           const float *rest_lengths,
+                                           size_t count,
+                                           float *strains);
+
+/**
+ * Writes the strain of `triangle_count` triangles of a body's nodes, any, such as those of its surface: `rest_positions` are 3
+ * `node_count` floats, m, where its nodes are at rest, or were when strain is to be counted from; `triangles` 3 `triangle_count`
+ * indices.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
+ */
+sinew_status sinew_body_get_triangle_strains(const struct sinew_world *world,
+                                             struct sinew_body_id body,
+                                             const float *rest_positions,
+                                             size_t node_count,
+                                             const uint32_t *triangles,
+                                             size_t triangle_count,
+                                             struct sinew_strain *strains);
+
+/**
+ * Writes the strain of `tetrahedron_count` tetrahedra of a body's nodes, any: `rest_positions` as for sinew_body_get_triangle_strains,
+ * `tetrahedra` 4 `tetrahedron_count` indices.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
+ */
+sinew_status sinew_body_get_tetrahedron_strains(const struct sinew_world *world,
+                                                struct sinew_body_id body,
+                                                const float *rest_positions,
+                                                size_t node_count,
+                                                const uint32_t *tetrahedra,
+                                                size_t tetrahedron_count,
+                                                struct sinew_strain *strains);
+
+/**
+ * Writes for each of `node_count` nodes the mean of the values of its elements, 0 where it has none, as to draw strain with
+ * sinew_world_save_picture_of_values: `elements` are `corners` `element_count` node indices, `corners` 2, 3 or 4, `values`
+ * `element_count` floats, finite, `means` `node_count` floats.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * The arrays are NULL or as long as stated, and do not overlap.
+ */
+sinew_status sinew_mean_at_nodes(const uint32_t *elements,
+                                 uint32_t corners,
+                                 const float *values,
+                                 size_t element_count,
+                                 float *means,
+                                 size_t node_count);
+
+/**
  * Writes the energy of a body. `out->struct_size` is set by the caller.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
@@ -1641,6 +1846,20 @@ sinew_status sinew_picture_def_init(struct sinew_picture_def *def, size_t struct
 sinew_status sinew_world_save_picture(const struct sinew_world *world,
                                       const struct sinew_picture_def *def,
                                       const char *path);
+
+/**
+ * The same with `count` bodies coloured by numbers, each body once; which numbers have which colours is in their `low` and `high`.
+ *
+ * Errors: those of sinew_world_save_picture, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * As for sinew_world_save_picture; `coloured` is NULL or as long as stated, with arrays of the lengths that they state.
+ */
+sinew_status sinew_world_save_picture_of_values(const struct sinew_world *world,
+                                                const struct sinew_picture_def *def,
+                                                const struct sinew_body_values *coloured,
+                                                size_t count,
+                                                const char *path);
 
 #ifdef __cplusplus
 }  // extern "C"

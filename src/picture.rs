@@ -6,8 +6,8 @@ use crate::body::{Body, finite_vector};
 use crate::contact::{Shape, Tool};
 use crate::error::{Error, Result};
 use crate::mesh::is_closed;
-use crate::raster::{self, Camera, Image, Lines, Look, Scene, Surface};
-use crate::world::World;
+use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
+use crate::world::{BodyId, World};
 
 /// How a world is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,31 +40,62 @@ impl Default for PictureDefinition {
     }
 }
 
+/// A body that is coloured by a number for each of its nodes, such as strain or a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyValues<'a> {
+    /// Which.
+    pub body: BodyId,
+    /// For each node, in the caller's order.
+    pub values: &'a [f32],
+    /// What colours they have.
+    pub scale: ColourScale,
+}
+
 impl World {
     /// A picture of all bodies and tools: the surface of a body, or its springs where it has none.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: something in the definition is out of its range. [`Error::OutOfMemory`].
     pub fn picture(&self, definition: &PictureDefinition) -> Result<Image> {
+        self.picture_of_values(definition, &[])
+    }
+
+    /// The same with some bodies coloured by numbers; what values stand for which colours is the caller's to tell.
+    ///
+    /// # Errors
+    /// As [`World::picture`]; and [`Error::InvalidArgument`]: not one value for each node, one that is not finite, or a scale whose
+    /// `low` is not below `high`. [`Error::StaleId`].
+    pub fn picture_of_values(&self, definition: &PictureDefinition, coloured: &[BodyValues]) -> Result<Image> {
+        for of in coloured {
+            self.body(of.body)?;
+        }
         let springs = self.springs_to_draw()?;
         let mut scene = Scene::default();
         for (body, springs) in self.bodies().zip(&springs) {
+            let is_this = |of: &&BodyValues| self.body(of.body).is_ok_and(|other| std::ptr::eq(body, other));
+            let coloured = coloured.iter().find(is_this).map(|of| Coloured {
+                values: of.values,
+                scale: of.scale,
+            });
+            let look = |look| if coloured.is_some() { Look::CHART } else { look };
             if body.surface().is_empty() {
                 scene.lines.push(Lines {
                     positions: body.positions(),
                     pairs: springs,
                     thickness: 2.0,
-                    look: Look::SPRINGS,
+                    look: look(Look::SPRINGS),
+                    coloured,
                 });
             } else {
                 scene.surfaces.push(Surface {
                     positions: body.positions(),
                     triangles: body.surface(),
-                    look: if is_closed(body.surface())? {
+                    look: look(if is_closed(body.surface())? {
                         Look::TISSUE
                     } else {
                         Look::CLOTH
-                    },
+                    }),
+                    coloured,
                 });
             }
         }

@@ -238,6 +238,7 @@ fn red_and_blue(order: [usize; 2]) -> Image {
             positions: &squares[i],
             triangles: &triangles,
             look: looks[i],
+            coloured: None,
         });
     }
     let camera = Camera {
@@ -394,12 +395,14 @@ fn broken_triangles_neither_draw_nor_hang() {
         positions: &positions,
         triangles: &[[0, 1, 2], [0, 0, 1], [0, 1, 1]],
         look: Look::CLOTH,
+        coloured: None,
     });
     scene.lines.push(Lines {
         positions: &positions,
         pairs: &[[0, 2], [1, 1]],
         thickness: 2.0,
         look: Look::SPRINGS,
+        coloured: None,
     });
     for radius in [0.0, f32::NAN, f32::INFINITY] {
         let sphere = Shape::Sphere { centre: a, radius };
@@ -445,6 +448,7 @@ fn wrong_arguments_are_refused() {
         positions: &[Vec3::ZERO, Vec3::X],
         triangles: &[[0, 1, 2]],
         look: Look::TISSUE,
+        coloured: None,
     });
     refused(scene.draw(&camera, 10, 10));
 }
@@ -465,6 +469,7 @@ fn a_hidden_instrument_shows_through() {
             positions: &positions,
             triangles: &[[0, 1, 2], [0, 2, 3]],
             look: Look::CLOTH,
+            coloured: None,
         });
         let ball = Shape::Sphere {
             centre: Vec3::ZERO,

@@ -439,7 +439,7 @@ fn plural(name: &str) -> String {
 }
 
 /// Checks that each element joins existing nodes, no node twice.
-fn node_indices<const N: usize>(name: &str, elements: &[[u32; N]], nodes: usize) -> Result<()> {
+pub(crate) fn node_indices<const N: usize>(name: &str, elements: &[[u32; N]], nodes: usize) -> Result<()> {
     for (index, element) in elements.iter().enumerate() {
         for (corner, &node) in element.iter().enumerate() {
             if node as usize >= nodes {

@@ -228,14 +228,9 @@ impl Body {
         }
         self.forget_rates();
         self.make_up_for_spring(Link::ends(&spring), -1.0);
-        self.scale_for_springs(nodes);
-        let stability = self.carry.stability;
-        let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-        };
-        let positions = self.state.positions();
-        self.carry.stability = stability.joined(nodes, &*self.springs, masses, positions, &mut self.watched);
+        let nodes = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
+        self.scale_for_springs(&nodes);
+        self.see_stability_of(&nodes);
         Ok(())
     }
 
@@ -265,13 +260,7 @@ impl Body {
     }
 
     fn remove_own_spring(&mut self, [a, b]: [u32; 2], [own_a, own_b]: [u32; 2]) -> Result<()> {
-        let mut link = None;
-        self.springs.visit(own_a as usize, &mut |other| {
-            if other.neighbour == own_b {
-                link = Some(other);
-            }
-        });
-        let link = link.ok_or_else(|| not_joined(a, b))?;
+        let link = self.link([own_a, own_b]).ok_or_else(|| not_joined(a, b))?;
         self.springs.remove(own_a, own_b)?;
         self.forces_current = false;
         self.forget_rates();
@@ -288,7 +277,7 @@ impl Body {
             .as_ref()
             .is_some_and(|scaling| scaling.concerns([own_a, own_b]))
         {
-            self.scale_for_springs([own_a, own_b]);
+            self.scale_for_springs(&[own_a, own_b]);
         }
         // What was stable still is; nothing limits what has no springs.
         if self.springs.spring_count() == 0 {
@@ -297,8 +286,20 @@ impl Body {
         Ok(())
     }
 
+    /// Makes what is known of the longest stable substep true again after springs of these nodes, given in order, have come or
+    /// changed.
+    pub(super) fn see_stability_of(&mut self, nodes: &[u32]) {
+        let stability = self.carry.stability;
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        let positions = self.state.positions();
+        self.carry.stability = stability.changed(nodes, &*self.springs, masses, positions, &mut self.watched);
+    }
+
     /// Masses, pins or springs are not what they were.
-    fn forget_rates(&mut self) {
+    pub(super) fn forget_rates(&mut self) {
         if let Some(elements) = &mut self.elements {
             elements.forget_rates();
         }
@@ -330,14 +331,14 @@ impl Body {
     }
 
     /// Sees that other springs may ask for other masses of these nodes.
-    fn scale_for_springs(&mut self, nodes: [u32; 2]) {
+    pub(super) fn scale_for_springs(&mut self, nodes: &[u32]) {
         if self.carry.masses_for > 0.0 {
             // What closes the step is made with the masses that it was taken with.
             close(self);
         }
         if let Some(scaling) = &mut self.scaling {
             let rates = self.damping.as_ref().map(|damping| damping.rates());
-            for node in nodes {
+            for &node in nodes {
                 scaling.change(node, &*self.springs, &self.masses, rates);
             }
         }
@@ -364,7 +365,7 @@ impl Body {
         }
     }
 
-    fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+    pub(super) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
         if (node as usize) < self.node_count() {
             return Ok(());
         }
@@ -375,7 +376,7 @@ impl Body {
     }
 
     /// The body's own numbers of two nodes that a spring may join.
-    fn check_pair(&self, a: u32, b: u32) -> Result<[u32; 2]> {
+    pub(super) fn check_pair(&self, a: u32, b: u32) -> Result<[u32; 2]> {
         self.check_node(&"a", a)?;
         self.check_node(&"b", b)?;
         if a == b {

@@ -5,13 +5,16 @@ mod damping;
 mod definition;
 mod edit;
 mod hash;
+mod nodes;
 mod order;
 mod origin;
 mod past;
 mod pins;
 mod published;
 mod records;
+mod region;
 mod state;
+mod tune;
 mod vectors;
 
 use glam::{BVec3, DVec3, Vec3};
@@ -19,9 +22,13 @@ use glam::{BVec3, DVec3, Vec3};
 pub(crate) use coarse::CoarseStep;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
-pub(crate) use definition::{SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, not_negative};
+pub(crate) use definition::{
+    SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices, not_negative,
+};
+pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
+pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
 use crate::contact::Contacts;

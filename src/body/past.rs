@@ -2,7 +2,7 @@
 
 use super::Body;
 use crate::elements::Elements;
-use crate::material::Viscosity;
+use crate::material::{Course, Viscosity};
 use crate::solver::write_records;
 use crate::terms::Terms;
 use crate::threads::Team;
@@ -13,6 +13,8 @@ enum Lapse {
     /// s
     Seconds(f64),
     AtOnce,
+    /// Nothing was deformed.
+    Nothing,
     /// So long that all is relaxed.
     Forever,
 }
@@ -68,6 +70,14 @@ impl Body {
         }
     }
 
+    /// What is elastic has changed where nodes are: arms hold what they held.
+    pub(super) fn measure_anew(&mut self) {
+        if self.remembers() {
+            self.lapse(Lapse::Nothing, false, &Team::alone());
+            self.keep();
+        }
+    }
+
     /// Nothing that is viscous holds anything with the nodes where they are.
     pub(super) fn relax(&mut self) {
         self.release();
@@ -90,6 +100,7 @@ impl Body {
         let course = |viscosity: Viscosity| match lapse {
             Lapse::Seconds(time) => viscosity.over(time),
             Lapse::AtOnce => viscosity.at_once(),
+            Lapse::Nothing => Course { decay: 1.0, gain: 0.0 },
             Lapse::Forever => Viscosity::default().over(1.0),
         };
         if let (Some(elements), Some(records)) = (&mut self.elements, &mut self.records)

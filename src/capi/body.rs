@@ -77,7 +77,7 @@ pub(super) unsafe fn with_body(
 ///
 /// # Safety
 /// `world` is NULL or a world that nobody else uses.
-unsafe fn with_body_mut(
+pub(super) unsafe fn with_body_mut(
     world: *mut sinew_world,
     body: sinew_body_id,
     call: impl FnOnce(&mut Body) -> Result<()>,

@@ -88,6 +88,36 @@ pub(super) unsafe fn optional_array<'a, T>(name: &str, pointer: *const T, count:
     unsafe { array(name, pointer, count) }.map(Some)
 }
 
+/// The place for `count` results; NULL is allowed where `count` is 0.
+///
+/// # Safety
+/// `pointer` is NULL or points to `count` valid values that nobody else uses meanwhile.
+pub(super) unsafe fn output_array<'a, T>(name: &str, pointer: *mut T, count: usize) -> Result<&'a mut [T]> {
+    // SAFETY: the same contract.
+    let values = unsafe { array(name, pointer.cast_const(), count) }?;
+    if values.is_empty() {
+        return Ok(&mut []);
+    }
+    // SAFETY: not NULL, aligned, of a size that exists; the caller vouches for its content.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
+}
+
+/// A place for results that may be left out altogether.
+///
+/// # Safety
+/// As [`output_array`].
+pub(super) unsafe fn optional_output_array<'a, T>(
+    name: &str,
+    pointer: *mut T,
+    count: usize,
+) -> Result<Option<&'a mut [T]>> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the same contract.
+    unsafe { output_array(name, pointer, count) }.map(Some)
+}
+
 /// The 3 floats that `pointer` points to.
 ///
 /// # Safety

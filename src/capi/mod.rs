@@ -18,6 +18,10 @@ pub mod definition;
 
 pub mod body;
 
+pub mod springs;
+
+pub mod strain;
+
 pub mod report;
 
 pub mod material;

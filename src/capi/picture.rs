@@ -3,11 +3,13 @@
 use glam::Vec3;
 use libc::c_char;
 
+use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::error::Result;
-use crate::picture::PictureDefinition;
+use crate::error::{Error, Result};
+use crate::picture::{BodyValues, PictureDefinition};
+use crate::raster::{ColourScale, Colours};
 
 /// How a world is drawn. Filled by sinew_picture_def_init.
 #[repr(C)]
@@ -81,6 +83,53 @@ pub unsafe extern "C" fn sinew_picture_def_init(def: *mut sinew_picture_def, str
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_picture_def::defaults()) })
 }
 
+/// From blue by a light grey, in the middle, to red: for values with a sign.
+pub const SINEW_COLOURS_DIVERGING: u32 = 0;
+/// From a dark violet by green to a light yellow.
+pub const SINEW_COLOURS_SEQUENTIAL: u32 = 1;
+
+/// A body that is coloured by a number for each of its nodes, such as strain or a force. Equal steps of a number look equally far apart.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_body_values {
+    /// Which.
+    pub body: sinew_body_id,
+    /// `node_count` floats, finite, in the caller's order.
+    pub values: *const f32,
+    /// The body's.
+    pub node_count: usize,
+    /// What has the first colour, as has what is below.
+    pub low: f32,
+    /// What has the last colour, as has what is above; above `low`.
+    pub high: f32,
+    /// SINEW_COLOURS_...
+    pub colours: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+impl sinew_body_values {
+    /// # Safety
+    /// `values` is NULL or as long as stated.
+    unsafe fn values<'a>(&self) -> Result<BodyValues<'a>> {
+        memory::reserved("reserved", self.reserved)?;
+        Ok(BodyValues {
+            body: self.body.id(),
+            // SAFETY: the same contract.
+            values: unsafe { memory::array("values", self.values, self.node_count) }?,
+            scale: ColourScale {
+                colours: match self.colours {
+                    SINEW_COLOURS_DIVERGING => Colours::Diverging,
+                    SINEW_COLOURS_SEQUENTIAL => Colours::Sequential,
+                    other => return Err(Error::invalid(format!("colours is {other}: there are no such colours"))),
+                },
+                low: self.low,
+                high: self.high,
+            },
+        })
+    }
+}
+
 /// Draws all bodies and tools into a PNG file: the surface of a body, or its springs where it has none. `def` may be NULL:
 /// the defaults. `path` is UTF-8; a file that exists is replaced, once the whole picture is written.
 ///
@@ -99,14 +148,49 @@ pub unsafe extern "C" fn sinew_world_save_picture(
     // SAFETY: the same contract.
     unsafe {
         with_world(world, |world| {
-            let defaults = sinew_picture_def::defaults();
-            let def = if def.is_null() {
-                defaults
-            } else {
-                memory::definition("def", def, defaults)?
-            };
             let path = memory::text("path", path)?;
-            world.picture(&def.definition()?)?.write_png(path)
+            world.picture(&definition(def)?)?.write_png(path)
         })
     }
+}
+
+/// The same with `count` bodies coloured by numbers, each body once; which numbers have which colours is in their `low` and `high`.
+///
+/// Errors: those of sinew_world_save_picture, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// As for sinew_world_save_picture; `coloured` is NULL or as long as stated, with arrays of the lengths that they state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_save_picture_of_values(
+    world: *const sinew_world,
+    def: *const sinew_picture_def,
+    coloured: *const sinew_body_values,
+    count: usize,
+    path: *const c_char,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let coloured = memory::array("coloured", coloured, count)?;
+            let mut values = crate::memory::reserved(count)?;
+            for of in coloured {
+                values.push(of.values()?);
+            }
+            let picture = world.picture_of_values(&definition(def)?, &values)?;
+            picture.write_png(memory::text("path", path)?)
+        })
+    }
+}
+
+/// What `def` asks for; NULL: the defaults.
+///
+/// # Safety
+/// `def` is NULL or a definition of the size that it states.
+unsafe fn definition(def: *const sinew_picture_def) -> Result<PictureDefinition> {
+    let defaults = sinew_picture_def::defaults();
+    if def.is_null() {
+        return defaults.definition();
+    }
+    // SAFETY: the same contract.
+    unsafe { memory::definition("def", def, defaults) }?.definition()
 }

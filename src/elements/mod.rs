@@ -9,6 +9,7 @@ mod memory;
 mod parts;
 mod rates;
 mod rings;
+mod scale;
 mod set;
 
 use glam::{DMat3, DVec3};
@@ -483,6 +484,7 @@ impl Elements {
     pub fn hash(&self, hasher: &mut StateHasher) {
         for group in self.parts.iter().flat_map(|part| part.groups.as_slice()) {
             hasher.write_floats(&group.volumes);
+            hasher.write_floats(group.inverse.as_flattened());
         }
         if let Some(memory) = &self.memory {
             memory.hash(hasher);

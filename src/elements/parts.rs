@@ -9,7 +9,7 @@ use crate::memory;
 use crate::springs::{GROUP, Group, Groups, TILE, tile_count};
 
 /// Tetrahedra of a part: so few that its nodes stay in the nearest cache, and their numbers are small.
-const PART: usize = 4096;
+pub(super) const PART: usize = 4096;
 
 /// Some tetrahedra, and their nodes.
 #[derive(Debug)]

@@ -1,10 +1,11 @@
 //! A scene as one list of triangles, ready to be rasterised.
 
+use super::scale::{ColourScale, Coloured};
 use super::scene::{Lines, Look, Scene, Shape, Surface};
 use super::shade::linear;
 use super::tessellate::{self, Tessellation};
 use super::view::View;
-use crate::{Error, Result};
+use crate::{Error, Result, memory};
 use glam::Vec3;
 
 /// Everything in a scene as triangles.
@@ -24,6 +25,27 @@ pub(crate) struct Part {
     /// The look's colour as light.
     pub colour: Vec3,
     pub kind: Kind,
+    /// What it is coloured by.
+    pub chart: Option<Chart>,
+}
+
+/// Numbers that a part is coloured by.
+pub(crate) struct Chart {
+    scale: ColourScale,
+    /// The part's first position.
+    first: u32,
+    /// One for each of its positions.
+    values: Vec<f32>,
+}
+
+impl Chart {
+    fn new(coloured: &Coloured, first: usize, count: usize) -> Result<Self> {
+        Ok(Self {
+            scale: coloured.scale,
+            first: first as u32,
+            values: memory::reserved(count)?,
+        })
+    }
 }
 
 /// What a part is, as far as light is concerned.
@@ -77,6 +99,12 @@ impl Geometry {
             surface.positions.len(),
             surface.triangles.len(),
         )?;
+        if let Some(coloured) = &surface.coloured {
+            coloured.check(surface.positions.len())?;
+            let mut chart = Chart::new(coloured, first as usize, coloured.values.len())?;
+            chart.values.extend_from_slice(coloured.values);
+            self.set_chart(chart);
+        }
         self.positions.extend_from_slice(surface.positions);
         self.normals.resize(self.positions.len(), Vec3::ZERO);
         tessellate::add_vertex_normals(
@@ -92,6 +120,11 @@ impl Geometry {
         check_indices(lines.pairs.as_flattened(), lines.positions.len())?;
         let count = lines.pairs.len();
         self.begin(lines.look, Kind::Thread, 4 * count, 2 * count)?;
+        let mut chart = None;
+        if let Some(coloured) = &lines.coloured {
+            coloured.check(lines.positions.len())?;
+            chart = Some(Chart::new(coloured, self.positions.len(), 4 * count)?);
+        }
         let eye = view.origin().as_vec3();
         let half_pixels = (f64::from(lines.thickness) / 1000.0 * f64::from(height) / 2.0).max(0.25);
         for pair in lines.pairs {
@@ -106,9 +139,22 @@ impl Geometry {
                 self.positions.extend(positions);
                 self.normals.extend(normals);
                 self.add_triangles(first, &triangles);
+                if let (Some(chart), Some(coloured)) = (&mut chart, &lines.coloured) {
+                    let [a, b] = pair.map(|node| coloured.values[node as usize]);
+                    chart.values.extend([a, b, b, a]);
+                }
             }
         }
+        if let Some(chart) = chart {
+            self.set_chart(chart);
+        }
         Ok(())
+    }
+
+    fn set_chart(&mut self, chart: Chart) {
+        if let Some(part) = self.parts.last_mut() {
+            part.chart = Some(chart);
+        }
     }
 
     fn add_shape(&mut self, shape: &Shape, look: &Look, eye: Vec3, (middle, radius): (Vec3, f32)) -> Result<()> {
@@ -165,6 +211,7 @@ impl Geometry {
             look,
             colour: linear(look.colour),
             kind,
+            chart: None,
         });
         u32::try_from(self.positions.len()).map_err(|_| too_many())
     }
@@ -184,6 +231,16 @@ impl Geometry {
     /// The corners of a triangle.
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|index| self.positions[index as usize])
+    }
+
+    /// The colour inside a triangle, as light.
+    pub fn colour(&self, triangle: u32, weights: [f32; 3]) -> Vec3 {
+        let part = self.part(triangle);
+        let Some(Chart { scale, first, values }) = &part.chart else {
+            return part.colour;
+        };
+        let corners = self.triangles[triangle as usize].map(|index| values[(index - first) as usize]);
+        scale.colour((0..3).map(|i| corners[i] * weights[i]).sum())
     }
 
     /// The smooth normal inside a triangle, towards the eye; and whether that is its outside.

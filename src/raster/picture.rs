@@ -271,7 +271,7 @@ impl<'a> Painter<'a> {
         // Normals change little within a pixel of one surface.
         let (normal, front) = self.geometry.normal(first.triangle, first.all_weights(), to_eye);
         let footprint = self.view.metres_per_pixel(f64::from(depth)) as f32 * FINE as f32;
-        let mut colour = part.colour;
+        let mut colour = self.geometry.colour(first.triangle, first.all_weights());
         let mut remaining = 1.0;
         if let Kind::Ground(pattern) = &part.kind {
             let facing = normal.dot(to_eye).max(0.1);

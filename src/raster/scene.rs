@@ -1,6 +1,7 @@
 //! What a picture shows.
 
 use super::camera::Camera;
+use super::scale::Coloured;
 use crate::Result;
 use glam::Vec3;
 
@@ -57,6 +58,15 @@ impl Look {
         show_through: 0.0,
     };
 
+    /// What is coloured by numbers: dull, so that light changes its colours little.
+    pub const CHART: Look = Look {
+        colour: [0.8, 0.8, 0.8],
+        gloss: 0.15,
+        two_sided: true,
+        mesh_edges: 0.0,
+        show_through: 0.0,
+    };
+
     /// Springs of a body that has no surface.
     pub const SPRINGS: Look = Look {
         colour: [0.70, 0.33, 0.27],
@@ -86,6 +96,8 @@ pub struct Surface<'a> {
     pub triangles: &'a [[u32; 3]],
     /// How it looks.
     pub look: Look,
+    /// Numbers that it is coloured by; `None`: as it looks.
+    pub coloured: Option<Coloured<'a>>,
 }
 
 /// Straight lines between points, such as springs.
@@ -99,6 +111,8 @@ pub struct Lines<'a> {
     pub thickness: f32,
     /// How they look.
     pub look: Look,
+    /// Numbers that they are coloured by; `None`: as they look.
+    pub coloured: Option<Coloured<'a>>,
 }
 
 /// The shape of an instrument or of the surroundings, in world coordinates.
@@ -138,7 +152,7 @@ pub enum Shape {
 ///
 /// let positions = [Vec3::ZERO, Vec3::X, Vec3::NEG_Z];
 /// let mut scene = Scene::default();
-/// scene.surfaces.push(Surface { positions: &positions, triangles: &[[0, 1, 2]], look: Look::CLOTH });
+/// scene.surfaces.push(Surface { positions: &positions, triangles: &[[0, 1, 2]], look: Look::CLOTH, coloured: None });
 /// let ball = Shape::Sphere { centre: Vec3::new(0.3, 0.2, -0.3), radius: 0.2 };
 /// scene.shapes.push((ball, Look::INSTRUMENT));
 /// let camera = scene.camera(Vec3::new(1.0, 0.6, 1.4), Vec3::Y, 0.6, 4.0 / 3.0)?;

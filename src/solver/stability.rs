@@ -24,6 +24,9 @@ const TRAVEL_BEFORE_ESTIMATE: f32 = 0.25;
 /// even lattices in three dimensions. A moving body would pay for that with the time of several substeps every few substeps.
 const WORTH_LENGTHENING: f32 = 2.0;
 
+/// So few nodes are sorted into those that are watched one by one.
+const FEW: usize = 8;
+
 /// What bounds the frequencies and the dampings of a node and its springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rates {
@@ -198,10 +201,11 @@ impl Stability {
         }
     }
 
-    /// The same after these nodes got another spring: no other node has to be looked at.
-    pub fn joined(
+    /// The same after springs of these nodes, given in order, have come or changed: no other node has to be looked at. Where they
+    /// became softer it may be lower than it has to be.
+    pub fn changed(
         self,
-        nodes: [u32; 2],
+        nodes: &[u32],
         springs: &dyn Springs,
         masses: Masses,
         positions: &Vectors,
@@ -214,11 +218,17 @@ impl Stability {
             limit: now,
             shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
         };
-        for node in nodes {
+        let is_few = nodes.len() <= FEW;
+        if !is_few {
+            watched.renew(nodes, springs, masses);
+        }
+        for &node in nodes {
             let Some(sums) = Sums::of(node as usize, springs, &masses, positions) else {
                 continue;
             };
-            watched.insert(node, sums.anywhere.limit());
+            if is_few {
+                watched.insert(node, sums.anywhere.limit());
+            }
             if self.is_coarse() {
                 found.limit = found.limit.min(sums.anywhere.limit());
             } else {

@@ -51,8 +51,10 @@ impl Watched {
     }
 
     /// The longest substep that is stable for all nodes wherever they are, s.
-    pub(super) fn limit(&self) -> f32 {
-        self.candidates.first().map_or(f32::INFINITY, |first| first.limit)
+    pub fn limit(&self) -> f32 {
+        // Springs of the first may have become softer than those of others.
+        let first = self.candidates.first();
+        first.map_or(self.others, |first| first.limit.min(self.others))
     }
 
     /// What the limit of any node that is not watched is at least, s.
@@ -68,13 +70,7 @@ impl Watched {
             if let Some(rates) = Rates::anywhere(node, springs, &masses) {
                 let limit = rates.limit();
                 if limit < self.others {
-                    self.candidates.push(Candidate {
-                        limit,
-                        node: node as u32,
-                    });
-                }
-                if self.candidates.len() == 2 * self.most {
-                    self.keep_first();
+                    self.take(node as u32, limit);
                 }
             }
         }
@@ -88,6 +84,30 @@ impl Watched {
             self.candidates.select_nth_unstable_by(self.most, Candidate::before);
             self.others = self.candidates[self.most].limit;
             self.candidates.truncate(self.most);
+        }
+    }
+
+    /// Sees that the springs of these nodes have changed, given in order.
+    pub(super) fn renew(&mut self, nodes: &[u32], springs: &dyn Springs, masses: Masses) {
+        self.candidates
+            .retain(|candidate| nodes.binary_search(&candidate.node).is_err());
+        for &node in nodes {
+            if let Some(rates) = Rates::anywhere(node as usize, springs, &masses) {
+                let limit = rates.limit();
+                if limit <= self.others {
+                    self.take(node, limit);
+                }
+            }
+        }
+        self.keep_first();
+        self.candidates.sort_unstable_by(Candidate::before);
+    }
+
+    /// Takes in a node that is not here.
+    fn take(&mut self, node: u32, limit: f32) {
+        self.candidates.push(Candidate { limit, node });
+        if self.candidates.len() == 2 * self.most {
+            self.keep_first();
         }
     }
 

@@ -10,7 +10,7 @@ use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::kernels::{Eights, prefetch};
-use super::{ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::{Change, ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
@@ -85,6 +85,21 @@ impl<L: KeptLink> Bulks<L> {
         }
         if let Some(bulk) = self.open()
             && let Some(place) = empty_place(bulk)
+        {
+            bulk[place] = L::of(link);
+        }
+    }
+
+    /// Puts another link to the same neighbour in the place of one.
+    fn replace(&mut self, link: &Link) {
+        let has = |bulk: &Bulk<L>| place_of(bulk, link.neighbour).is_some();
+        let bulk = if has(&self.first) {
+            Some(&mut self.first)
+        } else {
+            self.more.find_mut(has)
+        };
+        if let Some(bulk) = bulk
+            && let Some(place) = place_of(bulk, link.neighbour)
         {
             bulk[place] = L::of(link);
         }
@@ -240,6 +255,13 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
             }
         }
         self.spring_count -= 1;
+        Ok(())
+    }
+
+    fn set(&mut self, changes: &[Change]) -> Result<()> {
+        for (node, link) in changes.iter().flat_map(Change::ends) {
+            self.nodes[node as usize].replace(&link);
+        }
         Ok(())
     }
 }

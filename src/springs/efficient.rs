@@ -9,7 +9,7 @@ use super::ends::Ends;
 use super::gather::Gather;
 use super::kept::{DampedLink, KeptLink};
 use super::kernels::prefetch;
-use super::{Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::{Change, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
@@ -136,6 +136,15 @@ impl Springs for Efficient {
             }
         }
         self.spring_count -= 1;
+        Ok(())
+    }
+
+    fn set(&mut self, changes: &[Change]) -> Result<()> {
+        for (node, link) in changes.iter().flat_map(Change::ends) {
+            if let Some(kept) = self.lists[node as usize].find_mut(|kept| kept.neighbour() == link.neighbour) {
+                *kept = DampedLink::of(&link);
+            }
+        }
         Ok(())
     }
 }

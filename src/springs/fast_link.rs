@@ -7,7 +7,7 @@ use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::kernels::Eights;
-use super::{ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::{Change, ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
 use crate::body::Spring;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -144,6 +144,16 @@ impl<L: KeptLink> Springs for FastLink<L> {
             vacate(self.row_mut(node), place);
         }
         self.spring_count -= 1;
+        Ok(())
+    }
+
+    fn set(&mut self, changes: &[Change]) -> Result<()> {
+        for (node, link) in changes.iter().flat_map(Change::ends) {
+            let row = self.row_mut(node);
+            if let Some(place) = place_of(row, link.neighbour) {
+                row[place] = L::of(&link);
+            }
+        }
         Ok(())
     }
 }

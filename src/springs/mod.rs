@@ -57,6 +57,26 @@ impl Link {
     }
 }
 
+/// A spring that is to have another stiffness and rest length, as its node with the lower number sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Change {
+    pub node: u32,
+    pub before: Link,
+    /// To the same neighbour, with the same damping.
+    pub after: Link,
+}
+
+impl Change {
+    /// Its nodes, each with what it sees then.
+    pub fn ends(&self) -> [(u32, Link); 2] {
+        let other = Link {
+            neighbour: self.node,
+            ..self.after
+        };
+        [(self.node, self.after), (self.after.neighbour, other)]
+    }
+}
+
 /// What spring forces depend on, and what is wanted next.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion<'a> {
@@ -153,6 +173,9 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// Removes the spring between `a` and `b`; refused where there is none.
     fn remove(&mut self, a: u32, b: u32) -> Result<()>;
+
+    /// Gives springs that there are, each once, other stiffnesses and rest lengths. Changes nothing where it fails.
+    fn set(&mut self, changes: &[Change]) -> Result<()>;
 }
 
 /// `springs`, kept as a body's definition asks.

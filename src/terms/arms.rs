@@ -166,6 +166,27 @@ impl Law<2> for Arms {
         [[block, -block], [-block, block]]
     }
 
+    fn scaled(&self, arm: &Arm, length: f64) -> (Arm, f64) {
+        let rest_length = (f64::from(arm.rest_length) * length) as f32;
+        (Arm { rest_length, ..*arm }, 1.0)
+    }
+
+    fn is_finite(&self, arm: &Arm) -> bool {
+        arm.rest_length.is_finite()
+    }
+
+    fn size(&self, arm: &Arm) -> f32 {
+        arm.rest_length
+    }
+
+    fn shape_of_spring(&self, before: &Arm, rest_length: f32) -> Option<Arm> {
+        Some(Arm { rest_length, ..*before })
+    }
+
+    fn is_of_springs(&self) -> bool {
+        true
+    }
+
     /// What viscosity makes of rates is that of all springs and terms together.
     fn rate(&self, _arm: &Arm, _inverse_masses: [f64; 2]) -> f64 {
         0.0

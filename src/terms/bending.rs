@@ -312,6 +312,25 @@ impl Law<4> for Hinges {
         longest + 0.25 * bent.turn.length()
     }
 
+    fn scaled(&self, shape: &Shape, length: f64) -> (Shape, f64) {
+        let over = |number: f32| (f64::from(number) / length) as f32;
+        let scaled = Shape {
+            inverse_heights: shape.inverse_heights.map(over),
+            sine: over(shape.sine),
+            ..*shape
+        };
+        (scaled, 1.0)
+    }
+
+    fn is_finite(&self, shape: &Shape) -> bool {
+        let [first, second] = shape.inverse_heights;
+        first.is_finite() && second.is_finite() && shape.sine.is_finite()
+    }
+
+    fn size(&self, shape: &Shape) -> f32 {
+        shape.inverse_heights[0]
+    }
+
     fn is_edge(&self, a: usize, b: usize) -> bool {
         a < 2 || b < 2
     }

@@ -125,6 +125,22 @@ impl Law<4> for Fibres {
         shares.map(|a| shares.map(|b| stiffness * (a * b)))
     }
 
+    fn scaled(&self, weights: &[f32; 3], length: f64) -> ([f32; 3], f64) {
+        // As long at rest as its tetrahedron, whose volume is part of its stiffness.
+        (
+            weights.map(|weight| (f64::from(weight) / length) as f32),
+            length.powi(3),
+        )
+    }
+
+    fn is_finite(&self, weights: &[f32; 3]) -> bool {
+        weights.iter().all(|weight| weight.is_finite())
+    }
+
+    fn size(&self, weights: &[f32; 3]) -> f32 {
+        weights.iter().fold(0.0, |size, weight| size.max(weight.abs()))
+    }
+
     fn rate(&self, weights: &[f32; 3], inverse_masses: [f64; 4]) -> f64 {
         let nodes = shares(weights).into_iter().zip(inverse_masses);
         nodes.map(|(share, inverse_mass)| share * share * inverse_mass).sum()

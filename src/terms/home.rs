@@ -64,6 +64,14 @@ impl Law<1> for Home {
         inverse_mass
     }
 
+    fn scaled(&self, shape: &Shape, _length: f64) -> (Shape, f64) {
+        (*shape, 1.0)
+    }
+
+    fn is_finite(&self, _shape: &Shape) -> bool {
+        true
+    }
+
     fn move_origin(&self, shape: &mut Shape, origin: DVec3) {
         shape.local = (shape.rest.as_dvec3() - origin).as_vec3();
     }

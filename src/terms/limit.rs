@@ -115,6 +115,26 @@ impl Law<2> for Limit {
         [[block, -block], [-block, block]]
     }
 
+    fn scaled(&self, rest_length: &f32, length: f64) -> (f32, f64) {
+        ((f64::from(*rest_length) * length) as f32, 1.0)
+    }
+
+    fn is_finite(&self, rest_length: &f32) -> bool {
+        rest_length.is_finite()
+    }
+
+    fn size(&self, rest_length: &f32) -> f32 {
+        *rest_length
+    }
+
+    fn shape_of_spring(&self, _before: &f32, rest_length: f32) -> Option<f32> {
+        (rest_length > 0.0).then_some(rest_length)
+    }
+
+    fn is_of_springs(&self) -> bool {
+        true
+    }
+
     /// Nothing below the limit; beyond it the spring is so many times as stiff.
     fn rate(&self, _rest_length: &f32, _inverse_masses: [f64; 2]) -> f64 {
         0.0

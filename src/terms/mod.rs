@@ -19,13 +19,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DMat3, DVec3};
 
-use crate::body::{BodyDefinition, NodeOrder, Spring, Vectors, View};
+use crate::body::{BodyDefinition, NodeOrder, Region, Scale, Spring, Vectors, View};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
 use crate::memory;
 use crate::solver::{Masses, Rates};
-use crate::springs::{Springs, TileForces, tile_count};
+use crate::springs::{Change, Springs, TileForces, tile_count};
 pub use nonlinear::SpringLaw;
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
@@ -62,8 +62,8 @@ trait Term: Debug + Send + Sync {
     /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
     fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks));
 
-    /// Shows the nodes of each term.
-    fn show_nodes(&self, see: &mut dyn FnMut(&[u32]));
+    /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
+    fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32));
 
     /// By how much the stiffest is stiffer with nodes at `positions` than its rate says, 1: not at all.
     fn stiffening(&self, positions: &Vectors) -> f64;
@@ -73,6 +73,15 @@ trait Term: Debug + Send + Sync {
 
     /// Takes away what has an edge between two nodes: how many terms.
     fn remove_edge(&mut self, a: u32, b: u32) -> usize;
+
+    /// The spring between two nodes has another stiffness and rest length.
+    fn set_spring(&mut self, _change: &Change) {}
+
+    /// Refuses to scale what would have a number that is none. Terms of springs go with those.
+    fn check_scale(&self, region: &Region, scale: Scale) -> Result<()>;
+
+    /// Scales the terms with all nodes in a region, which must not be refused: how many.
+    fn scale(&mut self, region: &Region, scale: Scale) -> usize;
 
     /// Nodes are given from here on.
     fn move_origin(&mut self, _origin: DVec3) {}
@@ -188,8 +197,8 @@ impl Terms {
         self.laws.iter().for_each(|law| law.show_blocks(at, is_exact, see));
     }
 
-    /// Shows the nodes of each term.
-    pub fn show_nodes(&self, see: &mut dyn FnMut(&[u32])) {
+    /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
+    pub fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32)) {
         self.laws.iter().for_each(|law| law.show_nodes(see));
     }
 
@@ -206,6 +215,25 @@ impl Terms {
     /// Takes away what has an edge between two nodes: how many terms.
     pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         self.laws.iter_mut().map(|law| law.remove_edge(a, b)).sum()
+    }
+
+    /// The spring between two nodes has another stiffness and rest length.
+    pub fn set_spring(&mut self, change: &Change) {
+        self.laws.iter_mut().for_each(|law| law.set_spring(change));
+    }
+
+    /// Refuses to scale what would have a number that is none. Terms of springs go with those.
+    pub fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
+        self.laws.iter().try_for_each(|law| law.check_scale(region, scale))
+    }
+
+    /// Scales the terms with all nodes in a region, which must not be refused: how many.
+    pub fn scale(&mut self, region: &Region, scale: Scale) -> usize {
+        let count = self.laws.iter_mut().map(|law| law.scale(region, scale)).sum();
+        if scale.stiffness == 0.0 && self.holds_any {
+            self.holds_any = (0..self.sums.len()).any(|node| self.holds(node));
+        }
+        count
     }
 
     /// Nodes are given from here on.

@@ -161,16 +161,17 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     }
     let stiffest = law.stiffest();
     let mut stiffening = memory::reserved(springs.len())?;
-    // A spring without a length at rest has no strain.
-    let there = springs
-        .iter()
-        .filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
-    for spring in there {
+    for spring in springs {
         let mut nodes = spring.nodes.map(|node| order.own(node));
         nodes.sort_unstable();
         stiffening.push(Stencil {
             nodes,
-            stiffness: spring.stiffness,
+            // A spring without a length at rest has no strain.
+            stiffness: if spring.rest_length > 0.0 {
+                spring.stiffness
+            } else {
+                0.0
+            },
             shape: spring.rest_length,
         });
     }
@@ -259,6 +260,26 @@ impl Law<2> for Stiffening {
     fn blocks(&self, &rest_length: &f32, places: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
         let block = self.stiffness(&Stretched::new(rest_length, places), is_exact);
         [[block, -block], [-block, block]]
+    }
+
+    fn scaled(&self, rest_length: &f32, length: f64) -> (f32, f64) {
+        ((f64::from(*rest_length) * length) as f32, 1.0)
+    }
+
+    fn is_finite(&self, rest_length: &f32) -> bool {
+        rest_length.is_finite()
+    }
+
+    fn size(&self, rest_length: &f32) -> f32 {
+        *rest_length
+    }
+
+    fn shape_of_spring(&self, _before: &f32, rest_length: f32) -> Option<f32> {
+        (rest_length > 0.0).then_some(rest_length)
+    }
+
+    fn is_of_springs(&self) -> bool {
+        true
     }
 
     fn rate(&self, _rest_length: &f32, inverse_masses: [f64; 2]) -> f64 {

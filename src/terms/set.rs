@@ -111,6 +111,27 @@ impl Law<2> for Sets {
         [[block, -block], [-block, block]]
     }
 
+    fn scaled(&self, set: &Set, length: f64) -> (Set, f64) {
+        let rest_length = (f64::from(set.rest_length) * length) as f32;
+        (Set { rest_length, ..*set }, 1.0)
+    }
+
+    fn is_finite(&self, set: &Set) -> bool {
+        set.rest_length.is_finite()
+    }
+
+    fn size(&self, set: &Set) -> f32 {
+        set.rest_length
+    }
+
+    fn shape_of_spring(&self, before: &Set, rest_length: f32) -> Option<Set> {
+        (rest_length > 0.0).then_some(Set { rest_length, ..*before })
+    }
+
+    fn is_of_springs(&self) -> bool {
+        true
+    }
+
     /// A spring that has yielded is as stiff as before.
     fn rate(&self, _set: &Set, _inverse_masses: [f64; 2]) -> f64 {
         0.0

@@ -6,13 +6,13 @@ use std::ops::Range;
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{Blocks, Moment, Term};
-use crate::body::{Vectors, View};
+use crate::body::{Region, Scale, Vectors, View};
 use crate::diagnostics::StateHasher;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::material::{Course, Viscosity};
 use crate::memory;
 use crate::solver::Masses;
-use crate::springs::{TILE, TileForces, tile_count};
+use crate::springs::{Change, TILE, TileForces, tile_count};
 
 /// What a term does whose stiffness is 1.
 pub(super) trait Law<const N: usize>: Debug + Send + Sync {
@@ -46,6 +46,27 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
         N > 1
     }
 
+    /// What it is where everything is so many times as long at rest, and how many times as stiff it is then.
+    fn scaled(&self, shape: &Self::Shape, length: f64) -> (Self::Shape, f64);
+
+    /// Whether what it is at rest is a number.
+    fn is_finite(&self, shape: &Self::Shape) -> bool;
+
+    /// What changes of it as it is scaled.
+    fn size(&self, _shape: &Self::Shape) -> f32 {
+        0.0
+    }
+
+    /// What the term of a spring becomes with this rest length, where its terms are springs'; `None`: it has none.
+    fn shape_of_spring(&self, _before: &Self::Shape, _rest_length: f32) -> Option<Self::Shape> {
+        None
+    }
+
+    /// Whether its terms are springs'.
+    fn is_of_springs(&self) -> bool {
+        false
+    }
+
     /// Nodes are given from here on.
     fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
 
@@ -73,7 +94,7 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stencil<T, const N: usize> {
     pub nodes: [u32; N],
-    /// 0: it was taken away.
+    /// 0: it does nothing; below 0: it was taken away.
     pub stiffness: f32,
     pub shape: T,
 }
@@ -151,6 +172,27 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
 
     fn there(&self) -> impl Iterator<Item = &Stencil<L::Shape, N>> {
         self.all.iter().filter(|stencil| stencil.stiffness > 0.0)
+    }
+}
+
+impl<L: Law<N>, const N: usize> Stencils<L, N> {
+    /// Where the terms are that a region has all nodes of.
+    fn within(&self, region: &Region) -> impl Iterator<Item = usize> {
+        let tiles = region.tiles().filter(|_| !self.law.is_of_springs());
+        tiles
+            .flat_map(|tile| self.beginning(tile))
+            .filter(|&index| self.all[index].stiffness > 0.0 && region.has_all(&self.all[index].nodes))
+    }
+
+    fn scaled(&self, index: usize, scale: Scale) -> Stencil<L::Shape, N> {
+        let stencil = &self.all[index];
+        let (shape, factor) = self.law.scaled(&stencil.shape, f64::from(scale.length));
+        let stiffness = f64::from(stencil.stiffness) * f64::from(scale.stiffness) * factor;
+        Stencil {
+            nodes: stencil.nodes,
+            stiffness: stiffness as f32,
+            shape,
+        }
     }
 }
 
@@ -239,8 +281,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         }
     }
 
-    fn show_nodes(&self, see: &mut dyn FnMut(&[u32])) {
-        self.there().for_each(|stencil| see(&stencil.nodes));
+    fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32)) {
+        let kept = self.all.iter().filter(|stencil| stencil.stiffness >= 0.0);
+        kept.for_each(|stencil| see(&stencil.nodes, stencil.stiffness));
     }
 
     fn stiffening(&self, positions: &Vectors) -> f64 {
@@ -274,11 +317,11 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         let mut removed = 0;
         let mut look = |stencil: &mut Stencil<L::Shape, N>| {
             let place = |node: u32| stencil.nodes.iter().position(|&other| other == node);
-            if stencil.stiffness > 0.0
+            if stencil.stiffness >= 0.0
                 && let (Some(a), Some(b)) = (place(a), place(b))
                 && law.is_edge(a, b)
             {
-                stencil.stiffness = 0.0;
+                stencil.stiffness = -1.0;
                 removed += 1;
             }
         };
@@ -289,6 +332,50 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         removed
     }
 
+    fn set_spring(&mut self, change: &Change) {
+        if !self.law.is_of_springs() {
+            return;
+        }
+        let nodes = [change.node, change.after.neighbour];
+        let place = self.all.binary_search_by(|stencil| stencil.nodes[..].cmp(&nodes));
+        if let Ok(place) = place
+            && let stencil = &mut self.all[place]
+            && stencil.stiffness >= 0.0
+        {
+            match self.law.shape_of_spring(&stencil.shape, change.after.rest_length) {
+                Some(shape) => (stencil.stiffness, stencil.shape) = (change.after.stiffness, shape),
+                None => stencil.stiffness = 0.0,
+            }
+        }
+    }
+
+    fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
+        for index in self.within(region) {
+            let Stencil { stiffness, shape, .. } = self.scaled(index, scale);
+            if !(stiffness.is_finite() && self.law.is_finite(&shape)) {
+                return Err(Error::invalid(format!(
+                    "stiffness_factor is {} and length_factor {}: a stiffness of {stiffness}, or a length, would be too much or too little",
+                    scale.stiffness, scale.length
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn scale(&mut self, region: &Region, scale: Scale) -> usize {
+        let mut count = 0;
+        for tile in region.tiles().filter(|_| !self.law.is_of_springs()) {
+            for index in self.beginning(tile) {
+                let stencil = &self.all[index];
+                if stencil.stiffness > 0.0 && region.has_all(&stencil.nodes) {
+                    self.all[index] = self.scaled(index, scale);
+                    count += 1;
+                }
+            }
+        }
+        count
+    }
+
     fn move_origin(&mut self, origin: DVec3) {
         for stencil in &mut self.all {
             self.law.move_origin(&mut stencil.shape, origin);
@@ -297,10 +384,11 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn holds(&self, node: usize) -> bool {
         // A term of a single node is one between it and the world.
+        let springs = &self.all[self.beginning(tile_of(node as u32))];
         N == 1
-            && self.all[self.beginning(tile_of(node as u32))]
+            && springs
                 .binary_search_by_key(&(node as u32), |stencil| stencil.nodes[0])
-                .is_ok()
+                .is_ok_and(|place| springs[place].stiffness > 0.0)
     }
 
     fn remembers(&self) -> bool {
@@ -324,7 +412,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn hash(&self, hasher: &mut StateHasher) {
         for stencil in &self.all {
-            hasher.write_floats(&[stencil.stiffness]);
+            hasher.write_floats(&[stencil.stiffness, self.law.size(&stencil.shape)]);
             self.law.hash(&stencil.shape, hasher);
         }
     }

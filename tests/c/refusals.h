@@ -47,6 +47,9 @@ static struct outputs {
     sinew_mesh_view mesh_view;
     sinew_material_preset preset;
     sinew_picture_def picture_def;
+    uint32_t pairs[2];
+    float numbers[2][9];
+    sinew_strain strain;
 } out, untouched;
 
 /* Floats that are refused: the first three everywhere, a negative one often, zero sometimes. */

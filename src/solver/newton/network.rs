@@ -61,7 +61,7 @@ fn show_pairs(terms: Option<&Terms>, see: &mut dyn FnMut([u32; 2])) {
     let Some(terms) = terms else {
         return;
     };
-    terms.show_nodes(&mut |nodes| {
+    terms.show_nodes(&mut |nodes, _| {
         for (place, &a) in nodes.iter().enumerate() {
             nodes[..place].iter().for_each(|&b| see(ordered([a, b])));
         }

@@ -217,8 +217,8 @@ impl Parts {
             }
         }
         if let Some(terms) = &descent.network.terms {
-            terms.show_nodes(&mut |nodes| {
-                for &other in &nodes[1..] {
+            terms.show_nodes(&mut |nodes, stiffness| {
+                for &other in nodes[1..].iter().filter(|_| stiffness > 0.0) {
                     let [a, b] = [nodes[0], other].map(|end| parts.find(end));
                     parts.lowest[a.max(b) as usize] = a.min(b);
                 }

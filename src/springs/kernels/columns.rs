@@ -20,6 +20,9 @@ pub(crate) const LANES: usize = 16;
 /// How far ahead a gather with small indices reaches.
 const WINDOW: usize = 1 << 16;
 
+/// How many links of a node are looked for at a time.
+const AT_ONCE: usize = 16;
+
 /// Of a column whose springs bring their own parameters.
 const OWN: u16 = u16::MAX;
 
@@ -409,6 +412,73 @@ impl Columns {
                 damping: material.damping,
             });
         });
+    }
+
+    /// How many of some links of a node share their parameters with others: they would have to leave their columns to have others.
+    pub fn shared(&self, links: &[(u32, Link)]) -> usize {
+        let chunks = links.chunks(AT_ONCE);
+        chunks
+            .map(|links| {
+                self.find_all(links)
+                    .iter()
+                    .filter(|place| **place == Some(None))
+                    .count()
+            })
+            .sum()
+    }
+
+    /// Makes room for springs in columns to have any of these stiffnesses.
+    pub fn room_for_stiffnesses(&mut self, mut stiffnesses: impl Iterator<Item = f32>) -> Result<()> {
+        let uniform = self.own_stiffness;
+        if !uniform.is_nan() && stiffnesses.any(|stiffness| stiffness != uniform) {
+            self.own_stiffnesses = memory::filled(Line([uniform; LANES]), self.own_rest_lengths.len())?;
+            self.own_stiffness = f32::NAN;
+        }
+        Ok(())
+    }
+
+    /// Gives links of a node, in the order of their neighbours, other stiffnesses and rest lengths, for which there is room; those that
+    /// share their parameters go beside the columns: how many.
+    pub fn set(&mut self, links: &[(u32, Link)]) -> usize {
+        let mut left = 0;
+        for links in links.chunks(AT_ONCE) {
+            let places = self.find_all(links);
+            for (&(node, link), place) in links.iter().zip(places) {
+                let node = node as usize;
+                match place {
+                    Some(Some(own)) => {
+                        let lane = (node - self.first) % LANES;
+                        self.own_rest_lengths[own].0[lane] = link.rest_length;
+                        if let Some(line) = self.own_stiffnesses.get_mut(own) {
+                            line.0[lane] = link.stiffness;
+                        }
+                    }
+                    Some(None) => {
+                        self.remove(node, link.neighbour as usize);
+                        self.insert_stray(node, &link);
+                        left += 1;
+                    }
+                    None => {
+                        self.strays.set(node, &link);
+                    }
+                }
+            }
+        }
+        left
+    }
+
+    /// Where in columns links of a node are, a few in the order of their neighbours: their places among those with parameters of their
+    /// own, `Some(None)`: they share theirs; `None`: in no column.
+    fn find_all(&self, links: &[(u32, Link)]) -> [Option<Option<usize>>; AT_ONCE] {
+        let mut places = [None; AT_ONCE];
+        if let Some((node, _)) = links.first() {
+            self.columns_of(*node as usize, &mut |_, material, own, other| {
+                if let Ok(index) = links.binary_search_by_key(&other, |(_, link)| link.neighbour as usize) {
+                    places[index] = Some(material.is_none().then_some(own));
+                }
+            });
+        }
+        places
     }
 
     /// Takes out the link from `node` to `neighbour`; whether there was one.

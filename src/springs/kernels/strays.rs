@@ -78,11 +78,17 @@ impl Strays {
         }
     }
 
+    /// Gives the link from `node` another stiffness and rest length, where it is here.
+    pub fn set(&mut self, node: usize, link: &Link) {
+        if let Some(index) = self.find(node, link.neighbour as usize) {
+            self.stiffnesses[index] = link.stiffness;
+            self.rest_lengths[index] = link.rest_length;
+        }
+    }
+
     /// Takes out the link from `node` to `neighbour`; whether there was one.
     pub fn remove(&mut self, node: usize, neighbour: usize) -> bool {
-        let found = self
-            .of(node)
-            .find(|&index| self.neighbours[index] as usize == neighbour);
+        let found = self.find(node, neighbour);
         if let Some(index) = found {
             self.places.remove(index);
             self.neighbours.remove(index);
@@ -119,6 +125,11 @@ impl Strays {
             + self.neighbours.capacity() * size_of::<u32>()
             + floats * size_of::<f32>();
         (used, held)
+    }
+
+    fn find(&self, node: usize, neighbour: usize) -> Option<usize> {
+        self.of(node)
+            .find(|&index| self.neighbours[index] as usize == neighbour)
     }
 
     /// The indices of a node's.

@@ -85,6 +85,29 @@ impl Groups {
         }
     }
 
+    /// Gives tetrahedra that there are another volume and inverse, those for which `shape` has one; without a volume they are taken away.
+    pub fn reshape(&mut self, mut shape: impl FnMut(&Group, usize) -> Option<(f32, [f32; 6])>) {
+        for index in 0..self.groups.len() {
+            for lane in 0..GROUP {
+                let group = &self.groups[index];
+                if group.volumes[lane] == 0.0 {
+                    continue;
+                }
+                if let Some((volume, inverse)) = shape(group, lane) {
+                    if volume == 0.0 {
+                        self.remove(index, lane);
+                        continue;
+                    }
+                    let group = &mut self.groups[index];
+                    group.volumes[lane] = volume;
+                    for (to, entry) in group.inverse.iter_mut().zip(inverse) {
+                        to[lane] = entry;
+                    }
+                }
+            }
+        }
+    }
+
     /// Takes away a tetrahedron: what is left of it has no volume.
     pub fn remove(&mut self, group: usize, lane: usize) {
         let group = &mut self.groups[group];

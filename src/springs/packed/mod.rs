@@ -3,7 +3,8 @@
 //! Each spring is kept at both of its nodes, so that the force on a node is a sum over its own links, nothing is written
 //! but that node, and tiles can be worked on in any order. The links of a tile are packed into columns, which sixteen nodes
 //! side by side share. A spring that is removed leaves a lane empty; one that is added goes beside the columns. A tile
-//! is packed again when it has many of either.
+//! is packed again when it has many of either. A spring whose stiffness changes keeps its lane where that has parameters of its own, and
+//! goes beside the columns else.
 
 mod materials;
 mod pack;
@@ -20,7 +21,9 @@ pub(crate) use split::{Costs, Row, Split, cheapest};
 
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
-use super::{Course, Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes};
+use super::{
+    Change, Course, Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes,
+};
 use crate::body::{Spring, View};
 use crate::error::Result;
 use crate::memory;
@@ -148,18 +151,23 @@ impl Packed {
     /// Packs the tile of `node` again where that pays; where there is no memory for it, it stays as it is.
     fn mend(&mut self, node: u32) {
         if self.tile(node).is_worn()
-            && let Ok(tile) = self.repacked(node as usize / TILE)
+            && let Ok(tile) = self.repacked(node as usize / TILE, &[])
         {
             *self.tile_mut(node) = tile;
         }
     }
 
-    fn repacked(&self, tile: usize) -> Result<Tile> {
+    /// A tile packed again, with these of its links changed, in the order of their nodes and neighbours.
+    fn repacked(&self, tile: usize, changed: &[(u32, Link)]) -> Result<Tile> {
         let nodes = tile_nodes(tile, self.node_count);
         let mut links = Vec::new();
         for node in nodes.clone() {
             let mut room = Ok(());
-            self.visit(node, &mut |link| {
+            self.visit(node, &mut |mut link| {
+                let end = (node as u32, link.neighbour);
+                if let Ok(place) = changed.binary_search_by_key(&end, |(node, link)| (*node, link.neighbour)) {
+                    link = changed[place].1;
+                }
                 if room.is_ok() {
                     let kind = self.kinds.find_exactly(&Material::of(&link));
                     room = memory::push(&mut links, self.loose(node, &link, kind));
@@ -254,6 +262,41 @@ impl Springs for Packed {
         self.spring_count -= 1;
         self.mend(a);
         self.mend(b);
+        Ok(())
+    }
+
+    fn set(&mut self, changes: &[Change]) -> Result<()> {
+        let mut ends = memory::reserved(2 * changes.len())?;
+        ends.extend(changes.iter().flat_map(Change::ends));
+        ends.sort_unstable_by_key(|(node, link)| (*node, link.neighbour));
+        let same_node = |(a, _): &(u32, Link), (b, _): &(u32, Link)| a == b;
+        let same_tile = |(a, _): &(u32, Link), (b, _): &(u32, Link)| *a as usize / TILE == *b as usize / TILE;
+        // Those with too many links that would leave their columns.
+        let mut anew = Vec::new();
+        for ends in ends.chunk_by(same_tile) {
+            let tile = ends[0].0 as usize / TILE;
+            let columns = &mut self.tiles[tile].columns;
+            let leaving: usize = ends.chunk_by(same_node).map(|links| columns.shared(links)).sum();
+            if leaving > ADDED {
+                memory::push(&mut anew, (tile, self.repacked(tile, ends)?))?;
+            } else {
+                columns.reserve_strays(leaving)?;
+                columns.room_for_stiffnesses(ends.iter().map(|(_, link)| link.stiffness))?;
+            }
+        }
+        let mut anew = anew.into_iter().peekable();
+        for ends in ends.chunk_by(same_tile) {
+            let place = ends[0].0 as usize / TILE;
+            let tile = &mut self.tiles[place];
+            if let Some((_, packed)) = anew.next_if(|(of, _)| *of == place) {
+                *tile = packed;
+                continue;
+            }
+            for links in ends.chunk_by(same_node) {
+                tile.removed += tile.columns.set(links);
+            }
+            self.mend(ends[0].0);
+        }
         Ok(())
     }
 }

@@ -1,0 +1,86 @@
+//! Regions of a body made stiffer or softer, larger or smaller, between steps.
+
+use super::definition::not_negative;
+use super::{Body, Region, Scale};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::springs::{Change, Link};
+
+impl Body {
+    /// Makes what lies between `nodes` alone `stiffness` times as stiff and `length` times as long at rest, as cautery stiffens and
+    /// shrinks, and as tissue swells: springs of two of them, tetrahedra that are elements with all corners among them, and of the body's
+    /// other terms bending and fibres alike. Home springs become stiffer, and draw where they did. What reaches beyond the region stays
+    /// as it is, and so do masses, damping, positions and velocities: the body moves to its new shape by itself.
+    ///
+    /// `stiffness` is at least 0, `length` above 0. Factors multiply those of calls before; a stiffness of 0 is for good, and takes
+    /// tetrahedra away. Nodes may be named more than once. It takes as long as the region is large, with some thousands of tetrahedra
+    /// about it.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: there is no such node, a factor is out of its range, or something would become so stiff, long or small
+    /// that it is no number. [`Error::OutOfMemory`].
+    pub fn scale_region(&mut self, nodes: &[u32], stiffness: f32, length: f32) -> Result<()> {
+        not_negative("stiffness_factor", stiffness)?;
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(Error::invalid(format!(
+                "length_factor is {length}: must be above 0 and finite"
+            )));
+        }
+        let mut own = memory::reserved(nodes.len())?;
+        for (index, &node) in nodes.iter().enumerate() {
+            self.check_node(&format_args!("nodes[{index}]"), node)?;
+            own.push(self.order.own(node));
+        }
+        let region = Region::of(own);
+        let scale = Scale { stiffness, length };
+        let changes = self.springs_in(&region, scale)?;
+        if let Some(elements) = &self.elements {
+            elements.check_scale(&region, scale)?;
+        }
+        if let Some(terms) = &self.terms {
+            terms.check_scale(&region, scale)?;
+        }
+        self.change_springs(&changes)?;
+        let elements = self.elements.as_mut();
+        let mut scaled = elements.map_or(0, |elements| elements.scale(&region, scale));
+        let terms = self.terms.as_mut();
+        scaled += terms.map_or(0, |terms| terms.scale(&region, scale));
+        if scaled > 0 {
+            self.forces_current = false;
+            self.forget_rates();
+            if let Some(implicit) = &mut self.implicit {
+                implicit.forget_matrix();
+            }
+            self.measure_anew();
+        }
+        Ok(())
+    }
+
+    /// How the springs within a region are to change.
+    fn springs_in(&self, region: &Region, scale: Scale) -> Result<Vec<Change>> {
+        let mut changes = Vec::new();
+        let mut result = Ok(());
+        for &node in region.nodes() {
+            self.springs.visit(node as usize, &mut |before| {
+                if before.neighbour < node || !region.has(before.neighbour) || result.is_err() {
+                    return;
+                }
+                let after = Link {
+                    stiffness: before.stiffness * scale.stiffness,
+                    rest_length: before.rest_length * scale.length,
+                    ..before
+                };
+                if after.stiffness.is_finite() && after.rest_length.is_finite() {
+                    result = memory::push(&mut changes, Change { node, before, after });
+                } else {
+                    let [a, b] = [node, before.neighbour].map(|node| self.order.caller(node));
+                    result = Err(Error::invalid(format!(
+                        "the spring of nodes {a} and {b} would have a stiffness of {} N/m and a rest length of {} m",
+                        after.stiffness, after.rest_length
+                    )));
+                }
+            });
+        }
+        result.map(|()| changes)
+    }
+}
