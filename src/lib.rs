@@ -5,6 +5,7 @@ pub mod capi;
 mod contact;
 mod diagnostics;
 mod elements;
+mod enclosed;
 mod error;
 pub mod material;
 mod memory;
@@ -22,7 +23,7 @@ mod world;
 
 pub use body::{Body, BodyDefinition, Solver, Storage, Values};
 pub use contact::{Detection, Pose, Shape, ToolDefinition};
-pub use diagnostics::{Energy, SolverReport, StorageReport};
+pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
 pub use material::{Material, Model};
 pub use picture::PictureDefinition;

@@ -45,6 +45,9 @@ impl Body {
         if let Some(terms) = &self.terms {
             terms.hash(hasher);
         }
+        if let Some(enclosed) = &self.enclosed {
+            enclosed.hash(hasher);
+        }
         for pin in self.pins.iter() {
             hasher.write_u64(u64::from(pin.node) << 1 | u64::from(pin.target.is_some()));
             if let Some(target) = pin.target {

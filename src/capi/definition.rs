@@ -169,6 +169,15 @@ pub struct sinew_body_def {
     pub fibre_directions: *const f32,
     /// tetrahedron_count floats, Pa, at least 0; nullable: fibre_stiffness for all.
     pub fibre_stiffnesses: *const f32,
+    /// Pa, at least 0: how the volume inside of a closed surface resists a change; default 0: it does not. The energy of each cavity of
+    /// volume V, V0 at rest, is enclosed_stiffness / 2 V0 (V/V0 - 1)^2 - pressure (V - V0). The surface is triangles, or where there are
+    /// none the boundary of the tetrahedra or cells; each of its parts that hang together by edges must be closed and have a volume. Each is a
+    /// cavity of its own, unless some are inside out, as the inner wall of a hollow organ is: then those alone are cavities.
+    /// sinew_body_remove_spring opens the cavities whose triangles have the edge, for good.
+    pub enclosed_stiffness: f32,
+    /// Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
+    /// enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
+    pub pressure: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -178,6 +187,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, mass_scaling),
         offset_of!(Self, cells),
         offset_of!(Self, home_stiffnesses),
+        offset_of!(Self, enclosed_stiffness),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -234,6 +244,8 @@ impl sinew_body_def {
             fibre_stiffness: 0.0,
             fibre_directions: std::ptr::null(),
             fibre_stiffnesses: std::ptr::null(),
+            enclosed_stiffness: 0.0,
+            pressure: 0.0,
         }
     }
 
@@ -375,6 +387,8 @@ impl sinew_body_def {
                 accuracy: self.accuracy,
                 mass_scaling: self.mass_scaling,
                 volume_stiffness: self.volume_stiffness,
+                enclosed_stiffness: self.enclosed_stiffness,
+                pressure: self.pressure,
             })
         }
     }

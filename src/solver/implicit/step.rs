@@ -248,6 +248,10 @@ impl Substep<'_> {
                 implicit.blocks.add_terms(terms, positions);
                 implicit.coarse.add_terms(terms, positions);
             }
+            if let Some(enclosed) = &body.enclosed {
+                implicit.blocks.add_enclosed(enclosed, positions);
+                implicit.coarse.add_enclosed(enclosed, positions);
+            }
         }
         let time = self.formula.time as f32;
         if time != implicit.prepared || implicit.stale {

@@ -50,11 +50,11 @@ pub struct RestStateReport {
 
 /// Moves `body` to rest.
 pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
-    let terms = body.terms.as_deref();
-    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), terms)?;
-    descent.network.terms = body.terms.take();
+    let beside = (body.terms.as_deref(), body.enclosed.as_deref());
+    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), beside)?;
+    (descent.network.terms, descent.network.enclosed) = (body.terms.take(), body.enclosed.take());
     let found = find(&mut descent, body, gravity, definition);
-    body.terms = descent.network.terms.take();
+    (body.terms, body.enclosed) = descent.network.give_back();
     let report = found?;
     let held = |node: usize| -descent.residuals[node].as_vec3();
     body.rest_at(|node| descent.equation.position(node).as_vec3(), held);
@@ -211,6 +211,14 @@ impl Parts {
         }
         if let Some(terms) = &descent.network.terms {
             terms.show_nodes(&mut |nodes| {
+                for &other in &nodes[1..] {
+                    let [a, b] = [nodes[0], other].map(|end| parts.find(end));
+                    parts.lowest[a.max(b) as usize] = a.min(b);
+                }
+            });
+        }
+        if let Some(enclosed) = &descent.network.enclosed {
+            enclosed.show_triangles(&mut |nodes| {
                 for &other in &nodes[1..] {
                     let [a, b] = [nodes[0], other].map(|end| parts.find(end));
                     parts.lowest[a.max(b) as usize] = a.min(b);
