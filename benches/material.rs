@@ -78,6 +78,14 @@ fn bench(criterion: &mut Criterion) {
             },
         ),
         (
+            "with pressure inside",
+            BodyDefinition {
+                enclosed_stiffness: 1000.0,
+                pressure: 10.0,
+                ..springs
+            },
+        ),
+        (
             "with springs that stiffen",
             BodyDefinition {
                 spring_law: SpringLaw::Exponential {

@@ -135,9 +135,12 @@ impl Enclosed {
     /// Shows what `kappa/V0 g g^T` times vectors is at each node.
     pub fn show_products(&self, at: At, vectors: &[DVec3], see: &mut dyn FnMut(usize, DVec3)) {
         for cavity in self.closed().filter(|_| self.stiffness > 0.0) {
-            let growths = self.gradients(cavity, at).map(|(node, gradient)| gradient.dot(vectors[node]));
+            let growths = self
+                .gradients(cavity, at)
+                .map(|(node, gradient)| gradient.dot(vectors[node]));
             let change = self.stiffness_of(cavity) * growths.sum::<f64>();
-            self.gradients(cavity, at).for_each(|(node, gradient)| see(node, gradient * change));
+            self.gradients(cavity, at)
+                .for_each(|(node, gradient)| see(node, gradient * change));
         }
     }
 

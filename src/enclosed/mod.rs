@@ -179,7 +179,11 @@ impl Enclosed {
             }
             cavity.pressure = pressure_of(self.stiffness, self.pressure, cavity, sums.volume / 6.0);
             self.factors[index] = cavity.pressure / 6.0;
-            bounds.add(f64::from(self.stiffness) / cavity.rest_volume, cavity.pressure, &sums.bounds);
+            bounds.add(
+                f64::from(self.stiffness) / cavity.rest_volume,
+                cavity.pressure,
+                &sums.bounds,
+            );
         }
         self.highest = bounds.total() as f32;
     }

@@ -67,7 +67,12 @@ pub(super) fn close(
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let mut order_of_walls: Vec<u32> = memory::reserved(triangles.len())?;
     order_of_walls.extend(0..triangles.len() as u32);
-    let lowest = |triangle: u32| triangles[triangle as usize].into_iter().map(|node| order.own(node)).min();
+    let lowest = |triangle: u32| {
+        triangles[triangle as usize]
+            .into_iter()
+            .map(|node| order.own(node))
+            .min()
+    };
     order_of_walls.sort_unstable_by_key(|&triangle| (walls[triangle as usize], lowest(triangle), triangle));
     let same_wall = |a: &u32, b: &u32| walls[*a as usize] == walls[*b as usize];
     let volume_of = |wall: &[u32]| {
@@ -242,7 +247,10 @@ impl Surface {
     /// Shows the cavities of a node, and the triangles about it in each.
     pub fn visit_node(&self, node: usize, see: &mut impl FnMut(usize, &[u32])) {
         let start = self.members.partition_point(|member| (member.node as usize) < node);
-        let count = self.members[start..].iter().take_while(|member| member.node as usize == node).count();
+        let count = self.members[start..]
+            .iter()
+            .take_while(|member| member.node as usize == node)
+            .count();
         self.visit_members(start..start + count, |_, cavity, triangles| see(cavity, triangles));
     }
 

@@ -102,7 +102,8 @@ impl Descent {
         elements: Option<&Elements>,
         (terms, enclosed): (Option<Box<Terms>>, Option<Box<Enclosed>>),
     ) {
-        self.network.read(springs, elements, (terms.as_deref(), enclosed.as_deref()));
+        self.network
+            .read(springs, elements, (terms.as_deref(), enclosed.as_deref()));
         (self.network.terms, self.network.enclosed) = (terms, enclosed);
     }
 

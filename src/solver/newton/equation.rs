@@ -440,7 +440,8 @@ impl Equation {
         let of_cavities = network.enclosed.as_ref();
         let [stored, work] = of_cavities.map_or([0.0; 2], |enclosed| enclosed.energy(&|node| self.position(node)));
         let loads = self.loads.iter().enumerate();
-        elastic + of_elements + of_terms + stored - work
+        elastic + of_elements + of_terms + stored
+            - work
             - loads
                 .map(|(node, load)| load.dot(self.position(node) + origin))
                 .sum::<f64>()
