@@ -1025,32 +1025,3 @@ fn what_cannot_be_is_refused() {
     assert_eq!(scene.world.state_hash(), hash);
     assert_eq!(scene.body().enclosed().pressure, 2.0);
 }
-
-#[test]
-fn zz_products() {
-    let surface = Surface::sphere(RADIUS, 3);
-    for (stiffness, pressure) in [(0.0, 1.0), (0.0, 500.0), (1e4, 0.0), (1e4, 500.0), (1e6, 0.0), (1e6, 500.0), (1e8, 0.0)] {
-        let mut scene = Scene::new(
-            WorldDefinition { gravity: Vec3::new(0.0, -9.81, 0.0), ..FREE },
-            &BodyDefinition {
-                solver: Solver::Implicit,
-                enclosed_stiffness: stiffness,
-                pressure,
-                ..surface.sheet()
-            },
-        );
-        for node in (0..642).filter(|&node| surface.positions[node as usize].y > 0.8 * RADIUS as f32) {
-            scene.body_mut().pin(node).expect("a node");
-        }
-        let (mut products, mut solves, mut converged, mut most) = (0, 0, 0, 0);
-        for _ in 0..60 {
-            let substeps = scene.world.step(1.0 / 60.0).expect("a step").substeps;
-            let report = scene.body().solver_report();
-            products += report.iterations;
-            solves += report.solves;
-            converged += u32::from(report.converged);
-            most = most.max(substeps);
-        }
-        println!("{stiffness:e} {pressure}: {products} products, {solves} solves, {converged} converged, {most} substeps, {:?}", scene.body().enclosed());
-    }
-}
