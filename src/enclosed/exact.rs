@@ -8,6 +8,9 @@ use crate::diagnostics::EnclosedReport;
 /// Where each node is, or how far it goes.
 type At<'a> = &'a dyn Fn(usize) -> DVec3;
 
+/// Nodes, and what triangles have of the gradient of a volume by their places, m².
+type Gradients<'a> = &'a mut dyn Iterator<Item = (usize, DVec3)>;
+
 impl Enclosed {
     /// The cavities that are closed.
     fn closed(&self) -> impl Iterator<Item = &Cavity> {
@@ -160,7 +163,7 @@ impl Enclosed {
     }
 
     /// Shows for each cavity kappa over its volume at rest, Pa/m³, and what its triangles have of g.
-    pub fn show_factors(&self, at: At, see: &mut dyn FnMut(f64, &mut dyn Iterator<Item = (usize, DVec3)>)) {
+    pub fn show_factors(&self, at: At, see: &mut dyn FnMut(f64, Gradients)) {
         for cavity in self.closed().filter(|_| self.stiffness > 0.0) {
             see(self.stiffness_of(cavity), &mut self.gradients(cavity, at));
         }
