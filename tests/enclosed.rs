@@ -357,7 +357,6 @@ fn a_thin_sphere_widens_as_laplace_says() {
         // The surface it presses on has become larger too.
         errors.push(wider / (1.0 + wider).powi(2) / expected - 1.0);
     }
-    println!("{errors:?}");
     assert!(errors[3].abs() < 0.001, "{errors:?}");
     for pair in errors.windows(2) {
         assert!(pair[1].abs() < 0.4 * pair[0].abs(), "{errors:?}");
@@ -576,7 +575,6 @@ fn the_stable_substep_is_short_enough_and_not_far_too_short() {
         let numbers = [stiffness, pressure].map(f64::from);
         let highest = highest_frequency(&surface.triangles, [&surface.at(), &exact(places)], numbers, 1e-4);
         let part = f64::from(stable) / (2.0 / highest);
-        println!("{stiffness}, {pressure}: {part}");
         assert!(
             (least..1.001).contains(&part),
             "{stiffness}, {pressure}: {part} of the limit"
@@ -614,7 +612,6 @@ fn verlet_keeps_the_energy_of_a_balloon() {
             most / fastest
         };
         let [whole, half] = [8, 16].map(lost);
-        println!("{stiffness}, {pressure}: {whole} {half}");
         assert!(whole < 0.02, "{stiffness}, {pressure}: {whole} of the energy");
         assert!(half < 0.35 * whole, "{stiffness}, {pressure}: {whole} {half}");
     }
