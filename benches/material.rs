@@ -211,6 +211,14 @@ fn main() -> ExitCode {
             },
         ),
         (
+            "pressure inside",
+            BodyDefinition {
+                enclosed_stiffness: 1000.0,
+                pressure: 10.0,
+                ..springs
+            },
+        ),
+        (
             "springs that stiffen",
             BodyDefinition {
                 spring_law: SpringLaw::Exponential {

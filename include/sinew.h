@@ -618,13 +618,13 @@ typedef struct sinew_body_def {
    */
   float relaxation_time;
   /**
-   * The strain of springs from which they yield, stretched or pressed, at least 0; default 0: they do not. What is beyond it stays for
-   * good. SINEW_SPRING_LAW_LINEAR alone; springs that are added later do not yield.
+   * The strain from which springs, and rods of tetrahedra that are elements, yield, stretched or pressed, at least 0; default 0: they do
+   * not. What is beyond it stays for good. Springs that yield have SINEW_SPRING_LAW_LINEAR; those that are added later do not yield.
    */
   float yield_strain;
   /**
-   * By what part of its rest length a spring may become longer or shorter for good, above 0 and below 1 where yield_strain is given;
-   * default 0.5. Beyond that it is elastic again.
+   * By what part of its rest length it may become longer or shorter for good, above 0 and below 1 where yield_strain is given; default
+   * 0.5. Beyond that it is elastic again.
    */
   float largest_set;
   /**
@@ -635,6 +635,19 @@ typedef struct sinew_body_def {
    * How many times their stiffness is added beyond it, above 0, at most 1e6 where strain_limit is given; default 100.
    */
   float limit_stiffening;
+  /**
+   * Pa, at least 0: how the volume inside of a closed surface resists a change; default 0: it does not. The energy of each cavity of
+   * volume V, V0 at rest, is enclosed_stiffness / 2 V0 (V/V0 - 1)^2 - pressure (V - V0). The surface is triangles, or where there are
+   * none the boundary of the tetrahedra or cells; each of its parts that hang together by edges must be closed and have a volume. Each is a
+   * cavity of its own, unless some are inside out, as the inner wall of a hollow organ is: then those alone are cavities.
+   * sinew_body_remove_spring opens the cavities whose triangles have the edge, for good.
+   */
+  float enclosed_stiffness;
+  /**
+   * Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
+   * enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
+   */
+  float pressure;
 } sinew_body_def;
 
 /**
@@ -702,7 +715,7 @@ typedef struct sinew_energy {
    */
   double kinetic;
   /**
-   * Springs and every other inner term.
+   * Springs and every other inner term, less the work that a constant pressure has done.
    */
   double elastic;
   /**
@@ -768,6 +781,33 @@ typedef struct sinew_solver_report {
    */
   uint32_t converged;
 } sinew_solver_report;
+
+/**
+ * What a body encloses: sums over the cavities that are closed; all 0 where its definition asks for neither enclosed_stiffness nor
+ * pressure.
+ */
+typedef struct sinew_enclosed_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Cavities that have not been cut open.
+   */
+  size_t cavity_count;
+  /**
+   * m3, at the time of the positions; negative where they are inside out.
+   */
+  double volume;
+  /**
+   * The same at rest.
+   */
+  double rest_volume;
+  /**
+   * Pa: by how much the pressure inside is above that outside; the mean by volume at rest.
+   */
+  double pressure;
+} sinew_enclosed_report;
 
 /**
  * A tissue's figures, from the literature, for young_modulus and density of a body. Single organs differ by more than the
@@ -1439,6 +1479,20 @@ sinew_status sinew_body_add_spring(struct sinew_world *world,
                                    float rest_length);
 
 /**
+ * Makes the pressure of a body's cavities this, Pa, where they have their volumes at rest, from the next step on: see `pressure` of
+ * sinew_body_def. A cavity that was cut open stays without. A body that is to be inflated later is created with a pressure or an
+ * enclosed_stiffness.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body was created with neither), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_set_pressure(struct sinew_world *world,
+                                     struct sinew_body_id body,
+                                     float pressure);
+
+/**
  * Removes the spring between two nodes.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where there is none), SINEW_STATUS_STALE_ID.
@@ -1628,6 +1682,18 @@ sinew_status sinew_body_get_storage_report(const struct sinew_world *world,
 sinew_status sinew_body_get_solver_report(const struct sinew_world *world,
                                           struct sinew_body_id body,
                                           struct sinew_solver_report *out);
+
+/**
+ * Writes what a body encloses. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_body_get_enclosed_report(const struct sinew_world *world,
+                                            struct sinew_body_id body,
+                                            struct sinew_enclosed_report *out);
 
 /**
  * Writes the figures of a tissue, `preset` being a SINEW_PRESET_...; they are numbered from 0 without a gap. Its texts are

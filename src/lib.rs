@@ -5,6 +5,7 @@ pub mod capi;
 mod contact;
 mod diagnostics;
 mod elements;
+mod enclosed;
 mod error;
 pub mod material;
 mod memory;
@@ -23,7 +24,7 @@ mod world;
 
 pub use body::{Body, BodyDefinition, Solver, SpringState, Storage, Values};
 pub use contact::{Detection, Pose, Shape, ToolDefinition};
-pub use diagnostics::{Energy, SolverReport, StorageReport};
+pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
 pub use material::{Material, Model, Viscosity, Yielding};
 pub use picture::{BodyValues, PictureDefinition};

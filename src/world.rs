@@ -430,7 +430,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
             Some(Outcome::Done { substeps, carry, error }) => {
                 report.substeps = report.substeps.max(substeps);
                 report.error_estimate = report.error_estimate.max(error);
-                carry.limit()
+                carry.limit().map(|limit| limit.min(body.newest_limit_beside_springs()))
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);

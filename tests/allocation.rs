@@ -113,3 +113,28 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
         assert_eq!(refused, 0);
     }
 }
+
+#[test]
+fn nor_does_one_of_what_is_under_pressure() {
+    let block = Mesh::block([0.05; 3], [3; 3]).expect("a block");
+    for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let body = BodyDefinition {
+            positions: &block.positions,
+            tetrahedra: &block.tetrahedra,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(50.0),
+            enclosed_stiffness: 1000.0,
+            pressure: 100.0,
+            solver,
+            ..BodyDefinition::default()
+        };
+        let body = world.create_body(&body).expect("a body");
+        for step in 0..4 {
+            assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
+            let body = world.body_mut(body).expect("the body");
+            assert_eq!(asked(|| drop(body.set_pressure(100.0 * step as f32))), 0);
+            drop(body.remove_spring(0, step + 1));
+        }
+    }
+}

@@ -135,6 +135,19 @@ pub struct BodyDefinition<'a> {
     /// How many times their stiffness is added beyond it, above 0, at most 1e6: a load that would stretch a spring by some strain more
     /// stretches it by that over 1 + `limit_stiffening`. Springs that are added later have no limit.
     pub limit_stiffening: f32,
+    /// How the volume inside of a closed surface resists a change, Pa, at least 0; 0: it does not. With
+    /// [`Self::pressure`] p the energy of each cavity of volume V, V0 at rest, is
+    /// `enclosed_stiffness / 2 V0 (V/V0 - 1)² - p (V - V0)`: what fills it has this bulk modulus.
+    ///
+    /// The surface is `triangles`, or where there are none the boundary of the tetrahedra or cells; each of its parts that hang together
+    /// by edges must be closed and have a volume at rest. Each is a cavity of its own, unless some are inside out, as the inner wall
+    /// of a hollow organ is: then those alone are cavities. [`Body::remove_spring`](crate::Body::remove_spring) opens the cavities whose
+    /// triangles have the edge, for good.
+    pub enclosed_stiffness: f32,
+    /// By how much the pressure inside of a cavity that has its volume at rest is above that outside, Pa; below 0 it sucks; 0: it is not. See
+    /// [`Self::enclosed_stiffness`], and [`Body::set_pressure`](crate::Body::set_pressure) to change it. Without a stiffness the pressure
+    /// stays the same however large the cavity becomes: springs that do not stiffen may not hold it.
+    pub pressure: f32,
     /// How the springs are kept.
     pub storage: Storage,
     /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
@@ -187,6 +200,8 @@ impl Default for BodyDefinition<'_> {
             yielding: Yielding::default(),
             strain_limit: 0.0,
             limit_stiffening: 100.0,
+            enclosed_stiffness: 0.0,
+            pressure: 0.0,
             storage: Storage::Packed,
             springs_per_node: 0,
             solver: Solver::Verlet,
@@ -256,6 +271,8 @@ impl BodyDefinition<'_> {
         }
         self.viscosity.check()?;
         self.yielding.check()?;
+        not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
+        finite("pressure", self.pressure)?;
         if let Some(material) = &self.material {
             material.check(self)?;
         }
@@ -395,6 +412,13 @@ pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
         return Ok(());
     }
     Err(Error::invalid(format!("{name} is {vector}: must be finite")))
+}
+
+pub(crate) fn finite(name: &str, value: f32) -> Result<()> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is {value}: must be finite")))
 }
 
 pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use glam::{BVec3, Vec3};
 
-use super::definition::{Spring, distance, expect_count, finite_vector, finite_vectors, not_negative};
+use super::definition::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
 use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
 use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
@@ -235,16 +235,24 @@ impl Body {
     }
 
     /// Removes the spring between two nodes, and with it the tetrahedra of [`Model::Tetrahedra`](crate::Model::Tetrahedra) that
-    /// have this edge, with their fibres, and the bending of triangles that have it, whether or not there is a spring along it.
+    /// have this edge, with their fibres, and the bending of triangles that have it, whether or not there is a spring along it. A cavity
+    /// whose surface has it is open from then on, and neither keeps its volume nor its pressure.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or nothing of all that between them.
     pub fn remove_spring(&mut self, a: u32, b: u32) -> Result<()> {
-        let [own_a, own_b] = self.check_pair(a, b)?;
+        let nodes @ [own_a, own_b] = self.check_pair(a, b)?;
+        let link = self.link(nodes);
+        // What may fail comes first.
+        if let Some(link) = link {
+            self.remove_link(nodes, link)?;
+        }
         let elements = self.elements.as_mut();
         let mut removed = elements.map_or(0, |elements| elements.remove_edge(own_a, own_b));
         let terms = self.terms.as_mut();
         removed += terms.map_or(0, |terms| terms.remove_edge(own_a, own_b));
+        let enclosed = self.enclosed.as_mut();
+        removed += enclosed.map_or(0, |enclosed| enclosed.remove_edge(own_a, own_b));
         if removed > 0 {
             self.forces_current = false;
             self.forget_rates();
@@ -252,15 +260,34 @@ impl Body {
                 implicit.forget_matrix();
             }
         }
-        match self.remove_own_spring([a, b], [own_a, own_b]) {
-            // The edge was one of tetrahedra or hinges alone.
-            Err(Error::InvalidArgument(_)) if removed > 0 => Ok(()),
-            result => result,
+        if link.is_none() && removed == 0 {
+            return Err(not_joined(a, b));
         }
+        Ok(())
     }
 
-    fn remove_own_spring(&mut self, [a, b]: [u32; 2], [own_a, own_b]: [u32; 2]) -> Result<()> {
-        let link = self.link([own_a, own_b]).ok_or_else(|| not_joined(a, b))?;
+    /// Makes the pressure of its cavities this, Pa, where they have their volumes at rest, from the next step on: see
+    /// [`BodyDefinition::pressure`](crate::BodyDefinition::pressure). A cavity that was cut open stays without.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: the pressure is not finite, or the body was made with neither an `enclosed_stiffness` nor a `pressure`.
+    pub fn set_pressure(&mut self, pressure: f32) -> Result<()> {
+        finite("pressure", pressure)?;
+        let Some(enclosed) = &mut self.enclosed else {
+            return Err(Error::invalid(format!(
+                "pressure is {pressure} Pa, and the body was made with neither an enclosed_stiffness nor a pressure"
+            )));
+        };
+        enclosed.set_pressure(pressure);
+        self.forces_current = false;
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_energy();
+        }
+        Ok(())
+    }
+
+    /// Removes a spring, given as the first of its nodes sees it.
+    fn remove_link(&mut self, [own_a, own_b]: [u32; 2], link: Link) -> Result<()> {
         self.springs.remove(own_a, own_b)?;
         self.forces_current = false;
         self.forget_rates();
@@ -305,6 +332,9 @@ impl Body {
         }
         if let Some(terms) = &mut self.terms {
             terms.forget_rates();
+        }
+        if let Some(enclosed) = &mut self.enclosed {
+            enclosed.forget_rates();
         }
     }
 

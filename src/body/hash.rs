@@ -45,6 +45,9 @@ impl Body {
         if let Some(terms) = &self.terms {
             terms.hash(hasher);
         }
+        if let Some(enclosed) = &self.enclosed {
+            enclosed.hash(hasher);
+        }
         for pin in self.pins.iter() {
             let led = u64::from(pin.target.is_some());
             hasher.write_u64(u64::from(pin.node) << 4 | u64::from(pin.axes.bitmask()) << 1 | led);

@@ -32,8 +32,9 @@ pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
 use crate::contact::Contacts;
-use crate::diagnostics::{Energy, SolverReport, StorageReport};
+use crate::diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 use crate::elements::{Elements, Law};
+use crate::enclosed::Enclosed;
 use crate::error::{Error, Result};
 use crate::material::Made;
 use crate::memory;
@@ -62,6 +63,8 @@ pub struct Body {
     pub(crate) elements: Option<Box<Elements>>,
     /// What a definition asks for beside springs and elements.
     pub(crate) terms: Option<Box<Terms>>,
+    /// For bodies whose surface encloses what keeps its volume or its pressure.
+    pub(crate) enclosed: Option<Box<Enclosed>>,
     pub(crate) kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
     pub(crate) masses: Vec<f32>,
@@ -175,6 +178,7 @@ impl Body {
             ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,
             (triangles, _) => memory::copied(triangles)?,
         };
+        let enclosed = Enclosed::new(definition, &surface, &order)?;
         let mut body = Self {
             order,
             predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
@@ -183,6 +187,7 @@ impl Body {
                 .transpose()?,
             elements,
             terms,
+            enclosed,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
             springs,
             kernel: needs.kernel,
@@ -234,13 +239,16 @@ impl Body {
             )?)),
             Solver::Newton => {
                 let (springs, elements) = (&*body.springs, body.elements.as_deref());
-                let terms = body.terms.as_deref();
-                let implicit = Implicit::exact(positions, springs, elements, terms, [order, iterations], accuracy)?;
+                let beside = (body.terms.as_deref(), body.enclosed.as_deref());
+                let implicit = Implicit::exact(positions, springs, elements, beside, [order, iterations], accuracy)?;
                 Some(Box::new(implicit))
             }
         };
         if let (Some(implicit), Some(elements)) = (&mut body.implicit, &body.elements) {
             implicit.join(elements)?;
+        }
+        if let (Some(implicit), Some(enclosed)) = (&mut body.implicit, &body.enclosed) {
+            implicit.enclose(enclosed)?;
         }
         if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && !body.has_more_than_springs() {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
@@ -303,6 +311,13 @@ impl Body {
         }
     }
 
+    /// What its surface encloses, and the pressure there.
+    pub fn enclosed(&self) -> EnclosedReport {
+        let positions = self.state.positions();
+        let report = |enclosed: &Enclosed| enclosed.report(&|node| positions.get(node).as_dvec3());
+        self.enclosed.as_deref().map(report).unwrap_or_default()
+    }
+
     /// How its solver took the last step.
     pub fn solver_report(&self) -> SolverReport {
         let report = self.implicit.as_ref().map(|implicit| implicit.told);
@@ -339,10 +354,10 @@ impl Body {
 
     /// Whether forces are made of more than springs.
     pub(crate) fn has_more_than_springs(&self) -> bool {
-        self.elements.is_some() || self.terms.is_some()
+        self.elements.is_some() || self.terms.is_some() || self.enclosed.is_some()
     }
 
-    /// The longest substep that elements and terms allow with the nodes as they are, s; infinity where there are none.
+    /// The longest substep that elements, terms and what is enclosed allow with the nodes as they are, s; infinity where there are none.
     pub(crate) fn limit_beside_springs(&mut self, team: &Team) -> f32 {
         let masses = Masses {
             masses: &self.masses,
@@ -365,6 +380,14 @@ impl Body {
             }
             rates = rates.and(terms.settled_rates());
         }
+        if let Some(enclosed) = &mut self.enclosed {
+            let springs = (self.elements.is_none() && self.terms.is_none()).then_some(&*self.springs);
+            if !(enclosed.find_rates(springs, &masses) && self.forces_current) {
+                enclosed.find_forces(self.state.positions(), team);
+                enclosed.settle();
+            }
+            rates = rates.and(enclosed.settled_rates());
+        }
         rates.limit()
     }
 
@@ -372,7 +395,8 @@ impl Body {
     pub(crate) fn newest_limit_beside_springs(&self) -> f32 {
         let of_elements = self.elements.as_ref().map_or(Rates::ZERO, |elements| elements.rates());
         let of_terms = self.terms.as_ref().map_or(Rates::ZERO, |terms| terms.rates());
-        of_elements.and(of_terms).limit()
+        let of_enclosed = self.enclosed.as_ref().map_or(Rates::ZERO, |enclosed| enclosed.rates());
+        of_elements.and(of_terms).and(of_enclosed).limit()
     }
 
     /// The longest stable substep with the nodes at these positions.
@@ -485,6 +509,9 @@ impl Body {
         }
         if let Some(terms) = &mut self.terms {
             terms.settle();
+        }
+        if let Some(enclosed) = &mut self.enclosed {
+            enclosed.settle();
         }
         self.keep();
         if let Some(implicit) = &mut self.implicit {

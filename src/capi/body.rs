@@ -393,6 +393,24 @@ pub unsafe extern "C" fn sinew_body_add_spring(
     unsafe { with_body_mut(world, body, |body| body.add_spring(a, b, stiffness, rest_length)) }
 }
 
+/// Makes the pressure of a body's cavities this, Pa, where they have their volumes at rest, from the next step on: see `pressure` of
+/// sinew_body_def. A cavity that was cut open stays without. A body that is to be inflated later is created with a pressure or an
+/// enclosed_stiffness.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body was created with neither), SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_pressure(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    pressure: f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_body_mut(world, body, |body| body.set_pressure(pressure)) }
+}
+
 /// Removes the spring between two nodes.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where there is none), SINEW_STATUS_STALE_ID.

@@ -187,6 +187,15 @@ pub struct sinew_body_def {
     pub strain_limit: f32,
     /// How many times their stiffness is added beyond it, above 0, at most 1e6 where strain_limit is given; default 100.
     pub limit_stiffening: f32,
+    /// Pa, at least 0: how the volume inside of a closed surface resists a change; default 0: it does not. The energy of each cavity of
+    /// volume V, V0 at rest, is enclosed_stiffness / 2 V0 (V/V0 - 1)^2 - pressure (V - V0). The surface is triangles, or where there are
+    /// none the boundary of the tetrahedra or cells; each of its parts that hang together by edges must be closed and have a volume. Each is a
+    /// cavity of its own, unless some are inside out, as the inner wall of a hollow organ is: then those alone are cavities.
+    /// sinew_body_remove_spring opens the cavities whose triangles have the edge, for good.
+    pub enclosed_stiffness: f32,
+    /// Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
+    /// enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
+    pub pressure: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -259,6 +268,8 @@ impl sinew_body_def {
             largest_set: Yielding::default().largest,
             strain_limit: 0.0,
             limit_stiffening: BodyDefinition::default().limit_stiffening,
+            enclosed_stiffness: 0.0,
+            pressure: 0.0,
         }
     }
 
@@ -410,6 +421,8 @@ impl sinew_body_def {
                 accuracy: self.accuracy,
                 mass_scaling: self.mass_scaling,
                 volume_stiffness: self.volume_stiffness,
+                enclosed_stiffness: self.enclosed_stiffness,
+                pressure: self.pressure,
             })
         }
     }

@@ -15,7 +15,7 @@ pub struct sinew_energy {
     pub struct_size: usize,
     /// Of the nodes that are free to move, with what mass_scaling adds to them.
     pub kinetic: f64,
-    /// Springs and every other inner term.
+    /// Springs and every other inner term, less the work that a constant pressure has done.
     pub elastic: f64,
     /// Zero at the origin.
     pub gravitational: f64,
@@ -57,6 +57,23 @@ pub struct sinew_solver_report {
     pub converged: u32,
 }
 
+/// What a body encloses: sums over the cavities that are closed; all 0 where its definition asks for neither enclosed_stiffness nor
+/// pressure.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_enclosed_report {
+    /// Set by the caller.
+    pub struct_size: usize,
+    /// Cavities that have not been cut open.
+    pub cavity_count: usize,
+    /// m3, at the time of the positions; negative where they are inside out.
+    pub volume: f64,
+    /// The same at rest.
+    pub rest_volume: f64,
+    /// Pa: by how much the pressure inside is above that outside; the mean by volume at rest.
+    pub pressure: f64,
+}
+
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_energy {
     const SIZES: &'static [usize] = &[size_of::<Self>()];
@@ -67,6 +84,12 @@ unsafe impl Versioned for sinew_energy {
 unsafe impl Versioned for sinew_storage_report {
     const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "sinew_storage_report";
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_enclosed_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_enclosed_report";
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -153,6 +176,34 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 added_mass: report.added_mass,
                 solves: report.solves,
                 converged: u32::from(report.converged),
+            });
+            Ok(())
+        })
+    }
+}
+
+/// Writes what a body encloses. `out->struct_size` is set by the caller.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_enclosed_report(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut sinew_enclosed_report,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let report = body.enclosed();
+            memory::report("out", out)?.fill(sinew_enclosed_report {
+                struct_size: size_of::<sinew_enclosed_report>(),
+                cavity_count: report.cavity_count,
+                volume: report.volume,
+                rest_volume: report.rest_volume,
+                pressure: report.pressure,
             });
             Ok(())
         })

@@ -9,7 +9,7 @@ use crate::body::Body;
 pub struct Energy {
     /// Of the nodes that are free to move, along the axes along which they are, with what mass scaling adds to them.
     pub kinetic: f64,
-    /// Of the springs, of tetrahedra that are elements, and of every other term.
+    /// Of the springs, of tetrahedra that are elements, and of every other term; less the work that a constant pressure has done.
     pub elastic: f64,
     /// Of all nodes, zero at the origin.
     pub gravitational: f64,
@@ -48,6 +48,10 @@ impl Energy {
         }
         if let Some(terms) = &body.terms {
             energy.elastic += terms.energy(&|node| positions.get(node).as_dvec3());
+        }
+        if let Some(enclosed) = &body.enclosed {
+            let [stored, work] = enclosed.energy(&|node| positions.get(node).as_dvec3());
+            energy.elastic += stored - work;
         }
         energy
     }

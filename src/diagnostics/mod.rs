@@ -19,6 +19,19 @@ pub struct StorageReport {
     pub bytes_reserved: usize,
 }
 
+/// What a body encloses: the sums of the cavities that are closed; all 0 where it was not asked to keep or press anything.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnclosedReport {
+    /// Cavities that have not been cut open.
+    pub cavity_count: usize,
+    /// m³, at the time of the positions; negative where they are inside out.
+    pub volume: f64,
+    /// The same at rest, m³.
+    pub rest_volume: f64,
+    /// By how much the pressure inside is above that outside, Pa; the mean by volume at rest.
+    pub pressure: f64,
+}
+
 /// How a body's solver took the last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolverReport {

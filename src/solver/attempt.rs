@@ -175,7 +175,7 @@ fn run_stably(
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
-            // Where elements and terms go there is no end to how stiff they may be.
+            // Where elements, terms and cavities go there is no end to how stiff they may be.
             stable_substep = anywhere.min(if body.has_more_than_springs() {
                 0.5 * stable_substep
             } else {

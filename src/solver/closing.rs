@@ -12,6 +12,7 @@ use super::gravity::GravityKicks;
 use super::kick::{Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors};
 use crate::elements::Shares;
+use crate::enclosed;
 use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
@@ -53,7 +54,7 @@ impl ClosingKick {
 }
 
 /// Whether a step of `body` may be left open. Damping along springs and comparisons need velocities at its end, and forces
-/// from outside end with it; those of elements and terms are not worked out by who only reads.
+/// from outside end with it; those of elements, terms and cavities are not worked out by who only reads.
 pub(super) fn may_stay_open(body: &Body) -> bool {
     !body.has_more_than_springs()
         && body.predicted_velocities.is_none()
@@ -67,6 +68,7 @@ pub(super) struct Closed<'a> {
     /// What they give at these positions.
     pub elements: Option<Shares<'a>>,
     pub terms: Option<&'a Terms>,
+    pub enclosed: Option<enclosed::Shares<'a>>,
     pub kernel: ChosenKernel,
     /// Half of one.
     pub kick: Kick<'a>,
@@ -86,6 +88,9 @@ impl Closed<'_> {
         }
         if let Some(terms) = self.terms {
             terms.add_forces(tile, nodes.clone(), self.positions.view(), forces);
+        }
+        if let Some(enclosed) = &self.enclosed {
+            enclosed.add(tile, forces);
         }
         let velocities = self.velocities.slices(nodes.clone());
         for (closed, velocities) in closed.iter_mut().zip(velocities) {
@@ -119,6 +124,7 @@ pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut 
         springs: &*body.springs,
         elements: None,
         terms: None,
+        enclosed: None,
         kernel: body.kernel,
         kick: closing.kick(gravity.next(closing.fall()), inertia, body.damping.as_ref()),
         positions: state.positions,
@@ -183,6 +189,7 @@ pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> 
         springs: &*body.springs,
         elements: None,
         terms: None,
+        enclosed: None,
         kernel: body.kernel,
         kick: closing.kick(fall, inertia, body.damping.as_ref()),
         positions: body.state.positions(),

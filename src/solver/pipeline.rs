@@ -187,6 +187,7 @@ impl Common<'_> {
             springs: self.springs,
             elements: None,
             terms: None,
+            enclosed: None,
             kernel: self.kernel,
             masses: self.masses,
             request: self.request,

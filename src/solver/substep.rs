@@ -9,6 +9,7 @@ use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
 use crate::elements::{Elements, Shares};
+use crate::enclosed::{self, Enclosed};
 use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
@@ -135,6 +136,10 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         terms.begin();
     }
     let terms = body.terms.as_deref();
+    if let Some(enclosed) = body.enclosed.as_mut().filter(|_| !forces_known) {
+        enclosed.find_forces(state.positions, team);
+    }
+    let enclosed = body.enclosed.as_deref().map(Enclosed::shares);
     if part.before == Before::Open
         && let Some(predicted) = &mut body.predicted_velocities
     {
@@ -142,6 +147,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             springs: &*body.springs,
             elements,
             terms,
+            enclosed,
             kernel: body.kernel,
             kick: Kick {
                 duration: 0.5 * part.substep,
@@ -161,6 +167,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         springs: &*body.springs,
         elements,
         terms,
+        enclosed,
         kernel: body.kernel,
         masses: &body.masses,
         request,
@@ -213,6 +220,7 @@ pub(super) struct Pass<'a> {
     pub springs: &'a dyn Springs,
     pub elements: Option<Shares<'a>>,
     pub terms: Option<&'a Terms>,
+    pub enclosed: Option<enclosed::Shares<'a>>,
     pub kernel: ChosenKernel,
     pub masses: &'a [f32],
     pub request: &'a StepRequest<'a>,
@@ -260,6 +268,9 @@ impl Pass<'_> {
             }
             if let Some(terms) = self.terms {
                 terms.add_forces(tile, nodes.clone(), self.positions, forces);
+            }
+            if let Some(enclosed) = &self.enclosed {
+                enclosed.add(tile, forces);
             }
         }
         if let Some(first_velocities) = self.first_velocities {

@@ -74,7 +74,7 @@ fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
     }
 }
 
-/// The same for elements and terms, as they were deformed where forces were last worked out.
+/// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
 fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooLong> {
     let stable_substep = body.newest_limit_beside_springs();
     if substep <= stable_substep {

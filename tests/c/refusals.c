@@ -404,13 +404,17 @@ static void body_reports(void)
     REFUSES_NO_BODY(sinew_body_get_energy(world, body, &out.energy));
     REFUSES_NO_BODY(sinew_body_get_storage_report(world, body, &out.storage));
     REFUSES_NO_BODY(sinew_body_get_solver_report(world, body, &out.solver));
+    REFUSES_NO_BODY(sinew_body_get_enclosed_report(world, body, &out.enclosed));
     REFUSED(INVALID, "out", sinew_body_get_energy(the.world, the.body, NULL));
     REFUSED(INVALID, "out", sinew_body_get_storage_report(the.world, the.body, NULL));
     REFUSED(INVALID, "out", sinew_body_get_solver_report(the.world, the.body, NULL));
+    REFUSED(INVALID, "out", sinew_body_get_enclosed_report(the.world, the.body, NULL));
     REFUSES_RESULT_SIZES(sinew_energy, sizeof(contract_energy), energy,
                          sinew_body_get_energy(the.world, the.body, &out.energy));
     REFUSES_RESULT_SIZES(sinew_storage_report, sizeof(contract_storage_report), storage,
                          sinew_body_get_storage_report(the.world, the.body, &out.storage));
+    REFUSES_RESULT_SIZES(sinew_enclosed_report, sizeof(sinew_enclosed_report), enclosed,
+                         sinew_body_get_enclosed_report(the.world, the.body, &out.enclosed));
 }
 
 static void rest_states(void)

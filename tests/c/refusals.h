@@ -41,6 +41,7 @@ static struct outputs {
     sinew_energy energy;
     sinew_storage_report storage;
     sinew_solver_report solver;
+    sinew_enclosed_report enclosed;
     sinew_rest_state_def rest_def;
     sinew_rest_state_report rest;
     sinew_mesh *mesh;
@@ -272,6 +273,7 @@ static inline void set_up(void)
     untouched.energy.struct_size = sizeof untouched.energy;
     untouched.storage.struct_size = sizeof untouched.storage;
     untouched.solver.struct_size = sizeof untouched.solver;
+    untouched.enclosed.struct_size = sizeof untouched.enclosed;
     untouched.mesh_view.struct_size = sizeof untouched.mesh_view;
     memcpy(&out, &untouched, sizeof out);
 }

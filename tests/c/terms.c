@@ -1,4 +1,5 @@
-/* What a body may be asked for beside its springs: home springs, bending, springs that stiffen, fibres; and what is refused of it. */
+/* What a body may be asked for beside its springs: home springs, bending, springs that stiffen, fibres, what it encloses; and what is
+ * refused of it. */
 #include "scene.h"
 
 /* A tetrahedron of 1 m, 0.5 kg a node; its triangles turn about their edges. */
@@ -56,6 +57,43 @@ static void each_adds_the_energy_that_it_should(void)
     CHECK(elastic_energy(&def, 1.5f) > springs);
 }
 
+static void a_cavity_is_told_pressed_and_opened(void)
+{
+    sinew_world *world = a_world(0.0f);
+    sinew_body_def def = a_tetrahedron();
+    sinew_body_id body = {0, 0}, plain = {0, 0};
+    sinew_enclosed_report report;
+    float positions[12];
+    size_t i;
+    /* Twice as wide it has eight times the volume of 1/6 m3. */
+    const double springs = elastic_energy(&def, 2.0f);
+    def.enclosed_stiffness = 60.0f, def.pressure = 12.0f;
+    CHECK_NEAR(elastic_energy(&def, 2.0f) - springs, 30.0 / 6 * 49 - 12.0 / 6 * 7, 1e-3);
+    MUST(sinew_body_create(world, &def, &body));
+    for (i = 0; i < 12; i++)
+        positions[i] = 2 * CORNERS[i];
+    MUST(sinew_body_set_positions(world, body, positions, 4));
+    report.struct_size = sizeof report;
+    MUST(sinew_body_get_enclosed_report(world, body, &report));
+    CHECK(report.cavity_count == 1);
+    CHECK_NEAR(report.volume, 8.0 / 6, 1e-6);
+    CHECK_NEAR(report.rest_volume, 1.0 / 6, 1e-6);
+    CHECK_NEAR(report.pressure, 12.0 - 60 * 7, 1e-3);
+    MUST(sinew_body_set_pressure(world, body, 500.0f));
+    MUST(sinew_body_get_enclosed_report(world, body, &report));
+    CHECK_NEAR(report.pressure, 500.0 - 60 * 7, 1e-3);
+    CHECK(sinew_body_set_pressure(world, body, NAN) == SINEW_STATUS_INVALID_ARGUMENT);
+    MUST(sinew_body_remove_spring(world, body, 1, 3));
+    MUST(sinew_body_get_enclosed_report(world, body, &report));
+    CHECK(report.cavity_count == 0 && report.volume == 0 && report.pressure == 0);
+    def = a_tetrahedron();
+    MUST(sinew_body_create(world, &def, &plain));
+    MUST(sinew_body_get_enclosed_report(world, plain, &report));
+    CHECK(report.cavity_count == 0);
+    CHECK(sinew_body_set_pressure(world, plain, 1.0f) == SINEW_STATUS_INVALID_ARGUMENT);
+    sinew_world_destroy(world);
+}
+
 static void refused(sinew_body_def def, const char *name)
 {
     sinew_world *world = a_world(0.0f);
@@ -85,6 +123,12 @@ static void what_is_wrong_is_named(void)
     refused(def, "fibre_directions[0]");
     def = a_tetrahedron(), def.fibre_stiffness = 5.0f;
     refused(def, "fibre_stiffness");
+    def = a_tetrahedron(), def.enclosed_stiffness = -1.0f;
+    refused(def, "enclosed_stiffness is -1");
+    def = a_tetrahedron(), def.pressure = INFINITY;
+    refused(def, "pressure");
+    def = a_tetrahedron(), def.pressure = 5.0f, def.triangle_count = 3;
+    refused(def, "pressure is 5 Pa, and the surface is not closed");
 }
 
 static void an_older_program_knows_none_of_it(void)
@@ -93,11 +137,16 @@ static void an_older_program_knows_none_of_it(void)
     def.bending_stiffness = -1.0f;
     def.struct_size = offsetof(sinew_body_def, home_stiffnesses);
     CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
+    def = a_tetrahedron();
+    def.pressure = NAN;
+    def.struct_size = offsetof(sinew_body_def, enclosed_stiffness);
+    CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
 }
 
 int main(void)
 {
     each_adds_the_energy_that_it_should();
+    a_cavity_is_told_pressed_and_opened();
     what_is_wrong_is_named();
     an_older_program_knows_none_of_it();
     return checked("terms beside springs are what they say");

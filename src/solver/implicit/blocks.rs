@@ -7,6 +7,7 @@ use glam::{BVec3, DMat3, Vec3};
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
 use crate::elements::Elements;
+use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
@@ -75,6 +76,12 @@ impl Blocks {
                 self.add(node, blocks[place][place]);
             }
         });
+    }
+
+    /// Adds what is enclosed at these positions.
+    pub fn add_enclosed(&mut self, enclosed: &Enclosed, positions: &Vectors) {
+        let at = |node: usize| positions.get(node).as_dvec3();
+        enclosed.show_diagonal(&at, &mut |node, block| self.add(node as u32, block));
     }
 
     fn add(&mut self, node: u32, matrix: DMat3) {

@@ -10,6 +10,7 @@ use super::gradient::add_lanes;
 use crate::body::{Pins, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::elements::Elements;
+use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
 use crate::solver::held::without_held;
@@ -220,6 +221,30 @@ impl Coarse {
                         let cluster = usize::from(self.clusters[nodes[0] as usize / BLOCK]);
                         self.add_block([cluster, row], [cluster, column], sum);
                     }
+                }
+            }
+        });
+    }
+
+    /// Adds what is enclosed at these positions.
+    pub fn add_enclosed(&mut self, enclosed: &Enclosed, positions: &Vectors) {
+        let at = |node: usize| positions.get(node).as_dvec3();
+        let size = self.size();
+        enclosed.show_factors(&at, &mut |stiffness, gradients| {
+            // How the volume changes with each motion.
+            self.sums.fill(0.0);
+            for (node, gradient) in gradients {
+                let first = usize::from(self.clusters[node / BLOCK]) * MOTIONS;
+                for (function, part) in self.part(node).into_iter().enumerate() {
+                    let sums = &mut self.sums[first + 3 * function..][..3];
+                    for (sum, growth) in sums.iter_mut().zip((gradient * f64::from(part)).to_array()) {
+                        *sum += growth;
+                    }
+                }
+            }
+            for (row, &of_row) in self.stiffness.chunks_exact_mut(size).zip(&self.sums) {
+                for (entry, &of_column) in row.iter_mut().zip(&self.sums) {
+                    *entry += stiffness * of_row * of_column;
                 }
             }
         });

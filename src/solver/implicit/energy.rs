@@ -3,12 +3,12 @@
 use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, Implicit};
-use crate::body::{Body, Pins, Records, Vectors};
+use crate::body::{Body, Pins, Vectors};
 use crate::contact::Contacts;
 use crate::elements::Elements;
+use crate::enclosed::Enclosed;
 use crate::solver::write_records;
-use crate::springs::{ChosenKernel, Loops, Motion, Springs, TileForces, tile_count, tile_nodes};
-use crate::terms::Terms;
+use crate::springs::{ChosenKernel, Loops, Motion, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// What rounding may add, as a fraction of the energies involved.
@@ -20,21 +20,39 @@ const LANES: usize = 16;
 /// What was lost may come back, as far as it is no more than this part of the energy there is.
 const CREDIT: f64 = 0.1;
 
+/// Kinetic and elastic energy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Total {
+    /// J; below 0 where a constant pressure has done more work than is stored.
+    pub energy: f64,
+    /// What rounding is a part of: the same, with that work added, J.
+    pub size: f64,
+}
+
 /// The energy before a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Before {
-    /// Kinetic and elastic, J; the pins are already where the step leads them.
-    energy: f64,
+    /// The pins are already where the step leads them.
+    total: Total,
     credit: f64,
 }
 
-/// What has energy inside a body.
-struct Inside<'a> {
-    springs: &'a dyn Springs,
-    elements: Option<&'a mut Elements>,
-    terms: Option<&'a Terms>,
-    records: Option<&'a mut Records>,
-    kernel: ChosenKernel,
+impl Total {
+    /// What is stored, and the work that a constant pressure has done, J.
+    fn of(stored: f64, work: f64) -> Self {
+        Self {
+            energy: stored - work,
+            size: stored + work.abs(),
+        }
+    }
+
+    /// With so much more, J, above 0 where `size` is to grow.
+    fn plus(self, more: f64) -> Self {
+        Self {
+            energy: self.energy + more,
+            size: self.size + more,
+        }
+    }
 }
 
 impl Substep<'_> {
@@ -43,10 +61,10 @@ impl Substep<'_> {
         let history = implicit.last(self.is_first);
         let credit = history.credit;
         let travels = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
-        if let Some(energy) = history.energy
+        if let Some(total) = history.energy
             && !travels
         {
-            return Before { energy, credit };
+            return Before { total, credit };
         }
         let state = body.state.substep();
         let velocities = if self.is_first {
@@ -56,34 +74,23 @@ impl Substep<'_> {
         };
         let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, &body.pins, body.kernel);
         let from = implicit.place(self.is_first);
-        let mut inside = Inside {
-            springs: &*body.springs,
-            elements: body.elements.as_deref_mut(),
-            terms: body.terms.as_deref(),
-            records: body.records.as_mut(),
-            kernel: body.kernel,
-        };
-        let mut energy = implicit.elastic(&mut inside, state.positions, from, self.team);
+        let mut total = implicit.elastic(body, false, from, self.team);
         if travels {
             // With what viscous arms take up on that way.
             body.foresee(self.step);
             let state = body.state.substep();
-            let mut inside = Inside {
-                springs: &*body.springs,
-                elements: body.elements.as_deref_mut(),
-                terms: body.terms.as_deref(),
-                records: body.records.as_mut(),
-                kernel: body.kernel,
-            };
-            let moved = state.next_positions;
-            moved.copy_from(state.positions);
+            state.next_positions.copy_from(state.positions);
             for pin in body.pins.iter() {
-                pin.put_among(moved, pin.place(self.end));
+                pin.put_among(state.next_positions, pin.place(self.end));
             }
-            energy = energy.max(implicit.elastic(&mut inside, moved, from, self.team));
+            let there = implicit.elastic(body, true, from, self.team);
+            total = Total {
+                energy: total.energy.max(there.energy),
+                size: total.size.max(there.size),
+            };
         }
         Before {
-            energy: kinetic + energy,
+            total: total.plus(kinetic),
             credit,
         }
     }
@@ -99,25 +106,18 @@ impl Substep<'_> {
             body.kernel,
         );
         let next = 1 - implicit.settled;
-        let mut inside = Inside {
-            springs: &*body.springs,
-            elements: body.elements.as_deref_mut(),
-            terms: body.terms.as_deref(),
-            records: body.records.as_mut(),
-            kernel: body.kernel,
-        };
-        let elastic = implicit.elastic(&mut inside, state.next_positions, next, self.team);
+        let elastic = implicit.elastic(body, true, next, self.team);
         let work = self.work(body, &implicit.histories[next].ways);
-        let after = kinetic + elastic;
-        let allowed = before.energy + work + before.credit;
-        let rounding = ROUNDING * (before.energy + after + work.abs()) + implicit.noise(body.extent()).square;
-        if !after.is_finite() {
+        let after = elastic.plus(kinetic);
+        let allowed = before.total.energy + work + before.credit;
+        let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).square;
+        if !(after.energy.is_finite() && after.size.is_finite()) {
             return End::NotFinite;
         }
         let history = &mut implicit.histories[next];
         history.energy = Some(after);
-        history.credit = (allowed - after).clamp(0.0, CREDIT * (after + work.abs()));
-        if after <= allowed + rounding {
+        history.credit = (allowed - after.energy).clamp(0.0, CREDIT * (after.size + work.abs()));
+        if after.energy <= allowed + rounding {
             End::Fine
         } else {
             End::Gained
@@ -139,15 +139,15 @@ impl Substep<'_> {
         let work = self.work(body, &implicit.histories[next].ways);
         let state = body.state.substep();
         let history = &mut implicit.histories[next];
-        if let Some(energy) = known
+        if let Some(total) = known
             && kinetic.is_finite()
-            && energy - kinetic <= before.energy + work
+            && total.energy - kinetic <= before.total.energy + work
         {
-            let factor = ((before.energy + work - (energy - kinetic)) / kinetic)
+            let factor = ((before.total.energy + work - (total.energy - kinetic)) / kinetic)
                 .clamp(0.0, 1.0)
                 .sqrt() as f32;
             scale(state.velocities, factor);
-            history.energy = Some(energy - kinetic * (1.0 - f64::from(factor * factor)));
+            history.energy = Some(total.plus(-kinetic * (1.0 - f64::from(factor * factor))));
         } else {
             state.next_positions.copy_from(state.positions);
             for pin in body.pins.iter() {
@@ -180,6 +180,10 @@ impl Substep<'_> {
         }
         let elements = body.elements.as_deref().map(Elements::shares);
         let terms = body.terms.as_deref();
+        if let Some(enclosed) = &mut body.enclosed {
+            enclosed.find_forces(positions, self.team);
+        }
+        let enclosed = body.enclosed.as_deref().map(Enclosed::shares);
         let motion = Motion {
             positions: positions.view().with_records(body.records.as_ref()),
             ..Motion::at(positions, body.predicted_velocities.as_ref())
@@ -198,6 +202,9 @@ impl Substep<'_> {
                 }
                 if let Some(terms) = terms {
                     terms.add_forces(tile, tile_nodes(tile, node_count), motion.positions, &mut forces);
+                }
+                if let Some(enclosed) = &enclosed {
+                    enclosed.add(tile, &mut forces);
                 }
                 show_held(pins, &forces, gravity, masses);
             });
@@ -271,25 +278,27 @@ fn scale(vectors: &mut Vectors, factor: f32) {
 }
 
 impl Implicit {
-    /// The energy of what is inside a body with nodes at `positions`, which lack the remainders of this place where there are
-    /// some, J.
-    fn elastic(&mut self, inside: &mut Inside, positions: &Vectors, place: usize, team: &Team) -> f64 {
+    /// The energy of what is inside a body with nodes where the substep began, or where they are next; they lack the remainders of this place
+    /// where there are some, J.
+    fn elastic(&mut self, body: &mut Body, is_next: bool, place: usize, team: &Team) -> Total {
+        let (kernel, springs) = (body.kernel, &*body.springs);
+        let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
+        let state = body.state.substep();
+        let positions = if is_next {
+            &*state.next_positions
+        } else {
+            state.positions
+        };
         if let Some(newton) = &mut self.newton {
-            return newton.elastic(
-                inside.springs,
-                inside.elements.as_deref(),
-                inside.terms,
-                positions,
-                place,
-            );
+            let elements = body.elements.as_deref();
+            let [stored, work] = newton.elastic(springs, elements, (terms, enclosed), positions, place);
+            return Total::of(stored, work);
         }
-        let (node_count, springs, kernel) = (positions.len(), inside.springs, inside.kernel);
-        let terms = inside.terms;
-        if let Some(records) = &mut inside.records {
+        let node_count = positions.len();
+        if let Some(records) = &mut body.records {
             write_records(kernel, positions, records, team);
         }
-        let records = inside.records.as_deref();
-        let view = positions.view().with_records(records);
+        let view = positions.view().with_records(body.records.as_ref());
         let partials = Items::new(&mut self.partials);
         team.pass(tile_count(node_count), partials, |tile, partial| {
             partial.first = springs.half_energy(tile_nodes(tile, node_count), view);
@@ -298,11 +307,13 @@ impl Implicit {
             }
         });
         let of_tiles: f64 = self.partials.iter().map(|partial| partial.first).sum();
-        let of_elements = match (&mut inside.elements, records) {
+        let of_elements = match (&mut body.elements, &body.records) {
             (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
             _ => 0.0,
         };
-        of_tiles + of_elements
+        let at = |node: usize| positions.get(node).as_dvec3();
+        let [of_cavities, work] = enclosed.map_or([0.0; 2], |enclosed| enclosed.energy(&at));
+        Total::of(of_tiles + of_elements + of_cavities, work)
     }
 }
 

@@ -106,6 +106,11 @@ impl Implicit {
         }
         let elements = body.elements.as_deref().zip(self.changes.as_ref());
         let elements = elements.map(|(elements, changes)| elements.shares_of(changes));
+        if let (Some(enclosed), Some(changes)) = (&body.enclosed, &mut self.pressure_changes) {
+            enclosed.find_changes(&self.searches, changes, team);
+        }
+        let enclosed = body.enclosed.as_deref().zip(self.pressure_changes.as_ref());
+        let enclosed = enclosed.map(|(enclosed, changes)| enclosed.shares_of(changes));
         let (searches, inertia) = (&self.searches, &self.inertia);
         let course = Course {
             node_count,
@@ -123,6 +128,9 @@ impl Implicit {
             }
             if let Some(terms) = &body.terms {
                 terms.add_changes(tile, nodes.clone(), [course.positions, course.ways], &mut changes);
+            }
+            if let Some(enclosed) = &enclosed {
+                enclosed.add(tile, &mut changes);
             }
             partial.first = body.kernel.run(Product {
                 inertia: &inertia[nodes.clone()],

@@ -8,6 +8,7 @@ use super::loops::{Add, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
 use crate::body::{Body, Pin, Vectors};
 use crate::elements::Elements;
+use crate::enclosed::Enclosed;
 use crate::springs::{ChosenKernel, Motion, TILE, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -30,6 +31,10 @@ impl Substep<'_> {
         let elements = body.elements.as_deref().map(Elements::shares);
         let terms = body.terms.as_deref();
         let state = body.state.substep();
+        if let Some(enclosed) = &mut body.enclosed {
+            enclosed.find_forces(state.next_positions, self.team);
+        }
+        let enclosed = body.enclosed.as_deref().map(Enclosed::shares);
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
         let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
@@ -58,6 +63,9 @@ impl Substep<'_> {
                 }
                 if let Some(terms) = terms {
                     terms.add_forces(tile, nodes.clone(), motion.positions, &mut forces);
+                }
+                if let Some(enclosed) = &enclosed {
+                    enclosed.add(tile, &mut forces);
                 }
                 show_held(pins, &forces, gravity, masses);
                 kernel.run(Residual {

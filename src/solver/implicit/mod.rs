@@ -24,6 +24,7 @@ pub(super) use step::run;
 use crate::body::{Records, Vectors};
 use crate::diagnostics::{SolverReport, StateHasher};
 use crate::elements::{Elements, Sums};
+use crate::enclosed::{self, Enclosed};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::newton::Newton;
@@ -31,6 +32,7 @@ use crate::springs::{Springs, tile_count};
 use crate::terms::Terms;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
+use energy::Total;
 use estimate::Spectrum;
 use gradient::Partial;
 
@@ -49,7 +51,7 @@ pub(crate) struct History {
     /// s; 0: there is none.
     pub step: f32,
     /// Kinetic and elastic energy at its end, J, where they are known.
-    pub energy: Option<f64>,
+    energy: Option<Total>,
     /// What was lost not long ago, and may come back: the energy of a step's formula is not quite this one.
     pub credit: f64,
 }
@@ -116,6 +118,8 @@ pub(crate) struct Implicit {
     search_records: Option<Records>,
     /// What elements make of the search direction.
     changes: Option<Sums>,
+    /// What it does to pressures.
+    pressure_changes: Option<enclosed::Changes>,
     /// The matrix times the search direction, and what the preconditioner makes of the residual.
     products: Vectors,
     preconditioned: Vectors,
@@ -197,6 +201,7 @@ impl Implicit {
             searches: vectors()?,
             search_records: gathers.then(|| Records::zeros(solved_count)).transpose()?,
             changes: None,
+            pressure_changes: None,
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, solved_count)?,
@@ -227,12 +232,20 @@ impl Implicit {
         Ok(())
     }
 
-    /// As [`Self::new`], with the equations solved exactly, for these springs, elements and terms.
+    /// Makes room for what pressures change by.
+    pub fn enclose(&mut self, enclosed: &Enclosed) -> Result<()> {
+        if self.newton.is_none() {
+            self.pressure_changes = Some(enclosed.room_for_changes()?);
+        }
+        Ok(())
+    }
+
+    /// As [`Self::new`], with the equations solved exactly, for these springs, elements, terms and cavities.
     pub fn exact(
         positions: &Vectors,
         springs: &dyn Springs,
         elements: Option<&Elements>,
-        terms: Option<&Terms>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
         [order, budget]: [u32; 2],
         accuracy: f32,
     ) -> Result<Self> {
@@ -243,7 +256,7 @@ impl Implicit {
         let budget = if budget == 0 { BUDGET } else { budget };
         let accuracy = if accuracy == 0.0 { ACCURACY } else { accuracy };
         Ok(Self {
-            newton: Some(Newton::new(positions.len(), springs, elements, terms)?),
+            newton: Some(Newton::new(positions.len(), springs, elements, beside)?),
             ..Self::solving(&Vectors::zeros(0)?, positions.len(), false, order, budget, accuracy)?
         })
     }
@@ -340,7 +353,9 @@ impl Implicit {
             hasher.write_floats(&vector.to_array());
         }
         hasher.write_floats(&[*step, self.accuracy]);
-        hasher.write_u64(energy.unwrap_or(f64::NAN).to_bits());
+        let [energy, size] = energy.map_or([f64::NAN; 2], |total| [total.energy, total.size]);
+        hasher.write_u64(energy.to_bits());
+        hasher.write_u64(size.to_bits());
         hasher.write_u64(credit.to_bits());
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
         if let Some(newton) = &self.newton {
@@ -356,7 +371,7 @@ impl Implicit {
     }
 
     /// The energy is not what it was when the last step ended.
-    fn forget_energy(&mut self) {
+    pub fn forget_energy(&mut self) {
         self.histories[self.settled].energy = None;
     }
 

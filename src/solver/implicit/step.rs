@@ -261,6 +261,10 @@ impl Substep<'_> {
             for pin in body.pins.partial() {
                 implicit.blocks.hold(pin.node as usize, pin.axes);
             }
+            if let Some(enclosed) = &body.enclosed {
+                implicit.blocks.add_enclosed(enclosed, positions);
+                implicit.coarse.add_enclosed(enclosed, positions);
+            }
         }
         let time = self.formula.time as f32;
         if time != implicit.prepared || implicit.stale {

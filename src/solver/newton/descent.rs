@@ -9,6 +9,7 @@ use super::gradient::{Gradient, dot, longest};
 use super::matrix::Matrix;
 use super::network::Network;
 use crate::elements::Elements;
+use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Springs;
@@ -73,9 +74,9 @@ impl Descent {
         node_count: usize,
         springs: &dyn Springs,
         elements: Option<&Elements>,
-        terms: Option<&Terms>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
     ) -> Result<Self> {
-        let network = Network::new(node_count, springs, elements, terms)?;
+        let network = Network::new(node_count, springs, elements, beside)?;
         let pair_count = network.pair_count();
         Ok(Self {
             equation: Equation::new(node_count, network.ring_count(), network.member_count())?,
@@ -94,10 +95,16 @@ impl Descent {
         self.factor.make_room(pair_count)
     }
 
-    /// Takes springs and elements as they are now, and the terms themselves, until they are given back.
-    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>, terms: Option<Box<Terms>>) {
-        self.network.read(springs, elements, terms.as_deref());
-        self.network.terms = terms;
+    /// Takes springs and elements as they are now, and terms and cavities themselves, until they are given back.
+    pub fn read(
+        &mut self,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        (terms, enclosed): (Option<Box<Terms>>, Option<Box<Enclosed>>),
+    ) {
+        self.network
+            .read(springs, elements, (terms.as_deref(), enclosed.as_deref()));
+        (self.network.terms, self.network.enclosed) = (terms, enclosed);
     }
 
     /// Writes what acts on each node.

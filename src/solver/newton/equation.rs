@@ -10,6 +10,7 @@ use super::network::{Element, Network, PAIRS, Tetrahedron};
 use crate::body::Pins;
 use crate::contact::Holds;
 use crate::elements::Deformed;
+use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
 use crate::solver::held::without_held;
@@ -138,6 +139,9 @@ impl Equation {
         if let Some(terms) = &network.terms {
             terms.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
         }
+        if let Some(enclosed) = &network.enclosed {
+            enclosed.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
+        }
         let way = |node: usize| self.ways[node];
         self.holds
             .show_forces(way, |node, force| residuals[node] += self.free_part(node, force));
@@ -191,6 +195,9 @@ impl Equation {
         if let Some(terms) = &network.terms {
             terms.show_changes(&|node| self.position(node), &more, &mut add);
         }
+        if let Some(enclosed) = &network.enclosed {
+            enclosed.show_changes(&|node| self.position(node), &more, &mut add);
+        }
         self.holds.show_changes(way, more, add);
         sums
     }
@@ -221,6 +228,9 @@ impl Equation {
             self.add_tetrahedron(element, tangent, matrix);
         }
         self.add_terms(network, tangent, matrix);
+        if let Some(enclosed) = network.enclosed.as_deref().filter(|_| tangent == Tangent::Exact) {
+            self.add_pressure(network, enclosed, matrix);
+        }
         self.holds.show_blocks(|node, block| {
             if self.is_free(node) {
                 matrix.diagonal[node] += whole(block);
@@ -294,6 +304,16 @@ impl Equation {
                         matrix.beside[network.place([of_a, of_b])] += blocks[a][b];
                     }
                 }
+            }
+        });
+    }
+
+    /// Adds what pressure does as a surface turns. It draws one way as much as it pushes another: there is nothing of it that a matrix
+    /// without negative curvature could have.
+    fn add_pressure(&self, network: &Network, enclosed: &Enclosed, matrix: &mut Matrix) {
+        enclosed.show_blocks(&|node| self.position(node), &mut |[a, b], block| {
+            if self.is_free(a as usize) && self.is_free(b as usize) {
+                matrix.beside[network.place([a, b])] += if a > b { block } else { block.transpose() };
             }
         });
     }
@@ -372,11 +392,16 @@ impl Equation {
         self.holds.press(|node| ways[node]);
     }
 
-    /// Adds to the products with a matrix what contacts of several nodes have beside its diagonal, and rings; `changes` has a
-    /// number for each of these.
+    /// Adds to the products with a matrix what contacts of several nodes have beside its diagonal, rings and volumes of
+    /// cavities; `changes` has a number for each ring.
     pub fn add_products(&self, network: &Network, vectors: &[DVec3], products: &mut [DVec3], changes: &mut [f64]) {
         if !changes.is_empty() {
             self.add_products_of_rings(network, vectors, products, changes);
+        }
+        if let Some(enclosed) = &network.enclosed {
+            enclosed.show_products(&|node| self.position(node), vectors, &mut |node, product| {
+                products[node] += self.free_part(node, product);
+            });
         }
         let vector = |node: usize| vectors[node];
         self.holds.show_products(vector, |node, product| {
@@ -419,7 +444,7 @@ impl Equation {
         outer * along + DMat3::from_diagonal(DVec3::splat(across))
     }
 
-    /// The energy of springs, elements, terms and loads, J, with the origin of coordinates at `origin`.
+    /// The energy of springs, elements, terms, cavities and loads, J, with the origin of coordinates at `origin`.
     pub fn potential(&mut self, network: &Network, origin: DVec3) -> f64 {
         let elastic: f64 = network
             .springs()
@@ -435,8 +460,11 @@ impl Equation {
         }
         let of_terms = network.terms.as_ref();
         let of_terms = of_terms.map_or(0.0, |terms| terms.energy(&|node| self.position(node)));
+        let of_cavities = network.enclosed.as_ref();
+        let [stored, work] = of_cavities.map_or([0.0; 2], |enclosed| enclosed.energy(&|node| self.position(node)));
         let loads = self.loads.iter().enumerate();
-        elastic + of_elements + of_terms
+        elastic + of_elements + of_terms + stored
+            - work
             - loads
                 .map(|(node, load)| load.dot(self.position(node) + origin))
                 .sum::<f64>()

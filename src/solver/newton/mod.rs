@@ -23,6 +23,7 @@ pub(super) use step::Aimed;
 use crate::body::Vectors;
 use crate::diagnostics::StateHasher;
 use crate::elements::Elements;
+use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::Springs;
@@ -46,10 +47,10 @@ impl Newton {
         node_count: usize,
         springs: &dyn Springs,
         elements: Option<&Elements>,
-        terms: Option<&Terms>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
     ) -> Result<Self> {
         Ok(Self {
-            descent: Descent::new(node_count, springs, elements, terms)?,
+            descent: Descent::new(node_count, springs, elements, beside)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
             growths: memory::filled(0.0, elements.map_or(0, Elements::ring_count))?,
         })
@@ -65,15 +66,16 @@ impl Newton {
         self.remainders[place].clear();
     }
 
-    /// The energy of springs, elements and terms, J, with nodes at these positions and what they lack.
+    /// The energy of springs, elements, terms and cavities, J, with nodes at these positions and what they lack; and the work that a
+    /// constant pressure has done.
     pub fn elastic(
         &mut self,
         springs: &dyn Springs,
         elements: Option<&Elements>,
-        terms: Option<&Terms>,
+        (terms, enclosed): (Option<&Terms>, Option<&Enclosed>),
         positions: &Vectors,
         place: usize,
-    ) -> f64 {
+    ) -> [f64; 2] {
         let exact = |node: usize| exact(positions.get(node), self.remainders[place].get(node));
         let mut sum = 0.0;
         for node in 0..positions.len() {
@@ -95,7 +97,14 @@ impl Newton {
             let remainders = &self.remainders[place];
             sum += terms.energy(&|node| step::exact(positions.get(node), remainders.get(node)));
         }
-        sum
+        let mut work = 0.0;
+        if let Some(enclosed) = enclosed {
+            let remainders = &self.remainders[place];
+            let [stored, done] = enclosed.energy(&|node| step::exact(positions.get(node), remainders.get(node)));
+            sum += stored;
+            work = done;
+        }
+        [sum, work]
     }
 
     /// What the next step depends on.

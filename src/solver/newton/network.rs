@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::elements::{Elements, Law, Load, Rest};
+use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
 use crate::springs::{Link, Springs};
@@ -20,7 +21,8 @@ pub(super) struct Network {
     loads: Vec<Load>,
     /// Lent by the body while it is solved.
     pub terms: Option<Box<Terms>>,
-    /// The pairs of nodes of tetrahedra and terms, the higher number first.
+    pub enclosed: Option<Box<Enclosed>>,
+    /// The pairs of nodes of tetrahedra, terms and closed surfaces, the higher number first.
     edges: Vec<[u32; 2]>,
     law: Option<Law>,
     /// Where volume is kept by rings: each node's volume at rest, m³, and where the tetrahedra about it begin among all.
@@ -56,16 +58,19 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
     [a.max(b), a.min(b)]
 }
 
-/// Shows the pairs of nodes of each term.
-fn show_pairs(terms: Option<&Terms>, see: &mut dyn FnMut([u32; 2])) {
-    let Some(terms) = terms else {
-        return;
-    };
-    terms.show_nodes(&mut |nodes, _| {
+/// Shows the pairs of nodes of each term, and of each triangle of a closed surface.
+fn show_pairs((terms, enclosed): (Option<&Terms>, Option<&Enclosed>), see: &mut dyn FnMut([u32; 2])) {
+    let mut show = |nodes: &[u32]| {
         for (place, &a) in nodes.iter().enumerate() {
             nodes[..place].iter().for_each(|&b| see(ordered([a, b])));
         }
-    });
+    };
+    if let Some(terms) = terms {
+        terms.show_nodes(&mut |nodes, _| show(nodes));
+    }
+    if let Some(enclosed) = enclosed {
+        enclosed.show_triangles(&mut |corners| show(&corners));
+    }
 }
 
 impl Network {
@@ -74,10 +79,10 @@ impl Network {
         node_count: usize,
         springs: &dyn Springs,
         elements: Option<&Elements>,
-        terms: Option<&Terms>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
     ) -> Result<Self> {
         let mut pair_count = 6 * elements.map_or(0, Elements::count);
-        show_pairs(terms, &mut |_| pair_count += 1);
+        show_pairs(beside, &mut |_| pair_count += 1);
         let tetrahedron_count = elements.map_or(0, Elements::count);
         let ring_count = elements.map_or(0, Elements::ring_count);
         let remember = elements.is_some_and(Elements::remember);
@@ -88,13 +93,14 @@ impl Network {
             loads: memory::reserved(if remember { tetrahedron_count } else { 0 })?,
             ring_loads: memory::reserved(if remember { ring_count } else { 0 })?,
             terms: None,
+            enclosed: None,
             edges: memory::reserved(pair_count)?,
             law: None,
             volumes: memory::filled(0.0, ring_count)?,
             ring_starts: memory::filled(0, if ring_count > 0 { ring_count + 1 } else { 0 })?,
             ring_members: memory::filled(0, if ring_count > 0 { 4 * tetrahedron_count } else { 0 })?,
         };
-        network.read(springs, elements, terms);
+        network.read(springs, elements, beside);
         Ok(network)
     }
 
@@ -105,8 +111,18 @@ impl Network {
         Ok(pair_count)
     }
 
+    /// Gives back what was lent.
+    pub fn give_back(&mut self) -> (Option<Box<Terms>>, Option<Box<Enclosed>>) {
+        (self.terms.take(), self.enclosed.take())
+    }
+
     /// Takes them from a body, which allocates nothing where there is room for all.
-    pub fn read(&mut self, springs: &dyn Springs, elements: Option<&Elements>, terms: Option<&Terms>) {
+    pub fn read(
+        &mut self,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
+    ) {
         self.tetrahedra.clear();
         self.loads.clear();
         self.ring_loads.clear();
@@ -126,7 +142,7 @@ impl Network {
                 });
             });
         }
-        show_pairs(terms, &mut |pair| self.edges.push(pair));
+        show_pairs(beside, &mut |pair| self.edges.push(pair));
         self.edges.sort_unstable();
         self.edges.dedup();
         if let Some(elements) = elements.filter(|elements| elements.ring_count() > 0) {

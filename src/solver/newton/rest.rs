@@ -52,12 +52,12 @@ pub struct RestStateReport {
 pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
     // At rest nothing that is viscous holds anything.
     body.release();
-    let terms = body.terms.as_deref();
-    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), terms)?;
-    descent.network.terms = body.terms.take();
+    let beside = (body.terms.as_deref(), body.enclosed.as_deref());
+    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), beside)?;
+    (descent.network.terms, descent.network.enclosed) = (body.terms.take(), body.enclosed.take());
     descent.equation.pins = std::mem::take(&mut body.pins);
     let found = find(&mut descent, body, gravity, definition);
-    body.terms = descent.network.terms.take();
+    (body.terms, body.enclosed) = descent.network.give_back();
     body.pins = std::mem::take(&mut descent.equation.pins);
     if found.is_err() {
         body.recall();
@@ -219,6 +219,14 @@ impl Parts {
         if let Some(terms) = &descent.network.terms {
             terms.show_nodes(&mut |nodes, stiffness| {
                 for &other in nodes[1..].iter().filter(|_| stiffness > 0.0) {
+                    let [a, b] = [nodes[0], other].map(|end| parts.find(end));
+                    parts.lowest[a.max(b) as usize] = a.min(b);
+                }
+            });
+        }
+        if let Some(enclosed) = &descent.network.enclosed {
+            enclosed.show_triangles(&mut |nodes| {
+                for &other in &nodes[1..] {
                     let [a, b] = [nodes[0], other].map(|end| parts.find(end));
                     parts.lowest[a.max(b) as usize] = a.min(b);
                 }

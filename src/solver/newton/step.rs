@@ -37,8 +37,8 @@ impl Newton {
     /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
     /// there.
     pub(in crate::solver) fn solve(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) -> Found {
-        let terms = body.terms.take();
-        self.descent.read(&*body.springs, body.elements.as_deref(), terms);
+        let beside = (body.terms.take(), body.enclosed.take());
+        self.descent.read(&*body.springs, body.elements.as_deref(), beside);
         self.set_up(body, aimed, pushes);
         self.descent.equation.pins = std::mem::take(&mut body.pins);
         if let Some(contacts) = &mut body.contacts {
@@ -58,7 +58,7 @@ impl Newton {
         });
         self.descent.weigh();
         self.descent.equation.press();
-        body.terms = self.descent.network.terms.take();
+        (body.terms, body.enclosed) = self.descent.network.give_back();
         body.pins = std::mem::take(&mut self.descent.equation.pins);
         if let Some(contacts) = &mut body.contacts {
             contacts.holds = std::mem::take(&mut self.descent.equation.holds);
