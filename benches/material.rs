@@ -18,7 +18,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
-use sinew::{BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, World, WorldDefinition};
+use sinew::{
+    BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, Viscosity, World, WorldDefinition, Yielding,
+};
 
 const SUBSTEPS: u32 = 16;
 
@@ -151,6 +153,10 @@ fn main() -> ExitCode {
         stiffnesses: Values::Uniform(10.0),
         ..plain
     };
+    let solid = Viscosity {
+        retardation_time: 0.02,
+        relaxation_time: 0.02,
+    };
     let directions = vec![Vec3::X; tetrahedron_count];
     let (nowhere, none) = (
         vec![Vec3::ZERO; tetrahedron_count],
@@ -172,6 +178,11 @@ fn main() -> ExitCode {
                 spring_law: SpringLaw::Linear,
                 fibre_directions: &nowhere,
                 fibre_stiffnesses: Values::Each(&none[..tetrahedron_count]),
+                viscosity: Viscosity::default(),
+                yielding: Yielding::default(),
+                strain_limit: 0.0,
+                enclosed_stiffness: 0.0,
+                pressure: 0.0,
                 ..springs
             },
         ),
@@ -229,6 +240,30 @@ fn main() -> ExitCode {
             },
         ),
         (
+            "springs that relax",
+            BodyDefinition {
+                viscosity: solid,
+                ..springs
+            },
+        ),
+        (
+            "springs that yield",
+            BodyDefinition {
+                yielding: Yielding {
+                    strain: 0.1,
+                    ..Yielding::default()
+                },
+                ..springs
+            },
+        ),
+        (
+            "springs with a limit",
+            BodyDefinition {
+                strain_limit: 0.2,
+                ..springs
+            },
+        ),
+        (
             "fibres in all tetrahedra",
             BodyDefinition {
                 fibre_directions: &directions,
@@ -247,6 +282,25 @@ fn main() -> ExitCode {
             "tetrahedra, nu 0.3",
             BodyDefinition {
                 material: Some(tissue(Model::Tetrahedra, 0.3)),
+                ..plain
+            },
+        ),
+        (
+            "tetrahedra that relax, nu 0.3",
+            BodyDefinition {
+                material: Some(tissue(Model::Tetrahedra, 0.3)),
+                viscosity: solid,
+                ..plain
+            },
+        ),
+        (
+            "tetrahedra that yield, nu 0.3",
+            BodyDefinition {
+                material: Some(tissue(Model::Tetrahedra, 0.3)),
+                yielding: Yielding {
+                    strain: 0.1,
+                    ..Yielding::default()
+                },
                 ..plain
             },
         ),

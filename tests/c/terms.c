@@ -94,6 +94,48 @@ static void a_cavity_is_told_pressed_and_opened(void)
     sinew_world_destroy(world);
 }
 
+/* What holds a pinned corner that was led away, after some steps. */
+static double pull(sinew_body_def def, float place, int steps)
+{
+    sinew_world *world = a_world(0.0f);
+    sinew_body_id body = {0, 0};
+    float end[3] = {0, 0, 0}, force[3];
+    def.solver = SINEW_SOLVER_IMPLICIT;
+    MUST(sinew_body_create(world, &def, &body));
+    end[0] = place;
+    MUST(sinew_body_move_pin(world, body, 1, end));
+    while (steps-- > 0)
+        MUST(sinew_world_step(world, 0.001f, NULL));
+    MUST(sinew_body_get_pin_force(world, body, 1, force));
+    sinew_world_destroy(world);
+    return force[0];
+}
+
+static void springs_relax_yield_and_have_a_limit(void)
+{
+    static const float ends[] = {0, 0, 0, 1, 0, 0}, masses[] = {0, 0};
+    static const uint32_t spring[] = {0, 1};
+    sinew_body_def def, pair;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    def.positions = ends, def.node_count = 2;
+    def.masses = masses;
+    def.springs = spring, def.spring_count = 1;
+    def.stiffness = 10.0f;
+    pair = def;
+    CHECK_NEAR(pull(pair, 1.5f, 1), 5.0, 1e-5);
+    /* E (1 + 2 exp(-t / 0.1 s)): three times as much at once, what is elastic in the end. */
+    pair.retardation_time = 0.2f, pair.relaxation_time = 0.1f;
+    CHECK_NEAR(pull(pair, 1.5f, 1), 15.0, 0.01);
+    CHECK_NEAR(pull(pair, 1.5f, 101), 5.0 * (1 + 2 * 0.36788), 0.01);
+    CHECK_NEAR(pull(pair, 1.5f, 2000), 5.0, 1e-4);
+    pair = def, pair.yield_strain = 0.2f;
+    CHECK_NEAR(pull(pair, 1.5f, 2), 2.0, 1e-5);
+    pair.largest_set = 0.1f;
+    CHECK_NEAR(pull(pair, 1.5f, 2), 4.0, 1e-5);
+    pair = def, pair.strain_limit = 0.25f, pair.limit_stiffening = 4.0f;
+    CHECK_NEAR(pull(pair, 1.5f, 2), 15.0, 1e-5);
+}
+
 static void refused(sinew_body_def def, const char *name)
 {
     sinew_world *world = a_world(0.0f);
@@ -123,6 +165,18 @@ static void what_is_wrong_is_named(void)
     refused(def, "fibre_directions[0]");
     def = a_tetrahedron(), def.fibre_stiffness = 5.0f;
     refused(def, "fibre_stiffness");
+    def = a_tetrahedron(), def.retardation_time = -2.0f;
+    refused(def, "retardation_time is -2");
+    def = a_tetrahedron(), def.relaxation_time = 3.0f;
+    refused(def, "relaxation_time is 3");
+    def = a_tetrahedron(), def.yield_strain = -1.0f;
+    refused(def, "yield_strain is -1");
+    def = a_tetrahedron(), def.yield_strain = 0.1f, def.largest_set = 1.5f;
+    refused(def, "largest_set is 1.5");
+    def = a_tetrahedron(), def.strain_limit = -0.5f;
+    refused(def, "strain_limit is -0.5");
+    def = a_tetrahedron(), def.strain_limit = 0.1f, def.limit_stiffening = 0.0f;
+    refused(def, "limit_stiffening is 0");
     def = a_tetrahedron(), def.enclosed_stiffness = -1.0f;
     refused(def, "enclosed_stiffness is -1");
     def = a_tetrahedron(), def.pressure = INFINITY;
@@ -139,13 +193,14 @@ static void an_older_program_knows_none_of_it(void)
     CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
     def = a_tetrahedron();
     def.pressure = NAN;
-    def.struct_size = offsetof(sinew_body_def, enclosed_stiffness);
+    def.struct_size = offsetof(sinew_body_def, retardation_time);
     CHECK_NEAR(elastic_energy(&def, 1.5f), 0.5 * 10 * 0.25 * 9, 1e-5);
 }
 
 int main(void)
 {
     each_adds_the_energy_that_it_should();
+    springs_relax_yield_and_have_a_limit();
     a_cavity_is_told_pressed_and_opened();
     what_is_wrong_is_named();
     an_older_program_knows_none_of_it();
