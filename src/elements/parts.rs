@@ -19,6 +19,9 @@ pub(super) struct Part {
     pub groups: Groups,
 }
 
+/// What is shown the nodes of a tetrahedron, the way it is at rest, and its group and lane.
+pub(super) type See<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
+
 /// Cuts tetrahedra into parts.
 pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<Part>> {
     let mut order: Vec<u32> = memory::reserved(tetrahedra.len())?;
@@ -75,7 +78,7 @@ impl Part {
     }
 
     /// Shows the tetrahedra there are, and in which group and lane.
-    pub fn visit(&self, see: &mut dyn FnMut([u32; 4], &Rest, [usize; 2])) {
+    pub fn visit(&self, see: &mut See) {
         for (index, group) in self.groups.as_slice().iter().enumerate() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
                 let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
