@@ -6,19 +6,10 @@ mod support;
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3, Vec3};
-use sinew::{
-    Body, BodyDefinition, BodyId, Error, Material, Model, RestStateDefinition, Solver, Storage, Values, World,
-    WorldDefinition,
-};
+use sinew::{BodyDefinition, Error, Material, Model, Solver, Storage, Values, World, WorldDefinition};
 use support::bodies::{FREE, Random, largest_difference};
+use support::scene::{SOLVERS, STORAGES, Scene};
 
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 const RADIUS: f64 = 0.05;
 const YOUNG: f64 = 1e5;
 const THICKNESS: f64 = 1e-3;
@@ -172,42 +163,7 @@ impl Formula<'_> {
     }
 }
 
-struct Scene {
-    world: World,
-    id: BodyId,
-}
-
 impl Scene {
-    fn new(world: WorldDefinition, definition: &BodyDefinition) -> Self {
-        let mut world = World::new(world).expect("a world");
-        let id = world.create_body(definition).expect("a body");
-        Self { world, id }
-    }
-
-    fn body(&self) -> &Body {
-        self.world.body(self.id).expect("the body")
-    }
-
-    fn body_mut(&mut self) -> &mut Body {
-        self.world.body_mut(self.id).expect("the body")
-    }
-
-    fn positions(&self) -> Vec<DVec3> {
-        exact(self.body().positions())
-    }
-
-    /// Takes steps that must succeed.
-    fn run(&mut self, dt: f32, steps: usize) {
-        for _ in 0..steps {
-            assert_eq!(self.world.step(dt).expect("a step").bodies_restored, 0);
-        }
-    }
-
-    fn rest(&mut self) -> u32 {
-        let report = self.world.rest_state(self.id, &RestStateDefinition::default());
-        report.expect("a state of rest").iterations
-    }
-
     /// What acts on each node there, measured by what would hold it.
     fn forces(&mut self, places: &[Vec3]) -> Vec<DVec3> {
         let nodes = 0..places.len() as u32;
@@ -217,11 +173,6 @@ impl Scene {
         self.run(1e-5, 1);
         let held = |node| -self.body().pin_force(node).expect("a pin").as_dvec3();
         nodes.map(held).collect()
-    }
-
-    fn energy(&self) -> f64 {
-        let energy = self.body().energy(self.world.gravity());
-        energy.kinetic + energy.elastic + energy.gravitational
     }
 }
 

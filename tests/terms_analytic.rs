@@ -5,32 +5,12 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{
-    BodyDefinition, BodyId, Material, Model, RestStateDefinition, Solver, SpringLaw, Values, World, WorldDefinition,
-};
+use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Values, WorldDefinition};
 use support::bodies::FREE;
+use support::scene::Scene;
 
-struct Scene {
-    world: World,
-    id: BodyId,
-}
-
-impl Scene {
-    fn new(gravity: Vec3, definition: &BodyDefinition) -> Self {
-        let mut world = World::new(WorldDefinition { gravity, ..FREE }).expect("a world");
-        let id = world.create_body(definition).expect("a body");
-        Self { world, id }
-    }
-
-    fn body(&mut self) -> &mut sinew::Body {
-        self.world.body_mut(self.id).expect("the body")
-    }
-
-    fn rest(&mut self) -> Vec<DVec3> {
-        let found = self.world.rest_state(self.id, &RestStateDefinition::default());
-        found.expect("a state of rest");
-        self.body().positions().iter().map(|p| p.as_dvec3()).collect()
-    }
+fn hung(gravity: Vec3, definition: &BodyDefinition) -> Scene {
+    Scene::new(WorldDefinition { gravity, ..FREE }, definition)
 }
 
 #[test]
@@ -45,7 +25,7 @@ fn a_mass_hangs_on_its_home_spring_by_its_weight_over_the_stiffness() {
             solver,
             ..BodyDefinition::default()
         };
-        let mut scene = Scene::new(Vec3::NEG_Z * 9.81, &definition);
+        let mut scene = hung(Vec3::NEG_Z * 9.81, &definition);
         for _ in 0..300 {
             scene.world.step(0.01).expect("a step");
         }
@@ -98,10 +78,10 @@ fn springs_pull_along_their_curve() {
             spring_law,
             ..BodyDefinition::default()
         };
-        let mut scene = Scene::new(Vec3::ZERO, &definition);
+        let mut scene = hung(Vec3::ZERO, &definition);
         for strain in [-0.9, -0.5, -0.1, 0.01, 0.05, 0.1, 0.2, 0.249, 0.4, 0.49, 0.6, 1.0, 3.0] {
             let end = Vec3::new(0.6, 0.0, -0.8) * (LENGTH * (1.0 + strain)) as f32;
-            scene.body().set_positions(&[Vec3::ZERO, end]).expect("places");
+            scene.body_mut().set_positions(&[Vec3::ZERO, end]).expect("places");
             scene.world.step(1e-4).expect("a step");
             let strain = end.as_dvec3().length() / f64::from(LENGTH as f32) - 1.0;
             let pull = law(strain.min(limit)) + slope * (strain - limit).max(0.0);
@@ -137,7 +117,7 @@ const WIDTH: f64 = 0.02;
 
 /// How far the free end of a strip that is clamped at its first two columns gives way to forces on its nodes.
 fn give_way(positions: &[Vec3], triangles: &[[u32; 3]], rows: usize, load: impl Fn(usize) -> Vec3) -> DVec3 {
-    let mut scene = Scene::new(
+    let mut scene = hung(
         Vec3::ZERO,
         &BodyDefinition {
             positions,
@@ -152,12 +132,16 @@ fn give_way(positions: &[Vec3], triangles: &[[u32; 3]], rows: usize, load: impl 
     for node in 0..positions.len() {
         let column = node / rows;
         if column < 2 {
-            scene.body().pin(node as u32).expect("a node");
+            scene.body_mut().pin(node as u32).expect("a node");
         } else {
-            scene.body().apply_force(node as u32, load(column)).expect("a force");
+            scene
+                .body_mut()
+                .apply_force(node as u32, load(column))
+                .expect("a force");
         }
     }
-    let rest = scene.rest();
+    scene.rest();
+    let rest = scene.positions();
     let end = positions.len() - rows..positions.len();
     let ways = end.map(|node| rest[node] - positions[node].as_dvec3());
     ways.sum::<DVec3>() / rows as f64
@@ -235,7 +219,7 @@ fn equilateral_triangles_have_the_rigidity_asked_for_whichever_way_they_are_roll
             bending_stiffness: RIGIDITY as f32,
             ..BodyDefinition::default()
         };
-        let mut scene = Scene::new(Vec3::ZERO, &definition);
+        let scene = hung(Vec3::ZERO, &definition);
         let energy = scene.body().energy(Vec3::ZERO).elastic;
         let area = 0.5 * side * side * 0.75_f64.sqrt() * triangles.len() as f64;
         let expected = 0.5 * RIGIDITY * area / (RADIUS * RADIUS);
@@ -297,9 +281,9 @@ fn a_hinge_has_the_energy_of_its_angle() {
             bending_stiffness: RIGIDITY as f32,
             ..BodyDefinition::default()
         };
-        let mut scene = Scene::new(Vec3::ZERO, &definition);
+        let mut scene = hung(Vec3::ZERO, &definition);
         for angle in [0.0, 0.4, -0.7, 2.0, 3.1, -3.1] {
-            scene.body().set_positions(&corners(angle)).expect("places");
+            scene.body_mut().set_positions(&corners(angle)).expect("places");
             let energy = scene.body().energy(Vec3::ZERO).elastic;
             let expected = stiffness * (1.0 - f64::from(angle - rest).cos());
             assert!(
@@ -340,22 +324,23 @@ fn fibres_resist_a_pull_along_them_and_nothing_else() {
             solver: Solver::Newton,
             ..BodyDefinition::default()
         };
-        let mut scene = Scene::new(Vec3::ZERO, &definition);
+        let mut scene = hung(Vec3::ZERO, &definition);
         let strain = 0.002 * pull;
         for (node, position) in mesh.positions.iter().enumerate() {
             if position.x.abs() < 0.499 * SIZE[0] {
                 continue;
             }
             if position.x < 0.0 {
-                scene.body().pin(node as u32).expect("a node");
+                scene.body_mut().pin(node as u32).expect("a node");
                 continue;
             }
             let share = |at: f32| if at.abs() > 0.499 * SIZE[1] { 0.125 } else { 0.25 };
             let force = expected * strain * f64::from(SIZE[1] * SIZE[2] * share(position.y) * share(position.z));
             let force = Vec3::X * force as f32;
-            scene.body().apply_force(node as u32, force).expect("a force");
+            scene.body_mut().apply_force(node as u32, force).expect("a force");
         }
-        let rest = scene.rest();
+        scene.rest();
+        let rest = scene.positions();
         let (mut longer, mut lengths) = (0.0, 0.0);
         for (before, after) in mesh.positions.iter().zip(&rest) {
             if before.x.abs() < 0.3 * SIZE[0] {

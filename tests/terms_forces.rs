@@ -5,19 +5,10 @@ mod support;
 
 use glam::{DMat3, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{
-    Body, BodyDefinition, BodyId, Error, RestStateDefinition, Solver, SpringLaw, Storage, Values, World,
-    WorldDefinition,
-};
+use sinew::{BodyDefinition, Error, RestStateDefinition, Solver, SpringLaw, Storage, Values, World, WorldDefinition};
 use support::bodies::{FREE, Random, largest_difference};
+use support::scene::{SOLVERS, STORAGES, Scene};
 
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 const STIFFNESS: f64 = 4.0;
 const HOME: f64 = 0.5;
 const RIGIDITY: f64 = 3e-5;
@@ -242,30 +233,7 @@ fn hinge(rest: [DVec3; 4], places: [DVec3; 4]) -> f64 {
     0.5 * edge.length_squared() / areas * turn.length_squared()
 }
 
-struct Scene {
-    world: World,
-    id: BodyId,
-}
-
 impl Scene {
-    fn new(world: WorldDefinition, definition: &BodyDefinition) -> Self {
-        let mut world = World::new(world).expect("a world");
-        let id = world.create_body(definition).expect("a body");
-        Self { world, id }
-    }
-
-    fn body(&self) -> &Body {
-        self.world.body(self.id).expect("the body")
-    }
-
-    fn body_mut(&mut self) -> &mut Body {
-        self.world.body_mut(self.id).expect("the body")
-    }
-
-    fn positions(&self) -> Vec<DVec3> {
-        self.body().positions().iter().map(|p| p.as_dvec3()).collect()
-    }
-
     fn momentum(&self) -> [DVec3; 2] {
         let body = self.body();
         let nodes = body.positions().iter().zip(body.velocities());
@@ -273,11 +241,6 @@ impl Scene {
             let momentum = velocity.as_dvec3() * f64::from(MASS);
             [linear + momentum, angular + position.as_dvec3().cross(momentum)]
         })
-    }
-
-    fn energy(&self) -> f64 {
-        let energy = self.body().energy(Vec3::ZERO);
-        energy.kinetic + energy.elastic
     }
 }
 

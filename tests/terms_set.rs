@@ -4,58 +4,24 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{
-    Body, BodyDefinition, BodyId, Material, Model, RestStateDefinition, Solver, SpringLaw, Storage, Values, World,
-    WorldDefinition, Yielding,
-};
+use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Storage, Values, World, WorldDefinition, Yielding};
 use support::bodies::FREE;
+use support::scene::{SOLVERS, STORAGES, Scene};
 
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 const LENGTH: f64 = 0.1;
 const STIFFNESS: f64 = 30.0;
 const PAIR: [Vec3; 2] = [Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)];
 
-struct Scene {
-    world: World,
-    id: BodyId,
-}
-
 impl Scene {
-    fn new(world: WorldDefinition, definition: &BodyDefinition) -> Self {
-        let mut world = World::new(world).expect("a world");
-        let id = world.create_body(definition).expect("a body");
-        Self { world, id }
-    }
-
-    fn body(&mut self) -> &mut Body {
-        self.world.body_mut(self.id).expect("the body")
-    }
-
     /// The pull of the spring of a pair, with its far end led to a strain within a step.
     fn pull_at(&mut self, strain: f64) -> f64 {
         let place = Vec3::X * (LENGTH * (1.0 + strain)) as f32;
-        self.body().move_pin(1, place).expect("a pin");
+        self.body_mut().move_pin(1, place).expect("a pin");
         // The first leads it there; the second tells what it is there.
         for _ in 0..2 {
             self.world.step(0.01).expect("a step");
         }
         self.body().pin_force(1).expect("a pin").as_dvec3().x
-    }
-
-    fn energy(&mut self) -> f64 {
-        let gravity = self.world.gravity();
-        let energy = self.body().energy(gravity);
-        energy.kinetic + energy.elastic + energy.gravitational
-    }
-
-    fn positions(&mut self) -> Vec<DVec3> {
-        self.body().positions().iter().map(|p| p.as_dvec3()).collect()
     }
 }
 
@@ -162,7 +128,7 @@ fn a_block_that_was_bent_stays_bent() {
             let mut scene = Scene::new(FREE, &definition);
             for (node, p) in (0..).zip(&mesh.positions) {
                 if p.x < -0.039 {
-                    scene.body().pin(node).expect("a pin");
+                    scene.body_mut().pin(node).expect("a pin");
                 }
             }
             let (mut first, mut last) = (0.0, 0.0);
@@ -170,7 +136,7 @@ fn a_block_that_was_bent_stays_bent() {
                 if index < 200 {
                     for (node, p) in (0..).zip(&mesh.positions) {
                         if p.x > 0.039 {
-                            scene.body().apply_force(node, Vec3::Y * -0.001).expect("a force");
+                            scene.body_mut().apply_force(node, Vec3::Y * -0.001).expect("a force");
                         }
                     }
                 }
@@ -188,9 +154,7 @@ fn a_block_that_was_bent_stays_bent() {
                 last = energy;
             }
             let before = scene.positions();
-            let id = scene.id;
-            let rest = scene.world.rest_state(id, &RestStateDefinition::default());
-            rest.expect("a state of rest");
+            scene.rest();
             let (after, tip) = (scene.positions(), mesh.positions.len() - 1);
             let off = before[tip].distance(after[tip]);
             assert!(off < 2e-4, "{solver:?}, {yield_strain}: {off}");
@@ -230,7 +194,7 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
             let mut shear_at = |shear: f64| {
                 for (node, &p) in (0..).zip(&mesh.positions) {
                     let place = p + Vec3::X * (shear as f32 * (p.y + 0.02));
-                    scene.body().move_pin(node, place).expect("a pin");
+                    scene.body_mut().move_pin(node, place).expect("a pin");
                 }
                 for _ in 0..2 {
                     scene.world.step(0.01).expect("a step");
@@ -262,7 +226,7 @@ fn tetrahedra_yield_at_the_stress_of_von_mises() {
             let mut other = Scene::new(FREE, &definition);
             for factor in [1.1, 1.0] {
                 for (node, &p) in (0..).zip(&mesh.positions) {
-                    other.body().move_pin(node, p * factor).expect("a pin");
+                    other.body_mut().move_pin(node, p * factor).expect("a pin");
                 }
                 other.world.step(0.01).expect("a step");
             }
@@ -302,7 +266,7 @@ fn tetrahedra_that_yield_lose_energy() {
                     .iter()
                     .map(|p| Vec3::new(10.0, -5.0, -5.0) * *p)
                     .collect();
-                scene.body().set_velocities(&thrown).expect("velocities");
+                scene.body_mut().set_velocities(&thrown).expect("velocities");
                 let first = scene.energy();
                 for _ in 0..200 {
                     scene.world.step(2e-4).expect("a step");
@@ -402,7 +366,7 @@ fn energy_is_kept_at_the_limit() {
     for step in [1e-4_f32, 4e-4] {
         let mut scene = Scene::new(FREE, &definition);
         scene
-            .body()
+            .body_mut()
             .set_velocities(&[Vec3::ZERO, Vec3::X * 3.0])
             .expect("velocities");
         let first = scene.energy();
@@ -442,7 +406,7 @@ fn a_refused_step_and_threads_change_nothing() {
             ..FREE
         };
         let mut scene = Scene::new(world, &definition);
-        scene.body().set_velocities(&thrown).expect("velocities");
+        scene.body_mut().set_velocities(&thrown).expect("velocities");
         for _ in 0..20 {
             scene.world.step(1e-3).expect("a step");
         }

@@ -8,6 +8,7 @@ pub mod euler;
 pub mod motion;
 pub mod organ;
 pub mod reference;
+pub mod scene;
 pub mod statics;
 
 use std::io::Write;
