@@ -1,6 +1,8 @@
 //! Tetrahedra against the theory of elasticity, all of it: meshes of every fineness, each beside the same mesh in `f64`.
 //!
-//! `cargo bench --bench accuracy [-- part of a table's name]` writes `target/report/accuracy.md`.
+//! `cargo bench --bench accuracy [-- part of a table's name]` writes `target/report/accuracy.md`. It fails where a target is missed that
+//! is met today: spheres of eight cells within 5 % of Hertz's force and 0.05 of his exponent, cantilevers within 1e-4 of the same mesh in
+//! `f64`, blocks between sliding plates within 1e-4 of their law.
 #![allow(clippy::print_stderr)]
 
 #[path = "../tests/accuracy/mod.rs"]
@@ -9,35 +11,45 @@ mod accuracy;
 mod support;
 
 use std::fmt::Write;
+use std::process::ExitCode;
 
 use accuracy::cantilever::{Cantilever, refined};
 use accuracy::hertz::{DEEPEST, Layer, RADIUS};
 use accuracy::press::Block;
 use sinew::Solver;
 
-/// What writes a table.
-type WriteTable = fn(&mut String);
+/// What writes a table: whether its targets are met.
+type WriteTable = fn(&mut String) -> bool;
 
 /// By their names.
 const TABLES: [(&str, WriteTable); 3] = [("cantilever", cantilever), ("press", press), ("hertz", hertz)];
 
-fn main() {
+fn main() -> ExitCode {
     let asked = std::env::args().skip(1).find(|argument| argument != "--bench");
     let folder = support::report_folder();
     std::fs::create_dir_all(&folder).expect("a folder for reports");
     let mut report = String::from("# Accuracy of tetrahedra\n\n");
+    let mut missed = Vec::new();
     for (name, write) in TABLES {
         if asked.as_ref().is_none_or(|asked| name.contains(asked.as_str())) {
             eprintln!("{name}");
-            write(&mut report);
+            if !write(&mut report) {
+                missed.push(name);
+            }
         }
     }
     let path = folder.join("accuracy.md");
     std::fs::write(&path, &report).expect("a report");
     eprintln!("{report}{}", path.display());
+    if missed.is_empty() {
+        return ExitCode::SUCCESS;
+    }
+    eprintln!("targets missed: {missed:?}");
+    ExitCode::FAILURE
 }
 
-fn cantilever(report: &mut String) {
+fn cantilever(report: &mut String) -> bool {
+    let mut is_met = true;
     report.push_str(
         "## Cantilever\n\nHow far the end comes, over P L³ / 3 E I + P L / kappa G A: cubes cut in five, eight times as long as thick.\n\n\
          | nu | 2 thick | 4 | 8 | refined | order | off from the same mesh in f64, at most |\n|---|---|---|---|---|---|---|\n",
@@ -47,6 +59,7 @@ fn cantilever(report: &mut String) {
         let found = beams.each_ref().map(Cantilever::found);
         let off = |(beam, found): (&Cantilever, f64)| (found / beam.exact() - 1.0).abs();
         let worst = beams.iter().zip(found).map(off).fold(0.0, f64::max);
+        is_met &= worst < 1e-4;
         let (limit, order) = refined(found);
         let [coarse, middle, fine] = found;
         let _ = writeln!(
@@ -55,9 +68,11 @@ fn cantilever(report: &mut String) {
         );
     }
     report.push('\n');
+    is_met
 }
 
-fn press(report: &mut String) {
+fn press(report: &mut String) -> bool {
+    let mut is_met = true;
     report.push_str(
         "## Pressed block\n\nA cube between plates. Sliding: what the volume becomes, by the law and as found, and the force over the law's.\n\n\
          | nu | pressed by | by the law | found | about nodes, RMS off | force |\n|---|---|---|---|---|---|\n",
@@ -69,6 +84,9 @@ fn press(report: &mut String) {
             let expected = side * side * (1.0 - by);
             let found = block.sliding();
             let (whole, off) = found.volume(&block, expected);
+            // Up to nu = 0.3 a block that is pressed to half its height buckles within.
+            is_met &=
+                (nu < 0.4 && by > 0.4) || ((whole - expected).abs() < 1e-4 && (found.force / force - 1.0).abs() < 1e-3);
             let _ = writeln!(
                 report,
                 "| {nu} | {by} | {expected:.6} | {whole:.6} | {off:.1e} | {:.5} |",
@@ -92,9 +110,11 @@ fn press(report: &mut String) {
         );
     }
     report.push('\n');
+    is_met
 }
 
-fn hertz(report: &mut String) {
+fn hertz(report: &mut String) -> bool {
+    let mut is_met = true;
     report.push_str(
         "## Indentation by a sphere\n\nThe force over that of Hertz with the correction for the thickness (Dimitriadis et al. 2002), by depth over the \
          sphere's radius, and the exponent of the depth once the correction is taken off; a layer four radii of the deepest contact thick, \
@@ -108,6 +128,7 @@ fn hertz(report: &mut String) {
         let ratio = |which: usize| found[which] / layer.theory(depths[which]).0;
         let plain = |which: usize| found[which] / layer.theory(depths[which]).1;
         let exponent = (plain(2) / plain(0)).ln() / (depths[2] / depths[0]).ln();
+        is_met &= cells < 8 || ((0..3).all(|which| (ratio(which) - 1.0).abs() < 0.05) && (exponent - 1.5).abs() < 0.05);
         // A larger matrix takes minutes to factor.
         let exact = if cells < 8 {
             format!("{:.5}", found[2] / layer.exact(depths[2]))
@@ -124,4 +145,5 @@ fn hertz(report: &mut String) {
         );
     }
     report.push('\n');
+    is_met
 }
