@@ -259,6 +259,8 @@ impl Body {
             if let Some(implicit) = &mut self.implicit {
                 implicit.forget_matrix();
             }
+            // Rings of fewer tetrahedra have other pressures, of which nothing was deformed.
+            self.measure_anew();
         }
         if link.is_none() && removed == 0 {
             return Err(not_joined(a, b));

@@ -137,12 +137,17 @@ impl Body {
             Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
             None => None,
         };
-        if springs.is_empty() && elements.is_none() {
-            for (name, value) in [
-                ("retardation_time", definition.viscosity.retardation_time),
-                ("yield_strain", definition.yielding.strain),
+        if springs.is_empty() {
+            // Volume alone is viscous, and does not yield.
+            for (name, value, is_offered) in [
+                (
+                    "retardation_time",
+                    definition.viscosity.retardation_time,
+                    elements.is_some(),
+                ),
+                ("yield_strain", definition.yielding.strain, law.is_some()),
             ] {
-                if value > 0.0 {
+                if value > 0.0 && !is_offered {
                     return Err(Error::invalid(format!(
                         "{name} is {value}, and the body has neither springs nor elements"
                     )));

@@ -20,7 +20,8 @@ enum Lapse {
 }
 
 impl Body {
-    fn remembers(&self) -> bool {
+    /// Whether it remembers anything.
+    pub(crate) fn remembers(&self) -> bool {
         self.elements.as_deref().is_some_and(Elements::remember) || self.terms.as_deref().is_some_and(Terms::remember)
     }
 
@@ -107,7 +108,8 @@ impl Body {
             && elements.remember()
         {
             write_records(self.kernel, positions, records, team);
-            elements.age(self.kernel, records.as_slice(), course, team);
+            let yields = matches!(lapse, Lapse::Seconds(_));
+            elements.age(self.kernel, records.as_slice(), (course, yields), team);
         }
         if let Some(terms) = &mut self.terms {
             terms.age(positions, &course);

@@ -233,8 +233,9 @@ impl Deformed {
         self.volume * (elastic + 0.5 * self.kappa * self.growth.powi(2))
     }
 
-    /// How the energy, with that of the load, changes where the edges become longer by this, J, and the volume, m³, to the last digits of the changes.
-    pub fn change(&self, rest: &Rest, more: DMat3) -> (f64, f64) {
+    /// How the energy, and beside it that of the load, change where the edges become longer by this, J, and the volume, m³, to the last digits
+    /// of the changes.
+    pub fn change(&self, rest: &Rest, more: DMat3) -> [f64; 3] {
         let more = more * rest.inverse;
         let [a, b, c] = [more.x_axis, more.y_axis, more.z_axis];
         let cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
@@ -246,7 +247,7 @@ impl Deformed {
         let elastic = 0.5 * self.lambda * trace * (2.0 * self.trace() + trace) + self.mu * product(&both, &strain);
         let energy = elastic + 0.5 * self.kappa * growth * (2.0 * self.growth + growth);
         let of_load = product(&self.load.stress, &strain) + self.load.pressure * growth;
-        (self.volume * (energy + of_load), self.volume * growth)
+        [energy, of_load, growth].map(|change| self.volume * change)
     }
 
     /// The force on a corner whose function has this gradient, N.
@@ -332,7 +333,7 @@ mod tests {
                 let more = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
                 let [a, b, c, d] = corners;
                 let then = [a, b + more.x_axis, c + more.y_axis, d + more.z_axis];
-                let (change, growth) = at(corners).change(&rest, more);
+                let [change, _, growth] = at(corners).change(&rest, more);
                 let grown = at(then).swelling() - at(corners).swelling();
                 assert!((growth - grown).abs() < 1e-12 * (1.0 + grown.abs()), "{growth} {grown}");
                 let expected = at(then).energy() - size;

@@ -5,8 +5,8 @@
 //! any number of threads.
 
 mod law;
-mod memory;
 mod parts;
+mod past;
 mod rates;
 mod rings;
 mod scale;
@@ -18,12 +18,12 @@ use crate::body::{Record, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity, Yielding};
-use crate::memory::{filled, reserved};
+use crate::memory;
 use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
 pub(crate) use law::{Deformed, Law, Load, Rest};
-use memory::Memory;
 use parts::{Copies, Part};
+use past::Memory;
 use rings::{Pressures, Rings};
 
 /// The tetrahedra of a body that are elements.
@@ -67,12 +67,12 @@ pub(crate) struct Sums {
 
 impl Sums {
     fn new(copies: usize, parts: usize, with_ways: bool, ring_count: usize) -> Result<Self> {
-        let records = |count| filled(Record::default(), count);
+        let records = |count| memory::filled(Record::default(), count);
         Ok(Self {
             positions: records(copies)?,
             ways: records(if with_ways { copies } else { 0 })?,
             sums: records(copies)?,
-            of_parts: filled(0.0, parts)?,
+            of_parts: memory::filled(0.0, parts)?,
             pressures: Pressures::new(ring_count)?,
         })
     }
@@ -121,7 +121,7 @@ impl Elements {
         node_count: usize,
     ) -> Result<Self> {
         let parts = parts::split(tetrahedra, &rest)?;
-        let mut starts = reserved(parts.len() + 1)?;
+        let mut starts = memory::reserved(parts.len() + 1)?;
         let mut count = 0;
         for part in &parts {
             starts.push(count);
@@ -141,8 +141,8 @@ impl Elements {
             },
             parts,
             starts,
-            stiffnesses: filled(0.0, node_count)?,
-            carried: filled(0.0, node_count)?,
+            stiffnesses: memory::filled(0.0, node_count)?,
+            carried: memory::filled(0.0, node_count)?,
             highest: f32::INFINITY,
             settled: f32::INFINITY,
             most_damped: 0.0,
@@ -417,12 +417,12 @@ impl Elements {
         }
     }
 
-    /// Nodes have come to `positions` along the course that the viscosity leads to.
+    /// Nodes have come to `positions` along the course that the viscosity leads to, and tetrahedra yield or not.
     pub fn age(
         &mut self,
         kernel: ChosenKernel,
         positions: &[Record],
-        course: impl Fn(Viscosity) -> Course,
+        (course, yields): (impl Fn(Viscosity) -> Course, bool),
         team: &Team,
     ) {
         let Some(memory) = &self.memory else {
@@ -432,12 +432,28 @@ impl Elements {
         self.find_elastic(kernel, positions, team);
         if let Some(memory) = &mut self.memory {
             memory.gain = 0.0;
-            let bounds = memory.bounds;
+            let bounds = memory.bounds.filter(|_| yields);
             team.pass(memory.parts.len(), Items::new(&mut memory.parts), |_, part| {
-                part.age(course, bounds);
+                part.age(kernel, course, bounds);
             });
             memory.rings.age(course, &self.forces.pressures.of_nodes);
         }
+    }
+
+    /// Whether any would yield with nodes at these positions.
+    pub fn yield_at(&self, position: impl Fn(usize) -> DVec3) -> bool {
+        let Some((memory, bounds)) = self.memory.as_deref().and_then(|memory| Some((memory, memory.bounds?))) else {
+            return false;
+        };
+        let mut any = false;
+        for (index, part) in self.parts.iter().enumerate() {
+            part.visit(&mut |corners, rest, place| {
+                let [a, b, c, d] = corners.map(|node| position(node as usize));
+                let deformed = Deformed::new(self.law, rest, DMat3::from_cols(b - a, c - a, d - a));
+                any |= memory.parts[index].yields(bounds, place, deformed.elastic());
+            });
+        }
+        any
     }
 
     /// Works out the elastic stresses and pressures with nodes at `positions`.

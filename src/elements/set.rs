@@ -4,13 +4,13 @@
 //! sqrt(2/3) sigma long; what is beyond it is taken off for good, along itself (Simo, Hughes 1998, section 3.3, with S and E for small
 //! strains). Volume does not yield.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 use super::law::Law;
 use crate::error::Result;
 use crate::material::Yielding;
 use crate::memory;
-use crate::springs::{GROUP, Stresses};
+use crate::springs::{ChosenKernel, GROUP, Loops, Stresses};
 
 /// What is left of stresses in the tetrahedra of a part.
 #[derive(Debug)]
@@ -52,29 +52,22 @@ impl Set {
     }
 
     /// What is elastic has become this without anything left.
-    pub fn flow(&mut self, bounds: Bounds, elastic: &[Stresses]) {
-        for (Stresses(left), Stresses(elastic)) in self.stresses.iter_mut().zip(elastic) {
-            for lane in 0..GROUP {
-                let left_there = shape(left, lane);
-                let elastic_there = shape(elastic, lane);
-                let mut whole = left_there;
-                whole.iter_mut().zip(elastic_there).for_each(|(sum, more)| *sum += more);
-                let length = length(whole);
-                // Not so where it is not a number.
-                if !(length > bounds.yields && length.is_finite()) {
-                    continue;
-                }
-                let excess = 1.0 - bounds.yields / length;
-                let mut next = left_there;
-                next.iter_mut()
-                    .zip(whole)
-                    .for_each(|(left, whole)| *left -= excess * whole);
-                let longest = (bounds.longest / self::length(next)).min(1.0);
-                for (left, next) in left.iter_mut().zip(next) {
-                    left[lane] = next * longest;
-                }
-            }
-        }
+    pub fn flow(&mut self, kernel: ChosenKernel, bounds: Bounds, elastic: &[Stresses]) {
+        let left = &mut self.stresses;
+        kernel.run(Flow { bounds, left, elastic });
+    }
+
+    /// Whether a tetrahedron would yield where this is elastic, by more than rounding makes of it.
+    pub fn yields(&self, bounds: Bounds, [group, lane]: [usize; 2], elastic: DMat3) -> bool {
+        const ROUNDING: f64 = 1e-5;
+        let mut left = [[0.0; GROUP]; 6];
+        shapes(&self.stresses[group].0, &mut left);
+        let [xx, xy, xz, yy, yz, zz] = left.map(|entries| f64::from(entries[lane]));
+        let left = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
+        let mean = (elastic.x_axis.x + elastic.y_axis.y + elastic.z_axis.z) / 3.0;
+        let whole = elastic + left - DMat3::from_diagonal(DVec3::splat(mean));
+        let square: f64 = whole.to_cols_array().iter().map(|entry| entry * entry).sum();
+        square.sqrt() > f64::from(bounds.yields) * (1.0 + ROUNDING)
     }
 
     /// Adds to the loads of arms, of which there may be none, what is left.
@@ -100,7 +93,9 @@ impl Set {
 
     /// What the energy of a tetrahedron per volume differs by because of what is left, given what is elastic without it, Pa.
     pub fn energy(&self, law: Law, [group, lane]: [usize; 2], elastic: DMat3) -> f64 {
-        let [xx, xy, xz, yy, yz, zz] = shape(&self.stresses[group].0, lane).map(f64::from);
+        let mut left = [[0.0; GROUP]; 6];
+        shapes(&self.stresses[group].0, &mut left);
+        let [xx, xy, xz, yy, yz, zz] = left.map(|entries| f64::from(entries[lane]));
         let (x, y, z) = (elastic.x_axis, elastic.y_axis, elastic.z_axis);
         let along = xx * (2.0 * x.x + xx) + yy * (2.0 * y.y + yy) + zz * (2.0 * z.z + zz);
         let across = xy * (2.0 * x.y + xy) + xz * (2.0 * x.z + xz) + yz * (2.0 * y.z + yz);
@@ -108,13 +103,84 @@ impl Set {
     }
 }
 
-/// The part of a lane's stress that changes shape alone.
-fn shape(stresses: &[[f32; GROUP]; 7], lane: usize) -> [f32; 6] {
-    let [xx, xy, xz, yy, yz, zz, _] = stresses.map(|entries| entries[lane]);
-    let mean = (xx + yy + zz) / 3.0;
-    [xx - mean, xy, xz, yy - mean, yz, zz - mean]
+/// Takes off for good what is beyond the yield stress.
+struct Flow<'a> {
+    bounds: Bounds,
+    left: &'a mut [Stresses],
+    elastic: &'a [Stresses],
 }
 
-fn length([xx, xy, xz, yy, yz, zz]: [f32; 6]) -> f32 {
-    (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)).sqrt()
+impl Loops for Flow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Bounds { yields, longest } = self.bounds;
+        for (Stresses(left), Stresses(elastic)) in self.left.iter_mut().zip(self.elastic) {
+            let (mut before, mut whole) = ([[0.0; GROUP]; 6], [[0.0; GROUP]; 6]);
+            shapes(left, &mut before);
+            shapes(elastic, &mut whole);
+            for (whole, before) in whole.as_flattened_mut().iter_mut().zip(before.as_flattened()) {
+                *whole += before;
+            }
+            let mut beyond = [0.0; GROUP];
+            lengths(&whole, &mut beyond);
+            let mut most = 0.0_f32;
+            for beyond in &mut beyond {
+                // Nothing where it is not a number.
+                *beyond = if *beyond > yields && *beyond < f32::INFINITY {
+                    1.0 - yields / *beyond
+                } else {
+                    0.0
+                };
+                most = most.max(*beyond);
+            }
+            if most == 0.0 {
+                continue;
+            }
+            for (before, whole) in before.iter_mut().zip(&whole) {
+                for lane in 0..GROUP {
+                    before[lane] -= beyond[lane] * whole[lane];
+                }
+            }
+            let mut shortened = [0.0; GROUP];
+            lengths(&before, &mut shortened);
+            for shortened in &mut shortened {
+                *shortened = (longest / *shortened).min(1.0);
+            }
+            for (left, after) in left.iter_mut().zip(&before) {
+                for lane in 0..GROUP {
+                    left[lane] = if beyond[lane] > 0.0 {
+                        after[lane] * shortened[lane]
+                    } else {
+                        left[lane]
+                    };
+                }
+            }
+        }
+    }
+}
+
+/// The parts of stresses that change shape alone.
+#[inline(always)]
+fn shapes(stresses: &[[f32; GROUP]; 7], shapes: &mut [[f32; GROUP]; 6]) {
+    let [xx, xy, xz, yy, yz, zz, _] = stresses;
+    for lane in 0..GROUP {
+        let mean = (xx[lane] + yy[lane] + zz[lane]) / 3.0;
+        shapes[0][lane] = xx[lane] - mean;
+        shapes[1][lane] = xy[lane];
+        shapes[2][lane] = xz[lane];
+        shapes[3][lane] = yy[lane] - mean;
+        shapes[4][lane] = yz[lane];
+        shapes[5][lane] = zz[lane] - mean;
+    }
+}
+
+#[inline(always)]
+fn lengths([xx, xy, xz, yy, yz, zz]: &[[f32; GROUP]; 6], lengths: &mut [f32; GROUP]) {
+    for lane in 0..GROUP {
+        let along = xx[lane] * xx[lane] + yy[lane] * yy[lane] + zz[lane] * zz[lane];
+        let across = xy[lane] * xy[lane] + xz[lane] * xz[lane] + yz[lane] * yz[lane];
+        lengths[lane] = (along + 2.0 * across).sqrt();
+    }
 }

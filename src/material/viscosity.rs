@@ -9,14 +9,22 @@ use crate::solver::Rates;
 /// `E retardation_time` lies beside it, in a row with a spring of `E retardation_time / relaxation_time`.
 ///
 /// After a step of strain the stress relaxes as `E (1 + retardation_time / relaxation_time exp(-t / relaxation_time))`: where E0 is
-/// measured at once and E in the end, `retardation_time` is `relaxation_time (E0 / E - 1)`. Any times are stable, whatever the step.
+/// measured at once and E in the end, `retardation_time` is `relaxation_time (E0 / E - 1)`. Any times are stable, with VERLET for the price
+/// of shorter substeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Viscosity {
-    /// The dashpot's viscosity over the stiffness, s, at least 0; 0: there is none.
+    /// The dashpot's viscosity over the stiffness, s, at least 0, at most 1e6; 0: there is none. VERLET takes substeps as short as a dashpot
+    /// alone asks for, `2 / w² retardation_time` with w the highest frequency: from some hundredths of a second on IMPLICIT is the solver for
+    /// it. Below some 5 us slow creep is lost in the rounding of positions.
     pub retardation_time: f32,
-    /// Of the dashpot and the spring in its row, s, at least 0; 0: there is no such spring, and the dashpot acts alone (Kelvin and Voigt).
+    /// Of the dashpot and the spring in its row, s, from 1e-9 to 1e6, or 0: there is no such spring, and the dashpot acts alone (Kelvin and
+    /// Voigt). Forces on tetrahedra are then of order 1 in the step, all others of order 2.
     pub relaxation_time: f32,
 }
+
+/// The range of times, s: shorter than any step, and longer than anybody looks on.
+const SHORTEST: f32 = 1e-9;
+const LONGEST: f32 = 1e6;
 
 /// What becomes of an arm in some time: its stress is the part `decay` of what it was, and `gain` times what the elastic stress changed
 /// by. Exact where strain changes evenly (Taylor, Pister, Goudreau 1970).
@@ -30,6 +38,18 @@ impl Viscosity {
     pub(crate) fn check(&self) -> Result<()> {
         not_negative("retardation_time", self.retardation_time)?;
         not_negative("relaxation_time", self.relaxation_time)?;
+        if self.retardation_time > LONGEST {
+            return Err(Error::invalid(format!(
+                "retardation_time is {} s: must be at most {LONGEST}",
+                self.retardation_time
+            )));
+        }
+        if self.relaxation_time > 0.0 && !(SHORTEST..=LONGEST).contains(&self.relaxation_time) {
+            return Err(Error::invalid(format!(
+                "relaxation_time is {} s: must be 0, or from {SHORTEST} to {LONGEST}",
+                self.relaxation_time
+            )));
+        }
         if self.relaxation_time > 0.0 && self.retardation_time == 0.0 {
             return Err(Error::invalid(format!(
                 "relaxation_time is {} s while retardation_time is 0: there is nothing to relax",

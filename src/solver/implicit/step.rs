@@ -238,6 +238,11 @@ impl Substep<'_> {
 
     /// Makes inertia and preconditioner those of this step.
     fn prepare(&self, body: &Body, implicit: &mut Implicit) {
+        /// What viscosity adds goes with the step: within this factor the preconditioner serves.
+        const SIMILAR: f32 = 2.0;
+        let time = self.formula.time as f32;
+        let is_similar = (implicit.prepared / SIMILAR..=implicit.prepared * SIMILAR).contains(&time);
+        implicit.stale |= !is_similar && body.remembers();
         let positions = body.state.newest().0;
         if implicit.stale {
             implicit
@@ -266,7 +271,6 @@ impl Substep<'_> {
                 implicit.coarse.add_enclosed(enclosed, positions);
             }
         }
-        let time = self.formula.time as f32;
         if time != implicit.prepared || implicit.stale {
             let per_mass = 1.0 / (self.formula.time * self.formula.time);
             for (node, inertia) in implicit.inertia.iter_mut().enumerate() {

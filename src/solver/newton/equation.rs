@@ -175,7 +175,9 @@ impl Equation {
         for element in network.tetrahedra() {
             let tetrahedron = element.of;
             let more = edges(&tetrahedron.corners, |node| corrections[node] * part);
-            add(self.deformed(&element).change(&tetrahedron.rest, more).0);
+            let [elastic, of_load, _] = self.deformed(&element).change(&tetrahedron.rest, more);
+            add(elastic);
+            add(of_load);
         }
         for node in 0..network.ring_count() {
             let (mut growth, mut more) = (0.0, 0.0);
@@ -184,11 +186,12 @@ impl Equation {
                 let deformed = self.deformed(&element);
                 growth += 0.25 * deformed.swelling();
                 let longer = edges(&tetrahedron.corners, |node| corrections[node] * part);
-                more += 0.25 * deformed.change(&tetrahedron.rest, longer).1;
+                more += 0.25 * deformed.change(&tetrahedron.rest, longer)[2];
             }
             let volume = network.volumes[node];
             if volume > 0.0 {
-                add(0.5 * network.kappa() / volume * more * (2.0 * growth + more) + network.ring_load(node) * more);
+                add(0.5 * network.kappa() / volume * more * (2.0 * growth + more));
+                add(network.ring_load(node) * more);
             }
         }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);

@@ -4,6 +4,7 @@ use glam::{BVec3, DVec3, Vec3};
 
 use super::descent::{Descent, Found, Goal};
 use crate::body::Body;
+use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -63,6 +64,13 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
         body.recall();
     }
     let report = found?;
+    let yields = |elements: &Elements| elements.yield_at(|node| descent.equation.position(node));
+    if body.elements.as_deref().is_some_and(yields) {
+        body.recall();
+        return Err(Error::NotConverged(
+            "tetrahedra would yield in the state of rest that was found: it is not one".into(),
+        ));
+    }
     let held = |node: usize| -descent.residuals[node].as_vec3();
     body.rest_at(|node| descent.equation.position(node).as_vec3(), held);
     Ok(report)

@@ -12,7 +12,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity, Yielding};
 use crate::memory;
-use crate::springs::{GROUP, Group, Stresses};
+use crate::springs::{ChosenKernel, GROUP, Group, Stresses};
 
 #[derive(Debug)]
 pub(super) struct Memory {
@@ -106,8 +106,9 @@ impl<T: Numbers> Past<T> {
         for (((arm, elastic), load), newest) in stresses.zip(newest) {
             let numbers = arm.numbers_mut().iter_mut().zip(elastic.numbers_mut());
             for ((arm, elastic), newest) in numbers.zip(newest.numbers()) {
-                *arm = course.decay as f32 * *arm + course.gain as f32 * (newest - *elastic);
-                *elastic = *newest;
+                // Nothing is held by what is beyond the range of numbers.
+                *arm = finite(course.decay as f32 * *arm + course.gain as f32 * (newest - *elastic));
+                *elastic = finite(*newest);
             }
             *load = *arm;
         }
@@ -132,12 +133,20 @@ impl OfPart {
     }
 
     /// The newest elastic stresses are those now.
-    pub fn age(&mut self, course: Course, bounds: Option<Bounds>) {
+    /// They yield where there are bounds.
+    pub fn age(&mut self, kernel: ChosenKernel, course: Course, bounds: Option<Bounds>) {
         self.past.age(course, &self.newest);
         if let (Some(set), Some(bounds)) = (&mut self.set, bounds) {
-            set.flow(bounds, &self.newest);
+            set.flow(kernel, bounds, &self.newest);
         }
         self.combine();
+    }
+
+    /// Whether a tetrahedron would yield where this is elastic.
+    pub fn yields(&self, bounds: Bounds, place: [usize; 2], elastic: Load) -> bool {
+        self.set
+            .as_ref()
+            .is_some_and(|set| set.yields(bounds, place, elastic.stress))
     }
 
     fn combine(&mut self) {
@@ -280,6 +289,12 @@ impl Memory {
         hasher.write_floats(&self.rings.kept_arms);
         hasher.write_floats(&self.rings.kept_elastic);
     }
+}
+
+/// The number, or 0 where it is none.
+#[inline(always)]
+fn finite(number: f32) -> f32 {
+    if number.is_finite() { number } else { 0.0 }
 }
 
 /// The stresses of a lane.
