@@ -606,15 +606,16 @@ typedef struct sinew_body_def {
    */
   const float *fibre_stiffnesses;
   /**
-   * s, at least 0: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness; default 0:
-   * there is none. Springs that are added later have none.
+   * s, at least 0, at most 1e6: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness;
+   * default 0: there is none. Springs that are added later have none. VERLET takes substeps as short as a dashpot alone asks for: from
+   * some hundredths of a second on IMPLICIT is the solver for it. Below some 5 us slow creep is lost in the rounding of positions.
    */
   float retardation_time;
   /**
-   * s, at least 0: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
+   * s, from 1e-9 to 1e6: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
    * E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)): the standard linear solid. 0, the default: the dashpot acts
-   * alone, which is Kelvin and Voigt's solid. Stable whatever the times and the step. A body begins relaxed; what
-   * sinew_body_set_positions does is a deformation at once.
+   * alone, which is Kelvin and Voigt's solid, and on tetrahedra of order 1 in the step. A body begins relaxed, and is
+   * so where sinew_body_set_positions puts it.
    */
   float relaxation_time;
   /**

@@ -5,7 +5,9 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Storage, Values, Viscosity, World, WorldDefinition};
+use sinew::{
+    BodyDefinition, Material, Model, Solver, SpringLaw, Storage, Values, Viscosity, World, WorldDefinition, Yielding,
+};
 use support::bodies::{FREE, Random};
 use support::scene::{SOLVERS, STORAGES, Scene};
 
@@ -377,7 +379,7 @@ fn any_times_and_any_step_are_stable() {
                     let first = scene.energy();
                     for _ in 0..5 {
                         match scene.world.step(step) {
-                            Ok(_) => {}
+                            Ok(report) => assert_eq!(report.bodies_restored, 0),
                             Err(sinew::Error::Unstable { .. }) if solver == Solver::Verlet => break,
                             Err(error) => panic!("{error}"),
                         }
@@ -437,19 +439,113 @@ fn the_state_of_rest_is_that_of_what_is_elastic() {
     }
 }
 
+/// Bodies large enough to be shared out.
 #[test]
 fn threads_change_no_bit() {
-    for solver in SOLVERS {
+    let mesh = Mesh::block([0.2; 3], [20; 3]).expect("a block");
+    let thrown: Vec<Vec3> = mesh.positions.iter().map(|p| Vec3::new(3.0, -2.0, 1.0) * *p).collect();
+    for solver in [Solver::Verlet, Solver::Implicit] {
         for nu in [None, Some(0.3), Some(0.45)] {
             let hashes = [1, 2, 5].map(|thread_count| {
                 let world = WorldDefinition { thread_count, ..FREE };
-                let mut scene = swinging(nu, SOLID, solver, world);
-                for _ in 0..10 {
-                    scene.step(1e-3);
-                }
+                let definition = BodyDefinition {
+                    positions: &mesh.positions,
+                    tetrahedra: &mesh.tetrahedra,
+                    material: Some(nu.map_or(springs(), tissue)),
+                    viscosity: SOLID,
+                    yielding: Yielding {
+                        strain: 1e-3,
+                        ..Yielding::default()
+                    },
+                    solver,
+                    ..BodyDefinition::default()
+                };
+                let mut scene = Scene::new(world, &definition);
+                scene.body_mut().set_velocities(&thrown).expect("velocities");
+                scene.run(1e-3, 3);
                 scene.world.state_hash()
             });
             assert!(hashes.iter().all(|&hash| hash == hashes[0]), "{solver:?} {nu:?}");
+        }
+    }
+}
+
+/// A cut takes what it cuts, and what is left has no more energy than before, whatever the arms of its rings.
+#[test]
+fn a_cut_makes_no_energy() {
+    for solver in SOLVERS {
+        for nu in [None, Some(0.3), Some(0.45)] {
+            let viscosity = Viscosity {
+                retardation_time: 2.0,
+                relaxation_time: 0.1,
+            };
+            let mut scene = swinging(nu, viscosity, solver, FREE);
+            scene.run(1e-3, 10);
+            let before = scene.energy();
+            // An edge across the middle, and all that has it.
+            let mesh = block(nu).0;
+            let mut pairs = mesh.edges().expect("edges").into_iter();
+            let near = |node: u32| mesh.positions[node as usize].length() < 0.012;
+            let [a, b] = pairs.find(|pair| pair.iter().all(|&node| near(node))).expect("an edge");
+            scene.body_mut().remove_spring(a, b).expect("an edge");
+            let cut = scene.energy();
+            scene.run(1e-6, 1);
+            let after = scene.energy();
+            assert!(
+                cut < before && after < cut * 1.001,
+                "{solver:?}, nu {nu:?}: {before} {cut} {after}"
+            );
+        }
+    }
+}
+
+/// Thrown beyond all numbers and brought back, a body is what it was.
+#[test]
+fn what_was_beyond_all_numbers_is_forgotten() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        for nu in [None, Some(0.3), Some(0.45)] {
+            let mut scene = swinging(nu, SOLID, solver, FREE);
+            let places = scene.body().positions().to_vec();
+            for factor in [1e12, 1e20, 1e37] {
+                let far: Vec<Vec3> = places.iter().map(|place| *place * factor).collect();
+                scene.body_mut().set_positions(&far).expect("places");
+                scene.body_mut().set_positions(&places).expect("places");
+                assert!(scene.energy().is_finite());
+                scene.run(1e-3, 3);
+            }
+        }
+    }
+}
+
+/// NEWTON needs no more to find that nothing moves than it does without viscosity.
+#[test]
+fn newton_finds_that_what_rests_rests() {
+    for nu in [None, Some(0.3), Some(0.45)] {
+        for viscosity in [
+            SOLID,
+            Viscosity {
+                retardation_time: 0.05,
+                relaxation_time: 0.0,
+            },
+        ] {
+            let (mesh, material) = block(nu);
+            let definition = BodyDefinition {
+                positions: &mesh.positions,
+                tetrahedra: &mesh.tetrahedra,
+                material: Some(material),
+                viscosity,
+                solver: Solver::Newton,
+                ..BodyDefinition::default()
+            };
+            let mut scene = Scene::new(FREE, &definition);
+            for _ in 0..5 {
+                scene.step(1.0 / 60.0);
+                let report = scene.body().solver_report();
+                assert!(
+                    report.converged && report.iterations < 2000,
+                    "nu {nu:?}, {viscosity:?}: {report:?}"
+                );
+            }
         }
     }
 }
@@ -523,6 +619,8 @@ fn what_cannot_be_is_refused_by_name() {
     refused(&viscous(-1.0, 0.0), &["retardation_time", "-1"]);
     refused(&viscous(f32::NAN, 0.0), &["retardation_time", "NaN"]);
     refused(&viscous(1.0, f32::INFINITY), &["relaxation_time", "inf"]);
+    refused(&viscous(2e6, 0.0), &["retardation_time", "2000000"]);
+    refused(&viscous(1.0, 1e-12), &["relaxation_time", "0.000000000001"]);
     refused(&viscous(0.0, 2.0), &["relaxation_time", "2", "retardation_time"]);
     let bare = BodyDefinition {
         springs: Some(&[]),

@@ -124,8 +124,8 @@ pub struct BodyDefinition<'a> {
     /// the part by which they are longer, over the area across them at rest; they never push.
     pub fibre_stiffnesses: Values<'a>,
     /// How springs, and tetrahedra that are elements, resist the speed at which they are deformed. With a `retardation_time` alone it is
-    /// damping along the springs, on top of `spring_dampings`; springs that are added later have none. A body begins relaxed; what
-    /// [`Body::set_positions`](crate::Body::set_positions) does is a deformation at once.
+    /// damping along the springs, on top of `spring_dampings`; springs that are added later have none. A body begins relaxed, and is so
+    /// where [`Body::set_positions`](crate::Body::set_positions) puts it.
     pub viscosity: Viscosity,
     /// From which strain springs, and tetrahedra that are elements, take a set. Springs that yield are [`SpringLaw::Linear`]; those that
     /// are added later do not.

@@ -228,7 +228,6 @@ impl Body {
             published: Published::new(node_count)?,
         };
         body.place(definition.positions);
-        body.relax();
         let BodyDefinition {
             order,
             iterations,
@@ -500,7 +499,7 @@ impl Body {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
         }
         self.published.positions_mut().copy_from_slice(positions);
-        self.jump();
+        self.relax();
         self.forget_motion();
     }
 

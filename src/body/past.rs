@@ -12,7 +12,6 @@ use crate::threads::Team;
 enum Lapse {
     /// s
     Seconds(f64),
-    AtOnce,
     /// Nothing was deformed.
     Nothing,
     /// So long that all is relaxed.
@@ -62,15 +61,6 @@ impl Body {
         }
     }
 
-    /// Nodes have been put where they are at once.
-    pub(super) fn jump(&mut self) {
-        if self.remembers() {
-            self.recall();
-            self.lapse(Lapse::AtOnce, false, &Team::alone());
-            self.keep();
-        }
-    }
-
     /// What is elastic has changed where nodes are: arms hold what they held.
     pub(super) fn measure_anew(&mut self) {
         if self.remembers() {
@@ -100,7 +90,6 @@ impl Body {
         };
         let course = |viscosity: Viscosity| match lapse {
             Lapse::Seconds(time) => viscosity.over(time),
-            Lapse::AtOnce => viscosity.at_once(),
             Lapse::Nothing => Course { decay: 1.0, gain: 0.0 },
             Lapse::Forever => Viscosity::default().over(1.0),
         };

@@ -175,8 +175,8 @@ pub struct sinew_body_def {
     pub retardation_time: f32,
     /// s, from 1e-9 to 1e6: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
     /// E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)): the standard linear solid. 0, the default: the dashpot acts
-    /// alone, which is Kelvin and Voigt's solid, and on tetrahedra of order 1 in the step. A body begins relaxed; what
-    /// sinew_body_set_positions does is a deformation at once.
+    /// alone, which is Kelvin and Voigt's solid, and on tetrahedra of order 1 in the step. A body begins relaxed, and is
+    /// so where sinew_body_set_positions puts it.
     pub relaxation_time: f32,
     /// The strain from which springs, and rods of tetrahedra that are elements, yield, stretched or pressed, at least 0; default 0: they do
     /// not. What is beyond it stays for good. Springs that yield have SINEW_SPRING_LAW_LINEAR; those that are added later do not yield.

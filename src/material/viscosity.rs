@@ -82,14 +82,6 @@ impl Viscosity {
         }
     }
 
-    /// At once: a dashpot alone has nothing to do with that.
-    pub(crate) fn at_once(&self) -> Course {
-        Course {
-            decay: 1.0,
-            gain: self.stiffening().unwrap_or(0.0),
-        }
-    }
-
     /// How stiff the arm's spring is against what it lies beside; `None`: there is no such spring.
     pub(crate) fn stiffening(&self) -> Option<f64> {
         (self.relaxation_time > 0.0).then(|| f64::from(self.retardation_time) / f64::from(self.relaxation_time))
