@@ -9,7 +9,10 @@ use std::cell::Cell;
 use counting::Counting;
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Error, Pose, Shape, Solver, Storage, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{
+    BodyDefinition, Error, Material, Model, Pose, Shape, Solver, Storage, ToolDefinition, Values, Viscosity, World,
+    WorldDefinition, Yielding,
+};
 
 thread_local! {
     static ASKED: Cell<u64> = const { Cell::new(0) };
@@ -135,6 +138,55 @@ fn nor_does_one_of_what_is_under_pressure() {
             let body = world.body_mut(body).expect("the body");
             assert_eq!(asked(|| drop(body.set_pressure(100.0 * step as f32))), 0);
             drop(body.remove_spring(0, step + 1));
+        }
+    }
+}
+
+#[test]
+fn nor_does_one_of_tissue_that_remembers() {
+    let block = Mesh::block([0.05; 3], [3; 3]).expect("a block");
+    let plain = BodyDefinition {
+        positions: &block.positions,
+        tetrahedra: &block.tetrahedra,
+        viscosity: Viscosity {
+            retardation_time: 0.02,
+            relaxation_time: 0.01,
+        },
+        yielding: Yielding {
+            strain: 1e-3,
+            ..Yielding::default()
+        },
+        ..BodyDefinition::default()
+    };
+    let springs = BodyDefinition {
+        masses: Values::Uniform(1e-3),
+        stiffnesses: Values::Uniform(50.0),
+        strain_limit: 1e-3,
+        ..plain
+    };
+    let tetrahedra = BodyDefinition {
+        material: Some(Material {
+            model: Model::Tetrahedra,
+            young_modulus: 5000.0,
+            poisson_ratio: 0.45,
+            density: 1000.0,
+            ..Material::default()
+        }),
+        ..plain
+    };
+    for definition in [springs, tetrahedra] {
+        for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+            let mut world = World::new(WorldDefinition::default()).expect("a world");
+            let body = world.create_body(&BodyDefinition { solver, ..definition });
+            let body = body.expect("a body");
+            let pinned = world.body_mut(body).expect("the body");
+            pinned.pin(0).expect("a node");
+            pinned.pin_axes(5, [true, false, true]).expect("a node");
+            for step in 0..4 {
+                assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
+                let body = world.body_mut(body).expect("the body");
+                drop(body.remove_spring(0, step + 1));
+            }
         }
     }
 }
