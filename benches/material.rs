@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
-use sinew::{BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, Viscosity, World, WorldDefinition, Yielding};
 
 const SUBSTEPS: u32 = 16;
 
@@ -224,6 +224,34 @@ fn main() -> ExitCode {
                 spring_law: SpringLaw::Exponential {
                     steepness: 10.0,
                     limit: 0.2,
+                },
+                ..springs
+            },
+        ),
+        (
+            "springs that relax",
+            BodyDefinition {
+                viscosity: Viscosity {
+                    retardation_time: 0.02,
+                    relaxation_time: 0.02,
+                },
+                ..springs
+            },
+        ),
+        (
+            "springs with a limit",
+            BodyDefinition {
+                strain_limit: 0.05,
+                limit_stiffening: 10.0,
+                ..springs
+            },
+        ),
+        (
+            "springs that yield",
+            BodyDefinition {
+                yielding: Yielding {
+                    strain: 0.1,
+                    largest: 0.5,
                 },
                 ..springs
             },
