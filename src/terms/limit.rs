@@ -157,19 +157,13 @@ impl Law<2> for Limit {
     fn tension(&self, [rest_length, _]: [f32; 2], length: f32) -> Tension {
         let stiffening = self.stiffening as f32;
         let excess = (length - rest_length) - rest_length * self.strain as f32;
-        if excess > 0.0 {
-            let pull = stiffening * excess;
-            Tension {
-                pull,
-                slope: stiffening,
-                sideways: pull,
-                stiffening: 1.0 + stiffening,
-            }
-        } else {
-            Tension {
-                stiffening: 1.0,
-                ..Tension::default()
-            }
+        let slope = if excess > 0.0 { stiffening } else { 0.0 };
+        let pull = slope * excess;
+        Tension {
+            pull,
+            slope,
+            sideways: pull,
+            stiffening: 1.0 + slope,
         }
     }
 

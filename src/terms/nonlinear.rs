@@ -189,52 +189,33 @@ impl Curve {
     pub fn beyond(&self, strain: f32) -> [f32; 2] {
         let within = if strain < self.limit { strain } else { self.limit };
         let stretch = if within > 0.0 { within } else { 0.0 };
-        let growth = Growth::of(self.steepness * stretch);
-        let exponential = if growth.is_near {
-            stretch * growth.second
-        } else {
-            growth.all * self.inverse_steepness - stretch
-        };
+        let steep = self.steepness * stretch;
+        let steeper = exponential_beyond(steep);
         let (a, b) = (self.quadratic, self.cubic);
-        let pull = exponential + within * within * (a + b * within);
-        let slope = growth.all + within * (2.0 * a + 3.0 * b * within);
+        let pull = steeper * self.inverse_steepness + within * within * (a + b * within);
+        let slope = steeper + steep + within * (2.0 * a + 3.0 * b * within);
         [pull + slope * (strain - within), slope]
     }
 }
 
-/// How much larger than 1 the exponential of a number from 0 to 14 is, within some 2^-23 of it.
-struct Growth {
-    all: f32,
-    /// Whether the number is so small that a difference would lose digits, and then what is beyond the number itself, over the number.
-    is_near: bool,
-    second: f32,
-}
-
-impl Growth {
-    /// As 2^n exp(r), n being whole and r at most half the logarithm of 2.
-    #[inline(always)]
-    fn of(number: f32) -> Self {
-        /// Numbers of this size are whole, and their last bits are those of n.
-        const WHOLE: f32 = 12_582_912.0;
-        /// The logarithm of 2, in two parts: products of the first with n are exact.
-        const LOGARITHM: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
-        let shifted = number * std::f32::consts::LOG2_E + WHOLE;
-        let n = shifted - WHOLE;
-        let r = (number - n * LOGARITHM[0]) - n * LOGARITHM[1];
-        let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
-        // Taylor's series: what is left out is less than 2^-23 of it.
-        let series = [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5];
-        let mut second = 1.0 / 5040.0;
-        for factor in series {
-            second = second * r + factor;
-        }
-        second *= r;
-        Self {
-            all: power * (r + r * second) + (power - 1.0),
-            is_near: n == 0.0,
-            second,
-        }
+/// `exp(number) - 1 - number`, of a number from 0 to 14, without a difference that loses digits: as `2^n exp(r)`, n being whole and r at
+/// most half the logarithm of 2.
+#[inline(always)]
+fn exponential_beyond(number: f32) -> f32 {
+    /// Numbers of this size are whole, and their last bits are those of n.
+    const WHOLE: f32 = 12_582_912.0;
+    /// The logarithm of 2, in two parts: products of the first with n are exact.
+    const LOGARITHM: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    let shifted = number * std::f32::consts::LOG2_E + WHOLE;
+    let n = shifted - WHOLE;
+    let r = (number - n * LOGARITHM[0]) - n * LOGARITHM[1];
+    let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
+    // exp(r) - 1 - r, over r²: Taylor's series; what is left out is less than 2^-23 of it.
+    let mut beyond = 1.0 / 5040.0;
+    for factor in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5] {
+        beyond = beyond * r + factor;
     }
+    power * (r * r * beyond) + ((power - 1.0) * (1.0 + r) - n * std::f32::consts::LN_2)
 }
 
 /// What springs of a law do beyond what linear ones do; shapes are their rest lengths, m.

@@ -5,8 +5,10 @@
 
 use std::ops::Range;
 
+use glam::Vec4;
+
 use super::stencils::{Law, Stencil};
-use crate::body::{Record, View};
+use crate::body::View;
 use crate::material::Course;
 use crate::springs::{Loops, TILE, TileForces};
 
@@ -43,17 +45,34 @@ pub(super) struct OfTile<'a, L: Law<N>, const N: usize> {
     pub sums: &'a mut TileForces,
 }
 
+/// A vector for each of them, by axes.
+struct Vectors([[f32; BLOCK]; 3]);
+
+impl Vectors {
+    const ZERO: Self = Self([[0.0; BLOCK]; 3]);
+
+    #[inline(always)]
+    fn get(&self, lane: usize) -> [f32; 3] {
+        [self.0[0][lane], self.0[1][lane], self.0[2][lane]]
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, vector: [f32; 3]) {
+        (self.0[0][lane], self.0[1][lane], self.0[2][lane]) = (vector[0], vector[1], vector[2]);
+    }
+}
+
 /// Some strings side by side.
 struct Block {
     count: usize,
     strings: [u32; BLOCK],
     stiffnesses: [f32; BLOCK],
     numbers: [[f32; BLOCK]; 2],
-    lines: [Record; BLOCK],
+    lines: Vectors,
     /// How lines change.
-    changes: [Record; BLOCK],
+    changes: Vectors,
     /// What strings pull with, N.
-    pulls: [Record; BLOCK],
+    pulls: Vectors,
 }
 
 impl Block {
@@ -62,37 +81,35 @@ impl Block {
         strings: [0; BLOCK],
         stiffnesses: [0.0; BLOCK],
         numbers: [[0.0; BLOCK]; 2],
-        lines: [Record([0.0; 4]); BLOCK],
-        changes: [Record([0.0; 4]); BLOCK],
-        pulls: [Record([0.0; 4]); BLOCK],
+        lines: Vectors::ZERO,
+        changes: Vectors::ZERO,
+        pulls: Vectors::ZERO,
     };
-
-    #[inline(always)]
-    fn line(&self, lane: usize) -> [f32; 3] {
-        let [x, y, z, _] = self.lines[lane].0;
-        [x, y, z]
-    }
 
     /// The numbers of a string.
     #[inline(always)]
     fn numbers(&self, lane: usize) -> [f32; 2] {
-        self.numbers.map(|numbers| numbers[lane])
+        [self.numbers[0][lane], self.numbers[1][lane]]
     }
 }
 
 /// The vector of a string, given what its nodes have.
 #[inline(always)]
-fn line<L: Law<N>, const N: usize>(stencil: &Stencil<L::Shape, N>, of: &View) -> Record {
+fn line<L: Law<N>, const N: usize>(stencil: &Stencil<L::Shape, N>, of: &View) -> [f32; 3] {
     let weights = L::weights(&stencil.shape);
-    let Record(first) = of.record(stencil.nodes[0] as usize);
-    let mut line = [0.0; 4];
-    for (&node, weight) in stencil.nodes.iter().zip(weights).skip(1) {
-        let Record(other) = of.record(node as usize);
-        for (line, (other, first)) in line.iter_mut().zip(other.into_iter().zip(first)) {
-            *line += weight * (other - first);
-        }
+    let first = record(of, stencil.nodes[0]);
+    let way = |place: usize| (record(of, stencil.nodes[place]) - first) * weights[place];
+    let mut line = way(1);
+    for place in 2..N {
+        line += way(place);
     }
-    Record(line)
+    [line.x, line.y, line.z]
+}
+
+/// Four numbers are one load and one sum.
+#[inline(always)]
+fn record(of: &View, node: u32) -> Vec4 {
+    Vec4::from_array(of.record(node as usize).0)
 }
 
 #[inline(always)]
@@ -115,10 +132,9 @@ fn measured(line: [f32; 3]) -> (f32, f32, [f32; 3]) {
 impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     #[inline(always)]
     fn gather(&self, indices: impl Iterator<Item = usize>, block: &mut Block) {
-        block.count = 0;
+        let mut lane = 0;
         for index in indices {
             let stencil = &self.all[index];
-            let lane = block.count;
             if !(stencil.stiffness > 0.0 && lane < BLOCK) {
                 continue;
             }
@@ -126,12 +142,13 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
             block.stiffnesses[lane] = stencil.stiffness;
             let numbers = L::numbers(&stencil.shape);
             (block.numbers[0][lane], block.numbers[1][lane]) = (numbers[0], numbers[1]);
-            block.lines[lane] = line::<L, N>(stencil, &self.positions);
+            block.lines.set(lane, line::<L, N>(stencil, &self.positions));
             if let Some(ways) = &self.ways {
-                block.changes[lane] = line::<L, N>(stencil, ways);
+                block.changes.set(lane, line::<L, N>(stencil, ways));
             }
-            block.count += 1;
+            lane += 1;
         }
+        block.count = lane;
     }
 
     /// By how much the stiffest is stiffer than its rate says, as bits, whose order is that of the numbers.
@@ -139,10 +156,10 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     fn find_forces(&self, block: &mut Block) -> u32 {
         let mut stiffest = 0;
         for lane in 0..BLOCK {
-            let (length, _, direction) = measured(block.line(lane));
+            let (length, _, direction) = measured(block.lines.get(lane));
             let tension = self.law.tension(block.numbers(lane), length);
             let pull = block.stiffnesses[lane] * tension.pull;
-            block.pulls[lane] = Record([pull * direction[0], pull * direction[1], pull * direction[2], 0.0]);
+            block.pulls.set(lane, [pull * direction[0], pull * direction[1], pull * direction[2]]);
             stiffest = stiffest.max(tension.stiffening.to_bits());
         }
         stiffest
@@ -151,41 +168,39 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     #[inline(always)]
     fn find_changes(&self, block: &mut Block) {
         for lane in 0..BLOCK {
-            let (length, inverse, direction) = measured(block.line(lane));
+            let (length, inverse, direction) = measured(block.lines.get(lane));
             let tension = self.law.tension(block.numbers(lane), length);
             let across = tension.sideways * inverse;
-            let [x, y, z, _] = block.changes[lane].0;
-            let along = (tension.slope - across) * dot(direction, [x, y, z]);
+            let change = block.changes.get(lane);
+            let along = (tension.slope - across) * dot(direction, change);
             let stiffness = block.stiffnesses[lane];
-            block.pulls[lane] = Record([
-                stiffness * (along * direction[0] + across * x),
-                stiffness * (along * direction[1] + across * y),
-                stiffness * (along * direction[2] + across * z),
-                0.0,
-            ]);
+            let pull = [
+                stiffness * (along * direction[0] + across * change[0]),
+                stiffness * (along * direction[1] + across * change[1]),
+                stiffness * (along * direction[2] + across * change[2]),
+            ];
+            block.pulls.set(lane, pull);
         }
     }
 
     /// Gives pulls to nodes; those of other tiles have one place together.
     #[inline(always)]
-    fn scatter(&self, block: &Block, sums: &mut [Record; TILE + 1]) {
+    fn scatter(&self, block: &Block, sums: &mut [Vec4; TILE + 1]) {
         for start in 0..STRIDE {
             for lane in (start..block.count).step_by(STRIDE) {
                 let stencil = &self.all[block.strings[lane] as usize];
-                let Record(pull) = block.pulls[lane];
+                let [x, y, z] = block.pulls.get(lane);
+                let pull = Vec4::new(x, y, z, 0.0);
                 for (&node, weight) in stencil.nodes.iter().zip(L::weights(&stencil.shape)) {
                     let place = (node as usize).wrapping_sub(self.nodes.start).min(TILE);
-                    let Record(sum) = &mut sums[place];
-                    for (sum, pull) in sum.iter_mut().zip(pull) {
-                        *sum -= weight * pull;
-                    }
+                    sums[place] -= pull * weight;
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn take(&self, indices: impl Iterator<Item = usize>, block: &mut Block, sums: &mut [Record; TILE + 1]) -> u32 {
+    fn take(&self, indices: impl Iterator<Item = usize>, block: &mut Block, sums: &mut [Vec4; TILE + 1]) -> u32 {
         self.gather(indices, block);
         let mut stiffest = 0;
         if self.ways.is_some() {
@@ -204,7 +219,7 @@ impl<L: Law<N>, const N: usize> Loops for OfTile<'_, L, N> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let (mut block, mut sums) = (Block::EMPTY, [Record::default(); TILE + 1]);
+        let (mut block, mut sums) = (Block::EMPTY, [Vec4::ZERO; TILE + 1]);
         let mut stiffest = 1.0_f32.to_bits();
         for start in self.beginning.clone().step_by(BLOCK) {
             let indices = start..self.beginning.end.min(start + BLOCK);
@@ -215,7 +230,7 @@ impl<L: Law<N>, const N: usize> Loops for OfTile<'_, L, N> {
             stiffest = stiffest.max(self.take(indices, &mut block, &mut sums));
         }
         for (axis, forces) in self.sums.axes_mut().into_iter().enumerate() {
-            for (force, Record(sum)) in forces.iter_mut().zip(&sums) {
+            for (force, sum) in forces.iter_mut().zip(&sums) {
                 *force += sum[axis];
             }
         }
@@ -241,10 +256,10 @@ impl<L: Law<N>, const N: usize> Loops for Aging<'_, L, N> {
             for (lane, stencil) in strings.iter().enumerate() {
                 let numbers = L::numbers(&stencil.shape);
                 (block.numbers[0][lane], block.numbers[1][lane]) = (numbers[0], numbers[1]);
-                block.lines[lane] = line::<L, N>(stencil, &self.positions);
+                block.lines.set(lane, line::<L, N>(stencil, &self.positions));
             }
             for (lane, elastic) in elastic.iter_mut().enumerate() {
-                let (length, ..) = measured(block.line(lane));
+                let (length, ..) = measured(block.lines.get(lane));
                 *elastic = self.law.elastic(block.numbers(lane), length);
             }
             for (stencil, &elastic) in strings.iter_mut().zip(&elastic) {
