@@ -18,7 +18,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
-use sinew::{BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, Viscosity, World, WorldDefinition, Yielding};
+use sinew::{
+    BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, Viscosity, World, WorldDefinition, Yielding,
+};
 
 const SUBSTEPS: u32 = 16;
 

@@ -5,7 +5,9 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Error, Kernel, Solver, SpringLaw, Storage, Values, Viscosity, World, WorldDefinition, Yielding};
+use sinew::{
+    BodyDefinition, Error, Kernel, Solver, SpringLaw, Storage, Values, Viscosity, World, WorldDefinition, Yielding,
+};
 use support::bodies::{FREE, largest_difference};
 
 const STEPS: u32 = 8;

@@ -1,8 +1,10 @@
 //! Terms of a body's energy beside those of springs and elements: each is of a few nodes, and follows one law.
 //!
 //! A tile's forces are made of all terms that have one of its nodes; what belongs to two tiles is worked out in each of them. So there
-//! are no buffers, any thread may take any tile, and results are the same for any number of threads. Terms are worked out in `f64`, by
-//! the same few lines for every solver.
+//! are no buffers, any thread may take any tile, and results are the same for any number of threads.
+//!
+//! Each law is written once in `f64`, for energies, for exact solvers and for the rest. Where it is one of strings, `strings` has the
+//! forces once more, side by side in `f32`; of the same stored numbers.
 
 mod arms;
 mod bending;
@@ -58,13 +60,7 @@ trait Term: Debug + Send + Sync {
     ) -> f64;
 
     /// Adds how the forces on the nodes of a tile change, N, in the first order; nothing is pushed sideways.
-    fn add_changes(
-        &self,
-        kernel: ChosenKernel,
-        of: (usize, Range<usize>),
-        places: [View; 2],
-        changes: &mut TileForces,
-    );
+    fn add_changes(&self, kernel: ChosenKernel, of: (usize, Range<usize>), places: [View; 2], changes: &mut TileForces);
 
     /// The energy of the terms that begin in a tile, J.
     fn energy(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64;

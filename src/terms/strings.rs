@@ -159,7 +159,9 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
             let (length, _, direction) = measured(block.lines.get(lane));
             let tension = self.law.tension(block.numbers(lane), length);
             let pull = block.stiffnesses[lane] * tension.pull;
-            block.pulls.set(lane, [pull * direction[0], pull * direction[1], pull * direction[2]]);
+            block
+                .pulls
+                .set(lane, [pull * direction[0], pull * direction[1], pull * direction[2]]);
             stiffest = stiffest.max(tension.stiffening.to_bits());
         }
         stiffest
