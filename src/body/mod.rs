@@ -154,7 +154,7 @@ impl Body {
                 }
             }
         }
-        let terms = Terms::new(definition, &springs, &order)?;
+        let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
@@ -187,7 +187,7 @@ impl Body {
         let mut body = Self {
             order,
             predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
-            records: (springs.gathers() || elements.is_some())
+            records: (springs.gathers() || elements.is_some() || terms.is_some())
                 .then(|| Records::zeros(node_count))
                 .transpose()?,
             elements,

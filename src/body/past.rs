@@ -101,7 +101,7 @@ impl Body {
             elements.age(self.kernel, records.as_slice(), (course, yields), team);
         }
         if let Some(terms) = &mut self.terms {
-            terms.age(positions, &course);
+            terms.age(positions, course, team);
         }
     }
 }

@@ -99,6 +99,18 @@ impl<'a> View<'a> {
         Vec3::from(self.axes.map(|axis| axis[(node as isize - self.start) as usize]))
     }
 
+    /// That of a node, from the records where they are there.
+    #[inline(always)]
+    pub fn record(&self, node: usize) -> Record {
+        match self.records {
+            Some(records) => records[node],
+            None => {
+                let [x, y, z] = self.axes.map(|axis| axis[(node as isize - self.start) as usize]);
+                Record([x, y, z, 0.0])
+            }
+        }
+    }
+
     /// Those of some nodes along each axis.
     #[inline(always)]
     pub fn slices(&self, nodes: Range<usize>) -> [&'a [f32]; 3] {

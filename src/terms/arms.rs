@@ -5,9 +5,11 @@
 
 use glam::{DMat3, DVec3};
 
+use super::nonlinear::Curve;
 use super::stencils::{Law, Stencil, Stencils, directed};
+use super::strings::Tension;
 use super::{Moment, Term};
-use crate::body::{BodyDefinition, NodeOrder, Spring, View};
+use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
@@ -18,6 +20,7 @@ use crate::terms::SpringLaw;
 #[derive(Debug)]
 struct Arms {
     law: SpringLaw,
+    curve: Curve,
     viscosity: Viscosity,
     stiffening: f64,
     /// g of the equation that is being solved, 0 where there is none.
@@ -59,6 +62,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     }
     let law = Arms {
         law: definition.spring_law,
+        curve: Curve::new(definition.spring_law),
         viscosity,
         stiffening,
         gain: 0.0,
@@ -94,6 +98,15 @@ impl Arms {
             placed.slope += slope;
         }
         placed
+    }
+
+    /// What is elastic of an arm of this length, m, and how it grows with the length, in `f32`.
+    #[inline(always)]
+    fn beside(&self, rest_length: f32, length: f32) -> [f32; 2] {
+        let longer = length - rest_length;
+        let strain = if rest_length > 0.0 { longer / rest_length } else { 0.0 };
+        let [pull, slope] = self.curve.beyond(strain);
+        [longer + rest_length * pull, 1.0 + slope]
     }
 
     fn pull(&self, arm: &Arm, placed: &Placed) -> f64 {
@@ -195,7 +208,7 @@ impl Law<2> for Arms {
     fn begin(&mut self, moment: Moment) {
         self.gain = match moment {
             Moment::Foresee(time) => self.viscosity.over(time).gain,
-            Moment::Recall | Moment::Keep => 0.0,
+            Moment::Recall | Moment::Keep | Moment::Age => 0.0,
         };
     }
 
@@ -209,20 +222,46 @@ impl Law<2> for Arms {
                 let Course { decay, gain } = self.viscosity.over(time);
                 arm.load = (decay * f64::from(arm.stress) - gain * f64::from(arm.elastic)) as f32;
             }
+            Moment::Age => {}
         }
     }
 
-    fn age(&mut self, arms: &mut [Stencil<Arm, 2>], positions: View, course: &dyn Fn(Viscosity) -> Course) {
-        self.gain = 0.0;
-        let Course { decay, gain } = course(self.viscosity);
-        for Stencil { nodes, shape: arm, .. } in arms {
-            let places = nodes.map(|node| positions.get(node as usize).as_dvec3());
-            let elastic = self.place(arm, &places).elastic as f32;
-            let longer = f64::from(elastic) - f64::from(arm.elastic);
-            arm.stress = (decay * f64::from(arm.stress) + gain * longer) as f32;
-            arm.elastic = elastic;
-            arm.load = arm.stress;
+    const IS_STRING: bool = true;
+
+    #[inline(always)]
+    fn weights(_shape: &Arm) -> [f32; 2] {
+        [-1.0, 1.0]
+    }
+
+    #[inline(always)]
+    fn numbers(arm: &Arm) -> [f32; 2] {
+        [arm.rest_length, arm.load]
+    }
+
+    #[inline(always)]
+    fn tension(&self, [rest_length, load]: [f32; 2], length: f32) -> Tension {
+        let gain = self.gain as f32;
+        let [elastic, slope] = self.beside(rest_length, length);
+        let pull = load + gain * elastic;
+        Tension {
+            pull,
+            slope: gain * slope,
+            sideways: if pull > 0.0 { pull } else { 0.0 },
+            stiffening: 1.0,
         }
+    }
+
+    #[inline(always)]
+    fn elastic(&self, [rest_length, _]: [f32; 2], length: f32) -> f32 {
+        self.beside(rest_length, length)[0]
+    }
+
+    #[inline(always)]
+    fn age(&self, arm: &mut Arm, elastic: f32, Course { decay, gain }: Course) {
+        let longer = f64::from(elastic) - f64::from(arm.elastic);
+        arm.stress = (decay * f64::from(arm.stress) + gain * longer) as f32;
+        arm.elastic = elastic;
+        arm.load = arm.stress;
     }
 
     fn hash(&self, arm: &Arm, hasher: &mut StateHasher) {

@@ -9,6 +9,7 @@ use glam::{DMat3, DVec3};
 
 use super::Term;
 use super::stencils::{Law, Stencil, Stencils, directed, shares, weighted};
+use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, check_values, expect_count};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -139,6 +140,26 @@ impl Law<4> for Fibres {
 
     fn size(&self, weights: &[f32; 3]) -> f32 {
         weights.iter().fold(0.0, |size, weight| size.max(weight.abs()))
+    }
+
+    const IS_STRING: bool = true;
+
+    #[inline(always)]
+    fn weights(&[a, b, c]: &[f32; 3]) -> [f32; 4] {
+        [-(a + b + c), a, b, c]
+    }
+
+    #[inline(always)]
+    fn tension(&self, _numbers: [f32; 2], length: f32) -> Tension {
+        let longer = length - 1.0;
+        let slope = if longer > 0.0 { 1.0 } else { 0.0 };
+        let pull = slope * longer;
+        Tension {
+            pull,
+            slope,
+            sideways: pull,
+            stiffening: 1.0,
+        }
     }
 
     fn rate(&self, weights: &[f32; 3], inverse_masses: [f64; 4]) -> f64 {

@@ -7,6 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::Term;
 use super::stencils::{Law, Stencil, Stencils, directed};
+use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -138,6 +139,32 @@ impl Law<2> for Limit {
     /// Nothing below the limit; beyond it the spring is so many times as stiff.
     fn rate(&self, _rest_length: &f32, _inverse_masses: [f64; 2]) -> f64 {
         0.0
+    }
+
+    const IS_STRING: bool = true;
+
+    #[inline(always)]
+    fn weights(_shape: &f32) -> [f32; 2] {
+        [-1.0, 1.0]
+    }
+
+    #[inline(always)]
+    fn numbers(&rest_length: &f32) -> [f32; 2] {
+        [rest_length, 0.0]
+    }
+
+    #[inline(always)]
+    fn tension(&self, [rest_length, _]: [f32; 2], length: f32) -> Tension {
+        let stiffening = self.stiffening as f32;
+        let excess = (length - rest_length) - rest_length * self.strain as f32;
+        let slope = if excess > 0.0 { stiffening } else { 0.0 };
+        let pull = slope * excess;
+        Tension {
+            pull,
+            slope,
+            sideways: pull,
+            stiffening: 1.0 + slope,
+        }
     }
 
     fn stiffening(&self, &rest_length: &f32, places: &[DVec3; 2]) -> f64 {

@@ -1,8 +1,10 @@
 //! Terms of a body's energy beside those of springs and elements: each is of a few nodes, and follows one law.
 //!
 //! A tile's forces are made of all terms that have one of its nodes; what belongs to two tiles is worked out in each of them. So there
-//! are no buffers, any thread may take any tile, and results are the same for any number of threads. Terms are worked out in `f64`, by
-//! the same few lines for every solver.
+//! are no buffers, any thread may take any tile, and results are the same for any number of threads.
+//!
+//! Each law is written once in `f64`, for energies, for exact solvers and for the rest. Where it is one of strings, `strings` has the
+//! forces once more, side by side in `f32`; of the same stored numbers.
 
 mod arms;
 mod bending;
@@ -12,6 +14,7 @@ mod limit;
 mod nonlinear;
 mod set;
 mod stencils;
+mod strings;
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -25,7 +28,8 @@ use crate::error::Result;
 use crate::material::{Course, Viscosity};
 use crate::memory;
 use crate::solver::{Masses, Rates};
-use crate::springs::{Change, Springs, TileForces, tile_count};
+use crate::springs::{Change, ChosenKernel, Springs, TileForces, tile_count};
+use crate::threads::Team;
 pub use nonlinear::SpringLaw;
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
@@ -40,15 +44,23 @@ enum Moment {
     Keep,
     /// An equation is to be solved for the end of so many seconds.
     Foresee(f64),
+    /// Nodes have come to other places.
+    Age,
 }
 
 /// The terms of a body that follow one law.
 trait Term: Debug + Send + Sync {
     /// Adds the forces on the nodes of a tile, N: by how much they are stiffer than their rates say, 1: not at all.
-    fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) -> f64;
+    fn add_forces(
+        &self,
+        kernel: ChosenKernel,
+        of: (usize, Range<usize>),
+        positions: View,
+        forces: &mut TileForces,
+    ) -> f64;
 
     /// Adds how the forces on the nodes of a tile change, N, in the first order; nothing is pushed sideways.
-    fn add_changes(&self, tile: usize, nodes: Range<usize>, places: [View; 2], changes: &mut TileForces);
+    fn add_changes(&self, kernel: ChosenKernel, of: (usize, Range<usize>), places: [View; 2], changes: &mut TileForces);
 
     /// The energy of the terms that begin in a tile, J.
     fn energy(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64;
@@ -97,7 +109,7 @@ trait Term: Debug + Send + Sync {
     fn pass(&mut self, moment: Moment);
 
     /// Nodes have come to `positions`, and what is viscous along this course.
-    fn age(&mut self, positions: View, course: &dyn Fn(Viscosity) -> Course);
+    fn age(&mut self, kernel: ChosenKernel, positions: View, course: Course, team: &Team);
 
     /// What may change of them.
     fn hash(&self, hasher: &mut StateHasher);
@@ -111,6 +123,7 @@ pub(crate) struct Terms {
     holds_any: bool,
     /// Of the springs, where they have arms.
     viscosity: Viscosity,
+    kernel: ChosenKernel,
     /// Room for a number per node.
     sums: Vec<f32>,
     /// What bounds their frequencies, with that of the springs where they were given.
@@ -125,7 +138,12 @@ pub(crate) struct Terms {
 
 impl Terms {
     /// Those that a definition asks for; `springs` are its springs. `None`: it asks for none.
-    pub fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<Self>>> {
+    pub fn new(
+        kernel: ChosenKernel,
+        definition: &BodyDefinition,
+        springs: &[Spring],
+        order: &NodeOrder,
+    ) -> Result<Option<Box<Self>>> {
         let made = [
             home::new(definition, order)?,
             arms::new(definition, springs, order)?,
@@ -143,6 +161,7 @@ impl Terms {
         let mut nodes = 0..definition.positions.len();
         Ok(Some(Box::new(Self {
             viscosity: definition.viscosity,
+            kernel,
             holds_any: nodes.any(|node| laws.iter().any(|law| law.holds(node))),
             laws,
             sums: memory::filled(0.0, definition.positions.len())?,
@@ -156,7 +175,7 @@ impl Terms {
     /// Adds the forces on the nodes of a tile, N.
     pub fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) {
         for law in &self.laws {
-            let stiffening = law.add_forces(tile, nodes.clone(), positions, forces) as f32;
+            let stiffening = law.add_forces(self.kernel, (tile, nodes.clone()), positions, forces) as f32;
             if stiffening > 1.0 {
                 self.stiffening.fetch_max(stiffening.to_bits(), Ordering::Relaxed);
             }
@@ -166,7 +185,7 @@ impl Terms {
     /// Adds how the forces on the nodes of a tile change with nodes at the first of `places` that go the ways of the second, N.
     pub fn add_changes(&self, tile: usize, nodes: Range<usize>, places: [View; 2], changes: &mut TileForces) {
         for law in &self.laws {
-            law.add_changes(tile, nodes.clone(), places, changes);
+            law.add_changes(self.kernel, (tile, nodes.clone()), places, changes);
         }
     }
 
@@ -319,8 +338,11 @@ impl Terms {
     }
 
     /// Nodes have come to `positions`, and what is viscous along this course.
-    pub fn age(&mut self, positions: &Vectors, course: &dyn Fn(Viscosity) -> Course) {
-        self.laws.iter_mut().for_each(|law| law.age(positions.view(), course));
+    pub fn age(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> Course, team: &Team) {
+        let (kernel, course) = (self.kernel, course(self.viscosity));
+        for law in &mut self.laws {
+            law.age(kernel, positions.view(), course, team);
+        }
     }
 
     /// What may change of them.

@@ -8,6 +8,7 @@ use glam::{DMat3, DVec3};
 
 use super::Term;
 use super::stencils::{Law, Stencil, Stencils, directed};
+use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -143,10 +144,85 @@ impl SpringLaw {
     }
 }
 
+/// The same in `f32` and without branches, for springs side by side: the exponential and the cubic are added up, one of them 0.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Curve {
+    steepness: f32,
+    inverse_steepness: f32,
+    quadratic: f32,
+    cubic: f32,
+    limit: f32,
+}
+
+impl Curve {
+    pub fn new(law: SpringLaw) -> Self {
+        let linear = Self {
+            steepness: 0.0,
+            inverse_steepness: 0.0,
+            quadratic: 0.0,
+            cubic: 0.0,
+            limit: f32::INFINITY,
+        };
+        match law {
+            SpringLaw::Linear => linear,
+            SpringLaw::Exponential { steepness, limit } => Self {
+                steepness,
+                inverse_steepness: 1.0 / steepness,
+                limit,
+                ..linear
+            },
+            SpringLaw::Cubic {
+                quadratic,
+                cubic,
+                limit,
+            } => Self {
+                quadratic,
+                cubic,
+                limit,
+                ..linear
+            },
+        }
+    }
+
+    /// What the pull and its slope are beyond those of a linear spring.
+    #[inline(always)]
+    pub fn beyond(&self, strain: f32) -> [f32; 2] {
+        let within = if strain < self.limit { strain } else { self.limit };
+        let stretch = if within > 0.0 { within } else { 0.0 };
+        let steep = self.steepness * stretch;
+        let steeper = exponential_beyond(steep);
+        let (a, b) = (self.quadratic, self.cubic);
+        let pull = steeper * self.inverse_steepness + within * within * (a + b * within);
+        let slope = steeper + steep + within * (2.0 * a + 3.0 * b * within);
+        [pull + slope * (strain - within), slope]
+    }
+}
+
+/// `exp(number) - 1 - number`, of a number from 0 to 14, without a difference that loses digits: as `2^n exp(r)`, n being whole and r at
+/// most half the logarithm of 2.
+#[inline(always)]
+fn exponential_beyond(number: f32) -> f32 {
+    /// Numbers of this size are whole, and their last bits are those of n.
+    const WHOLE: f32 = 12_582_912.0;
+    /// The logarithm of 2, in two parts: products of the first with n are exact.
+    const LOGARITHM: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    let shifted = number * std::f32::consts::LOG2_E + WHOLE;
+    let n = shifted - WHOLE;
+    let r = (number - n * LOGARITHM[0]) - n * LOGARITHM[1];
+    let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
+    // exp(r) - 1 - r, over r²: Taylor's series; what is left out is less than 2^-23 of it.
+    let mut beyond = 1.0 / 5040.0;
+    for factor in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5] {
+        beyond = beyond * r + factor;
+    }
+    power * (r * r * beyond) + ((power - 1.0) * (1.0 + r) - n * std::f32::consts::LN_2)
+}
+
 /// What springs of a law do beyond what linear ones do; shapes are their rest lengths, m.
 #[derive(Debug)]
 struct Stiffening {
     law: SpringLaw,
+    curve: Curve,
     stiffest: f64,
 }
 
@@ -175,7 +251,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
             shape: spring.rest_length,
         });
     }
-    let law = Stiffening { law, stiffest };
+    let law = Stiffening {
+        law,
+        curve: Curve::new(law),
+        stiffest,
+    };
     Ok(Some(Box::new(Stencils::new(
         law,
         stiffening,
@@ -280,6 +360,31 @@ impl Law<2> for Stiffening {
 
     fn is_of_springs(&self) -> bool {
         true
+    }
+
+    const IS_STRING: bool = true;
+
+    #[inline(always)]
+    fn weights(_shape: &f32) -> [f32; 2] {
+        [-1.0, 1.0]
+    }
+
+    #[inline(always)]
+    fn numbers(&rest_length: &f32) -> [f32; 2] {
+        [rest_length, 0.0]
+    }
+
+    #[inline(always)]
+    fn tension(&self, [rest_length, _]: [f32; 2], length: f32) -> Tension {
+        let longer = length - rest_length;
+        let [pull, slope] = self.curve.beyond(longer / rest_length);
+        let pull = rest_length * pull;
+        Tension {
+            pull,
+            slope,
+            sideways: if longer > 0.0 { pull } else { 0.0 },
+            stiffening: 1.0,
+        }
     }
 
     fn rate(&self, _rest_length: &f32, inverse_masses: [f64; 2]) -> f64 {

@@ -6,11 +6,12 @@
 use glam::{DMat3, DVec3};
 
 use super::stencils::{Law, Stencil, Stencils, directed};
+use super::strings::Tension;
 use super::{Moment, Term};
-use crate::body::{BodyDefinition, NodeOrder, Spring, View};
+use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
-use crate::material::{Course, Viscosity, Yielding};
+use crate::material::{Course, Yielding};
 use crate::memory;
 use crate::terms::SpringLaw;
 
@@ -141,21 +142,41 @@ impl Law<2> for Sets {
         match moment {
             Moment::Recall => set.longer = set.kept,
             Moment::Keep => set.kept = set.longer,
-            Moment::Foresee(_) => {}
+            Moment::Foresee(_) | Moment::Age => {}
         }
     }
 
-    fn age(&mut self, sets: &mut [Stencil<Set, 2>], positions: View, _course: &dyn Fn(Viscosity) -> Course) {
-        for Stencil { nodes, shape: set, .. } in sets {
-            let [from, to] = nodes.map(|node| positions.get(node as usize).as_dvec3());
-            let rest_length = f64::from(set.rest_length);
-            let stretch = from.distance(to) - rest_length - f64::from(set.longer);
-            let yielded = stretch.abs() - self.yield_strain * rest_length;
-            if yielded > 0.0 {
-                let most = self.largest * rest_length;
-                let longer = f64::from(set.longer) + yielded.copysign(stretch);
-                set.longer = longer.clamp(-most, most) as f32;
-            }
+    const IS_STRING: bool = true;
+
+    #[inline(always)]
+    fn weights(_shape: &Set) -> [f32; 2] {
+        [-1.0, 1.0]
+    }
+
+    #[inline(always)]
+    fn numbers(set: &Set) -> [f32; 2] {
+        [set.longer, 0.0]
+    }
+
+    #[inline(always)]
+    fn tension(&self, [longer, _]: [f32; 2], _length: f32) -> Tension {
+        Tension {
+            pull: -longer,
+            slope: 0.0,
+            sideways: if longer < 0.0 { -longer } else { 0.0 },
+            stiffening: 1.0,
+        }
+    }
+
+    #[inline(always)]
+    fn age(&self, set: &mut Set, length: f32, _course: Course) {
+        let rest_length = f64::from(set.rest_length);
+        let stretch = f64::from(length) - rest_length - f64::from(set.longer);
+        let yielded = stretch.abs() - self.yield_strain * rest_length;
+        if yielded > 0.0 {
+            let most = self.largest * rest_length;
+            let longer = f64::from(set.longer) + yielded.copysign(stretch);
+            set.longer = longer.clamp(-most, most) as f32;
         }
     }
 

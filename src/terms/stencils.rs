@@ -5,14 +5,16 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::strings::{Aging, OfTile, Tension};
 use super::{Blocks, Moment, Term};
 use crate::body::{Region, Scale, Vectors, View};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
-use crate::material::{Course, Viscosity};
+use crate::material::Course;
 use crate::memory;
 use crate::solver::Masses;
-use crate::springs::{Change, TILE, TileForces, tile_count};
+use crate::springs::{Change, ChosenKernel, TILE, TileForces, tile_count};
+use crate::threads::{Ragged, Team};
 
 /// What a term does whose stiffness is 1.
 pub(super) trait Law<const N: usize>: Debug + Send + Sync {
@@ -70,7 +72,29 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     /// Nodes are given from here on.
     fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
 
-    /// Whether terms remember anything; what follows is for those.
+    /// Whether it is a string: it pulls along one vector, the sum of what its nodes have, weighted by numbers that add up to 0. What
+    /// follows is for those, to be worked out side by side in `f32`, and marked `#[inline(always)]`.
+    const IS_STRING: bool = false;
+
+    fn weights(_shape: &Self::Shape) -> [f32; N] {
+        [0.0; N]
+    }
+
+    /// What of a shape counts beside its length.
+    fn numbers(_shape: &Self::Shape) -> [f32; 2] {
+        [0.0; 2]
+    }
+
+    fn tension(&self, _numbers: [f32; 2], _length: f32) -> Tension {
+        Tension::default()
+    }
+
+    /// What a string that remembers has to know of its length, m.
+    fn elastic(&self, _numbers: [f32; 2], length: f32) -> f32 {
+        length
+    }
+
+    /// Whether terms remember anything; what follows is for those, which are strings.
     const REMEMBERS: bool = false;
 
     /// Something is about to be done to all terms.
@@ -78,14 +102,8 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
 
     fn pass(&self, _moment: Moment, _shape: &mut Self::Shape) {}
 
-    /// Nodes have come to `positions`.
-    fn age(
-        &mut self,
-        _stencils: &mut [Stencil<Self::Shape, N>],
-        _positions: View,
-        _course: &dyn Fn(Viscosity) -> Course,
-    ) {
-    }
+    /// Nodes have come to where this is elastic of it, m.
+    fn age(&self, _shape: &mut Self::Shape, _elastic: f32, _course: Course) {}
 
     fn hash(&self, _shape: &Self::Shape, _hasher: &mut StateHasher) {}
 }
@@ -106,8 +124,8 @@ pub(super) struct Stencils<L: Law<N>, const N: usize> {
     /// By the first of their tiles.
     all: Vec<Stencil<L::Shape, N>>,
     /// Where the terms of each tile begin among those that begin in it, and those that only end in it.
-    starts: Vec<u32>,
-    visitor_starts: Vec<u32>,
+    starts: Vec<usize>,
+    visitor_starts: Vec<usize>,
     visitors: Vec<u32>,
 }
 
@@ -160,14 +178,37 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
 
     /// Those that begin in a tile.
     fn beginning(&self, tile: usize) -> Range<usize> {
-        self.starts[tile] as usize..self.starts[tile + 1] as usize
+        self.starts[tile]..self.starts[tile + 1]
+    }
+
+    /// Those that only end in it.
+    fn visitors(&self, tile: usize) -> &[u32] {
+        &self.visitors[self.visitor_starts[tile]..self.visitor_starts[tile + 1]]
     }
 
     /// All that have a node of a tile.
     fn of_tile(&self, tile: usize) -> impl Iterator<Item = usize> {
-        let visitors = self.visitor_starts[tile] as usize..self.visitor_starts[tile + 1] as usize;
-        let visitors = self.visitors[visitors].iter().map(|&index| index as usize);
+        let visitors = self.visitors(tile).iter().map(|&index| index as usize);
         self.beginning(tile).chain(visitors)
+    }
+
+    fn strings<'a>(
+        &'a self,
+        (tile, nodes): (usize, Range<usize>),
+        positions: View<'a>,
+        ways: Option<View<'a>>,
+        sums: &'a mut TileForces,
+    ) -> OfTile<'a, L, N> {
+        OfTile {
+            law: &self.law,
+            all: &self.all,
+            beginning: self.beginning(tile),
+            visitors: self.visitors(tile),
+            nodes,
+            positions,
+            ways,
+            sums,
+        }
     }
 
     fn there(&self) -> impl Iterator<Item = &Stencil<L::Shape, N>> {
@@ -221,7 +262,16 @@ impl<T, const N: usize> Stencil<T, N> {
 }
 
 impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
-    fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) -> f64 {
+    fn add_forces(
+        &self,
+        kernel: ChosenKernel,
+        (tile, nodes): (usize, Range<usize>),
+        positions: View,
+        forces: &mut TileForces,
+    ) -> f64 {
+        if L::IS_STRING {
+            return kernel.run(self.strings((tile, nodes), positions, None, forces));
+        }
         let mut stiffening = 1.0_f64;
         for index in self.of_tile(tile) {
             let stencil = &self.all[index];
@@ -234,7 +284,17 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         stiffening
     }
 
-    fn add_changes(&self, tile: usize, nodes: Range<usize>, [positions, ways]: [View; 2], changes: &mut TileForces) {
+    fn add_changes(
+        &self,
+        kernel: ChosenKernel,
+        (tile, nodes): (usize, Range<usize>),
+        [positions, ways]: [View; 2],
+        changes: &mut TileForces,
+    ) {
+        if L::IS_STRING {
+            kernel.run(self.strings((tile, nodes), positions, Some(ways), changes));
+            return;
+        }
         for index in self.of_tile(tile) {
             let stencil = &self.all[index];
             if stencil.stiffness > 0.0 {
@@ -307,7 +367,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
     fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         let tile = tile_of(a);
         let beginning = self.beginning(tile);
-        let visitors = self.visitor_starts[tile] as usize..self.visitor_starts[tile + 1] as usize;
+        let visitors = self.visitor_starts[tile]..self.visitor_starts[tile + 1];
         let Self {
             law,
             all,
@@ -404,9 +464,19 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         }
     }
 
-    fn age(&mut self, positions: View, course: &dyn Fn(Viscosity) -> Course) {
+    fn age(&mut self, kernel: ChosenKernel, positions: View, course: Course, team: &Team) {
         if L::REMEMBERS {
-            self.law.age(&mut self.all, positions, course);
+            self.law.begin(Moment::Age);
+            let (law, tiles) = (&self.law, self.starts.len() - 1);
+            let strings = Ragged::new(&mut self.all, &self.starts[..tiles]);
+            team.pass(tiles, strings, |_, strings| {
+                kernel.run(Aging {
+                    law,
+                    strings,
+                    positions,
+                    course,
+                });
+            });
         }
     }
 
