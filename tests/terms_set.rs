@@ -4,7 +4,10 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Storage, Values, World, WorldDefinition, Yielding};
+use sinew::{
+    BodyDefinition, Material, Model, RestStateDefinition, Solver, SpringLaw, Storage, Values, World, WorldDefinition,
+    Yielding,
+};
 use support::bodies::FREE;
 use support::scene::{SOLVERS, STORAGES, Scene};
 
@@ -85,6 +88,128 @@ fn a_spring_yields_and_stays_so() {
         assert!((work / expected - 1.0).abs() < 1e-3, "{solver:?}: {work} {expected}");
         let stored = 0.5 * STIFFNESS * (LENGTH * YIELD).powi(2);
         assert!((scene.energy() / stored - 1.0).abs() < 1e-3);
+    }
+}
+
+/// Led far beyond at once, a spring pulls with no more than it yields at, whatever the solver and the step; and a weight that it cannot
+/// hold falls as it should.
+#[test]
+fn what_yields_does_not_hang_on_the_step() {
+    let definition = BodyDefinition {
+        yielding: yielding(0.1),
+        ..pair(&[0.0, 0.0])
+    };
+    let most = STIFFNESS * LENGTH * 0.1;
+    for solver in SOLVERS {
+        for step in [1e-3, 1.0 / 60.0, 1.0] {
+            let mut scene = Scene::new(FREE, &BodyDefinition { solver, ..definition });
+            scene.body_mut().move_pin(1, Vec3::X * 0.14).expect("a pin");
+            scene.step(step);
+            scene.step(step);
+            let pull = f64::from(scene.body().pin_force(1).expect("a pin").x);
+            assert!(
+                (pull / most - 1.0).abs() < 1e-4,
+                "{solver:?}, step {step}: {pull} of {most}"
+            );
+        }
+        for step in [1e-3_f32, 1.0 / 60.0] {
+            // Twice what it can hold: once it yields, half of the weight is left to fall with.
+            let mass = 2.0 * most / 9.81;
+            let masses = [0.0, mass as f32];
+            let gravity = Vec3::X * 9.81;
+            let falling = BodyDefinition {
+                masses: Values::Each(&masses),
+                yielding: Yielding {
+                    strain: 0.1,
+                    largest: 0.99,
+                },
+                solver,
+                ..definition
+            };
+            let mut scene = Scene::new(WorldDefinition { gravity, ..FREE }, &falling);
+            let steps = (0.1 / step).round();
+            scene.run(step, steps as usize);
+            let time = f64::from(step) * f64::from(steps);
+            // Until it yields it swings: y = y0 (1 - cos w t) with y0 = 2 most / k; then a = g / 2.
+            let (omega, deepest) = ((STIFFNESS / mass).sqrt(), 2.0 * most / STIFFNESS);
+            let first = (1.0_f64 - 0.5).acos() / omega;
+            let (speed, left) = (deepest * omega * (omega * first).sin(), time - first);
+            let expected = 0.5 * deepest + speed * left + 0.25 * 9.81 * left * left;
+            let way = scene.positions()[1].x - LENGTH;
+            let tolerance = if step < 0.01 { 0.01 } else { 0.08 };
+            assert!(
+                (way / expected - 1.0).abs() < tolerance,
+                "{solver:?}, step {step}: {way} of {expected}"
+            );
+        }
+    }
+}
+
+/// The state of rest is one: springs yield until they hold, and what nothing holds is told.
+#[test]
+fn the_state_of_rest_is_where_springs_have_yielded() {
+    let definition = BodyDefinition {
+        yielding: Yielding {
+            strain: 0.1,
+            largest: 0.3,
+        },
+        ..pair(&[0.0, 0.0458716])
+    };
+    // One and a half times what it yields at.
+    let mut scene = Scene::new(
+        WorldDefinition {
+            gravity: Vec3::X * 9.81,
+            ..FREE
+        },
+        &definition,
+    );
+    scene.rest();
+    let found = scene.positions()[1].x;
+    // At its largest set, and elastic again: 0.3 + 0.15 longer.
+    assert!((found - LENGTH * 1.45).abs() < 1e-5, "{found}");
+    let damped = BodyDefinition {
+        node_dampings: Values::Uniform(1.0),
+        ..definition
+    };
+    let mut falling = Scene::new(
+        WorldDefinition {
+            gravity: Vec3::X * 9.81,
+            ..FREE
+        },
+        &damped,
+    );
+    falling.run(0.01, 300);
+    assert!((falling.positions()[1].x - found).abs() < 1e-5);
+    scene.run(0.01, 10);
+    assert!((scene.positions()[1].x - found).abs() < 1e-5);
+    // Tetrahedra of which this is not known are told of.
+    let mesh = Mesh::block([0.04, 0.02, 0.02], [4, 2, 2]).expect("a block");
+    let tissue = BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(Material {
+            model: Model::Tetrahedra,
+            young_modulus: 5000.0,
+            poisson_ratio: 0.3,
+            density: 1000.0,
+            ..Material::default()
+        }),
+        yielding: yielding(0.02),
+        ..BodyDefinition::default()
+    };
+    for (gravity, holds) in [(0.5, true), (30.0, false)] {
+        let gravity = Vec3::NEG_Y * gravity;
+        let mut scene = Scene::new(WorldDefinition { gravity, ..FREE }, &tissue);
+        for (node, p) in (0..).zip(&mesh.positions) {
+            if p.x < -0.019 {
+                scene.body_mut().pin(node).expect("a pin");
+            }
+        }
+        let before = scene.world.state_hash();
+        let id = scene.id;
+        let found = scene.world.rest_state(id, &RestStateDefinition::default());
+        assert_eq!(found.is_ok(), holds, "{found:?}");
+        assert_eq!(scene.world.state_hash() == before, !holds);
     }
 }
 

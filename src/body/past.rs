@@ -7,17 +7,6 @@ use crate::solver::write_records;
 use crate::terms::Terms;
 use crate::threads::Team;
 
-/// How long something took.
-#[derive(Clone, Copy, Debug)]
-enum Lapse {
-    /// s
-    Seconds(f64),
-    /// Nothing was deformed.
-    Nothing,
-    /// So long that all is relaxed.
-    Forever,
-}
-
 impl Body {
     /// Whether it remembers anything.
     pub(crate) fn remembers(&self) -> bool {
@@ -57,14 +46,14 @@ impl Body {
     /// The substep in progress, of so many seconds, has put nodes where they are next.
     pub(crate) fn age(&mut self, time: f64, team: &Team) {
         if self.remembers() {
-            self.lapse(Lapse::Seconds(time), true, team);
+            self.lapse(|viscosity| viscosity.over(time), true, team);
         }
     }
 
     /// What is elastic has changed where nodes are: arms hold what they held.
     pub(super) fn measure_anew(&mut self) {
         if self.remembers() {
-            self.lapse(Lapse::Nothing, false, &Team::alone());
+            self.lapse(|_| Course::NOTHING, false, &Team::alone());
             self.keep();
         }
     }
@@ -78,27 +67,21 @@ impl Body {
     /// The same until [`Self::recall`].
     pub(crate) fn release(&mut self) {
         if self.remembers() {
-            self.lapse(Lapse::Forever, false, &Team::alone());
+            self.lapse(|_| Course::FOREVER, false, &Team::alone());
         }
     }
 
-    fn lapse(&mut self, lapse: Lapse, is_next: bool, team: &Team) {
+    fn lapse(&mut self, course: impl Fn(Viscosity) -> Course, is_next: bool, team: &Team) {
         let positions = if is_next {
             self.state.next_positions()
         } else {
             self.state.positions()
         };
-        let course = |viscosity: Viscosity| match lapse {
-            Lapse::Seconds(time) => viscosity.over(time),
-            Lapse::Nothing => Course { decay: 1.0, gain: 0.0 },
-            Lapse::Forever => Viscosity::default().over(1.0),
-        };
         if let (Some(elements), Some(records)) = (&mut self.elements, &mut self.records)
             && elements.remember()
         {
             write_records(self.kernel, positions, records, team);
-            let yields = matches!(lapse, Lapse::Seconds(_));
-            elements.age(self.kernel, records.as_slice(), (course, yields), team);
+            elements.age(self.kernel, records.as_slice(), &course, team);
         }
         if let Some(terms) = &mut self.terms {
             terms.age(positions, course, team);

@@ -417,12 +417,12 @@ impl Elements {
         }
     }
 
-    /// Nodes have come to `positions` along the course that the viscosity leads to, and tetrahedra yield or not.
+    /// Nodes have come to `positions` along the course that the viscosity leads to.
     pub fn age(
         &mut self,
         kernel: ChosenKernel,
         positions: &[Record],
-        (course, yields): (impl Fn(Viscosity) -> Course, bool),
+        course: impl Fn(Viscosity) -> Course,
         team: &Team,
     ) {
         let Some(memory) = &self.memory else {
@@ -432,7 +432,7 @@ impl Elements {
         self.find_elastic(kernel, positions, team);
         if let Some(memory) = &mut self.memory {
             memory.gain = 0.0;
-            let bounds = memory.bounds.filter(|_| yields);
+            let bounds = memory.bounds.filter(|_| course.yields);
             team.pass(memory.parts.len(), Items::new(&mut memory.parts), |_, part| {
                 part.age(kernel, course, bounds);
             });

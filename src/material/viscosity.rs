@@ -32,6 +32,23 @@ const LONGEST: f32 = 1e6;
 pub(crate) struct Course {
     pub decay: f64,
     pub gain: f64,
+    /// Whether what is deformed beyond its yield strain stays so.
+    pub yields: bool,
+}
+
+impl Course {
+    /// None: arms hold what they held.
+    pub const NOTHING: Self = Self {
+        decay: 1.0,
+        gain: 0.0,
+        yields: false,
+    };
+
+    /// So long that arms hold nothing.
+    pub const FOREVER: Self = Self {
+        decay: 0.0,
+        ..Self::NOTHING
+    };
 }
 
 impl Viscosity {
@@ -79,6 +96,7 @@ impl Viscosity {
         Course {
             decay: (-ratio).exp(),
             gain: retardation / time * -(-ratio).exp_m1(),
+            yields: true,
         }
     }
 

@@ -23,8 +23,8 @@ struct Arms {
     curve: Curve,
     viscosity: Viscosity,
     stiffening: f64,
-    /// g of the equation that is being solved, 0 where there is none.
-    gain: f64,
+    /// Of the equation that is being solved; nothing where there is none.
+    course: Course,
 }
 
 /// Stresses are pulls over the spring's stiffness, m.
@@ -65,7 +65,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         curve: Curve::new(definition.spring_law),
         viscosity,
         stiffening,
-        gain: 0.0,
+        course: Course::NOTHING,
     };
     Ok(Some(Box::new(Stencils::new(law, arms, definition.positions.len())?)))
 }
@@ -110,7 +110,7 @@ impl Arms {
     }
 
     fn pull(&self, arm: &Arm, placed: &Placed) -> f64 {
-        f64::from(arm.load) + self.gain * placed.elastic
+        f64::from(arm.load) + self.course.gain * placed.elastic
     }
 
     fn stiffness(&self, arm: &Arm, placed: &Placed, is_exact: bool) -> DMat3 {
@@ -120,7 +120,7 @@ impl Arms {
         } else {
             0.0
         };
-        directed(placed.direction(), self.gain * placed.slope, across)
+        directed(placed.direction(), self.course.gain * placed.slope, across)
     }
 }
 
@@ -159,7 +159,16 @@ impl Law<2> for Arms {
         if rest_length > 0.0 {
             elastic += rest_length.powi(2) * self.law.change(placed.strain, longer / rest_length);
         }
-        f64::from(arm.load) * longer + self.gain * elastic
+        self.course.gain * elastic
+    }
+
+    fn change_of_load(&self, arm: &Arm, [from, to]: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
+        let (way, more) = (*to - *from, ways[1] - ways[0]);
+        let both = way.length() + (way + more).length();
+        if both == 0.0 {
+            return 0.0;
+        }
+        f64::from(arm.load) * more.dot(way + way + more) / both
     }
 
     fn forces(&self, arm: &Arm, places: &[DVec3; 2]) -> [DVec3; 2] {
@@ -206,9 +215,9 @@ impl Law<2> for Arms {
     }
 
     fn begin(&mut self, moment: Moment) {
-        self.gain = match moment {
-            Moment::Foresee(time) => self.viscosity.over(time).gain,
-            Moment::Recall | Moment::Keep | Moment::Age => 0.0,
+        self.course = match moment {
+            Moment::Foresee(time) => self.viscosity.over(time),
+            Moment::Recall | Moment::Keep | Moment::Age => Course::NOTHING,
         };
     }
 
@@ -218,8 +227,8 @@ impl Law<2> for Arms {
                 (arm.stress, arm.elastic, arm.load) = (arm.kept_stress, arm.kept_elastic, arm.kept_stress)
             }
             Moment::Keep => (arm.kept_stress, arm.kept_elastic) = (arm.stress, arm.elastic),
-            Moment::Foresee(time) => {
-                let Course { decay, gain } = self.viscosity.over(time);
+            Moment::Foresee(_) => {
+                let Course { decay, gain, .. } = self.course;
                 arm.load = (decay * f64::from(arm.stress) - gain * f64::from(arm.elastic)) as f32;
             }
             Moment::Age => {}
@@ -240,7 +249,7 @@ impl Law<2> for Arms {
 
     #[inline(always)]
     fn tension(&self, [rest_length, load]: [f32; 2], length: f32) -> Tension {
-        let gain = self.gain as f32;
+        let gain = self.course.gain as f32;
         let [elastic, slope] = self.beside(rest_length, length);
         let pull = load + gain * elastic;
         Tension {
@@ -257,10 +266,12 @@ impl Law<2> for Arms {
     }
 
     #[inline(always)]
-    fn age(&self, arm: &mut Arm, elastic: f32, Course { decay, gain }: Course) {
+    fn age(&self, arm: &mut Arm, elastic: f32, Course { decay, gain, .. }: Course) {
         let longer = f64::from(elastic) - f64::from(arm.elastic);
-        arm.stress = (decay * f64::from(arm.stress) + gain * longer) as f32;
-        arm.elastic = elastic;
+        let stress = (decay * f64::from(arm.stress) + gain * longer) as f32;
+        // Nothing is held by what is beyond the range of numbers.
+        arm.stress = if stress.is_finite() { stress } else { 0.0 };
+        arm.elastic = if elastic.is_finite() { elastic } else { 0.0 };
         arm.load = arm.stress;
     }
 

@@ -160,7 +160,12 @@ impl Terms {
         }
         let mut nodes = 0..definition.positions.len();
         Ok(Some(Box::new(Self {
-            viscosity: definition.viscosity,
+            viscosity: if definition.viscosity.stiffening().is_some() && !springs.is_empty() {
+                definition.viscosity
+            } else {
+                // A dashpot alone is damping along the springs.
+                Viscosity::default()
+            },
             kernel,
             holds_any: nodes.any(|node| laws.iter().any(|law| law.holds(node))),
             laws,
@@ -311,10 +316,15 @@ impl Terms {
     }
 
     fn rates_times(&self, stiffening: f32) -> Rates {
-        self.viscosity.rates(Rates {
+        let rates = Rates {
             stiffest: self.rates.stiffest * stiffening,
             ..self.rates
-        })
+        };
+        if self.viscosity.is_none() {
+            rates
+        } else {
+            self.viscosity.rates(rates)
+        }
     }
 
     /// Whether any remember anything.

@@ -1,7 +1,9 @@
 //! Springs that take a set: stretched or pressed beyond a strain they yield, and are at rest elsewhere from then on (perfect plasticity;
 //! Terzopoulos, Fleischer 1988 have it for graphics).
 //!
-//! What was yielded is found where a substep ends, as the part of the length that is beyond the strain; within it a spring is elastic.
+//! Where a spring would be longer at rest if it stopped where it is, it pulls as if it were so already: its pull has a limit, with an
+//! energy of its own, which is convex. So an implicit step, however long, yields as far as it must, and where there is a state of rest it
+//! is one. What has yielded is kept where a substep ends.
 
 use glam::{DMat3, DVec3};
 
@@ -71,28 +73,74 @@ fn direction(way: DVec3) -> DVec3 {
     way.try_normalize().unwrap_or(DVec3::X)
 }
 
+/// What a spring does at a length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Flow {
+    Elastic,
+    Yields,
+    /// By as much as it may, longer or shorter.
+    AtEnd,
+}
+
+impl Sets {
+    /// By how much longer it would be at rest if it stopped at this length, m.
+    fn longer_at(&self, set: &Set, length: f64) -> (f64, Flow) {
+        let (rest_length, longer) = (f64::from(set.rest_length), f64::from(set.longer));
+        let stretch = length - rest_length - longer;
+        let yielded = stretch.abs() - self.yield_strain * rest_length;
+        if yielded <= 0.0 {
+            return (longer, Flow::Elastic);
+        }
+        let (after, most) = (longer + yielded.copysign(stretch), self.largest * rest_length);
+        if after.abs() < most {
+            (after, Flow::Yields)
+        } else {
+            (after.clamp(-most, most), Flow::AtEnd)
+        }
+    }
+
+    /// The integral of minus that over the length, so that it is what the elastic energy is off by where it does not yield.
+    fn energy_at(&self, set: &Set, length: f64) -> f64 {
+        let (rest_length, longer) = (f64::from(set.rest_length), f64::from(set.longer));
+        let (after, _) = self.longer_at(set, length);
+        if after == longer {
+            return longer * (0.5 * longer - (length - rest_length));
+        }
+        let yields = (self.yield_strain * rest_length).copysign(after - longer);
+        // Where it begins to yield, and where it ends.
+        let first = longer * (0.5 * longer - (longer + yields));
+        let flowing = 0.5 * (after * after - longer * longer);
+        first - flowing - after * (length - rest_length - yields - after)
+    }
+}
+
 impl Law<2> for Sets {
     type Shape = Set;
 
     const REMEMBERS: bool = true;
 
-    /// What the spring has less of than if it had not yielded.
+    /// What the spring has less of than if it could not yield.
     fn energy(&self, set: &Set, [from, to]: &[DVec3; 2]) -> f64 {
-        let longer = f64::from(set.longer);
-        longer * (0.5 * longer - (from.distance(*to) - f64::from(set.rest_length)))
+        self.energy_at(set, from.distance(*to))
     }
 
     fn change(&self, set: &Set, [from, to]: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
         let (way, more) = (*to - *from, ways[1] - ways[0]);
-        let both = way.length() + (way + more).length();
+        let lengths = [way.length(), (way + more).length()];
+        let both = lengths[0] + lengths[1];
         if both == 0.0 {
             return 0.0;
         }
-        -f64::from(set.longer) * more.dot(way + way + more) / both
+        let [before, after] = lengths.map(|length| self.longer_at(set, length));
+        if before.1 == after.1 {
+            -0.5 * (before.0 + after.0) * more.dot(way + way + more) / both
+        } else {
+            self.energy_at(set, lengths[1]) - self.energy_at(set, lengths[0])
+        }
     }
 
     fn forces(&self, set: &Set, [from, to]: &[DVec3; 2]) -> [DVec3; 2] {
-        let push = direction(*to - *from) * f64::from(set.longer);
+        let push = direction(*to - *from) * self.longer_at(set, from.distance(*to)).0;
         [-push, push]
     }
 
@@ -102,13 +150,16 @@ impl Law<2> for Sets {
     }
 
     fn blocks(&self, set: &Set, [from, to]: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
-        let (way, longer) = (*to - *from, f64::from(set.longer));
+        let way = *to - *from;
         let length = way.length();
-        let block = if length > 0.0 && (is_exact || longer < 0.0) {
-            directed(way / length, 0.0, -longer / length)
+        let (longer, flow) = self.longer_at(set, length);
+        let along = if flow == Flow::Yields { -1.0 } else { 0.0 };
+        let across = if length > 0.0 && (is_exact || longer < 0.0) {
+            -longer / length
         } else {
-            DMat3::ZERO
+            0.0
         };
+        let block = directed(direction(way), along, across);
         [[block, -block], [-block, block]]
     }
 
@@ -155,28 +206,32 @@ impl Law<2> for Sets {
 
     #[inline(always)]
     fn numbers(set: &Set) -> [f32; 2] {
-        [set.longer, 0.0]
+        [set.longer, set.rest_length]
     }
 
     #[inline(always)]
-    fn tension(&self, [longer, _]: [f32; 2], _length: f32) -> Tension {
+    fn tension(&self, [longer, rest_length]: [f32; 2], length: f32) -> Tension {
+        let stretch = length - rest_length - longer;
+        let yielded = stretch.abs() - self.yield_strain as f32 * rest_length;
+        let most = self.largest as f32 * rest_length;
+        let moved = longer + if yielded > 0.0 { yielded.copysign(stretch) } else { 0.0 };
+        let after = if yielded > 0.0 {
+            moved.clamp(-most, most)
+        } else {
+            longer
+        };
         Tension {
-            pull: -longer,
-            slope: 0.0,
-            sideways: if longer < 0.0 { -longer } else { 0.0 },
+            pull: -after,
+            slope: if yielded > 0.0 && moved.abs() < most { -1.0 } else { 0.0 },
+            sideways: if after < 0.0 { -after } else { 0.0 },
             stiffening: 1.0,
         }
     }
 
     #[inline(always)]
-    fn age(&self, set: &mut Set, length: f32, _course: Course) {
-        let rest_length = f64::from(set.rest_length);
-        let stretch = f64::from(length) - rest_length - f64::from(set.longer);
-        let yielded = stretch.abs() - self.yield_strain * rest_length;
-        if yielded > 0.0 {
-            let most = self.largest * rest_length;
-            let longer = f64::from(set.longer) + yielded.copysign(stretch);
-            set.longer = longer.clamp(-most, most) as f32;
+    fn age(&self, set: &mut Set, length: f32, course: Course) {
+        if course.yields {
+            set.longer = self.longer_at(set, f64::from(length)).0 as f32;
         }
     }
 

@@ -26,6 +26,11 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     /// How the energy changes where nodes go these ways, to the last digits of the change.
     fn change(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> f64;
 
+    /// The same of what acts on top of it, which may cancel it.
+    fn change_of_load(&self, _shape: &Self::Shape, _places: &[DVec3; N], _ways: &[DVec3; N]) -> f64 {
+        0.0
+    }
+
     /// The force on each node.
     fn forces(&self, shape: &Self::Shape, places: &[DVec3; N]) -> [DVec3; N];
 
@@ -323,8 +328,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64)) {
         for stencil in self.there() {
-            let change = self.law.change(&stencil.shape, &stencil.at(at), &stencil.at(more));
-            see(f64::from(stencil.stiffness) * change);
+            let (places, ways) = (stencil.at(at), stencil.at(more));
+            see(f64::from(stencil.stiffness) * self.law.change(&stencil.shape, &places, &ways));
+            see(f64::from(stencil.stiffness) * self.law.change_of_load(&stencil.shape, &places, &ways));
         }
     }
 

@@ -192,6 +192,10 @@ impl Substep<'_> {
         }
         if end == End::Fine {
             body.age(self.step, self.team);
+            if body.remembers() {
+                // What was stored is lost by then.
+                implicit.histories[1 - implicit.settled].energy = None;
+            }
         }
         end
     }
