@@ -99,16 +99,14 @@ impl<'a> View<'a> {
         Vec3::from(self.axes.map(|axis| axis[(node as isize - self.start) as usize]))
     }
 
-    /// That of a node, from the records where they are there.
+    /// The same vectors from node 0 on as records, none where there are none.
     #[inline(always)]
-    pub fn record(&self, node: usize) -> Record {
-        match self.records {
-            Some(records) => records[node],
-            None => {
-                let [x, y, z] = self.axes.map(|axis| axis[(node as isize - self.start) as usize]);
-                Record([x, y, z, 0.0])
-            }
-        }
+    pub fn records(&self) -> &'a [Record] {
+        self.records.unwrap_or(&[])
+    }
+
+    pub fn has_records(&self) -> bool {
+        self.records.is_some()
     }
 
     /// Those of some nodes along each axis.

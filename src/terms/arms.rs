@@ -177,12 +177,6 @@ impl Law<2> for Arms {
         [pull, -pull]
     }
 
-    fn changes(&self, arm: &Arm, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
-        let placed = self.place(arm, places);
-        let change = self.stiffness(arm, &placed, false) * (ways[1] - ways[0]);
-        [change, -change]
-    }
-
     fn blocks(&self, arm: &Arm, places: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
         let block = self.stiffness(arm, &self.place(arm, places), is_exact);
         [[block, -block], [-block, block]]

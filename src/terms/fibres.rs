@@ -116,11 +116,6 @@ impl Law<4> for Fibres {
         shares(weights).map(|share| pull * share)
     }
 
-    fn changes(&self, weights: &[f32; 3], places: &[DVec3; 4], ways: &[DVec3; 4]) -> [DVec3; 4] {
-        let change = stiffness(weighted(weights, places)) * weighted(weights, ways);
-        shares(weights).map(|share| change * -share)
-    }
-
     fn blocks(&self, weights: &[f32; 3], places: &[DVec3; 4], _is_exact: bool) -> [[DMat3; 4]; 4] {
         let (shares, stiffness) = (shares(weights), stiffness(weighted(weights, places)));
         shares.map(|a| shares.map(|b| stiffness * (a * b)))

@@ -106,11 +106,6 @@ impl Law<2> for Limit {
         [pull, -pull]
     }
 
-    fn changes(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
-        let change = self.stiffness(rest_length, places) * (ways[1] - ways[0]);
-        [change, -change]
-    }
-
     fn blocks(&self, &rest_length: &f32, places: &[DVec3; 2], _is_exact: bool) -> [[DMat3; 2]; 2] {
         let block = self.stiffness(rest_length, places);
         [[block, -block], [-block, block]]

@@ -332,11 +332,6 @@ impl Law<2> for Stiffening {
         [pull, -pull]
     }
 
-    fn changes(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
-        let change = self.stiffness(&Stretched::new(rest_length, places), false) * (ways[1] - ways[0]);
-        [change, -change]
-    }
-
     fn blocks(&self, &rest_length: &f32, places: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
         let block = self.stiffness(&Stretched::new(rest_length, places), is_exact);
         [[block, -block], [-block, block]]

@@ -144,11 +144,6 @@ impl Law<2> for Sets {
         [-push, push]
     }
 
-    fn changes(&self, set: &Set, places: &[DVec3; 2], ways: &[DVec3; 2]) -> [DVec3; 2] {
-        let change = self.blocks(set, places, false)[0][0] * (ways[1] - ways[0]);
-        [change, -change]
-    }
-
     fn blocks(&self, set: &Set, [from, to]: &[DVec3; 2], is_exact: bool) -> [[DMat3; 2]; 2] {
         let way = *to - *from;
         let length = way.length();

@@ -35,7 +35,10 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     fn forces(&self, shape: &Self::Shape, places: &[DVec3; N]) -> [DVec3; N];
 
     /// How the forces change where nodes go these ways, in the first order, by the blocks that are positive semidefinite.
-    fn changes(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> [DVec3; N];
+    fn changes(&self, shape: &Self::Shape, places: &[DVec3; N], ways: &[DVec3; N]) -> [DVec3; N] {
+        let blocks = self.blocks(shape, places, false);
+        blocks.map(|row| -row.iter().zip(ways).map(|(&block, &way)| block * way).sum::<DVec3>())
+    }
 
     /// How much the force on each node lessens with the place of each: exactly, or what is positive semidefinite of it.
     fn blocks(&self, shape: &Self::Shape, places: &[DVec3; N], is_exact: bool) -> [[DMat3; N]; N];

@@ -93,23 +93,26 @@ impl Block {
     }
 }
 
-/// The vector of a string, given what its nodes have.
+/// The vector of a string, given what its nodes have; as records or not.
 #[inline(always)]
-fn line<L: Law<N>, const N: usize>(stencil: &Stencil<L::Shape, N>, of: &View) -> [f32; 3] {
+fn line<const RECORDS: bool, L: Law<N>, const N: usize>(stencil: &Stencil<L::Shape, N>, of: &View) -> [f32; 3] {
     let weights = L::weights(&stencil.shape);
-    let first = record(of, stencil.nodes[0]);
-    let way = |place: usize| (record(of, stencil.nodes[place]) - first) * weights[place];
-    let mut line = way(1);
-    for place in 2..N {
-        line += way(place);
+    let first = four::<RECORDS>(of, stencil.nodes[0]);
+    let mut line = Vec4::ZERO;
+    for (&node, weight) in stencil.nodes.iter().zip(weights).skip(1) {
+        line += (four::<RECORDS>(of, node) - first) * weight;
     }
     [line.x, line.y, line.z]
 }
 
-/// Four numbers are one load and one sum.
+/// What a node has: four numbers are one load and one sum.
 #[inline(always)]
-fn record(of: &View, node: u32) -> Vec4 {
-    Vec4::from_array(of.record(node as usize).0)
+fn four<const RECORDS: bool>(of: &View, node: u32) -> Vec4 {
+    if RECORDS {
+        Vec4::from_array(of.records()[node as usize].0)
+    } else {
+        of.get(node as usize).extend(0.0)
+    }
 }
 
 #[inline(always)]
@@ -131,24 +134,25 @@ fn measured(line: [f32; 3]) -> (f32, f32, [f32; 3]) {
 
 impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     #[inline(always)]
-    fn gather(&self, indices: impl Iterator<Item = usize>, block: &mut Block) {
-        let mut lane = 0;
-        for index in indices {
-            let stencil = &self.all[index];
-            if !(stencil.stiffness > 0.0 && lane < BLOCK) {
-                continue;
-            }
-            block.strings[lane] = index as u32;
+    fn gather<const RECORDS: bool>(&self, indices: &mut impl Iterator<Item = usize>, block: &mut Block) {
+        let mut count = 0;
+        while count < BLOCK
+            && let Some(index) = indices.next()
+        {
+            block.strings[count] = index as u32;
+            count += usize::from(self.all[index].stiffness > 0.0);
+        }
+        for lane in 0..count {
+            let stencil = &self.all[block.strings[lane] as usize];
             block.stiffnesses[lane] = stencil.stiffness;
             let numbers = L::numbers(&stencil.shape);
             (block.numbers[0][lane], block.numbers[1][lane]) = (numbers[0], numbers[1]);
-            block.lines.set(lane, line::<L, N>(stencil, &self.positions));
+            block.lines.set(lane, line::<RECORDS, L, N>(stencil, &self.positions));
             if let Some(ways) = &self.ways {
-                block.changes.set(lane, line::<L, N>(stencil, ways));
+                block.changes.set(lane, line::<RECORDS, L, N>(stencil, ways));
             }
-            lane += 1;
         }
-        block.count = lane;
+        block.count = count;
     }
 
     /// By how much the stiffest is stiffer than its rate says, as bits, whose order is that of the numbers.
@@ -202,16 +206,23 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     }
 
     #[inline(always)]
-    fn take(&self, indices: impl Iterator<Item = usize>, block: &mut Block, sums: &mut [Vec4; TILE + 1]) -> u32 {
-        self.gather(indices, block);
-        let mut stiffest = 0;
-        if self.ways.is_some() {
-            self.find_changes(block);
-        } else {
-            stiffest = self.find_forces(block);
+    fn add<const RECORDS: bool>(&self, sums: &mut [Vec4; TILE + 1]) -> f64 {
+        let mut block = Block::EMPTY;
+        let mut stiffest = 1.0_f32.to_bits();
+        let visitors = self.visitors.iter().map(|&index| index as usize);
+        let mut indices = self.beginning.clone().chain(visitors);
+        loop {
+            self.gather::<RECORDS>(&mut indices, &mut block);
+            if block.count == 0 {
+                return f64::from(f32::from_bits(stiffest));
+            }
+            if self.ways.is_some() {
+                self.find_changes(&mut block);
+            } else {
+                stiffest = stiffest.max(self.find_forces(&mut block));
+            }
+            self.scatter(&block, sums);
         }
-        self.scatter(block, sums);
-        stiffest
     }
 }
 
@@ -221,22 +232,18 @@ impl<L: Law<N>, const N: usize> Loops for OfTile<'_, L, N> {
 
     #[inline(always)]
     fn run(self) -> f64 {
-        let (mut block, mut sums) = (Block::EMPTY, [Vec4::ZERO; TILE + 1]);
-        let mut stiffest = 1.0_f32.to_bits();
-        for start in self.beginning.clone().step_by(BLOCK) {
-            let indices = start..self.beginning.end.min(start + BLOCK);
-            stiffest = stiffest.max(self.take(indices, &mut block, &mut sums));
-        }
-        for visitors in self.visitors.chunks(BLOCK) {
-            let indices = visitors.iter().map(|&index| index as usize);
-            stiffest = stiffest.max(self.take(indices, &mut block, &mut sums));
-        }
+        let mut sums = [Vec4::ZERO; TILE + 1];
+        let stiffening = if self.positions.has_records() && self.ways.is_none_or(|ways| ways.has_records()) {
+            self.add::<true>(&mut sums)
+        } else {
+            self.add::<false>(&mut sums)
+        };
         for (axis, forces) in self.sums.axes_mut().into_iter().enumerate() {
             for (force, sum) in forces.iter_mut().zip(&sums) {
                 *force += sum[axis];
             }
         }
-        f64::from(f32::from_bits(stiffest))
+        stiffening
     }
 }
 
@@ -258,7 +265,7 @@ impl<L: Law<N>, const N: usize> Loops for Aging<'_, L, N> {
             for (lane, stencil) in strings.iter().enumerate() {
                 let numbers = L::numbers(&stencil.shape);
                 (block.numbers[0][lane], block.numbers[1][lane]) = (numbers[0], numbers[1]);
-                block.lines.set(lane, line::<L, N>(stencil, &self.positions));
+                block.lines.set(lane, line::<false, L, N>(stencil, &self.positions));
             }
             for (lane, elastic) in elastic.iter_mut().enumerate() {
                 let (length, ..) = measured(block.lines.get(lane));
