@@ -621,6 +621,8 @@ typedef struct sinew_body_def {
   /**
    * The strain from which springs, and rods of tetrahedra that are elements, yield, stretched or pressed, at least 0; default 0: they do
    * not. What is beyond it stays for good. Springs that yield have SINEW_SPRING_LAW_LINEAR; those that are added later do not yield.
+   * Springs yield within a step; tetrahedra do where a substep of VERLET or a step of the other solvers ends: with those, a load that
+   * deforms them further and further does so the more slowly the longer steps are.
    */
   float yield_strain;
   /**

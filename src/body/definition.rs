@@ -128,7 +128,8 @@ pub struct BodyDefinition<'a> {
     /// where [`Body::set_positions`](crate::Body::set_positions) puts it.
     pub viscosity: Viscosity,
     /// From which strain springs, and tetrahedra that are elements, take a set. Springs that yield are [`SpringLaw::Linear`]; those that
-    /// are added later do not.
+    /// are added later do not. Springs yield within a step; tetrahedra do where a substep ends, and with [`Solver::Implicit`] and
+    /// [`Solver::Newton`] where a step does: there a load that deforms them further and further does so the more slowly the longer steps are.
     pub yielding: Yielding,
     /// The strain of springs from which they are stiffer, at least 0; 0: there is none.
     pub strain_limit: f32,

@@ -180,6 +180,8 @@ pub struct sinew_body_def {
     pub relaxation_time: f32,
     /// The strain from which springs, and rods of tetrahedra that are elements, yield, stretched or pressed, at least 0; default 0: they do
     /// not. What is beyond it stays for good. Springs that yield have SINEW_SPRING_LAW_LINEAR; those that are added later do not yield.
+    /// Springs yield within a step; tetrahedra do where a substep of VERLET or a step of the other solvers ends: with those, a load that
+    /// deforms them further and further does so the more slowly the longer steps are.
     pub yield_strain: f32,
     /// By what part of its rest length it may become longer or shorter for good, above 0 and below 1 where yield_strain is given; default
     /// 0.5. Beyond that it is elastic again.

@@ -4,7 +4,7 @@ use crate::body::not_negative;
 use crate::error::{Error, Result};
 
 /// From which strain on springs, and tetrahedra that are elements, take a set: they are at rest elsewhere from then on (perfect
-/// plasticity). Found where a substep ends.
+/// plasticity).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Yielding {
     /// Of a spring, or a rod of tetrahedra, that is stretched or pressed; at least 0; 0: none.
