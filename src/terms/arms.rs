@@ -6,14 +6,13 @@
 use glam::{DMat3, DVec3};
 
 use super::nonlinear::Curve;
-use super::stencils::{Law, Stencil, Stencils, directed};
+use super::stencils::{Law, Stencils, directed, of_springs};
 use super::strings::Tension;
 use super::{Moment, Term};
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
-use crate::memory;
 use crate::terms::SpringLaw;
 
 /// Beside springs of a law.
@@ -43,23 +42,14 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     let Some(stiffening) = viscosity.stiffening().filter(|_| !springs.is_empty()) else {
         return Ok(None);
     };
-    let mut arms = memory::reserved(springs.len())?;
-    for spring in springs.iter().filter(|spring| spring.stiffness > 0.0) {
-        let mut nodes = spring.nodes.map(|node| order.own(node));
-        nodes.sort_unstable();
-        arms.push(Stencil {
-            nodes,
-            stiffness: spring.stiffness,
-            shape: Arm {
-                rest_length: spring.rest_length,
-                load: 0.0,
-                stress: 0.0,
-                elastic: 0.0,
-                kept_stress: 0.0,
-                kept_elastic: 0.0,
-            },
-        });
-    }
+    let arms = of_springs(springs, order, false, |rest_length| Arm {
+        rest_length,
+        load: 0.0,
+        stress: 0.0,
+        elastic: 0.0,
+        kept_stress: 0.0,
+        kept_elastic: 0.0,
+    })?;
     let law = Arms {
         law: definition.spring_law,
         curve: Curve::new(definition.spring_law),

@@ -6,11 +6,10 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencil, Stencils, directed};
+use super::stencils::{Law, Stencils, directed, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
 use crate::error::{Error, Result};
-use crate::memory;
 
 /// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.
 #[derive(Debug)]
@@ -39,20 +38,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
             "strain_limit is {strain} while the body has no springs"
         )));
     }
-    let mut limits = memory::reserved(springs.len())?;
-    // A spring without a length at rest has no strain.
-    let there = springs
-        .iter()
-        .filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
-    for spring in there {
-        let mut nodes = spring.nodes.map(|node| order.own(node));
-        nodes.sort_unstable();
-        limits.push(Stencil {
-            nodes,
-            stiffness: spring.stiffness,
-            shape: spring.rest_length,
-        });
-    }
+    let limits = of_springs(springs, order, true, |rest_length| rest_length)?;
     let law = Limit {
         strain: f64::from(strain),
         stiffening: f64::from(stiffening),

@@ -7,11 +7,10 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencil, Stencils, directed};
+use super::stencils::{Law, Stencils, directed, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::error::{Error, Result};
-use crate::memory;
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
 /// the stiffness they are given. Springs that are added later are linear.
@@ -236,21 +235,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         return Err(Error::invalid("spring_law is given while the body has no springs"));
     }
     let stiffest = law.stiffest();
-    let mut stiffening = memory::reserved(springs.len())?;
-    for spring in springs {
-        let mut nodes = spring.nodes.map(|node| order.own(node));
-        nodes.sort_unstable();
-        stiffening.push(Stencil {
-            nodes,
-            // A spring without a length at rest has no strain.
-            stiffness: if spring.rest_length > 0.0 {
-                spring.stiffness
-            } else {
-                0.0
-            },
-            shape: spring.rest_length,
-        });
-    }
+    let stiffening = of_springs(springs, order, true, |rest_length| rest_length)?;
     let law = Stiffening {
         law,
         curve: Curve::new(law),

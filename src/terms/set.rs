@@ -7,14 +7,13 @@
 
 use glam::{DMat3, DVec3};
 
-use super::stencils::{Law, Stencil, Stencils, directed};
+use super::stencils::{Law, Stencils, directed, of_springs};
 use super::strings::Tension;
 use super::{Moment, Term};
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::material::{Course, Yielding};
-use crate::memory;
 use crate::terms::SpringLaw;
 
 /// What springs pull less than before they yielded, over their stiffness.
@@ -43,24 +42,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
             "yield_strain is {strain} while spring_law is not linear: only linear springs yield"
         )));
     }
-    let mut sets = memory::reserved(springs.len())?;
-    // A spring without a length at rest has no strain.
-    let there = springs
-        .iter()
-        .filter(|spring| spring.stiffness > 0.0 && spring.rest_length > 0.0);
-    for spring in there {
-        let mut nodes = spring.nodes.map(|node| order.own(node));
-        nodes.sort_unstable();
-        sets.push(Stencil {
-            nodes,
-            stiffness: spring.stiffness,
-            shape: Set {
-                rest_length: spring.rest_length,
-                longer: 0.0,
-                kept: 0.0,
-            },
-        });
-    }
+    let sets = of_springs(springs, order, true, |rest_length| Set {
+        rest_length,
+        longer: 0.0,
+        kept: 0.0,
+    })?;
     let law = Sets {
         yield_strain: f64::from(strain),
         largest: f64::from(largest),

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::strings::{Aging, OfTile, Tension};
 use super::{Blocks, Moment, Term};
-use crate::body::{Region, Scale, Vectors, View};
+use crate::body::{NodeOrder, Region, Scale, Spring, Vectors, View};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::material::Course;
@@ -123,6 +123,28 @@ pub(super) struct Stencil<T, const N: usize> {
     /// 0: it does nothing; below 0: it was taken away.
     pub stiffness: f32,
     pub shape: T,
+}
+
+/// A term for each spring, with the shape that its rest length leads to; one without a length at rest has no strain, and nothing that goes
+/// by that.
+pub(super) fn of_springs<T>(
+    springs: &[Spring],
+    order: &NodeOrder,
+    goes_by_strain: bool,
+    shape: impl Fn(f32) -> T,
+) -> Result<Vec<Stencil<T, 2>>> {
+    let mut all = memory::reserved(springs.len())?;
+    all.extend(springs.iter().map(|spring| {
+        let mut nodes = spring.nodes.map(|node| order.own(node));
+        nodes.sort_unstable();
+        let is_there = spring.rest_length > 0.0 || !goes_by_strain;
+        Stencil {
+            nodes,
+            stiffness: if is_there { spring.stiffness } else { 0.0 },
+            shape: shape(spring.rest_length),
+        }
+    }));
+    Ok(all)
 }
 
 /// Terms of one law.
