@@ -429,7 +429,10 @@ impl Elements {
             return;
         };
         let course = course(memory.viscosity);
-        self.find_elastic(kernel, positions, team);
+        if self.rings.is_some() {
+            self.find_pressures(kernel, positions, false, team);
+        }
+        self.find_stresses(kernel, positions, team);
         if let Some(memory) = &mut self.memory {
             memory.gain = 0.0;
             let bounds = memory.bounds.filter(|_| course.yields);
@@ -456,11 +459,8 @@ impl Elements {
         any
     }
 
-    /// Works out the elastic stresses and pressures with nodes at `positions`.
-    fn find_elastic(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
-        if self.rings.is_some() {
-            self.find_pressures(kernel, positions, false, team);
-        }
+    /// Works out the elastic stresses with nodes at `positions`, without the pressures of rings.
+    fn find_stresses(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) {
         let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
         if let Some(memory) = &mut self.memory {
             let written = (
@@ -475,12 +475,12 @@ impl Elements {
         }
     }
 
-    /// The energy of the arms' springs with nodes at `positions`, J.
+    /// The energy of the arms' springs with nodes at `positions`, J, where the pressures of rings have just been worked out.
     fn energy_of_arms(&mut self, kernel: ChosenKernel, positions: &[Record], team: &Team) -> f64 {
         if self.memory.as_ref().is_none_or(|memory| !memory.has_energy()) {
             return 0.0;
         }
-        self.find_elastic(kernel, positions, team);
+        self.find_stresses(kernel, positions, team);
         let (law, parts, sums) = (self.law, &self.parts, &mut self.forces);
         let Some(memory) = self.memory.as_deref() else {
             return 0.0;

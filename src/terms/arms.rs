@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::nonlinear::Curve;
-use super::stencils::{Law, Stencils, directed, of_springs};
+use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Moment, Term};
 use crate::body::{BodyDefinition, NodeOrder, Spring};
@@ -110,23 +110,14 @@ impl Arms {
         } else {
             0.0
         };
-        directed(placed.direction(), self.course.gain * placed.slope, across)
-    }
-}
-
-impl Placed {
-    /// Where both nodes are at the same place it points along x, from the node with the lower number.
-    fn direction(&self) -> DVec3 {
-        if self.length > 0.0 {
-            self.way / self.length
-        } else {
-            DVec3::X
-        }
+        directed(direction(placed.way), self.course.gain * placed.slope, across)
     }
 }
 
 impl Law<2> for Arms {
     type Shape = Arm;
+
+    const IS_OF_SPRINGS: bool = true;
 
     const REMEMBERS: bool = true;
 
@@ -138,13 +129,8 @@ impl Law<2> for Arms {
     fn change(&self, arm: &Arm, places: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
         let placed = self.place(arm, places);
         let more = ways[1] - ways[0];
-        let then = placed.way + more;
-        let both = placed.length + then.length();
-        if both == 0.0 {
-            return 0.0;
-        }
-        let longer = more.dot(placed.way + then) / both;
-        let rest_length = f64::from(arm.rest_length);
+        let (longer, rest_length) = (lengthening(placed.way, more), f64::from(arm.rest_length));
+        let both = placed.length + (placed.way + more).length();
         let mut elastic = 0.5 * longer * (both - 2.0 * rest_length);
         if rest_length > 0.0 {
             elastic += rest_length.powi(2) * self.law.change(placed.strain, longer / rest_length);
@@ -153,17 +139,12 @@ impl Law<2> for Arms {
     }
 
     fn change_of_load(&self, arm: &Arm, [from, to]: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
-        let (way, more) = (*to - *from, ways[1] - ways[0]);
-        let both = way.length() + (way + more).length();
-        if both == 0.0 {
-            return 0.0;
-        }
-        f64::from(arm.load) * more.dot(way + way + more) / both
+        f64::from(arm.load) * lengthening(*to - *from, ways[1] - ways[0])
     }
 
     fn forces(&self, arm: &Arm, places: &[DVec3; 2]) -> [DVec3; 2] {
         let placed = self.place(arm, places);
-        let pull = placed.direction() * self.pull(arm, &placed);
+        let pull = direction(placed.way) * self.pull(arm, &placed);
         [pull, -pull]
     }
 
@@ -172,30 +153,12 @@ impl Law<2> for Arms {
         [[block, -block], [-block, block]]
     }
 
-    fn scaled(&self, arm: &Arm, length: f64) -> (Arm, f64) {
-        let rest_length = (f64::from(arm.rest_length) * length) as f32;
-        (Arm { rest_length, ..*arm }, 1.0)
-    }
-
-    fn is_finite(&self, arm: &Arm) -> bool {
-        arm.rest_length.is_finite()
-    }
-
     fn size(&self, arm: &Arm) -> f32 {
         arm.rest_length
     }
 
     fn shape_of_spring(&self, before: &Arm, rest_length: f32) -> Option<Arm> {
         Some(Arm { rest_length, ..*before })
-    }
-
-    fn is_of_springs(&self) -> bool {
-        true
-    }
-
-    /// What viscosity makes of rates is that of all springs and terms together.
-    fn rate(&self, _arm: &Arm, _inverse_masses: [f64; 2]) -> f64 {
-        0.0
     }
 
     fn begin(&mut self, moment: Moment) {

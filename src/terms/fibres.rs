@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencil, Stencils, directed, shares, weighted};
+use super::stencils::{Law, Stencil, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, check_values, expect_count};
 use crate::error::{Error, Result};
@@ -99,7 +99,7 @@ impl Law<4> for Fibres {
         let then = fibre + more;
         let (before, after) = (stretch(fibre), stretch(then));
         let longer = if before > 0.0 && after > 0.0 {
-            more.dot(fibre + then) / (fibre.length() + then.length())
+            lengthening(fibre, more)
         } else {
             after - before
         };

@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencils, directed, of_springs};
+use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
 use crate::error::{Error, Result};
@@ -67,16 +67,18 @@ impl Limit {
 impl Law<2> for Limit {
     type Shape = f32;
 
+    const IS_OF_SPRINGS: bool = true;
+
     fn energy(&self, &rest_length: &f32, places: &[DVec3; 2]) -> f64 {
         0.5 * self.stiffening * self.excess(rest_length, places).2.powi(2)
     }
 
     fn change(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
-        let (way, length, before) = self.excess(rest_length, places);
-        let then = way + ways[1] - ways[0];
-        let after = self.excess(rest_length, &[DVec3::ZERO, then]).2;
+        let (way, _, before) = self.excess(rest_length, places);
+        let more = ways[1] - ways[0];
+        let after = self.excess(rest_length, &[DVec3::ZERO, way + more]).2;
         let longer = if before > 0.0 && after > 0.0 {
-            (ways[1] - ways[0]).dot(way + then) / (length + then.length())
+            lengthening(way, more)
         } else {
             after - before
         };
@@ -97,29 +99,12 @@ impl Law<2> for Limit {
         [[block, -block], [-block, block]]
     }
 
-    fn scaled(&self, rest_length: &f32, length: f64) -> (f32, f64) {
-        ((f64::from(*rest_length) * length) as f32, 1.0)
-    }
-
-    fn is_finite(&self, rest_length: &f32) -> bool {
-        rest_length.is_finite()
-    }
-
     fn size(&self, rest_length: &f32) -> f32 {
         *rest_length
     }
 
     fn shape_of_spring(&self, _before: &f32, rest_length: f32) -> Option<f32> {
         (rest_length > 0.0).then_some(rest_length)
-    }
-
-    fn is_of_springs(&self) -> bool {
-        true
-    }
-
-    /// Nothing below the limit; beyond it the spring is so many times as stiff.
-    fn rate(&self, _rest_length: &f32, _inverse_masses: [f64; 2]) -> f64 {
-        0.0
     }
 
     const IS_STRING: bool = true;

@@ -7,7 +7,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencils, directed, of_springs};
+use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::error::{Error, Result};
@@ -267,15 +267,6 @@ impl Stretched {
             strain: length / rest_length - 1.0,
         }
     }
-
-    /// Where both nodes are at the same place it points along x, from the node with the lower number.
-    fn direction(&self) -> DVec3 {
-        if self.length > 0.0 {
-            self.way / self.length
-        } else {
-            DVec3::X
-        }
-    }
 }
 
 impl Stiffening {
@@ -287,12 +278,14 @@ impl Stiffening {
         } else {
             0.0
         };
-        directed(spring.direction(), slope, across)
+        directed(direction(spring.way), slope, across)
     }
 }
 
 impl Law<2> for Stiffening {
     type Shape = f32;
+
+    const IS_OF_SPRINGS: bool = true;
 
     fn energy(&self, &rest_length: &f32, places: &[DVec3; 2]) -> f64 {
         let spring = Stretched::new(rest_length, places);
@@ -301,19 +294,13 @@ impl Law<2> for Stiffening {
 
     fn change(&self, &rest_length: &f32, places: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
         let spring = Stretched::new(rest_length, places);
-        let more = ways[1] - ways[0];
-        let then = spring.way + more;
-        let both = spring.length + then.length();
-        if both == 0.0 {
-            return 0.0;
-        }
-        let longer = more.dot(spring.way + then) / both;
+        let longer = lengthening(spring.way, ways[1] - ways[0]);
         spring.rest_length.powi(2) * self.law.change(spring.strain, longer / spring.rest_length)
     }
 
     fn forces(&self, &rest_length: &f32, places: &[DVec3; 2]) -> [DVec3; 2] {
         let spring = Stretched::new(rest_length, places);
-        let pull = spring.direction() * (spring.rest_length * self.law.beyond(spring.strain)[0]);
+        let pull = direction(spring.way) * (spring.rest_length * self.law.beyond(spring.strain)[0]);
         [pull, -pull]
     }
 
@@ -322,24 +309,12 @@ impl Law<2> for Stiffening {
         [[block, -block], [-block, block]]
     }
 
-    fn scaled(&self, rest_length: &f32, length: f64) -> (f32, f64) {
-        ((f64::from(*rest_length) * length) as f32, 1.0)
-    }
-
-    fn is_finite(&self, rest_length: &f32) -> bool {
-        rest_length.is_finite()
-    }
-
     fn size(&self, rest_length: &f32) -> f32 {
         *rest_length
     }
 
     fn shape_of_spring(&self, _before: &f32, rest_length: f32) -> Option<f32> {
         (rest_length > 0.0).then_some(rest_length)
-    }
-
-    fn is_of_springs(&self) -> bool {
-        true
     }
 
     const IS_STRING: bool = true;

@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::stencils::{Law, Stencils, directed, of_springs};
+use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Moment, Term};
 use crate::body::{BodyDefinition, NodeOrder, Spring};
@@ -54,11 +54,6 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
     Ok(Some(Box::new(Stencils::new(law, sets, definition.positions.len())?)))
 }
 
-/// Where both nodes are at the same place it points along x, from the node with the lower number.
-fn direction(way: DVec3) -> DVec3 {
-    way.try_normalize().unwrap_or(DVec3::X)
-}
-
 /// What a spring does at a length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Flow {
@@ -103,6 +98,8 @@ impl Sets {
 impl Law<2> for Sets {
     type Shape = Set;
 
+    const IS_OF_SPRINGS: bool = true;
+
     const REMEMBERS: bool = true;
 
     /// What the spring has less of than if it could not yield.
@@ -113,13 +110,9 @@ impl Law<2> for Sets {
     fn change(&self, set: &Set, [from, to]: &[DVec3; 2], ways: &[DVec3; 2]) -> f64 {
         let (way, more) = (*to - *from, ways[1] - ways[0]);
         let lengths = [way.length(), (way + more).length()];
-        let both = lengths[0] + lengths[1];
-        if both == 0.0 {
-            return 0.0;
-        }
         let [before, after] = lengths.map(|length| self.longer_at(set, length));
         if before.1 == after.1 {
-            -0.5 * (before.0 + after.0) * more.dot(way + way + more) / both
+            -0.5 * (before.0 + after.0) * lengthening(way, more)
         } else {
             self.energy_at(set, lengths[1]) - self.energy_at(set, lengths[0])
         }
@@ -144,30 +137,12 @@ impl Law<2> for Sets {
         [[block, -block], [-block, block]]
     }
 
-    fn scaled(&self, set: &Set, length: f64) -> (Set, f64) {
-        let rest_length = (f64::from(set.rest_length) * length) as f32;
-        (Set { rest_length, ..*set }, 1.0)
-    }
-
-    fn is_finite(&self, set: &Set) -> bool {
-        set.rest_length.is_finite()
-    }
-
     fn size(&self, set: &Set) -> f32 {
         set.rest_length
     }
 
     fn shape_of_spring(&self, before: &Set, rest_length: f32) -> Option<Set> {
         (rest_length > 0.0).then_some(Set { rest_length, ..*before })
-    }
-
-    fn is_of_springs(&self) -> bool {
-        true
-    }
-
-    /// A spring that has yielded is as stiff as before.
-    fn rate(&self, _set: &Set, _inverse_masses: [f64; 2]) -> f64 {
-        0.0
     }
 
     fn pass(&self, moment: Moment, set: &mut Set) {

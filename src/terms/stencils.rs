@@ -43,8 +43,10 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     /// How much the force on each node lessens with the place of each: exactly, or what is positive semidefinite of it.
     fn blocks(&self, shape: &Self::Shape, places: &[DVec3; N], is_exact: bool) -> [[DMat3; N]; N];
 
-    /// What bounds the squares of frequencies as long as it does not stiffen.
-    fn rate(&self, shape: &Self::Shape, inverse_masses: [f64; N]) -> f64;
+    /// What bounds the squares of frequencies as long as it does not stiffen, beyond what springs of its terms have.
+    fn rate(&self, _shape: &Self::Shape, _inverse_masses: [f64; N]) -> f64 {
+        0.0
+    }
 
     /// By how much it is stiffer than that, 1: not at all.
     fn stiffening(&self, _shape: &Self::Shape, _places: &[DVec3; N]) -> f64 {
@@ -56,13 +58,20 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
         N > 1
     }
 
+    /// Whether its terms are springs': they go with those, and are not scaled by themselves.
+    const IS_OF_SPRINGS: bool = false;
+
     /// What it is where everything is so many times as long at rest, and how many times as stiff it is then.
-    fn scaled(&self, shape: &Self::Shape, length: f64) -> (Self::Shape, f64);
+    fn scaled(&self, shape: &Self::Shape, _length: f64) -> (Self::Shape, f64) {
+        (*shape, 1.0)
+    }
 
     /// Whether what it is at rest is a number.
-    fn is_finite(&self, shape: &Self::Shape) -> bool;
+    fn is_finite(&self, _shape: &Self::Shape) -> bool {
+        true
+    }
 
-    /// What changes of it as it is scaled.
+    /// What changes of it as it is scaled or its spring is given another rest length.
     fn size(&self, _shape: &Self::Shape) -> f32 {
         0.0
     }
@@ -70,11 +79,6 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     /// What the term of a spring becomes with this rest length, where its terms are springs'; `None`: it has none.
     fn shape_of_spring(&self, _before: &Self::Shape, _rest_length: f32) -> Option<Self::Shape> {
         None
-    }
-
-    /// Whether its terms are springs'.
-    fn is_of_springs(&self) -> bool {
-        false
     }
 
     /// Nodes are given from here on.
@@ -249,7 +253,7 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
 impl<L: Law<N>, const N: usize> Stencils<L, N> {
     /// Where the terms are that a region has all nodes of.
     fn within(&self, region: &Region) -> impl Iterator<Item = usize> {
-        let tiles = region.tiles().filter(|_| !self.law.is_of_springs());
+        let tiles = region.tiles().filter(|_| !L::IS_OF_SPRINGS);
         tiles
             .flat_map(|tile| self.beginning(tile))
             .filter(|&index| self.all[index].stiffness > 0.0 && region.has_all(&self.all[index].nodes))
@@ -424,7 +428,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
     }
 
     fn set_spring(&mut self, change: &Change) {
-        if !self.law.is_of_springs() {
+        if !L::IS_OF_SPRINGS {
             return;
         }
         let nodes = [change.node, change.after.neighbour];
@@ -455,7 +459,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn scale(&mut self, region: &Region, scale: Scale) -> usize {
         let mut count = 0;
-        for tile in region.tiles().filter(|_| !self.law.is_of_springs()) {
+        for tile in region.tiles().filter(|_| !L::IS_OF_SPRINGS) {
             for index in self.beginning(tile) {
                 let stencil = &self.all[index];
                 if stencil.stiffness > 0.0 && region.has_all(&stencil.nodes) {
@@ -533,6 +537,19 @@ pub(super) fn weighted(weights: &[f32; 3], [first, others @ ..]: &[DVec3; 4]) ->
 pub(super) fn shares(weights: &[f32; 3]) -> [f64; 4] {
     let [a, b, c] = weights.map(f64::from);
     [-(a + b + c), a, b, c]
+}
+
+/// How much longer a way becomes by more, to the last digits of that; 0 where both lengths are.
+pub(super) fn lengthening(way: DVec3, more: DVec3) -> f64 {
+    let then = way + more;
+    let both = way.length() + then.length();
+    if both > 0.0 { more.dot(way + then) / both } else { 0.0 }
+}
+
+/// Where a way points. Where it has no length, its nodes being in one place, it points along x, from the node with the lower number.
+pub(super) fn direction(way: DVec3) -> DVec3 {
+    let length = way.length();
+    if length > 0.0 { way / length } else { DVec3::X }
 }
 
 /// The matrix that has `along` in a direction, and `across` at right angles to it.

@@ -267,12 +267,12 @@ impl Substep<'_> {
                 implicit.blocks.add_terms(terms, positions);
                 implicit.coarse.add_terms(terms, &body.pins, positions);
             }
-            for pin in body.pins.partial() {
-                implicit.blocks.hold(pin.node as usize, pin.axes);
-            }
             if let Some(enclosed) = &body.enclosed {
                 implicit.blocks.add_enclosed(enclosed, positions);
                 implicit.coarse.add_enclosed(enclosed, positions);
+            }
+            for pin in body.pins.partial() {
+                implicit.blocks.hold(pin.node as usize, pin.axes);
             }
         }
         if time != implicit.prepared || implicit.stale {

@@ -284,17 +284,7 @@ impl<'a> Tetrahedra<'a> {
     #[inline(always)]
     unsafe fn inverse<L: Lanes>(group: &Group, first: usize) -> Six<L> {
         // SAFETY: the lanes are of a group.
-        unsafe {
-            let [a, b, c, d, e, f] = &group.inverse;
-            [
-                L::load(a.as_ptr().add(first)),
-                L::load(b.as_ptr().add(first)),
-                L::load(c.as_ptr().add(first)),
-                L::load(d.as_ptr().add(first)),
-                L::load(e.as_ptr().add(first)),
-                L::load(f.as_ptr().add(first)),
-            ]
-        }
+        unsafe { six(&group.inverse, first) }
     }
 
     #[inline(always)]
@@ -348,6 +338,25 @@ impl<'a> Tetrahedra<'a> {
     }
 }
 
+/// The first six numbers of a turn's lanes.
+///
+/// # Safety
+/// As for the kernel; there are six at least, and `first` is a turn's first lane.
+#[inline(always)]
+unsafe fn six<L: Lanes>(numbers: &[[f32; GROUP]], first: usize) -> Six<L> {
+    // SAFETY: the lanes are of a group.
+    unsafe {
+        [
+            L::load(numbers[0].as_ptr().add(first)),
+            L::load(numbers[1].as_ptr().add(first)),
+            L::load(numbers[2].as_ptr().add(first)),
+            L::load(numbers[3].as_ptr().add(first)),
+            L::load(numbers[4].as_ptr().add(first)),
+            L::load(numbers[5].as_ptr().add(first)),
+        ]
+    }
+}
+
 /// Where each turn's lanes begin.
 fn turns<L: Lanes>() -> impl Iterator<Item = usize> {
     Range { start: 0, end: GROUP }.step_by(L::COUNT)
@@ -391,17 +400,7 @@ impl Stresses {
     #[inline(always)]
     unsafe fn entries<L: Lanes>(&self, first: usize) -> Six<L> {
         // SAFETY: the lanes are of a group.
-        unsafe {
-            let [a, b, c, d, e, f, _] = &self.0;
-            [
-                L::load(a.as_ptr().add(first)),
-                L::load(b.as_ptr().add(first)),
-                L::load(c.as_ptr().add(first)),
-                L::load(d.as_ptr().add(first)),
-                L::load(e.as_ptr().add(first)),
-                L::load(f.as_ptr().add(first)),
-            ]
-        }
+        unsafe { six(&self.0, first) }
     }
 
     /// # Safety
