@@ -1,11 +1,14 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod candidates;
+#[allow(dead_code, reason = "tools of meshes ask for it")]
+mod closest;
 mod constraint;
 mod contacts;
 mod distance;
 mod features;
 mod holds;
+pub(crate) mod image_space;
 mod path;
 mod sweep;
 mod tool;

@@ -1,0 +1,16 @@
+//! What every detection method answers.
+
+use glam::Vec3;
+
+/// The closest that a node, edge or face comes to a solid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Closest {
+    /// The feature's point, as weights of its corners.
+    pub weights: [f32; 3],
+    /// From the solid's surface to it, m; below 0 inside.
+    pub distance: f32,
+    /// Away from the solid, of unit length.
+    pub normal: Vec3,
+    /// Whether the feature's point lies within it, and not at its border, where a smaller feature is met instead.
+    pub inside: bool,
+}

@@ -1,0 +1,298 @@
+//! A rigid solid as three layered depth images along its own axes, and how far a point is from it.
+
+use glam::{DVec3, Vec3};
+
+use super::covered::nearest_covered;
+use super::layers::{Crossing, Layers};
+use super::projection::{Frame, Projection};
+use crate::contact::distance::closest_on_triangle;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::mesh;
+
+/// How often a search goes on from the foot of the perpendicular on the face that it has found.
+const STEPS: usize = 4;
+
+/// A search meets at most so many faces: two in each image, and at each step.
+const MET: usize = 6 + 2 * STEPS;
+
+/// Faces whose distance differs by less than this part of it are equally close: they meet where they are closest.
+const EQUAL: f32 = 1e-4;
+
+/// A closed solid drawn along its three axes, once: for each pixel all faces that the ray through its middle passes.
+///
+/// Distances come from the faces seen at a point's pixels. They are exact where the closest face is seen there, else
+/// wrong by no more than about a pixel near the surface; what no ray passes, a part thinner than a pixel along two axes,
+/// is not seen at all.
+#[derive(Debug)]
+pub struct LayeredImage {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Of unit length; zero for a triangle without area.
+    normals: Vec<Vec3>,
+    images: [Image; 3],
+    low: Vec3,
+    high: Vec3,
+    /// Metres.
+    pixel: f32,
+}
+
+/// One of the three images.
+#[derive(Debug)]
+struct Image {
+    projection: Projection,
+    layers: Layers,
+    /// For each pixel the nearest that shows the solid.
+    covered: Vec<u32>,
+}
+
+/// A face that a search has met, as the point sees it.
+#[derive(Clone, Copy, Default)]
+struct Face {
+    triangle: u32,
+    squared_distance: f32,
+    /// From the face's plane to the point.
+    height: f32,
+    normal: Vec3,
+    /// From the point to the closest of the triangle.
+    closest: Vec3,
+    /// From there to the foot of the perpendicular on the plane; zero where that is within the triangle.
+    beside: Vec3,
+    /// From the point to the triangle's centre.
+    centre: Vec3,
+}
+
+impl Face {
+    /// How far a neighbour's centre stands out of the plane: below 0 where they meet at a ridge.
+    fn bend(&self, neighbour: &Face) -> f32 {
+        self.normal.dot(neighbour.centre - self.closest)
+    }
+}
+
+/// The faces that a search has met.
+struct Faces {
+    met: [Face; MET],
+    count: usize,
+    /// The closest; of several as close the one that the point is most in front of or behind, which tells the side.
+    closest: usize,
+}
+
+impl Faces {
+    fn add(&mut self, face: Face) {
+        if self.count == MET {
+            return;
+        }
+        self.met[self.count] = face;
+        let known = &self.met[self.closest];
+        let (least, most) = (1.0 - EQUAL, 1.0 + EQUAL);
+        let closer = face.squared_distance < known.squared_distance * least;
+        let as_close = face.squared_distance <= known.squared_distance * most;
+        if self.count == 0 || closer || as_close && face.height.abs() > known.height.abs() {
+            self.closest = self.count;
+        }
+        self.count += 1;
+    }
+
+    fn met(&self) -> &[Face] {
+        &self.met[..self.count]
+    }
+
+    fn closest(&self) -> Option<&Face> {
+        self.met().get(self.closest)
+    }
+
+    /// Where the point is beside the closest face, that face or its neighbours decide: what they have in common if they
+    /// meet at a ridge, what either has if they meet in a valley.
+    fn deciding(&self, pixel: f32) -> Option<&Face> {
+        let closest = self.closest()?;
+        if closest.beside == Vec3::ZERO {
+            return Some(closest);
+        }
+        let mut deciding = closest;
+        for face in self.met() {
+            let apart = face.closest - closest.closest;
+            let near = apart.length_squared() <= pixel * pixel;
+            let ridge = deciding.bend(face) <= 0.0;
+            if near && (ridge == (face.height > deciding.height)) {
+                deciding = face;
+            }
+        }
+        Some(deciding)
+    }
+}
+
+impl LayeredImage {
+    /// Draws a closed surface whose triangles face outwards, `positions` in metres, in pixels of `pixel` metres.
+    ///
+    /// Errors: [`Error::InvalidArgument`] for a pixel that is not above 0 and finite or so small that an image would
+    /// have more than 2^24 pixels, a position that is not finite, an index out of range, a surface that is not closed;
+    /// [`Error::OutOfMemory`].
+    pub fn new(positions: &[Vec3], triangles: &[[u32; 3]], pixel: f32) -> Result<Self> {
+        if !(pixel > 0.0 && pixel.is_finite()) {
+            return Err(Error::invalid(format!(
+                "pixel is {pixel} m: must be above 0 and finite"
+            )));
+        }
+        super::surface::check(positions.len(), triangles)?;
+        if !mesh::is_closed(triangles)? {
+            return Err(Error::invalid(super::surface::OPEN));
+        }
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (node, &position) in positions.iter().enumerate() {
+            if !position.is_finite() {
+                return Err(Error::invalid(format!("the position of node {node} is {position}")));
+            }
+        }
+        for &node in triangles.as_flattened() {
+            low = low.min(positions[node as usize]);
+            high = high.max(positions[node as usize]);
+        }
+        let mut normals = memory::reserved(triangles.len())?;
+        normals.extend(triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|node| positions[node as usize].as_dvec3());
+            (b - a).cross(c - a).normalize_or_zero().as_vec3()
+        }));
+        let image = |axis: usize| Image::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
+        Ok(Self {
+            images: [image(0)?, image(1)?, image(2)?],
+            positions: memory::copied(positions)?,
+            triangles: memory::copied(triangles)?,
+            normals,
+            low,
+            high,
+            pixel,
+        })
+    }
+
+    /// The signed distance of a point from the surface in metres, below 0 inside, and the direction in which it grows, of
+    /// unit length; `None` where the point is outside and further away than `within`.
+    pub fn distance(&self, point: Vec3, within: f32) -> Option<(f32, Vec3)> {
+        let beyond = point - point.clamp(self.low, self.high);
+        if !(beyond.length() <= within) {
+            return None;
+        }
+        let (distance, normal) = self.signed_distance(point)?;
+        (distance <= within).then_some((distance, normal))
+    }
+
+    /// Metres.
+    pub(super) fn pixel(&self) -> f32 {
+        self.pixel
+    }
+
+    /// The corners of the box around the solid.
+    pub(super) fn bounds(&self) -> [Vec3; 2] {
+        [self.low, self.high]
+    }
+
+    /// At any distance; `None` only where no image shows anything.
+    pub(super) fn signed_distance(&self, point: Vec3) -> Option<(f32, Vec3)> {
+        let mut faces = Faces {
+            met: [Face::default(); MET],
+            count: 0,
+            closest: 0,
+        };
+        for image in &self.images {
+            self.meet(image.near(point), point, &mut faces);
+        }
+        for _ in 0..STEPS {
+            let last = *faces.closest()?;
+            let axis = last.normal.abs().max_position();
+            self.meet(
+                self.images[axis].near(point - last.normal * last.height),
+                point,
+                &mut faces,
+            );
+            if faces.closest()?.triangle == last.triangle {
+                break;
+            }
+        }
+        let face = faces.deciding(self.pixel)?;
+        // A foot less than a pixel beside the face lies on its neighbour, which no ray has met.
+        let length = face.beside.length();
+        let beside = length - self.pixel;
+        if beside <= 0.0 {
+            return Some((face.height, face.normal));
+        }
+        let offset = face.normal * face.height + face.beside * (beside / length);
+        let side = if self.is_inside(point) { -1.0 } else { 1.0 };
+        let distance = offset.length();
+        Some((side * distance, offset * (side / distance)))
+    }
+
+    /// Adds the faces that a ray passes to those met.
+    fn meet(&self, crossings: &[Crossing], point: Vec3, faces: &mut Faces) {
+        for crossing in crossings {
+            let triangle = crossing.triangle();
+            let normal = self.normals[triangle as usize];
+            if normal == Vec3::ZERO || faces.met().iter().any(|face| face.triangle == triangle) {
+                continue;
+            }
+            let corners = self.triangles[triangle as usize].map(|node| self.positions[node as usize]);
+            let weights = closest_on_triangle(point, corners[0], corners[1], corners[2]);
+            // As seen from the point, so that no digits are lost.
+            let [a, b, c] = corners.map(|corner| corner - point);
+            let closest = a * weights[0] + b * weights[1] + c * weights[2];
+            let height = -a.dot(normal);
+            let within = weights.iter().all(|&weight| weight > 0.0);
+            faces.add(Face {
+                triangle,
+                squared_distance: closest.length_squared(),
+                height,
+                normal,
+                closest,
+                beside: if within {
+                    Vec3::ZERO
+                } else {
+                    -(closest + normal * height)
+                },
+                centre: (a + b + c) / 3.0,
+            });
+        }
+    }
+
+    /// What most of the three images say.
+    fn is_inside(&self, point: Vec3) -> bool {
+        self.images.iter().filter(|image| image.shows_inside(point)).count() >= 2
+    }
+}
+
+impl Image {
+    fn new(frame: Frame, positions: &[Vec3], triangles: &[[u32; 3]], bounds: [Vec3; 2], pixel: f32) -> Result<Self> {
+        let [low, high]: [DVec3; 2] = bounds.map(|corner| frame.coordinates(corner));
+        let projection = Projection::new(frame, low, high, pixel.into())?;
+        let layers = Layers::new(&projection, positions, triangles)?;
+        let covered = nearest_covered(projection.width, projection.height, |pixel| {
+            !layers.at(pixel).is_empty()
+        })?;
+        Ok(Self {
+            projection,
+            layers,
+            covered,
+        })
+    }
+
+    /// Of what the ray next to a point passes, the last before it and the first behind it.
+    fn near(&self, point: Vec3) -> &[Crossing] {
+        let vertex = self.projection.project(point);
+        let pixel = self.covered[self.projection.pixel_at(&vertex)];
+        if pixel as usize >= self.covered.len() {
+            return &[];
+        }
+        let crossings = self.layers.at(pixel as usize);
+        let behind = crossings.partition_point(|crossing| f64::from(crossing.depth) < vertex.depth);
+        &crossings[behind.saturating_sub(1)..(behind + 1).min(crossings.len())]
+    }
+
+    fn shows_inside(&self, point: Vec3) -> bool {
+        let vertex = self.projection.project(point);
+        let in_image = vertex.x >= 0.0
+            && vertex.y >= 0.0
+            && vertex.x < f64::from(self.projection.width)
+            && vertex.y < f64::from(self.projection.height);
+        let passed = |crossing: &&Crossing| f64::from(crossing.depth) < vertex.depth;
+        let crossings = self.layers.at(self.projection.pixel_at(&vertex));
+        let windings = crossings.iter().take_while(passed).map(Crossing::winding);
+        in_image && windings.sum::<i32>() > 0
+    }
+}

@@ -1,0 +1,130 @@
+//! A layered depth image (Shade et al. 1998): for each pixel all surfaces that a ray through its middle passes, by depth.
+
+use glam::Vec3;
+
+use super::projection::Projection;
+use crate::error::Result;
+use crate::memory;
+use crate::raster::{Window, rasterise_triangle};
+
+/// Where the ray of a pixel passes a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Crossing {
+    /// Along the view, m.
+    pub depth: f32,
+    /// The triangle, doubled, and 1 where the ray enters.
+    code: u32,
+}
+
+impl Crossing {
+    fn new(depth: f32, triangle: usize, enters: bool) -> Self {
+        Self {
+            depth,
+            code: (triangle as u32) << 1 | u32::from(enters),
+        }
+    }
+
+    pub fn triangle(&self) -> u32 {
+        self.code >> 1
+    }
+
+    /// What it changes of the number of times that the surface is wound around the ray's point.
+    pub fn winding(&self) -> i32 {
+        if self.code & 1 == 1 { 1 } else { -1 }
+    }
+}
+
+/// The crossings of all pixels, those of a pixel in ascending depth.
+#[derive(Debug, Default)]
+pub(super) struct Layers {
+    /// Where the crossings of each pixel end; those of the next begin there.
+    ends: Vec<u32>,
+    crossings: Vec<Crossing>,
+}
+
+impl Layers {
+    /// Room for so much.
+    pub fn reserved(pixels: usize, crossings: usize) -> Result<Self> {
+        Ok(Self {
+            ends: memory::reserved(pixels)?,
+            crossings: memory::reserved(crossings)?,
+        })
+    }
+
+    /// Of a surface, in memory of its own.
+    pub fn new(projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
+        let mut layers = Self::reserved(projection.pixel_count(), 0)?;
+        let count = layers.count(projection, positions, triangles);
+        layers.crossings = memory::reserved(count)?;
+        layers.fill(count, projection, positions, triangles);
+        Ok(layers)
+    }
+
+    /// Draws a surface into the memory reserved; answers whether it was enough.
+    pub fn draw(&mut self, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+        if projection.pixel_count() > self.ends.capacity() {
+            return false;
+        }
+        let count = self.count(projection, positions, triangles);
+        let fits = count <= self.crossings.capacity().min(u32::MAX as usize);
+        if fits {
+            self.fill(count, projection, positions, triangles);
+        }
+        fits
+    }
+
+    /// Leaves in `ends` where each pixel's crossings are to begin; answers how many there are in all.
+    fn count(&mut self, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> usize {
+        self.ends.clear();
+        self.ends.resize(projection.pixel_count(), 0);
+        for_each_fragment(projection, positions, triangles, |pixel, _| {
+            self.ends[pixel] = self.ends[pixel].saturating_add(1);
+        });
+        let mut total = 0;
+        for end in &mut self.ends {
+            let count = *end as usize;
+            *end = u32::try_from(total).unwrap_or(u32::MAX);
+            total += count;
+        }
+        total
+    }
+
+    /// A counting sort by pixel, then a small sort in each.
+    fn fill(&mut self, count: usize, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) {
+        self.crossings.resize(count, Crossing::default());
+        for_each_fragment(projection, positions, triangles, |pixel, crossing| {
+            let place = &mut self.ends[pixel];
+            self.crossings[*place as usize] = crossing;
+            *place += 1;
+        });
+        let mut begin = 0;
+        for &end in &self.ends {
+            let by_depth = |a: &Crossing, b: &Crossing| a.depth.total_cmp(&b.depth).then(a.code.cmp(&b.code));
+            self.crossings[begin as usize..end as usize].sort_unstable_by(by_depth);
+            begin = end;
+        }
+    }
+
+    /// What the ray of a pixel passes.
+    pub fn at(&self, pixel: usize) -> &[Crossing] {
+        let begin = pixel.checked_sub(1).map_or(0, |previous| self.ends[previous]);
+        &self.crossings[begin as usize..self.ends[pixel] as usize]
+    }
+}
+
+/// Calls `sink` for each pixel whose middle a triangle covers.
+fn for_each_fragment(
+    projection: &Projection,
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    mut sink: impl FnMut(usize, Crossing),
+) {
+    let window = Window::new(projection.width, projection.height);
+    for (index, triangle) in triangles.iter().enumerate() {
+        let vertices = triangle.map(|node| projection.project(positions[node as usize]));
+        rasterise_triangle(&window, &vertices, |fragment| {
+            let pixel = fragment.y as usize * projection.width as usize + fragment.x as usize;
+            sink(pixel, Crossing::new(fragment.depth, index, fragment.front));
+        });
+    }
+}

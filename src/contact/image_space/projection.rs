@@ -1,0 +1,106 @@
+//! From space to the pixels of a parallel view, and how large such an image may be.
+
+use glam::{DVec3, Vec3};
+
+use crate::error::{Error, Result};
+use crate::raster::{GUARD, PixelVertex};
+
+/// The most pixels of one image.
+pub(super) const LARGEST_IMAGE: u64 = 1 << 24;
+
+/// Where a parallel view looks, and which way its rows and columns run; a right-handed orthonormal frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frame {
+    pub right: DVec3,
+    pub down: DVec3,
+    pub forward: DVec3,
+}
+
+impl Frame {
+    /// Along the axes of space.
+    pub const AXES: [Frame; 3] = [
+        Frame::new(DVec3::Y, DVec3::Z, DVec3::X),
+        Frame::new(DVec3::Z, DVec3::X, DVec3::Y),
+        Frame::new(DVec3::X, DVec3::Y, DVec3::Z),
+    ];
+
+    const fn new(right: DVec3, down: DVec3, forward: DVec3) -> Self {
+        Self { right, down, forward }
+    }
+
+    /// Along a direction that is not zero.
+    pub fn along(direction: Vec3) -> Self {
+        let forward = direction.as_dvec3().normalize();
+        let (right, down) = forward.any_orthonormal_pair();
+        let down = if right.cross(down).dot(forward) > 0.0 {
+            down
+        } else {
+            -down
+        };
+        Frame::new(right, down, forward)
+    }
+
+    /// Right, down, forward.
+    pub fn coordinates(&self, point: Vec3) -> DVec3 {
+        let point = point.as_dvec3();
+        DVec3::new(self.right.dot(point), self.down.dot(point), self.forward.dot(point))
+    }
+}
+
+/// A parallel view of a rectangle of space, cut into square pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Projection {
+    pub frame: Frame,
+    /// Right and down, of the upper left corner, m.
+    low: [f64; 2],
+    /// Metres.
+    pub pixel: f64,
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Projection {
+    /// An image of what lies between `low` and `high`, in the coordinates of the frame, at least a pixel large.
+    ///
+    /// Refused where it would have more than [`LARGEST_IMAGE`] pixels.
+    pub fn new(frame: Frame, low: DVec3, high: DVec3, pixel: f64) -> Result<Self> {
+        let size = [high.x - low.x, high.y - low.y];
+        let counts = size.map(|length| (length / pixel).ceil().max(1.0));
+        if !(counts[0] * counts[1] <= LARGEST_IMAGE as f64 && counts[0].max(counts[1]) < GUARD / 2.0) {
+            return Err(Error::invalid(format!(
+                "pixel is {pixel} m: an image of {} x {} m would have {} x {} pixels, at most {LARGEST_IMAGE} are possible",
+                size[0], size[1], counts[0], counts[1]
+            )));
+        }
+        let middle = [low.x + high.x, low.y + high.y];
+        Ok(Self {
+            frame,
+            low: [0, 1].map(|i| (middle[i] - counts[i] * pixel) / 2.0),
+            pixel,
+            width: counts[0] as u32,
+            height: counts[1] as u32,
+        })
+    }
+
+    pub fn pixel_count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Where a point falls.
+    pub fn project(&self, point: Vec3) -> PixelVertex {
+        let at = self.frame.coordinates(point);
+        PixelVertex {
+            x: (at.x - self.low[0]) / self.pixel,
+            y: (at.y - self.low[1]) / self.pixel,
+            depth: at.z,
+            reciprocal: 1.0,
+        }
+    }
+
+    /// The pixel of these coordinates, or the nearest one of the image.
+    pub fn pixel_at(&self, vertex: &PixelVertex) -> usize {
+        let column = (vertex.x.max(0.0) as u32).min(self.width - 1);
+        let row = (vertex.y.max(0.0) as u32).min(self.height - 1);
+        row as usize * self.width as usize + column as usize
+    }
+}

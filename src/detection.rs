@@ -1,0 +1,6 @@
+//! Which parts of two surfaces overlap, and by how much, without a world.
+
+/// In image space: rays through the pixels of a parallel view (CInDeR; Halic et al., section 2.1).
+pub mod image_space {
+    pub use crate::contact::image_space::LayeredImage;
+}
