@@ -24,7 +24,7 @@ mod threads;
 mod world;
 
 pub use body::{Body, BodyDefinition, Solver, SpringState, Storage, Values};
-pub use contact::{Detection, Pose, Shape, ToolDefinition};
+pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
 pub use material::{Material, Model, Viscosity, Yielding};

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::body::{Body, finite_vector};
-use crate::contact::{Shape, Tool};
+use crate::contact::{Form, Pose, Tool};
 use crate::error::{Error, Result};
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
@@ -99,7 +99,16 @@ impl World {
                 });
             }
         }
-        scene.shapes.extend(self.tools().map(shape_of));
+        scene.shapes.extend(self.tools().filter_map(shape_of));
+        let meshes: Vec<_> = self.tools().filter_map(mesh_of).collect();
+        for (positions, triangles) in &meshes {
+            scene.surfaces.push(Surface {
+                positions,
+                triangles,
+                look: Look::INSTRUMENT,
+                coloured: None,
+            });
+        }
         let camera = definition.camera(&scene)?;
         scene.draw(&camera, definition.width, definition.height)
     }
@@ -139,25 +148,38 @@ impl PictureDefinition {
     }
 }
 
-fn shape_of(tool: &Tool) -> (raster::Shape, Look) {
+/// What a tool that is no mesh looks like.
+fn shape_of(tool: &Tool) -> Option<(raster::Shape, Look)> {
     let centre = tool.pose.position;
     let up = tool.pose.orientation * Vec3::Y;
-    match tool.shape {
-        Shape::Sphere { radius } => (raster::Shape::Sphere { centre, radius }, Look::INSTRUMENT),
-        Shape::Capsule { radius, half_length } => {
-            let capsule = raster::Shape::Capsule {
-                start: centre - up * half_length,
-                end: centre + up * half_length,
-                radius,
-            };
-            (capsule, Look::INSTRUMENT)
-        }
-        Shape::Plane => (
-            raster::Shape::Plane {
+    let shape = match tool.form {
+        Form::Mesh(_) => return None,
+        Form::HalfSpace => {
+            let plane = raster::Shape::Plane {
                 point: centre,
                 normal: up,
-            },
-            Look::GROUND,
-        ),
-    }
+            };
+            return Some((plane, Look::GROUND));
+        }
+        Form::Rounded {
+            radius,
+            half_length: 0.0,
+        } => raster::Shape::Sphere { centre, radius },
+        Form::Rounded { radius, half_length } => raster::Shape::Capsule {
+            start: centre - up * half_length,
+            end: centre + up * half_length,
+            radius,
+        },
+    };
+    Some((shape, Look::INSTRUMENT))
+}
+
+/// The surface of a tool that is a mesh, where it is.
+fn mesh_of(tool: &Tool) -> Option<(Vec<Vec3>, &[[u32; 3]])> {
+    let Form::Mesh(solid) = &tool.form else {
+        return None;
+    };
+    let Pose { position, orientation } = tool.pose;
+    let placed = solid.positions().iter().map(|&corner| position + orientation * corner);
+    Some((placed.collect(), solid.triangles()))
 }

@@ -103,6 +103,22 @@ impl<T> Slots<T> {
         &mut self.slots
     }
 
+    /// All that live, with their ids.
+    pub fn iter_ids(&self) -> impl Iterator<Item = (SlotId, &T)> {
+        (1..).zip(&self.slots).filter_map(|(index1, slot)| {
+            let id = SlotId {
+                index1,
+                generation: slot.generation,
+            };
+            slot.content.as_ref().map(|content| (id, content))
+        })
+    }
+
+    /// Where something lives.
+    pub fn place(&self, id: SlotId) -> Result<usize> {
+        self.index(id)
+    }
+
     fn index(&self, id: SlotId) -> Result<usize> {
         let index = (id.index1 as usize).wrapping_sub(1);
         match self.slots.get(index) {

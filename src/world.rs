@@ -1,9 +1,9 @@
 //! A world: bodies and tools that are stepped together.
 
-use glam::{Quat, Vec3};
+use glam::{DVec3, Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
-use crate::contact::{Pose, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, Pose, TRIES, Tool, ToolDefinition, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
@@ -138,7 +138,7 @@ impl World {
     pub fn create_body(&mut self, definition: &BodyDefinition) -> Result<BodyId> {
         let needs = Needs {
             tolerance: self.definition.tolerance > 0.0 && self.definition.substeps == 0,
-            tools: self.tools.iter().count(),
+            tools: self.tool_places(),
             kernel: self.kernel,
         };
         let body = Body::new(definition, needs)?;
@@ -197,14 +197,14 @@ impl World {
     /// does not offer its detection. [`Error::OutOfMemory`].
     pub fn create_tool(&mut self, definition: &ToolDefinition) -> Result<ToolId> {
         let tool = Tool::new(definition)?;
-        let count = self.tools.iter().count() + 1;
+        let count = self.tools.places() + 1;
         self.paths.try_reserve(count)?;
         let made = self
             .bodies
             .iter_mut()
             .try_for_each(|(_, body)| body.make_contacts(count));
         let id = made.and_then(|()| self.tools.insert(tool));
-        if id.is_err() && count == 1 {
+        if id.is_err() && self.tool_places() == 0 {
             self.drop_contacts();
         }
         Ok(ToolId(id?))
@@ -215,11 +215,26 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
+        let slot = self.tools.place(tool.0)?;
         self.tools.remove(tool.0)?;
-        if self.tools.iter().next().is_none() {
+        if self.tool_places() == 0 {
             self.drop_contacts();
         }
+        for (_, body) in self.bodies.iter_mut() {
+            if let Some(contacts) = &mut body.contacts {
+                contacts.forget_tool(slot);
+            }
+        }
         Ok(())
+    }
+
+    /// How many places contacts need for tools.
+    fn tool_places(&self) -> usize {
+        if self.tools.iter().next().is_some() {
+            self.tools.places()
+        } else {
+            0
+        }
     }
 
     /// A world without tools keeps nothing for them.
@@ -276,7 +291,31 @@ impl World {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
         }
-        self.plan_tools();
+        for (_, tool) in self.tools.iter_mut() {
+            tool.set_out();
+        }
+        for left in (0..=TRIES).rev() {
+            self.plan_tools();
+            if let Err(report) = self.attempt(dt) {
+                self.put_back();
+                return Err(Error::Unstable {
+                    report,
+                    allowed: match self.definition.substeps {
+                        0 => self.definition.max_substeps,
+                        fixed => fixed,
+                    },
+                });
+            }
+            if left == 0 || self.are_within_limits(dt, left == 1) {
+                break;
+            }
+            self.put_back();
+        }
+        Ok(self.commit(dt))
+    }
+
+    /// Lets every body try the step; what it would come to where one cannot take it.
+    fn attempt(&mut self, dt: f32) -> std::result::Result<(), StepReport> {
         let Self {
             definition,
             threads,
@@ -298,36 +337,88 @@ impl World {
             },
             tools: paths,
         };
-        let shared = is_worth_sharing(bodies);
-        let mut step = |team: &Team| {
-            attempt_bodies(bodies, outcomes, &request, team);
-            let report = report(bodies, outcomes);
-            let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
-            if outcomes.iter().flatten().any(unstable) {
-                bodies.iter_mut().for_each(|(_, body)| body.put_back());
-                return Err(report);
-            }
-            commit_bodies(bodies, outcomes, team);
-            Ok(report)
-        };
-        let report = if shared {
-            threads.lead(step)
-        } else {
-            step(&Team::alone())
-        };
-        match report {
-            Ok(report) => {
-                self.commit_tools(dt);
-                Ok(report)
-            }
-            Err(report) => Err(Error::Unstable {
-                report,
-                allowed: match self.definition.substeps {
-                    0 => self.definition.max_substeps,
-                    fixed => fixed,
-                },
-            }),
+        lead(threads, bodies, |bodies, team| {
+            attempt_bodies(bodies, outcomes, &request, team)
+        });
+        let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
+        if outcomes.iter().flatten().any(unstable) {
+            return Err(report(bodies, outcomes));
         }
+        Ok(())
+    }
+
+    /// Takes back what bodies have tried.
+    fn put_back(&mut self) {
+        self.bodies.iter_mut().for_each(|(_, body)| body.put_back());
+    }
+
+    /// Makes the step that was tried the current state.
+    fn commit(&mut self, dt: f32) -> StepReport {
+        let Self {
+            threads,
+            bodies,
+            paths,
+            outcomes,
+            ..
+        } = self;
+        let report = report(bodies, outcomes);
+        lead(threads, bodies, |bodies, team| {
+            commit_bodies(bodies, outcomes, paths, team)
+        });
+        self.commit_tools(dt);
+        report
+    }
+
+    /// Whether no tool presses harder than it can; else those that do go less far in the next try, which may be the `last`.
+    fn are_within_limits(&mut self, dt: f32, last: bool) -> bool {
+        let mut are_within = true;
+        for index in 0..self.paths.len() {
+            let [force, _] = self.wrench_of(index, dt);
+            if let Some((_, tool)) = self.tools.iter_mut().nth(index)
+                && let Some(reach) = &mut tool.reach
+            {
+                are_within &= reach.is_allowed(force.length() as f32, tool.force_limit, last);
+            }
+        }
+        are_within
+    }
+
+    /// The mean force and torque on a tool, at this place among the ways, in the step that was tried, N and N m.
+    fn wrench_of(&self, index: usize, dt: f32) -> [DVec3; 2] {
+        let mut wrench = [DVec3::ZERO; 2];
+        for (place, body) in self.bodies.iter() {
+            if let (Some(Outcome::Done { .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
+                let load = contacts.loads()[index];
+                wrench[0] += load.impulse / f64::from(dt);
+                wrench[1] += load.angular_impulse / f64::from(dt);
+            }
+        }
+        wrench
+    }
+
+    /// Where a tool pressed bodies when the last step ended.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`].
+    pub fn contacts(&self, tool: ToolId) -> Result<impl Iterator<Item = Contact>> {
+        let slot = self.tools.place(tool.0)?;
+        let bodies = self.bodies.iter_ids();
+        Ok(bodies.flat_map(move |(id, body)| body.contacts_with(slot, BodyId(id))))
+    }
+
+    /// The tools and bodies that began or ceased to touch in the last step: with a tool or body that was destroyed nothing ceases.
+    pub fn contact_changes(&self) -> impl Iterator<Item = ContactChange> {
+        self.bodies.iter_ids().flat_map(move |(body, content)| {
+            self.tools.iter_ids().filter_map(move |(tool, _)| {
+                let slot = tool.index1 as usize - 1;
+                let [now, before] = content.contacts.as_ref()?.touched(slot);
+                (now != before).then_some(ContactChange {
+                    tool: ToolId(tool),
+                    body: BodyId(body),
+                    begun: now,
+                })
+            })
+        })
     }
 
     /// A hash over everything that the next step depends on; to be compared within one version.
@@ -358,23 +449,27 @@ impl World {
     }
 
     fn commit_tools(&mut self, dt: f32) {
-        let dt = f64::from(dt);
-        for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
-            let mut force = glam::DVec3::ZERO;
-            let mut torque = glam::DVec3::ZERO;
-            for (place, body) in self.bodies.iter() {
-                if let (Some(Outcome::Done { .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
-                    force += contacts.loads()[index].impulse / dt;
-                    torque += contacts.loads()[index].angular_impulse / dt;
-                }
-            }
-            // Finite, whatever the step's length.
-            tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
-            tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
-            if let Some(target) = tool.target.take() {
-                tool.pose = target;
+        for index in 0..self.paths.len() {
+            let [force, torque] = self.wrench_of(index, dt);
+            let end = self.paths[index].end();
+            if let Some((_, tool)) = self.tools.iter_mut().nth(index) {
+                // Finite, whatever the step's length.
+                tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+                tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+                tool.pose = end;
+                tool.target = None;
+                tool.reach = None;
             }
         }
+    }
+}
+
+/// Has the threads do something with bodies that are worth it, or the caller's own alone.
+fn lead(threads: &mut Threads, bodies: &mut Slots<Body>, act: impl FnOnce(&mut Slots<Body>, &Team) + Send) {
+    if is_worth_sharing(bodies) {
+        threads.lead(|team| act(bodies, team));
+    } else {
+        act(bodies, &Team::alone());
     }
 }
 
@@ -446,13 +541,13 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
     report
 }
 
-fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], team: &Team) {
+fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: &[ToolPath], team: &Team) {
     for (place, body) in bodies.iter_mut() {
         match outcomes[place] {
             Some(Outcome::Done { substeps, carry, .. }) => {
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
-                body.commit(substeps, carry, team);
+                body.commit(substeps, carry, tools, team);
             }
             _ => {
                 body.put_back();

@@ -12,7 +12,7 @@ const GRAVITY: Vec3 = Vec3::new(1.0, -9.81, 0.5);
 
 /// A tool that comes to a free block, and how it moves: per step, and turning.
 struct Visit {
-    shape: Shape,
+    shape: Shape<'static>,
     friction: f32,
     start: Pose,
     velocity: Vec3,

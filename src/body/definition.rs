@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::contact::BodyContact;
 use crate::error::{Error, Result};
 use crate::material::{Material, Viscosity, Yielding};
 use crate::memory;
@@ -149,6 +150,8 @@ pub struct BodyDefinition<'a> {
     /// [`Self::enclosed_stiffness`], and [`Body::set_pressure`](crate::Body::set_pressure) to change it. Without a stiffness the pressure
     /// stays the same however large the cavity becomes: springs that do not stiffen may not hold it.
     pub pressure: f32,
+    /// What keeps off its surface, and whether it meets other bodies and itself.
+    pub contact: BodyContact,
     /// How the springs are kept.
     pub storage: Storage,
     /// [`Storage::FastLink`]: places of each node; [`Storage::DynamicBulk`]: places of each array. 0: chosen from the
@@ -203,6 +206,7 @@ impl Default for BodyDefinition<'_> {
             limit_stiffening: 100.0,
             enclosed_stiffness: 0.0,
             pressure: 0.0,
+            contact: BodyContact::default(),
             storage: Storage::Packed,
             springs_per_node: 0,
             solver: Solver::Verlet,
@@ -272,6 +276,7 @@ impl BodyDefinition<'_> {
         }
         self.viscosity.check()?;
         self.yielding.check()?;
+        self.contact.check()?;
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
         if let Some(material) = &self.material {

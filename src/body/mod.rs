@@ -31,7 +31,7 @@ pub(crate) use records::{Record, Records, WriteRecords};
 pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
-use crate::contact::Contacts;
+use crate::contact::{BodyContact, Contact, Contacts, ToolPath};
 use crate::diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 use crate::elements::{Elements, Law};
 use crate::enclosed::Enclosed;
@@ -45,6 +45,7 @@ use crate::solver::{
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::Team;
+use crate::world::BodyId;
 pub(crate) use order::NodeOrder;
 use origin::shift_towards;
 pub(crate) use pins::{Pin, Pins};
@@ -94,6 +95,7 @@ pub struct Body {
     /// Forces from outside for the next step, N; kept from the first force on.
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
+    pub(crate) contact: BodyContact,
     pub(crate) carry: Carry,
     /// Whether the state's forces belong to its positions and velocities.
     pub(crate) forces_current: bool,
@@ -214,6 +216,7 @@ impl Body {
             implicit: None,
             applied: None,
             contacts: None,
+            contact: definition.contact,
             carry: Carry {
                 stability: Stability::UNKNOWN,
                 gravity: GravityKicks::new(Bounds {
@@ -433,13 +436,31 @@ impl Body {
             Some(contacts) => contacts.reserve(tools)?,
             None => {
                 let surface = self.order.own_triangles(&self.surface)?;
-                self.contacts = Some(Contacts::new(self.node_count(), &surface, tools)?);
+                self.contacts = Some(Contacts::new(self.node_count(), &surface, &self.contact, tools)?);
             }
         }
         if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
             implicit.reserve_contacts(contacts.reserve_holds()?)?;
         }
         Ok(())
+    }
+
+    /// What the last step left of contacts with the tool at this place.
+    pub(crate) fn contacts_with(&self, slot: usize, body: BodyId) -> impl Iterator<Item = Contact> {
+        let touches = self.contacts.iter().flat_map(move |contacts| contacts.touches(slot));
+        touches.map(move |touch| {
+            let nodes = touch.nodes.map(|node| self.order.caller(node));
+            let places = nodes.map(|node| self.published.positions()[node as usize].as_dvec3());
+            let point = (0..3).map(|corner| places[corner] * f64::from(touch.weights[corner]));
+            Contact {
+                body,
+                nodes,
+                weights: touch.weights,
+                point: point.sum::<DVec3>().as_vec3(),
+                normal: touch.normal,
+                force: touch.force,
+            }
+        })
     }
 
     /// How far it reaches along an axis, m.
@@ -504,7 +525,7 @@ impl Body {
     }
 
     /// Makes the step in progress, of `substeps` substeps, the current state.
-    pub(crate) fn commit(&mut self, substeps: u32, carry: Carry, team: &Team) {
+    pub(crate) fn commit(&mut self, substeps: u32, carry: Carry, tools: &[ToolPath], team: &Team) {
         self.state.commit();
         self.carry = carry;
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
@@ -527,7 +548,7 @@ impl Body {
             pin.closing_share = carry.closing.map_or(0.0, |_| 0.5 / substeps as f32);
         }
         if let Some(contacts) = &mut self.contacts {
-            contacts.commit();
+            contacts.commit(tools);
         }
         self.clear_pending();
         self.publish(team);

@@ -50,6 +50,15 @@ impl sinew_body_id {
     }
 }
 
+impl From<BodyId> for sinew_body_id {
+    fn from(BodyId(id): BodyId) -> Self {
+        Self {
+            index1: id.index1,
+            generation: id.generation,
+        }
+    }
+}
+
 impl sinew_vec3_view {
     fn of(vectors: &[Vec3]) -> Self {
         Self {

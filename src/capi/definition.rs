@@ -5,7 +5,9 @@ use std::mem::offset_of;
 use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
+use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::body::{BodyDefinition, Solver, Storage, Values};
+use crate::contact::{BodyContact, CollisionFilter};
 use crate::error::{Error, Result};
 use crate::material::{Material, Model, Viscosity, Yielding};
 use crate::terms::SpringLaw;
@@ -199,6 +201,24 @@ pub struct sinew_body_def {
     /// Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
     /// enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
     pub pressure: f32,
+    /// m, at least 0: what tools and other tissue keep off the surface; default 0.
+    pub contact_thickness: f32,
+    /// Coulomb coefficient with other tissue and with itself, at least 0; of two bodies that meet, the larger holds; default 0. With tools
+    /// the tool's own holds.
+    pub contact_friction: f32,
+    /// 1: it meets other bodies that have 1 here; 0, the default: it does not.
+    pub meets_bodies: u32,
+    /// 1: it meets itself; 0, the default: it does not.
+    pub meets_itself: u32,
+    /// How it finds other bodies: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE; exactly where one of two asks for that.
+    pub contact_detection: u32,
+    /// IMAGE_SPACE: m, the side of a pixel; 0, the default: chosen from the body.
+    pub contact_resolution: f32,
+    /// The categories that it belongs to, a bit for each; default 1. It meets tools and bodies where each has a category that the other's
+    /// mask has.
+    pub collision_category: u32,
+    /// The categories that it meets, a bit for each; default 0xffffffff.
+    pub collision_mask: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -209,6 +229,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, cells),
         offset_of!(Self, home_stiffnesses),
         offset_of!(Self, retardation_time),
+        offset_of!(Self, contact_thickness),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -273,6 +294,14 @@ impl sinew_body_def {
             limit_stiffening: BodyDefinition::default().limit_stiffening,
             enclosed_stiffness: 0.0,
             pressure: 0.0,
+            contact_thickness: 0.0,
+            contact_friction: 0.0,
+            meets_bodies: 0,
+            meets_itself: 0,
+            contact_detection: SINEW_DETECTION_EXACT,
+            contact_resolution: 0.0,
+            collision_category: CollisionFilter::default().category,
+            collision_mask: CollisionFilter::default().mask,
         }
     }
 
@@ -306,6 +335,26 @@ impl sinew_body_def {
             density: self.density,
             thickness: self.thickness,
         }))
+    }
+
+    fn contact(&self) -> Result<BodyContact> {
+        let flag = |name: &str, value: u32| match value {
+            0 => Ok(false),
+            1 => Ok(true),
+            _ => Err(Error::invalid(format!("{name} is {value}: must be 0 or 1"))),
+        };
+        Ok(BodyContact {
+            thickness: self.contact_thickness,
+            friction: self.contact_friction,
+            with_bodies: flag("meets_bodies", self.meets_bodies)?,
+            with_itself: flag("meets_itself", self.meets_itself)?,
+            detection: detection("contact_detection", self.contact_detection)?,
+            resolution: self.contact_resolution,
+            filter: CollisionFilter {
+                category: self.collision_category,
+                mask: self.collision_mask,
+            },
+        })
     }
 
     fn spring_law(&self) -> Result<SpringLaw> {
@@ -426,6 +475,7 @@ impl sinew_body_def {
                 volume_stiffness: self.volume_stiffness,
                 enclosed_stiffness: self.enclosed_stiffness,
                 pressure: self.pressure,
+                contact: self.contact()?,
             })
         }
     }

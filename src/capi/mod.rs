@@ -30,6 +30,8 @@ pub mod rest_state;
 
 pub mod tool;
 
+pub mod contact;
+
 pub mod mesh;
 
 pub mod picture;

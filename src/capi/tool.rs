@@ -1,11 +1,13 @@
 //! Tools.
 
+use std::mem::offset_of;
+
 use glam::{Quat, Vec3};
 
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::contact::{Detection, Pose, Shape, ToolDefinition};
+use crate::contact::{CollisionFilter, Detection, Pose, Shape, ToolDefinition};
 use crate::error::{Error, Result};
 use crate::slots::SlotId;
 use crate::world::ToolId;
@@ -68,20 +70,49 @@ pub struct sinew_tool_def {
     pub orientation: [f32; 4],
     /// 0.
     pub reserved: u32,
+    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: chosen from the mesh.
+    pub resolution: f32,
+    /// N, at least 0: the largest force that moves it; default infinity: it goes wherever it is sent. Where tissue resists with more it stops
+    /// short of its pose: see sinew_tool_get_pose.
+    pub force_limit: f32,
+    /// The categories that it belongs to, a bit for each; default 1. It meets bodies where each has a category that the other's
+    /// mask has.
+    pub collision_category: u32,
+    /// The categories that it meets, a bit for each; default 0xffffffff.
+    pub collision_mask: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_tool_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[offset_of!(Self, resolution), size_of::<Self>()];
     const NAME: &'static str = "sinew_tool_def";
 }
 
+impl From<ToolId> for sinew_tool_id {
+    fn from(ToolId(id): ToolId) -> Self {
+        Self {
+            index1: id.index1,
+            generation: id.generation,
+        }
+    }
+}
+
 impl sinew_tool_id {
-    fn id(self) -> ToolId {
+    pub(super) fn id(self) -> ToolId {
         ToolId(SlotId {
             index1: self.index1,
             generation: self.generation,
         })
+    }
+}
+
+/// The way of detection of this number.
+pub(super) fn detection(name: &str, number: u32) -> Result<Detection> {
+    match number {
+        SINEW_DETECTION_EXACT => Ok(Detection::Exact),
+        SINEW_DETECTION_IMAGE_SPACE => Ok(Detection::ImageSpace),
+        SINEW_DETECTION_DISTANCE_FIELD => Ok(Detection::DistanceField),
+        unknown => Err(Error::invalid(format!("{name} is {unknown}: no SINEW_DETECTION_..."))),
     }
 }
 
@@ -102,22 +133,21 @@ impl sinew_tool_def {
             position: [0.0; 3],
             orientation: [0.0, 0.0, 0.0, 1.0],
             reserved: 0,
+            resolution: 0.0,
+            force_limit: f32::INFINITY,
+            collision_category: CollisionFilter::default().category,
+            collision_mask: CollisionFilter::default().mask,
         }
     }
 
-    fn definition(&self) -> Result<ToolDefinition> {
+    /// The definition with its arrays found.
+    ///
+    /// # Safety
+    /// Every array is NULL or has as many entries as the definition states.
+    unsafe fn definition<'a>(&self) -> Result<ToolDefinition<'a>> {
         memory::reserved("reserved0", self.reserved0)?;
         memory::reserved("reserved", self.reserved)?;
-        let detection = match self.detection {
-            SINEW_DETECTION_EXACT => Detection::Exact,
-            SINEW_DETECTION_IMAGE_SPACE => Detection::ImageSpace,
-            SINEW_DETECTION_DISTANCE_FIELD => Detection::DistanceField,
-            unknown => {
-                return Err(Error::invalid(format!(
-                    "detection is {unknown}: no SINEW_DETECTION_..."
-                )));
-            }
-        };
+        let detection = detection("detection", self.detection)?;
         let shape = match self.shape {
             SINEW_SHAPE_SPHERE => Shape::Sphere { radius: self.radius },
             SINEW_SHAPE_CAPSULE => Shape::Capsule {
@@ -125,17 +155,24 @@ impl sinew_tool_def {
                 half_length: self.half_length,
             },
             SINEW_SHAPE_PLANE => Shape::Plane,
-            SINEW_SHAPE_MESH => {
-                return Err(Error::Unsupported(
-                    "shape is SINEW_SHAPE_MESH: this version offers spheres, capsules and planes".into(),
-                ));
-            }
+            SINEW_SHAPE_MESH => Shape::Mesh {
+                // SAFETY: the same contract.
+                positions: unsafe { memory::array("positions", self.positions.cast(), self.node_count) }?,
+                // SAFETY: the same contract.
+                triangles: unsafe { memory::array("triangles", self.triangles.cast(), self.triangle_count) }?,
+            },
             unknown => return Err(Error::invalid(format!("shape is {unknown}: no SINEW_SHAPE_..."))),
         };
         Ok(ToolDefinition {
             shape,
             detection,
+            resolution: self.resolution,
             friction: self.friction,
+            force_limit: self.force_limit,
+            filter: CollisionFilter {
+                category: self.collision_category,
+                mask: self.collision_mask,
+            },
             pose: Pose {
                 position: Vec3::from_array(self.position),
                 orientation: Quat::from_array(self.orientation),
@@ -158,7 +195,7 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
 
 /// Creates a tool; copies what `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (SINEW_SHAPE_MESH, detection other than EXACT),
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh),
 /// SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
@@ -175,11 +212,7 @@ pub unsafe extern "C" fn sinew_tool_create(
         with_world_mut(world, |world| {
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_tool_def::defaults())?;
-            let ToolId(id) = world.create_tool(&def.definition()?)?;
-            *out = sinew_tool_id {
-                index1: id.index1,
-                generation: id.generation,
-            };
+            *out = world.create_tool(&def.definition()?)?.into();
             Ok(())
         })
     }
@@ -218,6 +251,37 @@ pub unsafe extern "C" fn sinew_tool_set_pose(
             let orientation = memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1)?;
             let orientation = orientation.map(|orientation| Quat::from_array(orientation[0]));
             world.set_pose(tool.id(), position, orientation)
+        })
+    }
+}
+
+/// Writes where a tool is: its position, 3 floats, m, and its orientation, 4 floats, x y z w; either may be NULL. Where its force is
+/// limited it may have stopped short of where it was sent.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_pose(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    position: *mut f32,
+    orientation: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let pose = world.pose(tool.id())?;
+            let position = memory::optional_output_array("position", position.cast(), 1)?;
+            let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
+            if let Some(place) = position {
+                place[0] = pose.position.to_array();
+            }
+            if let Some(place) = orientation {
+                place[0] = pose.orientation.to_array();
+            }
+            Ok(())
         })
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::features::Features;
-use super::path::{Solid, ToolPath};
+use super::path::{Placement, Solid, ToolPath};
 use crate::body::{Bounds, Vectors};
 use crate::error::Result;
 use crate::memory;
@@ -20,18 +20,21 @@ pub(super) struct Candidates {
     slack: f32,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 enum Zone {
     /// About all that a tool sweeps, with the slack that nodes need.
     Box { slot: usize, bounds: Bounds },
+    /// About a mesh that stands here, for as long as none of its points leaves its place by more than `allowance`, m.
+    Mesh {
+        slot: usize,
+        bounds: Bounds,
+        standing: Placement,
+        allowance: f32,
+    },
     /// About what lies behind a plane that does not move.
     Behind { slot: usize, point: Vec3, normal: Vec3 },
     /// About what a moving plane sweeps.
-    Between {
-        slot: usize,
-        first: (Vec3, Vec3),
-        last: (Vec3, Vec3),
-    },
+    Between { first: (Vec3, Vec3), last: (Vec3, Vec3) },
 }
 
 impl Candidates {
@@ -64,17 +67,7 @@ impl Candidates {
             && tools
                 .iter()
                 .zip(&self.zones)
-                .all(|(tool, zone)| match (*zone, Zone::of(tool, origin)) {
-                    (
-                        Zone::Box { slot, bounds },
-                        Zone::Box {
-                            slot: other,
-                            bounds: swept,
-                        },
-                    ) => slot == other && bounds.contains(&swept),
-                    (Zone::Between { .. }, _) => false,
-                    (zone, other) => zone == other,
-                })
+                .all(|(tool, zone)| zone.covers(tool, origin))
     }
 
     /// Takes `distance` from the slack: whether the list is still good when the nodes have moved so far.
@@ -103,6 +96,17 @@ impl Candidates {
                     slot,
                     bounds: bounds.extended(slack),
                 },
+                Zone::Mesh {
+                    slot,
+                    bounds,
+                    standing,
+                    allowance,
+                } => Zone::Mesh {
+                    slot,
+                    bounds: bounds.extended(slack),
+                    standing,
+                    allowance: allowance + slack,
+                },
                 plane => plane,
             });
         }
@@ -111,7 +115,7 @@ impl Candidates {
         if !self.zones.iter().any(|zone| zone.meets(&everything, reach)) {
             return;
         }
-        let boxes = self.zones.iter().any(|zone| matches!(zone, Zone::Box { .. }));
+        let boxes = self.zones.iter().any(Zone::is_bounded);
         // Only nodes can be the first to meet a plane.
         let count = if boxes {
             features.count()
@@ -122,9 +126,12 @@ impl Candidates {
             let feature = features.get(index);
             let nodes = feature.nodes();
             let bounds = Bounds::of(nodes.iter().map(|&node| positions.get(node as usize)));
-            let meets =
-                |zone: &Zone| (nodes.len() == 1 || matches!(zone, Zone::Box { .. })) && zone.meets(&bounds, reach);
-            if self.zones.iter().any(meets) {
+            let meets = |(zone, tool): (&Zone, &ToolPath)| {
+                (nodes.len() == 1 || zone.is_bounded())
+                    && zone.meets(&bounds, reach)
+                    && zone.reaches(tool, nodes, positions, reach)
+            };
+            if self.zones.iter().zip(tools).any(meets) {
                 self.near.push(index);
             }
         }
@@ -134,14 +141,21 @@ impl Candidates {
 impl Zone {
     fn of(tool: &ToolPath, origin: DVec3) -> Self {
         if let Some(sweep) = tool.sweep(origin) {
-            return Zone::Box {
-                slot: tool.slot,
-                bounds: sweep.bounds,
+            let (slot, bounds) = (tool.slot, sweep.bounds);
+            return match tool.solid_at(0.0, origin) {
+                Solid::Mesh(standing) => Zone::Mesh {
+                    slot,
+                    bounds,
+                    standing,
+                    allowance: sweep.travel,
+                },
+                _ => Zone::Box { slot, bounds },
             };
         }
         let plane = |fraction: f64| match tool.solid_at(fraction, origin) {
             Solid::HalfSpace { point, normal } => (point, normal),
             Solid::Rounded { a, .. } => (a, Vec3::Y),
+            Solid::Mesh(placement) => (placement.centre, Vec3::Y),
         };
         let (first, last) = (plane(0.0), plane(1.0));
         if first == last {
@@ -151,12 +165,66 @@ impl Zone {
                 normal: first.1,
             }
         } else {
-            Zone::Between {
-                slot: tool.slot,
-                first,
-                last,
-            }
+            Zone::Between { first, last }
         }
+    }
+
+    fn is_bounded(&self) -> bool {
+        matches!(self, Zone::Box { .. } | Zone::Mesh { .. })
+    }
+
+    /// Whether it is good for this tool on its way.
+    fn covers(&self, tool: &ToolPath, origin: DVec3) -> bool {
+        match (*self, Zone::of(tool, origin)) {
+            (
+                Zone::Box { slot, bounds },
+                Zone::Box {
+                    slot: other,
+                    bounds: swept,
+                },
+            ) => slot == other && bounds.contains(&swept),
+            (
+                Zone::Mesh {
+                    slot,
+                    standing,
+                    allowance,
+                    ..
+                },
+                Zone::Mesh { slot: other, .. },
+            ) => slot == other && tool.furthest_from(&standing, origin) <= allowance,
+            (
+                Zone::Behind { slot, point, normal },
+                Zone::Behind {
+                    slot: other,
+                    point: there,
+                    normal: turned,
+                },
+            ) => slot == other && point == there && normal == turned,
+            _ => false,
+        }
+    }
+
+    /// Whether a feature of these nodes may come to the tool itself when it moves by `reach`.
+    fn reaches(&self, tool: &ToolPath, nodes: &[u32], positions: &Vectors, reach: f32) -> bool {
+        let (
+            Zone::Mesh {
+                standing, allowance, ..
+            },
+            Some(solid),
+        ) = (self, tool.mesh())
+        else {
+            return true;
+        };
+        let mut corners = [Vec3::ZERO; 3];
+        for (corner, &node) in corners.iter_mut().zip(nodes) {
+            *corner = standing.own(positions.get(node as usize));
+        }
+        // No part of a feature is further from its nodes than they are from each other.
+        let corners = &corners[..nodes.len()];
+        let spread = corners
+            .iter()
+            .fold(0.0_f32, |spread, corner| spread.max(corner.distance(corners[0])));
+        solid.closest(&corners[..1], reach + allowance + spread).is_some()
     }
 
     /// Whether something within `bounds` may come into the zone when it moves by `reach`.
@@ -167,12 +235,10 @@ impl Zone {
             (lowest - point).dot(normal) <= reach
         };
         match *self {
-            Zone::Box { bounds: zone, .. } => zone.extended(reach).overlaps(bounds),
+            Zone::Box { bounds: zone, .. } | Zone::Mesh { bounds: zone, .. } => zone.extended(reach).overlaps(bounds),
             Zone::Behind { point, normal, .. } => behind(point, normal),
             // A turning plane passes between its ends: nothing is ruled out.
-            Zone::Between { first, last, .. } => {
-                first.1 != last.1 || behind(first.0, first.1) || behind(last.0, last.1)
-            }
+            Zone::Between { first, last } => first.1 != last.1 || behind(first.0, first.1) || behind(last.0, last.1),
         }
     }
 }

@@ -9,9 +9,11 @@ use glam::{BVec3, DVec3, Vec3};
 use super::candidates::Candidates;
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
+use super::filter::{BodyContact, CollisionFilter};
 use super::holds::Holds;
+use super::meet::{meet_mesh, meet_plane, meet_rounded};
 use super::path::{Motion, Solid, ToolPath};
-use super::sweep::{Corners, Segment};
+use super::report::Touch;
 use crate::body::{Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
 
@@ -48,6 +50,10 @@ pub(crate) struct Load {
 /// The contacts of one body; kept only in worlds that have tools.
 #[derive(Debug)]
 pub(crate) struct Contacts {
+    /// What tools keep off the surface, m.
+    pub thickness: f32,
+    /// Which tools it meets.
+    pub filter: CollisionFilter,
     features: Features,
     candidates: Candidates,
     constraints: Vec<Constraint>,
@@ -57,6 +63,12 @@ pub(crate) struct Contacts {
     pub holds: Holds,
     /// By the place of a tool among those of the step.
     loads: Vec<Load>,
+    /// What a contact's last impulse stands for, s.
+    pressed_for: f32,
+    /// What the last step that became current left, in the order of tools.
+    touches: Vec<Touch>,
+    /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
+    touched: Vec<[bool; 2]>,
     /// The box of all velocities that contacts gave in this substep.
     given: Bounds,
     /// Whether the step that was begun last became current.
@@ -79,6 +91,8 @@ pub(crate) struct Meeting<'a> {
     pub drifts: bool,
     /// Contacts that are open by less count, m.
     pub slack: f32,
+    /// What tools keep off the surface, m.
+    pub thickness: f32,
     /// No node is faster, m/s.
     pub fastest: f32,
     pub mobility: Mobility<'a>,
@@ -91,11 +105,11 @@ pub(crate) struct Meeting<'a> {
 /// A part of a substep in which no tool moves further against the body than half its radius. Springs act once in a substep,
 /// contact in each slice: a tip that goes far takes along what it meets, however far that is.
 #[derive(Clone, Copy, Debug)]
-struct Slice {
+pub(super) struct Slice {
     /// Seconds from its start to the end of the substep.
     remains: f32,
     /// s
-    duration: f32,
+    pub duration: f32,
     first: bool,
     sweeps: u32,
     /// Whether contacts are only looked for.
@@ -103,16 +117,21 @@ struct Slice {
 }
 
 impl Contacts {
-    /// For a body with this surface, in a world with `tools` tools.
-    pub fn new(node_count: usize, surface: &[[u32; 3]], tools: usize) -> Result<Self> {
+    /// For a body with this surface, of which this is asked, in a world with `tools` tools.
+    pub fn new(node_count: usize, surface: &[[u32; 3]], contact: &BodyContact, tools: usize) -> Result<Self> {
         let features = Features::new(node_count, surface)?;
         let mut contacts = Self {
+            thickness: contact.thickness,
+            filter: contact.filter,
             candidates: Candidates::new(&features)?,
             constraints: Vec::new(),
             together: 0,
             holds: Holds::default(),
             features,
             loads: Vec::new(),
+            pressed_for: 0.0,
+            touches: Vec::new(),
+            touched: Vec::new(),
             given: Bounds::EMPTY,
             committed: true,
         };
@@ -120,13 +139,17 @@ impl Contacts {
         Ok(contacts)
     }
 
-    /// Makes room for `tools` tools.
+    /// Makes room for `tools` tools, at so many places in the world.
     pub fn reserve(&mut self, tools: usize) -> Result<()> {
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
         let together = self.features.count().saturating_mul(tools);
         let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
         self.constraints
             .try_reserve_exact(together.saturating_sub(self.constraints.len()))?;
+        self.touches
+            .try_reserve_exact(together.saturating_sub(self.touches.len()))?;
+        self.touched.try_reserve(tools.saturating_sub(self.touched.len()))?;
+        self.touched.resize(tools.max(self.touched.len()), [false; 2]);
         self.together = together;
         self.candidates.reserve(tools)
     }
@@ -151,8 +174,47 @@ impl Contacts {
     }
 
     /// The step that was begun last is current now.
-    pub fn commit(&mut self) {
+    pub fn commit(&mut self, tools: &[ToolPath]) {
         self.committed = true;
+        self.touches.clear();
+        for pair in &mut self.touched {
+            *pair = [false, pair[0]];
+        }
+        for (place, (tool, load)) in tools.iter().zip(&self.loads).enumerate() {
+            if let Some(pair) = self.touched.get_mut(tool.slot) {
+                pair[0] = load.impulse != DVec3::ZERO;
+            }
+            let pressing = self.constraints.iter();
+            let pressing = pressing.filter(|constraint| constraint.tool == place && constraint.given() != Vec3::ZERO);
+            for constraint in pressing.take(self.touches.capacity() - self.touches.len()) {
+                let nodes = constraint.feature.nodes();
+                self.touches.push(Touch {
+                    slot: tool.slot,
+                    nodes: [0, 1, 2].map(|corner| nodes[corner.min(nodes.len() - 1)]),
+                    weights: constraint.weights,
+                    normal: constraint.normal,
+                    force: (-constraint.given() / self.pressed_for).clamp(Vec3::MIN, Vec3::MAX),
+                });
+            }
+        }
+    }
+
+    /// What the last step that became current left of contacts with a tool at this place in the world.
+    pub fn touches(&self, slot: usize) -> impl Iterator<Item = &Touch> {
+        self.touches.iter().filter(move |touch| touch.slot == slot)
+    }
+
+    /// Whether the tool at this place touched in the last step that became current, and in the one before.
+    pub fn touched(&self, slot: usize) -> [bool; 2] {
+        self.touched.get(slot).copied().unwrap_or_default()
+    }
+
+    /// A tool at this place in the world is gone.
+    pub fn forget_tool(&mut self, slot: usize) {
+        self.touches.retain(|touch| touch.slot != slot);
+        if let Some(pair) = self.touched.get_mut(slot) {
+            *pair = [false; 2];
+        }
     }
 
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
@@ -217,6 +279,7 @@ impl Contacts {
         }
         self.find_candidates(&meeting);
         if self.candidates.near().is_empty() && self.holds.is_empty() {
+            self.constraints.clear();
             return;
         }
         let is_foreseen = !self.holds.is_empty();
@@ -225,6 +288,7 @@ impl Contacts {
         } else {
             1
         };
+        self.pressed_for = meeting.kick() / slices as f32;
         for index in 0..slices {
             let part = |index: u32| f64::from(index) / f64::from(slices);
             let slice = Slice {
@@ -254,8 +318,11 @@ impl Contacts {
 
     /// Adds the contacts of a slice between these fractions of the step.
     fn find(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
-        for place in 0..meeting.tools.len() {
-            let motion = meeting.tools[place].motion(start, end, meeting.dt, meeting.origin);
+        for (place, tool) in meeting.tools.iter().enumerate() {
+            if !tool.filter.meets(self.filter) {
+                continue;
+            }
+            let motion = tool.motion(start, end, meeting.dt, meeting.origin);
             for candidate in 0..self.candidates.near().len() {
                 let feature = self.features.get(self.candidates.near()[candidate]);
                 self.touch(meeting, slice, place, &motion, feature);
@@ -279,7 +346,7 @@ impl Contacts {
             meeting.positions,
             meeting.tools,
             meeting.origin,
-            meeting.substep * tool_speed + meeting.slack,
+            meeting.substep * tool_speed + meeting.slack + meeting.thickness,
             slack,
         );
         self.candidates.spend(travel);
@@ -291,6 +358,12 @@ impl Contacts {
             Solid::HalfSpace { point, .. } => {
                 if feature.nodes().len() == 1 {
                     let found = meet_plane(meeting, slice, motion, feature, point);
+                    self.add(meeting, slice, tool, found);
+                }
+            }
+            Solid::Mesh(from) => {
+                if let Solid::Mesh(to) = motion.to {
+                    let found = meet_mesh(meeting, slice, motion, feature, [&from, &to]);
                     self.add(meeting, slice, tool, found);
                 }
             }
@@ -385,7 +458,7 @@ fn slices(meeting: &Meeting) -> u32 {
             continue;
         };
         let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
-        let wanted = (travel / (sweep.radius * SLICE_TRAVEL)).ceil();
+        let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
         if wanted > slices {
             let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
             if reached.overlaps(&sweep.bounds) {
@@ -411,7 +484,7 @@ impl Slice {
 
 impl Meeting<'_> {
     /// The axes along which nodes of a feature are held that are free along others.
-    fn held_axes(&self, feature: Feature) -> [BVec3; 3] {
+    pub(super) fn held_axes(&self, feature: Feature) -> [BVec3; 3] {
         let mut held = [BVec3::FALSE; 3];
         for (held, &node) in held.iter_mut().zip(feature.nodes()) {
             *held = self.pins.partial_axes_of(node);
@@ -419,113 +492,21 @@ impl Meeting<'_> {
         held
     }
 
+    /// What the kick that was given stands for, s.
+    fn kick(&self) -> f32 {
+        if self.mobility.half {
+            0.5 * self.substep
+        } else {
+            self.substep
+        }
+    }
+
     /// Where a node is when the slice begins.
-    fn position(&self, slice: &Slice, node: usize) -> Vec3 {
+    pub(super) fn position(&self, slice: &Slice, node: usize) -> Vec3 {
         if slice.first {
             self.positions.get(node)
         } else {
             self.next_positions.get(node) - self.velocities.get(node) * slice.remains
         }
     }
-}
-
-impl Motion {
-    /// The segment within a rounded tool over `duration` seconds; with the last half kick of a step as if it went on.
-    fn segment(&self, duration: f32, drifts: bool) -> Segment {
-        let (
-            Solid::Rounded { a, b, radius },
-            Solid::Rounded {
-                a: last_a, b: last_b, ..
-            },
-        ) = (self.from, self.to)
-        else {
-            return Segment {
-                ends: [Vec3::INFINITY; 2],
-                steps: [Vec3::ZERO; 2],
-                radius: 0.0,
-            };
-        };
-        let steps = if drifts {
-            [last_a - a, last_b - b]
-        } else {
-            [a, b].map(|end| self.velocity_at(end) * duration)
-        };
-        Segment {
-            ends: [a, b],
-            steps,
-            radius,
-        }
-    }
-
-    /// How fast the tool's matter at `point` moves, m/s.
-    fn velocity_at(&self, point: Vec3) -> Vec3 {
-        self.velocity + self.spin.cross(point - self.centre)
-    }
-}
-
-/// The contact of a node with a plane over the slice.
-fn meet_plane(meeting: &Meeting, slice: &Slice, motion: &Motion, feature: Feature, point: Vec3) -> Option<Constraint> {
-    let (Solid::HalfSpace { normal: first, .. }, Solid::HalfSpace { normal, .. }) = (motion.from, motion.to) else {
-        return None;
-    };
-    let node = feature.nodes()[0] as usize;
-    let position = meeting.position(slice, node);
-    let gap = (position - point).dot(first);
-    let foot = position - first * gap;
-    let surface_velocity = motion.velocity_at(foot);
-    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * slice.duration;
-    let margin = surface_velocity.length() * slice.duration + meeting.slack;
-    if !(gap <= closing.max(0.0) + margin) {
-        return None;
-    }
-    let starts = [position, Vec3::ZERO, Vec3::ZERO];
-    let held = meeting.held_axes(feature);
-    let mut constraint = Constraint::new(feature, starts, [1.0, 0.0, 0.0], normal, &meeting.mobility, held)?;
-    constraint.surface_velocity = surface_velocity;
-    constraint.arm = foot - motion.centre;
-    constraint.friction = motion.friction;
-    constraint.allow_gap(gap, slice.duration);
-    Some(constraint)
-}
-
-/// The contact of a feature with a rounded tool over the slice.
-fn meet_rounded(
-    meeting: &Meeting,
-    slice: &Slice,
-    motion: &Motion,
-    feature: Feature,
-    segment: &Segment,
-) -> Option<Constraint> {
-    let mut corners = Corners {
-        points: [Vec3::ZERO; 3],
-        steps: [Vec3::ZERO; 3],
-        count: feature.nodes().len(),
-    };
-    for (corner, &node) in feature.nodes().iter().enumerate() {
-        corners.points[corner] = meeting.position(slice, node as usize);
-        corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
-    }
-    let separation = corners.approach(segment, segment.travel() + meeting.slack)?;
-    if !separation.inside {
-        return None;
-    }
-    let step = segment.steps[0].lerp(segment.steps[1], separation.along);
-    let start = segment.ends[0].lerp(segment.ends[1], separation.along);
-    // A feature through the middle of the tool has no side of its own: it is carried ahead of the tool.
-    let normal = separation
-        .offset
-        .try_normalize()
-        .or_else(|| step.try_normalize())
-        .unwrap_or(Vec3::Y);
-    let weights = separation.weights;
-    let held = meeting.held_axes(feature);
-    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility, held)?;
-    let points = corners.points.iter().zip(weights);
-    let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
-    let surface = normal * segment.radius;
-    constraint.surface_velocity = step / slice.duration + motion.spin.cross(surface);
-    constraint.arm = start + step * if meeting.drifts { 1.0 } else { 0.0 } + surface - motion.centre;
-    constraint.friction = motion.friction;
-    constraint.allow_gap((matter - start).dot(normal) - segment.radius, slice.duration);
-    Some(constraint)
 }

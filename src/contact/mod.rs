@@ -1,20 +1,27 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod candidates;
-#[allow(dead_code, reason = "tools of meshes ask for it")]
 mod closest;
 mod constraint;
 mod contacts;
 mod distance;
 mod features;
+mod filter;
 mod holds;
 pub(crate) mod image_space;
+mod limit;
+mod meet;
+mod mesh_solid;
 mod path;
+mod report;
 mod sweep;
 mod tool;
 
 pub(crate) use contacts::{Contacts, Meeting};
+pub use filter::{BodyContact, CollisionFilter};
 pub(crate) use holds::Holds;
+pub(crate) use limit::TRIES;
 pub(crate) use path::ToolPath;
-pub(crate) use tool::Tool;
+pub use report::{Contact, ContactChange};
 pub use tool::{Detection, Pose, Shape, ToolDefinition};
+pub(crate) use tool::{Form, Tool};

@@ -2,16 +2,19 @@
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::tool::{Pose, Shape, Tool};
+use super::filter::CollisionFilter;
+use super::mesh_solid::MeshSolid;
+use super::tool::{Form, Pose, Tool};
 use crate::body::Bounds;
 
 /// The way of a tool over a step: a straight line at constant speed, turning at a constant rate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct ToolPath {
     /// The tool's place among the world's tools.
     pub slot: usize,
-    shape: Shape,
+    form: Form,
     pub friction: f32,
+    pub filter: CollisionFilter,
     start: Pose,
     end: Pose,
     /// The whole turn of the step as axis times angle, rad.
@@ -25,11 +28,34 @@ pub(super) enum Solid {
     Rounded { a: Vec3, b: Vec3, radius: f32 },
     /// All that lies behind the plane through `point`.
     HalfSpace { point: Vec3, normal: Vec3 },
+    /// What a closed surface encloses.
+    Mesh(Placement),
+}
+
+/// Where a mesh is and how it is turned, in a body's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placement {
+    pub centre: Vec3,
+    pub orientation: Quat,
+}
+
+impl Placement {
+    /// A point in the mesh's own frame.
+    pub fn own(&self, point: Vec3) -> Vec3 {
+        self.orientation.conjugate() * (point - self.centre)
+    }
+
+    /// A point of the mesh's own frame in the body's coordinates.
+    pub fn placed(&self, own: Vec3) -> Vec3 {
+        self.centre + self.orientation * own
+    }
 }
 
 /// A tool over one substep, in a body's coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion {
+pub(super) struct Motion<'a> {
+    /// What a mesh encloses, in its own frame.
+    pub mesh: Option<&'a MeshSolid>,
     pub friction: f32,
     pub from: Solid,
     pub to: Solid,
@@ -44,23 +70,22 @@ pub(super) struct Motion {
 impl ToolPath {
     pub fn new(slot: usize, tool: &Tool) -> Self {
         let start = tool.pose;
-        let end = tool.target.unwrap_or(start);
-        // The shorter way round; 0 where the orientation stays.
-        let turn = if end.orientation == start.orientation {
-            Vec3::ZERO
-        } else {
-            let change = end.orientation * start.orientation.conjugate();
-            let change = if change.w < 0.0 { -change } else { change };
-            change.normalize().to_scaled_axis()
-        };
+        let end = tool.aim();
+        let turn = start.turn_to(&end);
         Self {
             slot,
-            shape: tool.shape,
+            form: tool.form.clone(),
             friction: tool.friction,
+            filter: tool.filter,
             start,
             end,
             turn,
         }
+    }
+
+    /// Where the step leaves it.
+    pub fn end(&self) -> Pose {
+        self.end
     }
 
     /// Its position after `fraction` of the step, in the coordinates of a body that begin at `origin`.
@@ -82,31 +107,45 @@ impl ToolPath {
     /// Where it is after `fraction` of the step, in the coordinates of a body that begin at `origin`.
     pub(super) fn solid_at(&self, fraction: f64, origin: DVec3) -> Solid {
         let centre = self.centre_at(fraction, origin);
-        let up = self.orientation_at(fraction) * Vec3::Y;
-        match self.shape {
-            Shape::Sphere { radius } => Solid::Rounded {
+        let orientation = self.orientation_at(fraction);
+        let up = || orientation * Vec3::Y;
+        match self.form {
+            Form::Rounded {
+                radius,
+                half_length: 0.0,
+            } => Solid::Rounded {
                 a: centre,
                 b: centre,
                 radius,
             },
-            Shape::Capsule { radius, half_length } => {
-                let axis = up * half_length;
+            Form::Rounded { radius, half_length } => {
+                let axis = up() * half_length;
                 Solid::Rounded {
                     a: centre - axis,
                     b: centre + axis,
                     radius,
                 }
             }
-            Shape::Plane => Solid::HalfSpace {
+            Form::HalfSpace => Solid::HalfSpace {
                 point: centre,
-                normal: up,
+                normal: up(),
             },
+            Form::Mesh(_) => Solid::Mesh(Placement { centre, orientation }),
+        }
+    }
+
+    /// What its mesh encloses, where it is one.
+    pub(super) fn mesh(&self) -> Option<&MeshSolid> {
+        match &self.form {
+            Form::Mesh(solid) => Some(solid),
+            _ => None,
         }
     }
 
     /// Its motion between two fractions of a step of `dt` seconds.
-    pub(super) fn motion(&self, start: f64, end: f64, dt: f32, origin: DVec3) -> Motion {
+    pub(super) fn motion(&self, start: f64, end: f64, dt: f32, origin: DVec3) -> Motion<'_> {
         Motion {
+            mesh: self.mesh(),
             friction: self.friction,
             from: self.solid_at(start, origin),
             to: self.solid_at(end, origin),
@@ -118,17 +157,38 @@ impl ToolPath {
 
     /// What it sweeps over the step; `None` for a plane, which has no end.
     pub fn sweep(&self, origin: DVec3) -> Option<Sweep> {
-        let (radius, half_length) = match self.shape {
-            Shape::Sphere { radius } => (radius, 0.0),
-            Shape::Capsule { radius, half_length } => (radius, half_length),
-            Shape::Plane => return None,
+        let centres = Bounds::of([0.0, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
+        let (bounds, reach, thickness) = match &self.form {
+            Form::HalfSpace => return None,
+            Form::Rounded { radius, half_length } => (centres.extended(radius + half_length), *half_length, *radius),
+            Form::Mesh(solid) => {
+                // Between its ends a corner that turns goes outside their box by no more than the height of its arc.
+                let ends = [0.0, 1.0].map(|end| (self.centre_at(end, origin), self.orientation_at(end)));
+                let corners = ends
+                    .into_iter()
+                    .flat_map(|(centre, orientation)| solid.corners().map(|corner| centre + orientation * corner));
+                let half_turn = 0.5 * self.turn.length();
+                let height = solid.reach() * (1.0 - half_turn.min(std::f32::consts::PI).cos());
+                (Bounds::of(corners).extended(height), solid.reach(), solid.thickness())
+            }
         };
-        let bounds = Bounds::of([0.0, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
         Some(Sweep {
-            bounds: bounds.extended(radius + half_length),
-            travel: self.start.position.distance(self.end.position) + self.turn.length() * half_length,
-            radius,
+            bounds,
+            travel: self.start.position.distance(self.end.position) + self.turn.length() * reach,
+            thickness,
         })
+    }
+
+    /// How far any point of a mesh can be from where it is at one end of the step, when it stands there instead, m.
+    pub(super) fn furthest_from(&self, standing: &Placement, origin: DVec3) -> f32 {
+        let Form::Mesh(solid) = &self.form else {
+            return 0.0;
+        };
+        let far = |end: f64| {
+            let turn = self.orientation_at(end).angle_between(standing.orientation);
+            self.centre_at(end, origin).distance(standing.centre) + turn * solid.reach()
+        };
+        far(0.0).max(far(1.0))
     }
 
     /// How fast its fastest point moves, m/s; for a plane the point at its position.
@@ -146,8 +206,8 @@ impl ToolPath {
 pub(crate) struct Sweep {
     /// A box about all of it.
     pub bounds: Bounds,
-    /// The furthest that any point of its axis goes, m.
+    /// The furthest that any point of its axis or its mesh goes, m.
     pub travel: f32,
-    /// The tool's, m.
-    pub radius: f32,
+    /// Half of the tool's least extent, m.
+    pub thickness: f32,
 }

@@ -1,10 +1,13 @@
-//! When a moving node, edge or face first touches a moving rounded tool: conservative advancement.
+//! When a moving node, edge or face first touches a moving tool: conservative advancement.
 
 use glam::Vec3;
 
+use super::closest::Closest;
+use super::mesh_solid::MeshSolid;
+
 use super::distance::{closest_of_segments, closest_on_segment, closest_on_triangle};
 
-/// A gap of this part of the tool's radius counts as touching.
+/// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
 const TOUCHING: f32 = 1e-4;
 
 /// Advances of one search. A search that takes more grazes the tool, and ends where it is, still clear of it.
@@ -133,5 +136,37 @@ impl Corners {
             gap = separation.offset.length() - segment.radius;
         }
         Some(separation)
+    }
+
+    /// The same for what a mesh encloses, in whose own frame the corners are: also when that is, a fraction of the substep. They touch
+    /// where they are `clearance` apart.
+    pub fn approach_mesh(&self, solid: &MeshSolid, clearance: f32, margin: f32) -> Option<(Closest, f32)> {
+        let closing = self.steps[..self.count]
+            .iter()
+            .fold(0.0, |closing: f32, step| closing.max(step.length()));
+        let touching = TOUCHING * solid.thickness();
+        let within = clearance + margin.max(touching);
+        let mut time = 0.0;
+        let mut closest = solid.closest(&self.at(0.0)[..self.count], within + closing)?;
+        for _ in 0..ADVANCES {
+            let gap = closest.distance - clearance;
+            if gap <= touching {
+                break;
+            }
+            time += gap / closing;
+            if !(time < 1.0) {
+                let last = solid.closest(&self.at(1.0)[..self.count], within)?;
+                return Some((last, 1.0));
+            }
+            // Further away than the tool can still come to meet it.
+            let left = closing * (1.0 - time);
+            closest = solid.closest(&self.at(time)[..self.count], within + left)?;
+        }
+        Some((closest, time))
+    }
+
+    /// The corners at `time`.
+    pub fn at(&self, time: f32) -> [Vec3; 3] {
+        [0, 1, 2].map(|corner| self.points[corner] + self.steps[corner] * time)
     }
 }

@@ -1,14 +1,19 @@
 //! Tools: rigid shapes that the caller moves, and the load that they feel.
 
+use std::sync::Arc;
+
 use glam::{Quat, Vec3};
 
+use super::filter::CollisionFilter;
+use super::limit::Reach;
+use super::mesh_solid::MeshSolid;
 use crate::body::{finite_vector, not_negative};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 
 /// The shape of a tool, about its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum Shape<'a> {
     /// A ball.
     Sphere {
         /// Metres, above 0.
@@ -23,6 +28,13 @@ pub enum Shape {
     },
     /// The plane y = 0, with free space above it and solid below.
     Plane,
+    /// What a closed surface encloses. Corners at exactly the same place are one.
+    Mesh {
+        /// Metres.
+        positions: &'a [Vec3],
+        /// Three of the positions each, outward by the right-hand rule.
+        triangles: &'a [[u32; 3]],
+    },
 }
 
 /// How a tool finds what it touches.
@@ -53,6 +65,25 @@ impl Pose {
         orientation: Quat::IDENTITY,
     };
 
+    /// The shorter way round from this orientation to that one, as axis times angle, rad; 0 where they are the same.
+    pub(super) fn turn_to(&self, other: &Self) -> Vec3 {
+        if other.orientation == self.orientation {
+            return Vec3::ZERO;
+        }
+        let change = other.orientation * self.orientation.conjugate();
+        let change = if change.w < 0.0 { -change } else { change };
+        change.normalize().to_scaled_axis()
+    }
+
+    /// Where something is after a part of the way from here to there, 0 to 1.
+    fn on_way_to(&self, other: &Self, part: f32) -> Self {
+        let turned = Quat::from_scaled_axis(self.turn_to(other) * part) * self.orientation;
+        Self {
+            position: self.position.lerp(other.position, part),
+            orientation: turned.normalize(),
+        }
+    }
+
     /// The pose with its orientation normalised; refused where it has no direction or is not finite.
     pub(crate) fn checked(self) -> Result<Self> {
         finite_vector("position", self.position)?;
@@ -76,37 +107,62 @@ impl Pose {
 
 /// What a tool is. Plain data, used only during [`World::create_tool`](crate::World::create_tool).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToolDefinition {
+pub struct ToolDefinition<'a> {
     /// Its shape.
-    pub shape: Shape,
+    pub shape: Shape<'a>,
     /// How it finds what it touches.
     pub detection: Detection,
+    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0: chosen from the mesh.
+    pub resolution: f32,
     /// The Coulomb coefficient of friction, at least 0.
     pub friction: f32,
+    /// The largest force that moves it, N, at least 0; infinite: it goes wherever it is sent. Where tissue resists with more it stops short of
+    /// its pose: see [`World::pose`](crate::World::pose).
+    pub force_limit: f32,
+    /// Which bodies it meets.
+    pub filter: CollisionFilter,
     /// Where it is at first.
     pub pose: Pose,
 }
 
-impl ToolDefinition {
-    /// A tool of this shape at the origin, without friction.
-    pub fn new(shape: Shape) -> Self {
+impl<'a> ToolDefinition<'a> {
+    /// A tool of this shape at the origin, without friction, that meets everything.
+    pub fn new(shape: Shape<'a>) -> Self {
         Self {
             shape,
             detection: Detection::Exact,
+            resolution: 0.0,
+            force_limit: f32::INFINITY,
+            filter: CollisionFilter::default(),
             friction: 0.0,
             pose: Pose::IDENTITY,
         }
     }
 }
 
+/// A shape as a tool keeps it.
+#[derive(Clone, Debug)]
+pub(crate) enum Form {
+    /// All that is within `radius` of a segment along y; a sphere's has no length.
+    Rounded { radius: f32, half_length: f32 },
+    /// All that lies below y = 0.
+    HalfSpace,
+    /// What a closed surface encloses.
+    Mesh(Arc<MeshSolid>),
+}
+
 /// A tool of a world.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Tool {
-    pub shape: Shape,
+    pub form: Form,
     pub friction: f32,
+    pub force_limit: f32,
+    pub filter: CollisionFilter,
     pub pose: Pose,
     /// Where the next step moves it.
     pub target: Option<Pose>,
+    /// How much of that way the step in progress takes, where it has a limit of force.
+    pub reach: Option<Reach>,
     /// Mean force on it over the last step, N.
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
@@ -121,27 +177,49 @@ impl Tool {
             }
             Err(Error::invalid(format!("{name} is {value}: must be above 0 and finite")))
         };
-        match definition.shape {
-            Shape::Sphere { radius } => positive("radius", radius)?,
-            Shape::Capsule { radius, half_length } => {
-                positive("radius", radius)?;
-                not_negative("half_length", half_length)?;
-            }
-            Shape::Plane => {}
-        }
         not_negative("friction", definition.friction)?;
+        not_negative("resolution", definition.resolution)?;
+        if !(definition.force_limit >= 0.0) {
+            return Err(Error::invalid(format!(
+                "force_limit is {}: must be at least 0",
+                definition.force_limit
+            )));
+        }
         let pose = definition.pose.checked()?;
-        if definition.detection != Detection::Exact {
+        let is_mesh = matches!(definition.shape, Shape::Mesh { .. });
+        if definition.detection != Detection::Exact && !is_mesh {
             return Err(Error::Unsupported(format!(
-                "detection is {:?}: this version offers Exact alone",
+                "detection is {:?}: spheres, capsules and planes are met exactly",
                 definition.detection
             )));
         }
+        let form = match definition.shape {
+            Shape::Sphere { radius } => {
+                positive("radius", radius)?;
+                Form::Rounded {
+                    radius,
+                    half_length: 0.0,
+                }
+            }
+            Shape::Capsule { radius, half_length } => {
+                positive("radius", radius)?;
+                not_negative("half_length", half_length)?;
+                Form::Rounded { radius, half_length }
+            }
+            Shape::Plane => Form::HalfSpace,
+            Shape::Mesh { positions, triangles } => {
+                let (detection, resolution) = (definition.detection, definition.resolution);
+                Form::Mesh(MeshSolid::shared(positions, triangles, detection, resolution)?)
+            }
+        };
         Ok(Self {
-            shape: definition.shape,
+            form,
             friction: definition.friction,
+            force_limit: definition.force_limit,
+            filter: definition.filter,
             pose,
             target: None,
+            reach: None,
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
         })
@@ -149,15 +227,32 @@ impl Tool {
 }
 
 impl Tool {
+    /// Where the step in progress takes it.
+    pub fn aim(&self) -> Pose {
+        let target = self.target.unwrap_or(self.pose);
+        match self.reach {
+            Some(reach) if reach.part < 1.0 => self.pose.on_way_to(&target, reach.part),
+            _ => target,
+        }
+    }
+
+    /// Begins a step: all of its way, until it is known what resists.
+    pub fn set_out(&mut self) {
+        let is_limited = self.force_limit < f32::INFINITY && self.target.is_some();
+        self.reach = is_limited.then(|| Reach::new(self.force.length(), self.force_limit));
+    }
+
     /// Adds the bits that the next step depends on.
     pub fn hash_state(&self, hasher: &mut StateHasher) {
-        let shape = match self.shape {
-            Shape::Sphere { radius } => [0.0, radius, 0.0],
-            Shape::Capsule { radius, half_length } => [1.0, radius, half_length],
-            Shape::Plane => [2.0, 0.0, 0.0],
-        };
-        hasher.write_floats(&shape);
-        hasher.write_floats(&[self.friction]);
+        match &self.form {
+            Form::Rounded { radius, half_length } => hasher.write_floats(&[1.0, *radius, *half_length]),
+            Form::HalfSpace => hasher.write_floats(&[2.0]),
+            Form::Mesh(solid) => hasher.write_u64(solid.hash()),
+        }
+        hasher.write_floats(&[self.friction, self.force_limit]);
+        for bits in [self.filter.category, self.filter.mask] {
+            hasher.write_u64(u64::from(bits));
+        }
         hasher.write_u64(u64::from(self.target.is_some()));
         for pose in [Some(self.pose), self.target].into_iter().flatten() {
             hasher.write_floats(&pose.position.to_array());

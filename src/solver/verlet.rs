@@ -281,6 +281,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         substep: part.substep,
         drifts: part.drifts,
         slack: 0.0,
+        thickness: contacts.thickness,
         fastest,
         mobility: Mobility {
             inverse_masses: &body.inverse_masses,

@@ -113,6 +113,7 @@ impl Substep<'_> {
             substep: self.step as f32,
             drifts: true,
             slack,
+            thickness: contacts.thickness,
             fastest: bounds.min.abs().max(bounds.max.abs()).length(),
             mobility: Mobility {
                 inverse_masses: &body.inverse_masses,

@@ -1,0 +1,65 @@
+//! What meets what, and what a body asks of contact.
+
+use super::tool::Detection;
+use crate::body::not_negative;
+use crate::error::{Error, Result};
+
+/// Which tools and bodies meet: two do where each has a category that the other's mask has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CollisionFilter {
+    /// The categories that it belongs to, a bit for each.
+    pub category: u32,
+    /// The categories that it meets, a bit for each.
+    pub mask: u32,
+}
+
+impl Default for CollisionFilter {
+    /// Of the first category; meets all.
+    fn default() -> Self {
+        Self {
+            category: 1,
+            mask: u32::MAX,
+        }
+    }
+}
+
+impl CollisionFilter {
+    /// Whether both meet each other.
+    pub(crate) fn meets(self, other: Self) -> bool {
+        self.category & other.mask != 0 && other.category & self.mask != 0
+    }
+}
+
+/// What a body asks of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyContact {
+    /// What tools and other tissue keep off its surface, m, at least 0: the thickness of a cloth on either side.
+    pub thickness: f32,
+    /// The Coulomb coefficient of friction with other tissue and with itself, at least 0; of two bodies that meet, the larger holds. A
+    /// tool's own holds with tools.
+    pub friction: f32,
+    /// Whether it meets other bodies that want it too.
+    pub with_bodies: bool,
+    /// Whether it meets itself.
+    pub with_itself: bool,
+    /// How it finds other bodies: [`Detection::Exact`] or [`Detection::ImageSpace`]; exactly where one of two asks for that.
+    pub detection: Detection,
+    /// [`Detection::ImageSpace`]: the side of a pixel, m; 0: chosen from the body.
+    pub resolution: f32,
+    /// Which tools and bodies it meets.
+    pub filter: CollisionFilter,
+}
+
+impl BodyContact {
+    pub(crate) fn check(&self) -> Result<()> {
+        not_negative("contact_thickness", self.thickness)?;
+        not_negative("contact_friction", self.friction)?;
+        not_negative("contact_resolution", self.resolution)?;
+        if self.detection == Detection::DistanceField {
+            return Err(Error::Unsupported(
+                "contact_detection is DistanceField: that is for meshes of tools alone".into(),
+            ));
+        }
+        Ok(())
+    }
+}

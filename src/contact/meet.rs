@@ -1,0 +1,191 @@
+//! Where a feature of a body first meets a tool, as a contact.
+
+use glam::Vec3;
+
+use super::constraint::Constraint;
+use super::contacts::{Meeting, Slice};
+use super::features::Feature;
+use super::path::{Motion, Placement, Solid};
+use super::sweep::{Corners, Segment};
+
+impl Motion<'_> {
+    /// The segment within a rounded tool over `duration` seconds; with the last half kick of a step as if it went on.
+    pub fn segment(&self, duration: f32, drifts: bool) -> Segment {
+        let (
+            Solid::Rounded { a, b, radius },
+            Solid::Rounded {
+                a: last_a, b: last_b, ..
+            },
+        ) = (self.from, self.to)
+        else {
+            return Segment {
+                ends: [Vec3::INFINITY; 2],
+                steps: [Vec3::ZERO; 2],
+                radius: 0.0,
+            };
+        };
+        let steps = if drifts {
+            [last_a - a, last_b - b]
+        } else {
+            [a, b].map(|end| self.velocity_at(end) * duration)
+        };
+        Segment {
+            ends: [a, b],
+            steps,
+            radius,
+        }
+    }
+
+    /// How fast the tool's matter at `point` moves, m/s.
+    fn velocity_at(&self, point: Vec3) -> Vec3 {
+        self.velocity + self.spin.cross(point - self.centre)
+    }
+}
+
+/// The contact of a node with a plane over the slice.
+pub(super) fn meet_plane(
+    meeting: &Meeting,
+    slice: &Slice,
+    motion: &Motion,
+    feature: Feature,
+    point: Vec3,
+) -> Option<Constraint> {
+    let (Solid::HalfSpace { normal: first, .. }, Solid::HalfSpace { normal, .. }) = (motion.from, motion.to) else {
+        return None;
+    };
+    let node = feature.nodes()[0] as usize;
+    let position = meeting.position(slice, node);
+    let gap = (position - point).dot(first);
+    let foot = position - first * gap;
+    let surface_velocity = motion.velocity_at(foot);
+    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * slice.duration;
+    let margin = surface_velocity.length() * slice.duration + meeting.slack + meeting.thickness;
+    if !(gap <= closing.max(0.0) + margin) {
+        return None;
+    }
+    let starts = [position, Vec3::ZERO, Vec3::ZERO];
+    let held = meeting.held_axes(feature);
+    let mut constraint = Constraint::new(feature, starts, [1.0, 0.0, 0.0], normal, &meeting.mobility, held)?;
+    constraint.surface_velocity = surface_velocity;
+    constraint.arm = foot - motion.centre;
+    constraint.friction = motion.friction;
+    constraint.allow_gap(gap - meeting.thickness, slice.duration);
+    Some(constraint)
+}
+
+/// The contact of a feature with a rounded tool over the slice.
+pub(super) fn meet_rounded(
+    meeting: &Meeting,
+    slice: &Slice,
+    motion: &Motion,
+    feature: Feature,
+    segment: &Segment,
+) -> Option<Constraint> {
+    let corners = Corners::of(meeting, slice, feature);
+    let around = Segment {
+        radius: segment.radius + meeting.thickness,
+        ..*segment
+    };
+    let separation = corners.approach(&around, segment.travel() + meeting.slack)?;
+    if !separation.inside {
+        return None;
+    }
+    let step = segment.steps[0].lerp(segment.steps[1], separation.along);
+    let start = segment.ends[0].lerp(segment.ends[1], separation.along);
+    // A feature through the middle of the tool has no side of its own: it is carried ahead of the tool.
+    let normal = separation
+        .offset
+        .try_normalize()
+        .or_else(|| step.try_normalize())
+        .unwrap_or(Vec3::Y);
+    let weights = separation.weights;
+    let held = meeting.held_axes(feature);
+    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility, held)?;
+    let points = corners.points.iter().zip(weights);
+    let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
+    let surface = normal * segment.radius;
+    constraint.surface_velocity = step / slice.duration + motion.spin.cross(surface);
+    constraint.arm = start + step * if meeting.drifts { 1.0 } else { 0.0 } + surface - motion.centre;
+    constraint.friction = motion.friction;
+    let gap = (matter - start).dot(normal) - segment.radius;
+    constraint.allow_gap(gap - meeting.thickness, slice.duration);
+    Some(constraint)
+}
+
+/// The contact of a feature with what a mesh encloses over the slice.
+pub(super) fn meet_mesh(
+    meeting: &Meeting,
+    slice: &Slice,
+    motion: &Motion,
+    feature: Feature,
+    [from, to]: [&Placement; 2],
+) -> Option<Constraint> {
+    let solid = motion.mesh?;
+    let corners = Corners::of(meeting, slice, feature);
+    let count = corners.count;
+    // In the mesh's own frame, where it stands still; with the last half kick of a step as if it went on.
+    let mut own = corners;
+    let mut travel = 0.0_f32;
+    for corner in 0..count {
+        let (point, step) = (corners.points[corner], corners.steps[corner]);
+        let start = from.own(point);
+        let way = if meeting.drifts {
+            to.placed(start) - point
+        } else {
+            motion.velocity_at(point) * slice.duration
+        };
+        travel = travel.max(way.length());
+        own.points[corner] = start;
+        own.steps[corner] = if meeting.drifts {
+            to.own(point + step) - start
+        } else {
+            from.orientation.conjugate() * (step - way)
+        };
+    }
+    let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack)?;
+    if !closest.inside {
+        return None;
+    }
+    let weights = closest.weights;
+    let weighted = |corners: [Vec3; 3]| -> Vec3 {
+        let corners = corners.iter().zip(weights).take(count);
+        corners.map(|(corner, weight)| *corner * weight).sum()
+    };
+    let surface = weighted(own.at(time)) - closest.normal * closest.distance;
+    let gap = (weighted(own.points) - surface).dot(closest.normal);
+    let orientation = if meeting.drifts {
+        from.orientation.lerp(to.orientation, time)
+    } else {
+        from.orientation
+    };
+    let normal = orientation * closest.normal;
+    let held = meeting.held_axes(feature);
+    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility, held)?;
+    let [start, end] = [from, to].map(|placement| placement.placed(surface));
+    if meeting.drifts {
+        constraint.surface_velocity = (end - start) / slice.duration;
+        constraint.arm = end - motion.centre;
+    } else {
+        constraint.surface_velocity = motion.velocity_at(start);
+        constraint.arm = start - motion.centre;
+    }
+    constraint.friction = motion.friction;
+    constraint.allow_gap(gap - meeting.thickness, slice.duration);
+    Some(constraint)
+}
+
+impl Corners {
+    /// Those of a feature over the slice, in the body's coordinates.
+    fn of(meeting: &Meeting, slice: &Slice, feature: Feature) -> Self {
+        let mut corners = Corners {
+            points: [Vec3::ZERO; 3],
+            steps: [Vec3::ZERO; 3],
+            count: feature.nodes().len(),
+        };
+        for (corner, &node) in feature.nodes().iter().enumerate() {
+            corners.points[corner] = meeting.position(slice, node as usize);
+            corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
+        }
+        corners
+    }
+}

@@ -1,0 +1,124 @@
+//! A closed mesh in `f64`, looked at triangle by triangle.
+
+#![allow(dead_code, reason = "every test takes a part of it")]
+
+use std::f64::consts::PI;
+use std::path::PathBuf;
+
+use glam::{DVec3, Vec3};
+use sinew::Pose;
+use sinew::mesh::{Mesh, MeshFormat};
+
+use super::tissue::point_to_triangle;
+
+/// A closed mesh at some place.
+pub struct Solid {
+    triangles: Vec<[DVec3; 3]>,
+}
+
+impl Solid {
+    pub fn new(mesh: &Mesh, pose: Pose) -> Self {
+        let (position, turned) = (pose.position.as_dvec3(), pose.orientation.as_dquat());
+        let corner = |node: u32| position + turned * mesh.positions[node as usize].as_dvec3();
+        Self {
+            triangles: mesh.triangles.iter().map(|triangle| triangle.map(corner)).collect(),
+        }
+    }
+
+    /// How often the surface winds about a point: 1 inside, 0 outside. By the triangles' solid angles (van Oosterom, Strackee 1983).
+    pub fn winding(&self, point: DVec3) -> f64 {
+        let angle = |triangle: &[DVec3; 3]| {
+            let [a, b, c] = triangle.map(|corner| corner - point);
+            let (la, lb, lc) = (a.length(), b.length(), c.length());
+            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            2.0 * a.dot(b.cross(c)).atan2(below)
+        };
+        self.triangles.iter().map(angle).sum::<f64>() / (4.0 * PI)
+    }
+
+    /// How far the surface is from a point, m.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let distances = self.triangles.iter().map(|&triangle| point_to_triangle(point, triangle));
+        distances.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same, negative inside.
+    pub fn signed_distance(&self, point: DVec3) -> f64 {
+        let distance = self.distance(point);
+        if self.winding(point) > 0.5 { -distance } else { distance }
+    }
+}
+
+/// A real mesh with its size multiplied by `scale`; `None`, said aloud, where it is missing.
+pub fn real(name: &str, scale: f32) -> Option<Mesh> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    let path = folder.join(name);
+    if !path.exists() {
+        use std::io::Write;
+        let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes/{name} is missing");
+        return None;
+    }
+    Some(sinew::mesh::load(path, MeshFormat::Stl, scale).expect("a mesh").mesh)
+}
+
+/// A ball of this radius: an icosahedron whose triangles were quartered so often.
+pub fn ball(radius: f32, quartered: u32) -> Mesh {
+    let golden = 0.5 * (1.0 + 5.0_f32.sqrt());
+    let corners = [
+        [-1.0, golden, 0.0],
+        [1.0, golden, 0.0],
+        [-1.0, -golden, 0.0],
+        [1.0, -golden, 0.0],
+        [0.0, -1.0, golden],
+        [0.0, 1.0, golden],
+        [0.0, -1.0, -golden],
+        [0.0, 1.0, -golden],
+        [golden, 0.0, -1.0],
+        [golden, 0.0, 1.0],
+        [-golden, 0.0, -1.0],
+        [-golden, 0.0, 1.0],
+    ];
+    let mut positions: Vec<Vec3> = corners.map(|corner| Vec3::from_array(corner).normalize() * radius).to_vec();
+    let mut triangles: Vec<[u32; 3]> = vec![
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
+    ];
+    for _ in 0..quartered {
+        let mut middles = std::collections::HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                let sum = positions[a as usize] + positions[b as usize];
+                positions.push(sum.normalize() * radius);
+                positions.len() as u32 - 1
+            })
+        };
+        let quarters = triangles.iter().flat_map(|&[a, b, c]| {
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        });
+        triangles = quarters.collect();
+    }
+    Mesh {
+        positions,
+        triangles,
+        ..Default::default()
+    }
+}
