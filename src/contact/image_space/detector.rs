@@ -166,7 +166,7 @@ impl ImageSpace {
             inside.join_points();
         }
         overlap.volume /= self.view_count as f64;
-        let gradient: DVec3 = overlap.gradients[0].iter().map(|gradient| gradient.as_dvec3()).sum();
+        let gradient: DVec3 = overlap.gradients[0].iter().sum();
         let area = gradient.length();
         if overlap.volume > 0.0 && area > 0.0 {
             overlap.normal = (-gradient / area).as_vec3();

@@ -1,6 +1,6 @@
 //! What a detection finds.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::surface::Surface;
 use crate::error::Result;
@@ -14,7 +14,7 @@ pub struct Overlap {
     /// m³, the mean over the views; 0 where one of them is open, and with [`Form::Counted`](super::Form::Counted).
     pub volume: f64,
     /// How the volume changes with each node of each, m² (Faure et al. 2008); zero where the volume is.
-    pub gradients: [Vec<Vec3>; 2],
+    pub gradients: [Vec<DVec3>; 2],
     /// The direction of unit length in which the first has to be moved so that the volume shrinks fastest, opposite to the
     /// gradient; zero where there is no volume.
     pub normal: Vec3,
@@ -97,7 +97,7 @@ impl Overlap {
             self.inside[side].edges.clear();
             self.inside[side].unlisted = 0;
             self.gradients[side].clear();
-            self.gradients[side].resize(node_counts[side], Vec3::ZERO);
+            self.gradients[side].resize(node_counts[side], DVec3::ZERO);
         }
         (self.volume, self.normal, self.depth, self.pixel) = (0.0, Vec3::ZERO, 0.0, pixel);
     }

@@ -1,7 +1,7 @@
 //! The volume that two bodies have in common and its gradient (Faure, Barbier, Allard, Falipou 2008, "Image-based
 //! collision detection and response between arbitrary volume objects").
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3};
 
 use super::intervals::{Interval, Intervals};
 use super::layers::Layers;
@@ -16,7 +16,7 @@ pub(super) fn add_volume(
     projection: &Projection,
     layers: &[Layers; 2],
     bodies: &[Placed; 2],
-    gradients: &mut [Vec<Vec3>; 2],
+    gradients: &mut [Vec<DVec3>; 2],
 ) -> f64 {
     let area = projection.pixel * projection.pixel;
     let mut length = 0.0;
@@ -55,7 +55,7 @@ fn add_gradient(
     body: &Placed,
     triangle: u32,
     change: f64,
-    gradient: &mut [Vec3],
+    gradient: &mut [DVec3],
 ) {
     let nodes = body.surface.triangles()[triangle as usize].map(|node| node as usize);
     let [a, b, c] = nodes.map(|node| {
@@ -70,6 +70,6 @@ fn add_gradient(
         _ => 1.0 / 3.0,
     };
     for (node, weight) in nodes.into_iter().zip([weight(b, c), weight(c, a), weight(a, b)]) {
-        gradient[node] += (projection.frame.forward * (change * weight)).as_vec3();
+        gradient[node] += projection.frame.forward * (change * weight);
     }
 }
