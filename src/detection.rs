@@ -2,5 +2,8 @@
 
 /// In image space: rays through the pixels of a parallel view (CInDeR; Halic et al., section 2.1).
 pub mod image_space {
-    pub use crate::contact::image_space::LayeredImage;
+    pub use crate::contact::image_space::{
+        EdgeInside, Form, ImageSpace, ImageSpaceDefinition, Inside, LayeredImage, Overlap, Placed, PointInside,
+        Surface, Views,
+    };
 }

@@ -190,3 +190,49 @@ fn nor_does_one_of_tissue_that_remembers() {
         }
     }
 }
+
+#[test]
+fn detection_in_image_space_allocates_nothing() {
+    use sinew::detection::image_space::{Form, ImageSpace, ImageSpaceDefinition, LayeredImage, Placed, Surface};
+    let organ = Mesh::block([0.1; 3], [6; 3]).expect("a block");
+    let triangles = organ.surface().expect("its surface");
+    let surface = Surface::closed(organ.positions.len(), &triangles).expect("closed");
+    let moved: Vec<Vec3> = organ
+        .positions
+        .iter()
+        .map(|&p| p * 0.9 + Vec3::new(0.03, 0.02, 0.04))
+        .collect();
+    let bodies = [&organ.positions, &moved].map(|positions| Placed {
+        surface: &surface,
+        positions,
+        thickness: 0.001,
+    });
+    for form in [Form::Intervals, Form::Counted] {
+        // Room for the coarser pixels alone.
+        let definition = ImageSpaceDefinition {
+            form,
+            pixels: 2000,
+            crossings: 5000,
+            ..ImageSpaceDefinition::new(0.001)
+        };
+        let mut detector = ImageSpace::new(&definition, &[&surface]).expect("a detector");
+        let mut found = 0;
+        let count = asked(|| {
+            let overlap = detector.detect(&bodies).expect("an overlap");
+            assert!(overlap.pixel > 0.001);
+            found = overlap.inside[0].edges.len() + overlap.inside[1].edges.len();
+        });
+        assert_eq!(count, 0, "{form:?}");
+        assert!(found > 20, "{form:?}");
+    }
+    let image = LayeredImage::new(&organ.positions, &triangles, 0.001).expect("an image");
+    let mut near = 0;
+    let count = asked(|| {
+        near = moved
+            .iter()
+            .filter(|&&point| image.distance(point, 0.01).is_some())
+            .count()
+    });
+    assert_eq!(count, 0);
+    assert!(near > 20);
+}

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::covered::nearest_covered;
 use super::layers::{Crossing, Layers};
 use super::projection::{Frame, Projection};
+use super::surface;
 use crate::contact::distance::closest_on_triangle;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -133,16 +134,12 @@ impl LayeredImage {
                 "pixel is {pixel} m: must be above 0 and finite"
             )));
         }
-        super::surface::check(positions.len(), triangles)?;
+        surface::check(positions.len(), triangles)?;
+        surface::check_positions(positions)?;
         if !mesh::is_closed(triangles)? {
-            return Err(Error::invalid(super::surface::OPEN));
+            return Err(Error::invalid(surface::OPEN));
         }
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for (node, &position) in positions.iter().enumerate() {
-            if !position.is_finite() {
-                return Err(Error::invalid(format!("the position of node {node} is {position}")));
-            }
-        }
         for &node in triangles.as_flattened() {
             low = low.min(positions[node as usize]);
             high = high.max(positions[node as usize]);
@@ -286,13 +283,9 @@ impl Image {
 
     fn shows_inside(&self, point: Vec3) -> bool {
         let vertex = self.projection.project(point);
-        let in_image = vertex.x >= 0.0
-            && vertex.y >= 0.0
-            && vertex.x < f64::from(self.projection.width)
-            && vertex.y < f64::from(self.projection.height);
         let passed = |crossing: &&Crossing| f64::from(crossing.depth) < vertex.depth;
         let crossings = self.layers.at(self.projection.pixel_at(&vertex));
         let windings = crossings.iter().take_while(passed).map(Crossing::winding);
-        in_image && windings.sum::<i32>() > 0
+        self.projection.shows(&vertex) && windings.sum::<i32>() > 0
     }
 }

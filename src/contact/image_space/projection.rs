@@ -1,6 +1,6 @@
 //! From space to the pixels of a parallel view, and how large such an image may be.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::error::{Error, Result};
 use crate::raster::{GUARD, PixelVertex};
@@ -82,6 +82,14 @@ impl Projection {
         })
     }
 
+    /// Whether an image of what lies between `low` and `high` has at most so many pixels, and all corners of what lies
+    /// between `lowest` and `highest` can be drawn.
+    pub fn fits([low, high]: [DVec3; 2], [lowest, highest]: [DVec3; 2], pixel: f64, pixels: usize) -> bool {
+        let [columns, rows] = [high.x - low.x, high.y - low.y].map(|length| (length / pixel).ceil().max(1.0));
+        let reach = (highest - lowest).truncate().max_element() / pixel;
+        columns * rows <= pixels as f64 && reach < GUARD / 2.0
+    }
+
     pub fn pixel_count(&self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -95,6 +103,18 @@ impl Projection {
             depth: at.z,
             reciprocal: 1.0,
         }
+    }
+
+    /// The middle of a pixel, in pixels.
+    pub fn middle_of(&self, pixel: usize) -> DVec2 {
+        let width = self.width as usize;
+        DVec2::new((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5)
+    }
+
+    /// Whether what falls there is within the image.
+    pub fn shows(&self, vertex: &PixelVertex) -> bool {
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        vertex.x >= 0.0 && vertex.y >= 0.0 && vertex.x < width && vertex.y < height
     }
 
     /// The pixel of these coordinates, or the nearest one of the image.

@@ -1,10 +1,116 @@
 //! What can be drawn: checked once, so that a detection need not.
 
+use glam::Vec3;
+
 use crate::error::{Error, Result};
+use crate::memory;
+use crate::mesh;
 
 /// What is said of an occluder that is none.
 pub(super) const OPEN: &str =
     "the surface is not closed: an occluder must be, with each edge as often in one direction as in the other";
+
+/// The triangles of a body and their edges.
+#[derive(Debug)]
+pub struct Surface {
+    node_count: usize,
+    triangles: Vec<[u32; 3]>,
+    edges: Vec<[u32; 2]>,
+    closed: bool,
+}
+
+/// A surface where its nodes are now.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a> {
+    /// What is joined to what.
+    pub surface: &'a Surface,
+    /// Metres, one for each node.
+    pub positions: &'a [Vec3],
+    /// How much further along the view than its faces the body counts as there, m, at least 0: what keeps thin parts from
+    /// being missed.
+    pub thickness: f32,
+}
+
+impl Surface {
+    /// Of a body that others can be inside of: its triangles face outwards and leave no gap.
+    ///
+    /// Errors: [`Error::InvalidArgument`] for no triangles, an index out of range, a surface that is not closed;
+    /// [`Error::OutOfMemory`].
+    pub fn closed(node_count: usize, triangles: &[[u32; 3]]) -> Result<Self> {
+        check(node_count, triangles)?;
+        if !mesh::is_closed(triangles)? {
+            return Err(Error::invalid(OPEN));
+        }
+        Self::new(node_count, triangles, true)
+    }
+
+    /// Of a body that has no inside: it gives edges alone.
+    ///
+    /// Errors: [`Error::InvalidArgument`] for no triangles or an index out of range; [`Error::OutOfMemory`].
+    pub fn open(node_count: usize, triangles: &[[u32; 3]]) -> Result<Self> {
+        check(node_count, triangles)?;
+        Self::new(node_count, triangles, false)
+    }
+
+    fn new(node_count: usize, triangles: &[[u32; 3]], closed: bool) -> Result<Self> {
+        Ok(Self {
+            node_count,
+            triangles: memory::copied(triangles)?,
+            edges: mesh::edges(triangles, &[])?,
+            closed,
+        })
+    }
+
+    /// Whether others can be inside of it.
+    pub fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    /// How many positions it has.
+    pub fn node_count(&self) -> usize {
+        self.node_count
+    }
+
+    /// Three nodes each.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Two nodes each, every edge once.
+    pub fn edges(&self) -> &[[u32; 2]] {
+        &self.edges
+    }
+}
+
+impl Placed<'_> {
+    /// Refuses what does not belong together or is not finite.
+    pub(super) fn check(&self) -> Result<()> {
+        let node_count = self.surface.node_count;
+        if self.positions.len() != node_count {
+            return Err(Error::invalid(format!(
+                "{} positions of a surface of {node_count} nodes",
+                self.positions.len()
+            )));
+        }
+        if !(self.thickness >= 0.0 && self.thickness.is_finite()) {
+            return Err(Error::invalid(format!(
+                "thickness is {} m: must be finite and at least 0",
+                self.thickness
+            )));
+        }
+        check_positions(self.positions)
+    }
+}
+
+pub(super) fn check_positions(positions: &[Vec3]) -> Result<()> {
+    match positions.iter().position(|position| !position.is_finite()) {
+        Some(node) => Err(Error::invalid(format!(
+            "the position of node {node} is {}",
+            positions[node]
+        ))),
+        None => Ok(()),
+    }
+}
 
 /// Refuses what cannot be drawn.
 pub(super) fn check(node_count: usize, triangles: &[[u32; 3]]) -> Result<()> {
