@@ -1,14 +1,24 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod candidates;
+pub(crate) mod closest;
+mod coarse;
 mod constraint;
 mod contacts;
+mod deepest;
 mod distance;
+pub(crate) mod exact;
+#[cfg(test)]
+mod exact_tests;
+mod facets;
 mod features;
 mod holds;
+pub(crate) mod nearest;
 mod path;
+pub(crate) mod predicates;
 mod sweep;
 mod tool;
+pub(crate) mod tree;
 
 pub(crate) use contacts::{Contacts, Meeting};
 pub(crate) use holds::Holds;
