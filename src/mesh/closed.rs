@@ -9,8 +9,14 @@ use crate::contact::tree::Tree;
 use crate::memory;
 use crate::{Error, Result};
 
-/// A triangle has no area where it is lower than this part of its longest side.
-const FLAT: f64 = 1e-10;
+/// A triangle lies along a line where it is lower than this part of its longest side: about what rounding makes of it.
+const FLAT: f64 = 1e-6;
+
+/// Triangles cross where they pass through each other by more than this part of the largest coordinate: about what rounding makes of them.
+const CROSSING: f64 = 1e-6;
+
+/// Rounds of turning edges, at most: for rows of flat triangles.
+const ROUNDS: usize = 16;
 
 /// No node lies further from the origin, m: squares of distances stay finite in `f32`.
 const FURTHEST: f32 = 1e9;
@@ -32,13 +38,14 @@ impl ClosedSurface {
     /// Checks that `triangles` (three node indices each, outward by the right-hand rule) over `positions` (metres) enclose a solid.
     ///
     /// Nodes at exactly the same place count as one, as in STL files, where each triangle brings its own corners: triangles then name
-    /// the first of them.
+    /// the first of them. A triangle that lies along a line, lower than 1e-6 of its longest side, closes a gap where nodes lie on the edge
+    /// of a neighbour; it takes a part of that neighbour, so that both have an area.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`], naming triangles and nodes, where there are no triangles; an index is that of no node; a position is
-    /// not finite or further than 1e9 m from the origin; a triangle has no area (it repeats a place, or is lower than 1e-10 of its
-    /// longest side); an edge is not gone along as often in one direction as in the other, so that the surface is open; the surface, or
-    /// a part of it, is inside out; two triangles pass through each other. [`Error::OutOfMemory`].
+    /// not finite or further than 1e9 m from the origin; a triangle repeats a place, or lies along a line and has no neighbour to take a
+    /// part of; an edge is not gone along as often in one direction as in the other, so that the surface is open; the surface, or a part of
+    /// it, is inside out; two triangles pass through each other, by more than 1e-6 of the largest coordinate. [`Error::OutOfMemory`].
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         if triangles.is_empty() {
             return Err(Error::invalid("no triangles: they enclose nothing"));
@@ -64,8 +71,9 @@ impl ClosedSurface {
             volume: 0.0,
         };
         surface.weld()?;
-        surface.check_areas()?;
+        surface.check_corners()?;
         let parts = surface.parts()?;
+        surface.part_flat_triangles()?;
         surface.check_volume()?;
         surface.check_parts(parts)?;
         surface.check_crossings()?;
@@ -77,7 +85,8 @@ impl ClosedSurface {
         &self.positions
     }
 
-    /// The triangles in the order given; of nodes at the same place they name the first.
+    /// The triangles in the order given; of nodes at the same place they name the first, and what lay along a line has taken a part of its
+    /// neighbour.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
@@ -111,15 +120,81 @@ impl ClosedSurface {
         Ok(())
     }
 
-    fn check_areas(&self) -> Result<()> {
+    fn check_corners(&self) -> Result<()> {
         for (index, &[a, b, c]) in self.triangles.iter().enumerate() {
-            let [p, q, r] = self.corners(index).map(|corner| corner.as_dvec3());
-            let longest = (q - p).length_squared().max((r - q).length_squared());
-            let longest = longest.max((p - r).length_squared());
-            if !((q - p).cross(r - p).length() > FLAT * longest) {
+            if a == b || b == c || c == a {
                 return Err(Error::invalid(format!(
-                    "triangle {index} with nodes {a}, {b} and {c} has no area"
+                    "triangle {index} has no area: nodes {a}, {b} and {c}, counted once where they are at the same place"
                 )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a triangle is flat, the number of its longest side.
+    fn flat_side(&self, triangle: usize) -> Option<usize> {
+        let corners = self.corners(triangle).map(|corner| corner.as_dvec3());
+        let [a, b, c] = corners;
+        let mut longest = (0, 0.0);
+        for side in 0..3 {
+            let squared = corners[side].distance_squared(corners[(side + 1) % 3]);
+            if squared > longest.1 {
+                longest = (side, squared);
+            }
+        }
+        (!((b - a).cross(c - a).length() > FLAT * longest.1)).then_some(longest.0)
+    }
+
+    /// Turns the longest edge of each flat triangle, so that it parts its neighbour there; refused where that does not help.
+    fn part_flat_triangles(&mut self) -> Result<()> {
+        let mut sides: Vec<(u64, u32, u32)> = Vec::new();
+        let mut touched: Vec<bool> = Vec::new();
+        for round in 0..=ROUNDS {
+            let Some(first) = (0..self.triangles.len()).find(|&index| self.flat_side(index).is_some()) else {
+                return Ok(());
+            };
+            if round == ROUNDS {
+                let [a, b, c] = self.triangles[first];
+                return Err(Error::invalid(format!(
+                    "triangle {first} has no area: nodes {a}, {b} and {c} lie along a line"
+                )));
+            }
+            sides.clear();
+            sides.try_reserve(3 * self.triangles.len())?;
+            for (index, triangle) in (0_u32..).zip(&self.triangles) {
+                for (side, ends) in (0_u32..).zip(super::TRIANGLE_EDGES) {
+                    sides.push((super::pack(triangle, ends), index, side));
+                }
+            }
+            sides.sort_unstable();
+            touched.clear();
+            touched.try_reserve(self.triangles.len())?;
+            touched.resize(self.triangles.len(), false);
+            for flat in first..self.triangles.len() {
+                let Some(side) = self.flat_side(flat) else {
+                    continue;
+                };
+                let edge = super::pack(&self.triangles[flat], super::TRIANGLE_EDGES[side]);
+                let start = sides.partition_point(|other| other.0 < edge);
+                let mut others = sides[start..].iter().take_while(|other| other.0 == edge);
+                let (Some(one), Some(two), None) = (others.next(), others.next(), others.next()) else {
+                    continue;
+                };
+                let &(_, neighbour, across) = if one.1 as usize == flat { two } else { one };
+                let neighbour = neighbour as usize;
+                let turn = |triangle: [u32; 3], by: usize| [0, 1, 2].map(|corner| triangle[(corner + by) % 3]);
+                // From `c` to `a` along the edge, and in the neighbour back.
+                let [c, a, b] = turn(self.triangles[flat], side);
+                let [_, _, d] = turn(self.triangles[neighbour], across as usize);
+                let parting = (u64::from(b.min(d)) << 32) | u64::from(b.max(d));
+                let is_there = sides.binary_search_by_key(&parting, |other| other.0).is_ok();
+                if b == d || is_there || touched[flat] || touched[neighbour] {
+                    continue;
+                }
+                self.triangles[flat] = [a, b, d];
+                self.triangles[neighbour] = [b, c, d];
+                touched[flat] = true;
+                touched[neighbour] = true;
             }
         }
         Ok(())
@@ -250,6 +325,8 @@ impl ClosedSurface {
 
     fn check_crossings(&self) -> Result<()> {
         let tree = Tree::new(self.triangles.len(), |triangle| self.corners(triangle as usize))?;
+        let bounds = tree.bounds();
+        let depth = CROSSING * f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
         for (index, nodes) in self.triangles.iter().enumerate() {
             let corners = self.corners(index);
             let bounds = Bounds::of(corners.into_iter());
@@ -258,8 +335,8 @@ impl ClosedSurface {
                 let other = tree.triangle(place) as usize;
                 if other > index
                     && crossed.is_none()
-                    && (pierces(nodes, corners, &self.triangles[other], self.corners(other))
-                        || pierces(&self.triangles[other], self.corners(other), nodes, corners))
+                    && (pierces(nodes, corners, &self.triangles[other], self.corners(other), depth)
+                        || pierces(&self.triangles[other], self.corners(other), nodes, corners, depth))
                 {
                     crossed = Some(other);
                 }
@@ -276,9 +353,9 @@ impl ClosedSurface {
 }
 
 /// Whether an edge of the first triangle passes through the second, with which it shares no node.
-fn pierces(nodes: &[u32; 3], corners: [Vec3; 3], others: &[u32; 3], triangle: [Vec3; 3]) -> bool {
+fn pierces(nodes: &[u32; 3], corners: [Vec3; 3], others: &[u32; 3], triangle: [Vec3; 3], depth: f64) -> bool {
     super::TRIANGLE_EDGES.iter().any(|ends| {
-        ends.iter().all(|&end| !others.contains(&nodes[end])) && crosses(corners[ends[0]], corners[ends[1]], triangle)
+        ends.iter().all(|&end| !others.contains(&nodes[end])) && crosses(corners[ends[0]], corners[ends[1]], triangle, depth)
     })
 }
 
