@@ -82,6 +82,16 @@ impl<T> Slots<T> {
         slots[index].content.as_mut().ok_or_else(|| stale(noun, id))
     }
 
+    /// What lives at a place.
+    pub fn at(&self, place: usize) -> Option<&T> {
+        self.slots.get(place)?.content.as_ref()
+    }
+
+    /// What lives at a place.
+    pub fn at_mut(&mut self, place: usize) -> Option<&mut T> {
+        self.slots.get_mut(place)?.content.as_mut()
+    }
+
     /// All that live, with their places.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &T)> {
         self.slots

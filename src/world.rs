@@ -3,7 +3,7 @@
 use glam::{DVec3, Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
-use crate::contact::{Contact, ContactChange, Pose, TRIES, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, Pose, TRIES, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
@@ -85,6 +85,8 @@ pub struct World {
     tools: Slots<Tool>,
     /// The ways of the tools in the step in progress.
     paths: Vec<ToolPath>,
+    /// Contacts of tissue with tissue, where bodies ask for them.
+    tissue: Option<Box<Tissue>>,
     /// How the step in progress ended for each body, at its place.
     outcomes: Vec<Option<Outcome>>,
 }
@@ -111,6 +113,7 @@ impl World {
             bodies: Slots::new("body"),
             tools: Slots::new("tool"),
             paths: Vec::new(),
+            tissue: None,
             outcomes: Vec::new(),
         })
     }
@@ -143,7 +146,24 @@ impl World {
         };
         let body = Body::new(definition, needs)?;
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
-        Ok(BodyId(self.bodies.insert(body)?))
+        let id = self.bodies.insert(body)?;
+        match self.join_tissue(id) {
+            Ok(()) => Ok(BodyId(id)),
+            Err(error) => {
+                self.bodies.remove(id)?;
+                Err(error)
+            }
+        }
+    }
+
+    /// Lets a body that asks for it meet tissue.
+    fn join_tissue(&mut self, id: SlotId) -> Result<()> {
+        let place = self.bodies.place(id)?;
+        let body = self.bodies.get_mut(id)?;
+        if !body.meets_tissue() {
+            return Ok(());
+        }
+        self.tissue.get_or_insert_default().join(place, body)
     }
 
     /// Removes a body.
@@ -151,6 +171,10 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_body(&mut self, body: BodyId) -> Result<()> {
+        let place = self.bodies.place(body.0)?;
+        if let Some(tissue) = &mut self.tissue {
+            tissue.leave(place);
+        }
         self.bodies.remove(body.0).map(drop)
     }
 
@@ -322,6 +346,7 @@ impl World {
             bodies,
             paths,
             outcomes,
+            tissue,
             ..
         } = self;
         let request = StepRequest {
@@ -337,12 +362,22 @@ impl World {
             },
             tools: paths,
         };
+        if let Some(tissue) = tissue {
+            tissue.lend(bodies);
+        }
         lead(threads, bodies, |bodies, team| {
             attempt_bodies(bodies, outcomes, &request, team)
         });
+        if let Some(tissue) = tissue {
+            tissue.take_back(bodies);
+        }
         let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
         if outcomes.iter().flatten().any(unstable) {
             return Err(report(bodies, outcomes));
+        }
+        if let Some(tissue) = tissue {
+            let has_tried = |place: usize| matches!(outcomes[place], Some(Outcome::Done { .. }));
+            tissue.meet(bodies, dt, has_tried);
         }
         Ok(())
     }
@@ -365,6 +400,9 @@ impl World {
         lead(threads, bodies, |bodies, team| {
             commit_bodies(bodies, outcomes, paths, team)
         });
+        if let Some(tissue) = &mut self.tissue {
+            tissue.commit(dt);
+        }
         self.commit_tools(dt);
         report
     }
@@ -437,6 +475,9 @@ impl World {
         for (place, tool) in self.tools.iter() {
             hasher.write_u64(place as u64);
             tool.hash_state(&mut hasher);
+        }
+        if let Some(tissue) = &self.tissue {
+            tissue.hash_state(&mut hasher);
         }
         hasher.finish()
     }

@@ -14,6 +14,7 @@ mod published;
 mod records;
 mod region;
 mod state;
+mod tissue;
 mod tune;
 mod vectors;
 
@@ -28,6 +29,7 @@ pub(crate) use definition::{
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
+use tissue::Deflection;
 pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
@@ -96,6 +98,8 @@ pub struct Body {
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
     pub(crate) contact: BodyContact,
+    /// What other tissue did to the step in progress.
+    deflection: Option<Deflection>,
     pub(crate) carry: Carry,
     /// Whether the state's forces belong to its positions and velocities.
     pub(crate) forces_current: bool,
@@ -217,6 +221,7 @@ impl Body {
             applied: None,
             contacts: None,
             contact: definition.contact,
+            deflection: None,
             carry: Carry {
                 stability: Stability::UNKNOWN,
                 gravity: GravityKicks::new(Bounds {
@@ -529,6 +534,13 @@ impl Body {
         self.state.commit();
         self.carry = carry;
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
+        if let Some(deflection) = self.deflection.take() {
+            self.forces_current = false;
+            self.carry.gravity.velocities = self.carry.gravity.velocities.and(&deflection.velocities);
+            if carry.masses_for == 0.0 && !self.carry.stability.holds_after(2.0 * deflection.furthest) {
+                self.carry.stability = Stability::UNKNOWN;
+            }
+        }
         if let Some(elements) = &mut self.elements {
             elements.settle();
         }
@@ -557,6 +569,7 @@ impl Body {
 
     /// Prepares again what an attempted step that is not committed has changed.
     pub(crate) fn put_back(&mut self) {
+        self.deflection = None;
         if let Some(implicit) = &mut self.implicit {
             implicit.put_back();
         }

@@ -5,18 +5,18 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::closest::Closest;
+use super::exact::ExactSolid;
 use super::image_space::LayeredImage;
 use super::tool::Detection;
 use crate::body::Bounds;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::mesh::ClosedSurface;
 
 /// What a mesh encloses.
 #[derive(Debug)]
 pub(crate) struct MeshSolid {
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    surface: ClosedSurface,
     found: Found,
     bounds: Bounds,
     reach: f32,
@@ -26,6 +26,7 @@ pub(crate) struct MeshSolid {
 /// How what it encloses is found.
 #[derive(Debug)]
 enum Found {
+    Exact(Box<ExactSolid>),
     Image(LayeredImage),
 }
 
@@ -40,7 +41,8 @@ impl MeshSolid {
         detection: Detection,
         resolution: f32,
     ) -> Result<Arc<Self>> {
-        let bounds = Bounds::of(positions.iter().copied());
+        let surface = ClosedSurface::new(positions, triangles)?;
+        let bounds = Bounds::of(surface.positions().iter().copied());
         let fine = |count: f32| {
             if resolution > 0.0 {
                 resolution
@@ -49,10 +51,14 @@ impl MeshSolid {
             }
         };
         let found = match detection {
-            Detection::ImageSpace => Found::Image(LayeredImage::new(positions, triangles, fine(PIXELS))?),
+            Detection::Exact => Found::Exact(Box::new(ExactSolid::new(&surface)?)),
+            Detection::ImageSpace => {
+                let image = LayeredImage::new(surface.positions(), surface.triangles(), fine(PIXELS))?;
+                Found::Image(image)
+            }
             other => {
                 return Err(Error::Unsupported(format!(
-                    "detection is {other:?}: this version finds meshes in image space alone"
+                    "detection is {other:?}: this version finds meshes exactly or in image space"
                 )));
             }
         };
@@ -65,18 +71,14 @@ impl MeshSolid {
         for corner in triangles.as_flattened() {
             hasher.write_u64(u64::from(*corner));
         }
-        let used = || {
-            triangles
-                .as_flattened()
-                .iter()
-                .map(|&corner| positions[corner as usize])
-        };
         let solid = Self {
-            positions: memory::copied(positions)?,
-            triangles: memory::copied(triangles)?,
             found,
-            bounds: Bounds::of(used()),
-            reach: used().fold(0.0, |reach, corner| corner.length().max(reach)),
+            bounds,
+            reach: surface
+                .positions()
+                .iter()
+                .fold(0.0, |reach, corner| corner.length().max(reach)),
+            surface,
             hash: hasher.finish(),
         };
         Ok(Arc::new(solid))
@@ -84,12 +86,12 @@ impl MeshSolid {
 
     /// The corners of its surface.
     pub fn positions(&self) -> &[Vec3] {
-        &self.positions
+        self.surface.positions()
     }
 
     /// Its surface.
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+        self.surface.triangles()
     }
 
     /// The corners of the box about it.
@@ -116,6 +118,7 @@ impl MeshSolid {
     /// The closest that a node, edge or face with these corners comes; `None`: no closer than `within`.
     pub(super) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         match &self.found {
+            Found::Exact(solid) => solid.closest(corners, within),
             Found::Image(image) => image.closest(corners, within),
         }
     }

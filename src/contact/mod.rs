@@ -1,10 +1,16 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod candidates;
-mod closest;
+pub(crate) mod closest;
+mod coarse;
 mod constraint;
 mod contacts;
+mod deepest;
 mod distance;
+pub(crate) mod exact;
+#[cfg(test)]
+mod exact_tests;
+mod facets;
 mod features;
 mod filter;
 mod holds;
@@ -12,10 +18,14 @@ pub(crate) mod image_space;
 mod limit;
 mod meet;
 mod mesh_solid;
+pub(crate) mod nearest;
 mod path;
+pub(crate) mod predicates;
 mod report;
 mod sweep;
+mod tissue;
 mod tool;
+pub(crate) mod tree;
 
 pub(crate) use contacts::{Contacts, Meeting};
 pub use filter::{BodyContact, CollisionFilter};
@@ -23,5 +33,6 @@ pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
 pub(crate) use path::ToolPath;
 pub use report::{Contact, ContactChange};
+pub(crate) use tissue::Tissue;
 pub use tool::{Detection, Pose, Shape, ToolDefinition};
 pub(crate) use tool::{Form, Tool};

@@ -10,6 +10,9 @@ use super::distance::{closest_of_segments, closest_on_segment, closest_on_triang
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
 const TOUCHING: f32 = 1e-4;
 
+/// A way of this part of half a mesh's least extent is not searched: it is too short to pass anything.
+const FLAT: f32 = 0.01;
+
 /// Advances of one search. A search that takes more grazes the tool, and ends where it is, still clear of it.
 const ADVANCES: u32 = 32;
 
@@ -150,7 +153,8 @@ impl Corners {
         let mut closest = solid.closest(&self.at(0.0)[..self.count], within + closing)?;
         for _ in 0..ADVANCES {
             let gap = closest.distance - clearance;
-            if gap <= touching {
+            // So short a way sees the solid as flat.
+            if gap <= touching || closing * (1.0 - time) <= FLAT * solid.thickness() {
                 break;
             }
             time += gap / closing;

@@ -3,6 +3,7 @@
 //! [`load`] reads a file, [`Mesh::cloth`], [`Mesh::block`], [`Mesh::lattice`] and [`Mesh::organ`] make a shape, and [`tidy`]
 //! cleans a mesh that is already in memory.
 
+mod closed;
 mod file;
 pub(crate) mod order;
 mod organ;
@@ -15,6 +16,7 @@ use glam::{DVec3, Vec3};
 use crate::memory;
 use crate::{Error, Result};
 
+pub use closed::ClosedSurface;
 pub use file::{MeshFormat, load};
 pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};

@@ -38,7 +38,10 @@ impl Solid {
 
     /// How far the surface is from a point, m.
     pub fn distance(&self, point: DVec3) -> f64 {
-        let distances = self.triangles.iter().map(|&triangle| point_to_triangle(point, triangle));
+        let distances = self
+            .triangles
+            .iter()
+            .map(|&triangle| point_to_triangle(point, triangle));
         distances.fold(f64::INFINITY, f64::min)
     }
 
@@ -78,7 +81,9 @@ pub fn ball(radius: f32, quartered: u32) -> Mesh {
         [-golden, 0.0, -1.0],
         [-golden, 0.0, 1.0],
     ];
-    let mut positions: Vec<Vec3> = corners.map(|corner| Vec3::from_array(corner).normalize() * radius).to_vec();
+    let mut positions: Vec<Vec3> = corners
+        .map(|corner| Vec3::from_array(corner).normalize() * radius)
+        .to_vec();
     let mut triangles: Vec<[u32; 3]> = vec![
         [0, 11, 5],
         [0, 5, 1],

@@ -189,6 +189,16 @@ impl Substep<'_> {
 }
 
 impl Implicit {
+    /// Other tissue gave a node this velocity at the end of a step, m/s.
+    pub fn deflect(&mut self, node: usize, given: Vec3) {
+        let history = &mut self.histories[1 - self.settled];
+        let way = history.ways.get(node) + given * history.step;
+        history.ways.set(node, way);
+        // What it gives is no gain that will go on.
+        history.gains.set(node, Vec3::ZERO);
+        history.energy = None;
+    }
+
     /// Makes the preconditioner what it is without contacts.
     pub(super) fn soften(&mut self) {
         while let Some((node, part)) = self.stiffened.pop() {

@@ -1,0 +1,367 @@
+//! EXACT against all triangles, in `f64`.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use super::exact::ExactSolid;
+use super::predicates::solid_angle;
+use crate::mesh::{ClosedSurface, Mesh, MeshFormat, load};
+use crate::random::Random;
+
+/// m, as all of these solids are about 0.1 m across.
+const WITHIN: f32 = 0.004;
+
+fn cube() -> ClosedSurface {
+    let mesh = Mesh::lattice(0.02, [4; 3]).expect("a lattice");
+    ClosedSurface::new(&mesh.positions, &mesh.surface().expect("a surface")).expect("a cube")
+}
+
+fn sphere() -> ClosedSurface {
+    let mesh = Mesh::lattice(0.125, [8; 3]).expect("a lattice");
+    let bounds = crate::body::Bounds::of(mesh.positions.iter().copied());
+    let centre = (bounds.min + bounds.max) * 0.5;
+    let round = |p: &Vec3| (*p - centre).normalize_or_zero() * 0.05;
+    let positions: Vec<Vec3> = mesh.positions.iter().map(round).collect();
+    ClosedSurface::new(&positions, &mesh.surface().expect("a surface")).expect("a sphere")
+}
+
+fn torus() -> ClosedSurface {
+    let (rings, sides) = (24_u32, 12_u32);
+    let angle = |index: u32, count: u32| std::f32::consts::TAU * index as f32 / count as f32;
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for ring in 0..rings {
+        for side in 0..sides {
+            let (around, across) = (angle(ring, rings), angle(side, sides));
+            let radius = 0.035 + 0.015 * across.cos();
+            positions.push(Vec3::new(
+                radius * around.cos(),
+                radius * around.sin(),
+                0.015 * across.sin(),
+            ));
+            let node = |ring: u32, side: u32| (ring % rings) * sides + side % sides;
+            let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(r, s)| node(ring + r, side + s));
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    ClosedSurface::new(&positions, &triangles).expect("a torus")
+}
+
+/// A real mesh, about 0.1 m across; none where the folder is missing.
+fn real(name: &str, scale: f32) -> Option<ClosedSurface> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .map(|above| above.join("shared/meshes"))
+        .find(|folder| folder.is_dir())?;
+    let mesh = load(folder.join(name), MeshFormat::Auto, scale).expect("a mesh").mesh;
+    Some(ClosedSurface::new(&mesh.positions, &mesh.triangles).expect("a closed surface"))
+}
+
+fn solids() -> Vec<(&'static str, ClosedSurface)> {
+    let mut solids = vec![("cube", cube()), ("sphere", sphere()), ("torus", torus())];
+    for (name, scale) in [("stomach.stl", 0.001), ("forceps_jaw_left.stl", 0.004)] {
+        match real(name, scale) {
+            Some(surface) => solids.push((name, surface)),
+            None => skip(name),
+        }
+    }
+    solids
+}
+
+#[allow(clippy::print_stderr)]
+fn skip(name: &str) {
+    eprintln!("SKIPPED: ../shared/meshes/{name} is missing");
+}
+
+/// All triangles of a solid.
+struct Reference(Vec<[DVec3; 3]>);
+
+impl Reference {
+    fn new(surface: &ClosedSurface) -> Self {
+        let place = |node: u32| surface.positions()[node as usize].as_dvec3();
+        Self(surface.triangles().iter().map(|nodes| nodes.map(place)).collect())
+    }
+
+    fn near(&self, low: DVec3, high: DVec3) -> Self {
+        let meets = |triangle: &&[DVec3; 3]| {
+            let [a, b, c] = triangle;
+            a.min(*b).min(*c).cmple(high).all() && low.cmple(a.max(*b).max(*c)).all()
+        };
+        Self(self.0.iter().filter(meets).copied().collect())
+    }
+
+    /// By planes and sides, in another way than what it is compared with.
+    fn distance(&self, point: DVec3) -> f64 {
+        let one = |&[a, b, c]: &[DVec3; 3]| {
+            let normal = (b - a).cross(c - a);
+            let above = |p: DVec3, q: DVec3| normal.dot((q - p).cross(point - p)) >= 0.0;
+            if above(a, b) && above(b, c) && above(c, a) {
+                return normal.dot(point - a).abs() / normal.length();
+            }
+            let to_side = |p: DVec3, q: DVec3| {
+                let along = ((point - p).dot(q - p) / p.distance_squared(q)).clamp(0.0, 1.0);
+                point.distance(p + (q - p) * along)
+            };
+            to_side(a, b).min(to_side(b, c)).min(to_side(c, a))
+        };
+        self.0.iter().map(one).fold(f64::INFINITY, f64::min)
+    }
+
+    fn is_inside(&self, point: DVec3) -> bool {
+        let angle: f64 = self.0.iter().map(|&triangle| solid_angle(point, triangle)).sum();
+        angle > std::f64::consts::TAU
+    }
+
+    fn signed(&self, point: DVec3) -> f64 {
+        self.distance(point) * if self.is_inside(point) { -1.0 } else { 1.0 }
+    }
+}
+
+/// Points near a solid, and some further in and out.
+fn place(random: &mut Random, surface: &ClosedSurface, spread: f32) -> Vec3 {
+    let triangle = surface.triangles()[random.below(surface.triangles().len())];
+    let [a, b, c] = triangle.map(|node| surface.positions()[node as usize]);
+    // Often at a node or an edge.
+    let [u, v, w] = [(); 3].map(|()| {
+        if random.below(4) == 0 {
+            0.0
+        } else {
+            random.unit() + 1e-3
+        }
+    });
+    let on = if u + v + w > 0.0 {
+        (a * u + b * v + c * w) / (u + v + w)
+    } else {
+        a
+    };
+    let far = 10.0_f32.powf(-4.0 * random.unit());
+    on + random.vector() * spread * far
+}
+
+#[test]
+fn points_are_measured() {
+    let mut random = Random(5);
+    for (name, surface) in solids() {
+        let solid = ExactSolid::new(&surface).expect("a solid");
+        let changing = ExactSolid::changing(&surface).expect("a solid");
+        let reference = Reference::new(&surface);
+        let (mut insides, mut found) = (0, 0);
+        for _ in 0..400 {
+            let point = place(&mut random, &surface, 0.03);
+            let expected = reference.signed(point.as_dvec3());
+            for solid in [&solid, &changing] {
+                let told = solid.closest(&[point], WITHIN);
+                // What lies on the surface to rounding has no side.
+                if expected.abs() > 1e-9 {
+                    assert_eq!(solid.is_inside(point), expected < 0.0, "{name}: {point} at {expected}");
+                }
+                let Some(told) = told else {
+                    assert!(
+                        expected > f64::from(WITHIN) * 0.999_999,
+                        "{name}: {point} at {expected} is not found"
+                    );
+                    continue;
+                };
+                assert!(
+                    (f64::from(told.distance) - expected).abs() < 1e-8,
+                    "{name}: {point}: {} for {expected}",
+                    told.distance
+                );
+                // The normal leads away as fast as may be.
+                let step = 1e-5 * expected.abs().max(1e-4);
+                let ahead = reference.signed(point.as_dvec3() + told.normal.as_dvec3() * step);
+                assert!(
+                    ahead - expected > 0.99 * step,
+                    "{name}: {point} at {expected}: {} of {step}",
+                    ahead - expected
+                );
+                found += 1;
+            }
+            insides += i32::from(expected < 0.0);
+        }
+        assert!(insides > 50 && found > 300, "{name}: {insides} inside, {found} near");
+    }
+}
+
+#[test]
+fn edges_and_faces_are_measured() {
+    let mut random = Random(11);
+    for (name, surface) in solids() {
+        let solid = ExactSolid::new(&surface).expect("a solid");
+        let reference = Reference::new(&surface);
+        // How often: nothing near, at the border, in between, deep.
+        let mut seen = [[0; 4]; 2];
+        for turn in 0..1200 {
+            let count = 2 + turn % 2;
+            let first = place(&mut random, &surface, 0.01);
+            let size = 0.012 * random.unit() + 0.001;
+            let corners = [first, first + random.vector() * size, first + random.vector() * size];
+            let corners = &corners[..count];
+            let exact: Vec<DVec3> = corners.iter().map(|corner| corner.as_dvec3()).collect();
+            let reach = DVec3::splat(0.03);
+            let near = reference.near(exact[0] - reach, exact[0] + reach);
+            // The least over a grid of points, refined about the least of them.
+            let place_of = |weights: [f64; 3]| -> DVec3 { exact.iter().zip(weights).map(|(p, w)| *p * w).sum() };
+            let mut best = ([1.0, 0.0, 0.0], f64::INFINITY);
+            let mut centre = [0.0; 2];
+            let mut width = 1.0;
+            for round in 0..5 {
+                let steps = if count == 2 { 60 } else { 14 };
+                let low = if round == 0 {
+                    [0.0; 2]
+                } else {
+                    centre.map(|c: f64| c - width)
+                };
+                let span = if round == 0 { 1.0 } else { 2.0 * width };
+                for i in 0..=steps {
+                    for j in 0..=if count == 2 { 0 } else { steps } {
+                        let [u, v] = [
+                            low[0] + span * f64::from(i) / f64::from(steps),
+                            low[1] + span * f64::from(j) / f64::from(steps),
+                        ];
+                        let v = if count == 2 { 0.0 } else { v.clamp(0.0, 1.0) };
+                        let u = u.clamp(0.0, 1.0 - v);
+                        let weights = [1.0 - u - v, u, v];
+                        let point = place_of(weights);
+                        let here = near.distance(point);
+                        let here = if here < best.1.abs() || best.1 <= 0.0 || here > 0.0 && best.1 == f64::INFINITY {
+                            if reference_is_inside(&solid, &reference, point, here) {
+                                -here
+                            } else {
+                                here
+                            }
+                        } else {
+                            here
+                        };
+                        if here < best.1 {
+                            best = (weights, here);
+                            centre = [u, v];
+                        }
+                    }
+                }
+                width = if round == 0 {
+                    1.0 / f64::from(steps)
+                } else {
+                    width / f64::from(steps) * 2.0
+                };
+            }
+            let told = solid.closest(corners, WITHIN);
+            let tally = &mut seen[count - 2];
+            let inner = best.0[..count].iter().all(|&weight| weight > 1e-3);
+            let Some(told) = told else {
+                // Found nowhere near: far, or closest with a corner or a border, which is another feature's concern.
+                assert!(
+                    best.1 > 0.99 * f64::from(WITHIN) || !inner && best.1 > -1e-7,
+                    "{name}: {corners:?}: {best:?} is not found"
+                );
+                tally[0] += 1;
+                continue;
+            };
+            let weights = told.weights.map(f64::from);
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+            assert!((told.normal.length() - 1.0).abs() < 1e-6);
+            if told.inside {
+                // What is told is the distance of the point that is told.
+                let here = reference.signed(place_of(weights));
+                assert!(
+                    (here - f64::from(told.distance)).abs() < 2e-8,
+                    "{name}: {corners:?}: {told:?}: {here}"
+                );
+            }
+            if best.1 < -1e-7 {
+                tally[3] += 1;
+                // Cutting planes find the deepest point in what is convex; elsewhere one that is deep.
+                let convex = name == "cube" || name == "sphere";
+                let least = if convex { 0.99 } else { 0.2 };
+                assert!(
+                    f64::from(told.distance) <= least * best.1,
+                    "{name}: {corners:?}: {told:?} for {best:?}"
+                );
+            } else if told.inside {
+                tally[2] += 1;
+                // A least distance between the ends is found, unless a border is closer.
+                if inner {
+                    assert!(
+                        f64::from(told.distance) < best.1 + 2e-6,
+                        "{name}: {corners:?}: {told:?} for {best:?}"
+                    );
+                }
+            } else {
+                tally[1] += 1;
+                assert!(
+                    f64::from(told.distance) > reference.signed(place_of(weights)) - 2e-8,
+                    "{name}: {corners:?}: {told:?}"
+                );
+            }
+        }
+        let [edges, faces] = seen;
+        assert!(edges.iter().all(|&count| count > 5), "{name}: {seen:?}");
+        // A cube has few corners to meet a face with.
+        assert!(
+            faces[1] > 2 && faces[3] > 5 && (faces[2] > 5 || name == "cube"),
+            "{name}: {seen:?}"
+        );
+    }
+}
+
+/// By the solid angle only where it could matter.
+fn reference_is_inside(solid: &ExactSolid, reference: &Reference, point: DVec3, distance: f64) -> bool {
+    if distance < 1e-6 {
+        reference.is_inside(point)
+    } else {
+        solid.is_inside(point.as_vec3())
+    }
+}
+
+#[test]
+fn crossings_alternate() {
+    let mut random = Random(23);
+    for (name, surface) in solids() {
+        let solid = ExactSolid::new(&surface).expect("a solid");
+        let reference = Reference::new(&surface);
+        let mut crossed = 0;
+        for turn in 0..600 {
+            let [from, to] = if turn % 2 == 0 {
+                [(); 2].map(|()| place(&mut random, &surface, 0.05))
+            } else {
+                // From node to node, through edges and nodes.
+                let count = surface.triangles().len();
+                let [a, b] =
+                    [(); 2].map(|()| surface.positions()[surface.triangles()[random.below(count)][0] as usize]);
+                [a + (a - b), b + (b - a)]
+            };
+            let mut crossings = Vec::new();
+            solid.crossings(from, to, |crossing| crossings.push(crossing));
+            crossings.sort_by(|a, b| a.fraction.total_cmp(&b.fraction));
+            let mut winding = i32::from(reference.is_inside(from.as_dvec3()));
+            let mut last = 0.0;
+            let check = |winding: i32, from_fraction: f64, to_fraction: f64| {
+                // Between two crossings that are apart the side is what was counted.
+                let middle = from.as_dvec3().lerp(to.as_dvec3(), 0.5 * (from_fraction + to_fraction));
+                if to_fraction - from_fraction > 1e-4 && reference.distance(middle) > 1e-7 {
+                    assert_eq!(
+                        winding,
+                        i32::from(reference.is_inside(middle)),
+                        "{name}: {from} to {to}"
+                    );
+                }
+            };
+            for crossing in &crossings {
+                check(winding, last, crossing.fraction);
+                winding += if crossing.enters { 1 } else { -1 };
+                last = crossing.fraction;
+            }
+            check(winding, last, 1.0);
+            if reference.distance(to.as_dvec3()) > 1e-7 && reference.distance(from.as_dvec3()) > 1e-7 {
+                assert_eq!(
+                    winding,
+                    i32::from(reference.is_inside(to.as_dvec3())),
+                    "{name}: {from} to {to}"
+                );
+            }
+            crossed += crossings.len();
+        }
+        assert!(crossed > 500, "{name}: {crossed}");
+    }
+}

@@ -1,0 +1,120 @@
+//! Which side, and whether it crosses: in `f64`, where rounding would decide.
+
+use glam::{DVec3, Vec3};
+
+/// What rounding may make of a triple product, as a part of the sum of its products' sizes.
+const ROUNDING: f64 = 1e-15;
+
+/// `a . (b x c)`, of which the sign is exact; of coordinates rounded to `f32` differences are exact too.
+fn triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let rounded = a.dot(b.cross(c));
+    let (x, y, z) = (b.abs(), c.abs(), a.abs());
+    let size = z.x * (x.y * y.z + x.z * y.y) + z.y * (x.z * y.x + x.x * y.z) + z.z * (x.x * y.y + x.y * y.x);
+    if rounded.abs() > ROUNDING * size {
+        return rounded;
+    }
+    let mut terms = [0.0; 24];
+    let products = [
+        (a.x, b.y, c.z),
+        (-a.x, b.z, c.y),
+        (a.y, b.z, c.x),
+        (-a.y, b.x, c.z),
+        (a.z, b.x, c.y),
+        (-a.z, b.y, c.x),
+    ];
+    for (four, (a, b, c)) in terms.chunks_exact_mut(4).zip(products) {
+        let (high, low) = two_product(a, b);
+        (four[0], four[1]) = two_product(high, c);
+        (four[2], four[3]) = two_product(low, c);
+    }
+    // Each is taken into a sum of numbers that do not overlap, of which the last that is not 0 has its sign (Shewchuk 1997).
+    let mut sum = [0.0; 24];
+    for (count, &term) in terms.iter().enumerate() {
+        let mut carried = term;
+        for part in &mut sum[..count] {
+            (carried, *part) = two_sum(carried, *part);
+        }
+        sum[count] = carried;
+    }
+    sum.into_iter().rev().find(|&part| part != 0.0).unwrap_or(0.0)
+}
+
+/// The product, and what rounding took from it.
+fn two_product(a: f64, b: f64) -> (f64, f64) {
+    let product = a * b;
+    (product, a.mul_add(b, -product))
+}
+
+/// The sum, and what rounding took from it.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let taken = sum - a;
+    (sum, (a - (sum - taken)) + (b - taken))
+}
+
+/// Whether the segment from `p` to `q` passes through a triangle from one side to the other, further than `depth` on both and from its
+/// border; what only touches, or lies in its plane, does not.
+pub(crate) fn crosses(p: Vec3, q: Vec3, triangle: [Vec3; 3], depth: f64) -> bool {
+    let corners = triangle.map(|corner| corner.as_dvec3());
+    let (p, q) = (p.as_dvec3(), q.as_dvec3());
+    let normal = (corners[1] - corners[0])
+        .cross(corners[2] - corners[0])
+        .normalize_or_zero();
+    let [before, after] = [p, q].map(|end| normal.dot(end - corners[0]));
+    if !(before.abs() > depth && after.abs() > depth && (before < 0.0) != (after < 0.0)) {
+        return false;
+    }
+    let point = p.lerp(q, before / (before - after));
+    (0..3).all(|side| {
+        let (from, to) = (corners[side], corners[(side + 1) % 3]);
+        normal.dot((to - from).cross(point - from)) > depth * from.distance(to)
+    })
+}
+
+/// How far along the segment from `p` to `q` it passes through a triangle, 0 to 1, and whether it goes in at its front.
+///
+/// As if the segment were shifted by next to nothing, in one direction for all triangles (Edelsbrunner, Muecke 1990): of triangles that share an
+/// edge or a corner, of which `nodes` are the numbers, it passes through as many as it should.
+pub(crate) fn pierce(p: DVec3, q: DVec3, corners: [DVec3; 3], nodes: [u32; 3]) -> Option<(f64, bool)> {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a);
+    let (height_p, height_q) = (normal.dot(p - a), normal.dot(q - a));
+    // The shift goes along x, by far less along y, and by far less again along z.
+    let is_above = |height: f64, shifted: DVec3| {
+        [height, shifted.x, shifted.y, shifted.z]
+            .into_iter()
+            .find(|&term| term != 0.0)
+            .is_some_and(|term| term > 0.0)
+    };
+    let (ab, ac) = (b - a, c - a);
+    let enters = is_above(triple(p - a, ab, ac), normal);
+    if enters == is_above(triple(q - a, ab, ac), normal) {
+        return None;
+    }
+    let way = q - p;
+    // Each side is seen the same by both of its triangles: from the lower node on.
+    let passes_left = |from: usize, to: usize| {
+        let turned = nodes[from] > nodes[to];
+        let (low, high) = if turned {
+            (corners[to], corners[from])
+        } else {
+            (corners[from], corners[to])
+        };
+        let (low, high) = (low - p, high - p);
+        is_above(triple(way, low, high), (low - high).cross(way)) != turned
+    };
+    let left = passes_left(0, 1);
+    if passes_left(1, 2) != left || passes_left(2, 0) != left {
+        return None;
+    }
+    Some(((height_p / (height_p - height_q)).clamp(0.0, 1.0), enters))
+}
+
+/// The solid angle that a triangle takes of all that is seen from a point, 4 pi in all; above 0 where its back is seen (Van Oosterom,
+/// Strackee 1983). Over all triangles of a closed surface this is 4 pi inside and 0 outside.
+pub(crate) fn solid_angle(point: DVec3, triangle: [DVec3; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|corner| corner - point);
+    let [length_a, length_b, length_c] = [a, b, c].map(DVec3::length);
+    let cosine = length_a * length_b * length_c + a.dot(b) * length_c + b.dot(c) * length_a + c.dot(a) * length_b;
+    2.0 * a.dot(b.cross(c)).atan2(cosine)
+}
