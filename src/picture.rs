@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::body::{Body, finite_vector};
-use crate::contact::{Form, Pose, Tool};
+use crate::contact::{Contact, Form, Pose, Tool};
 use crate::error::{Error, Result};
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
@@ -24,6 +24,9 @@ pub struct PictureDefinition {
     pub direction: Vec3,
     /// The vertical angle of view, above 0 and below pi, in radians.
     pub field_of_view: f32,
+    /// Whether the points are drawn where tools press bodies, and the forces on the tools there: the largest is as long as a sixth of
+    /// the scene, seen through what hides it.
+    pub show_contacts: bool,
 }
 
 impl Default for PictureDefinition {
@@ -36,6 +39,7 @@ impl Default for PictureDefinition {
             up: Vec3::Y,
             direction: Vec3::new(1.0, 0.6, 1.4),
             field_of_view: 0.6,
+            show_contacts: false,
         }
     }
 }
@@ -110,7 +114,29 @@ impl World {
             });
         }
         let camera = definition.camera(&scene)?;
+        if definition.show_contacts {
+            scene.shapes.extend(self.marks_of_contacts(&scene));
+        }
         scene.draw(&camera, definition.width, definition.height)
+    }
+
+    /// A dot where a tool presses a body, and a line along the force on it.
+    fn marks_of_contacts(&self, scene: &Scene) -> Vec<(raster::Shape, Look)> {
+        let extent = scene.extent().map_or(0.0, |(low, high)| (high - low).max_element());
+        let contacts: Vec<Contact> = self.tool_ids().filter_map(|tool| self.contacts(tool).ok()).flatten().collect();
+        let largest = contacts.iter().fold(0.0_f32, |largest, contact| largest.max(contact.force.length()));
+        let marks = contacts.iter().flat_map(|contact| {
+            let centre = contact.point;
+            let radius = DOT * extent;
+            let dot = raster::Shape::Sphere { centre, radius };
+            let arrow = raster::Shape::Capsule {
+                start: centre,
+                end: centre + contact.force * (LONGEST_FORCE * extent / largest),
+                radius: 0.4 * radius,
+            };
+            [dot, arrow].map(|shape| (shape, Look::CONTACT))
+        });
+        if largest > 0.0 && extent > 0.0 { marks.collect() } else { Vec::new() }
     }
 
     /// For each body the springs that stand for a surface it does not have.
@@ -147,6 +173,10 @@ impl PictureDefinition {
         })
     }
 }
+
+/// The radius of a contact's dot, and how long the largest force is drawn, as parts of the scene.
+const DOT: f32 = 0.006;
+const LONGEST_FORCE: f32 = 1.0 / 6.0;
 
 /// What a tool that is no mesh looks like.
 fn shape_of(tool: &Tool) -> Option<(raster::Shape, Look)> {

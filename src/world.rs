@@ -301,6 +301,10 @@ impl World {
         Ok((tool.force, tool.torque))
     }
 
+    pub(crate) fn tool_ids(&self) -> impl Iterator<Item = ToolId> {
+        self.tools.iter_ids().map(|(id, _)| ToolId(id))
+    }
+
     /// The shapes and poses of all tools.
     pub(crate) fn tools(&self) -> impl Iterator<Item = &Tool> {
         self.tools.iter().map(|(_, tool)| tool)

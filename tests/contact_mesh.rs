@@ -8,8 +8,8 @@ mod tissue;
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, Detection, Pose, Shape, Solver, ToolDefinition, ToolId, Values, WorldDefinition,
-    World,
+    BodyContact, BodyDefinition, BodyId, Detection, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World,
+    WorldDefinition,
 };
 use solid::{Solid, real};
 use tissue::*;
@@ -81,11 +81,16 @@ impl Drape {
     /// Whether the cloth lies as it should.
     fn check(&self, what: &str) {
         let nodes = body(&self.world, self.cloth).positions();
-        let distances: Vec<f64> = nodes.iter().map(|node| self.solid.signed_distance(node.as_dvec3())).collect();
+        let distances: Vec<f64> = nodes
+            .iter()
+            .map(|node| self.solid.signed_distance(node.as_dvec3()))
+            .collect();
         let inside = distances.iter().filter(|distance| **distance < 0.0).count();
         let deepest = distances.iter().copied().fold(0.0, f64::min);
         let contacts: Vec<_> = self.world.contacts(self.organ).expect("a tool").collect();
-        let pressed = contacts.iter().map(|contact| self.solid.signed_distance(contact.point.as_dvec3()));
+        let pressed = contacts
+            .iter()
+            .map(|contact| self.solid.signed_distance(contact.point.as_dvec3()));
         let (lowest, highest) = pressed.fold((f64::INFINITY, 0.0_f64), |(low, high), d| (low.min(d), high.max(d)));
         let (force, _) = self.world.wrench(self.organ).expect("a tool");
         let weight = f64::from(MASS) * 9.81;
@@ -95,16 +100,26 @@ impl Drape {
             nodes.len(),
             contacts.len()
         );
-        assert!(inside <= nodes.len() / 50, "{what}: {inside} of {} nodes are inside", nodes.len());
+        assert!(
+            inside <= nodes.len() / 50,
+            "{what}: {inside} of {} nodes are inside",
+            nodes.len()
+        );
         assert!(deepest > -0.5e-3, "{what}: {deepest} m deep");
         assert!(contacts.len() > 20, "{what}: {} contacts", contacts.len());
-        assert!(highest < f64::from(THICKNESS) + 0.5e-3, "{what}: something lies at {highest} m");
+        assert!(
+            highest < f64::from(THICKNESS) + 0.5e-3,
+            "{what}: something lies at {highest} m"
+        );
         let down = DVec3::new(0.0, -weight, 0.0);
         assert!(
             force.as_dvec3().distance(down) < 0.01 * weight,
             "{what}: a force of {force} for a weight of {weight}"
         );
-        assert!((sum - force.as_dvec3()).length() < 0.02 * weight, "{what}: contacts make {sum} of {force}");
+        assert!(
+            (sum - force.as_dvec3()).length() < 0.02 * weight,
+            "{what}: contacts make {sum} of {force}"
+        );
     }
 }
 
@@ -115,7 +130,14 @@ fn drape(detection: Detection, solver: Solver) {
     let start = std::time::Instant::now();
     for part in 0..5 {
         drape.fall(200);
-        println!("{part}: {:.2} s, speed {}", start.elapsed().as_secs_f64(), body(&drape.world, drape.cloth).velocities().iter().fold(0.0_f32, |a, v| a.max(v.length())));
+        println!(
+            "{part}: {:.2} s, speed {}",
+            start.elapsed().as_secs_f64(),
+            body(&drape.world, drape.cloth)
+                .velocities()
+                .iter()
+                .fold(0.0_f32, |a, v| a.max(v.length()))
+        );
     }
     drape.check(&format!("{detection:?}, {solver:?}"));
 }

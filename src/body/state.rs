@@ -128,10 +128,7 @@ impl State {
 
     /// The same, to be changed.
     pub fn newest_mut(&mut self) -> (&mut Vectors, &mut Vectors) {
-        (
-            &mut self.positions[self.latest],
-            &mut self.velocities[1 - self.settled],
-        )
+        (&mut self.positions[self.latest], &mut self.velocities[1 - self.settled])
     }
 
     /// Whether those, and their squares, are finite.

@@ -31,8 +31,8 @@ pub struct sinew_picture_def {
     pub direction: [f32; 3],
     /// rad, vertical, above 0 and below pi; default 0.6.
     pub field_of_view: f32,
-    /// 0.
-    pub reserved: u32,
+    /// 1: with the points where tools press bodies and the forces on the tools there; 0, the default: without.
+    pub show_contacts: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -53,12 +53,11 @@ impl sinew_picture_def {
             up: defaults.up.to_array(),
             direction: defaults.direction.to_array(),
             field_of_view: defaults.field_of_view,
-            reserved: 0,
+            show_contacts: 0,
         }
     }
 
     fn definition(&self) -> Result<PictureDefinition> {
-        memory::reserved("reserved", self.reserved)?;
         let (eye, target) = (Vec3::from_array(self.eye), Vec3::from_array(self.target));
         Ok(PictureDefinition {
             width: self.width,
@@ -67,6 +66,11 @@ impl sinew_picture_def {
             up: Vec3::from_array(self.up),
             direction: Vec3::from_array(self.direction),
             field_of_view: self.field_of_view,
+            show_contacts: match self.show_contacts {
+                0 => false,
+                1 => true,
+                other => return Err(Error::invalid(format!("show_contacts is {other}: must be 0 or 1"))),
+            },
         })
     }
 }

@@ -14,16 +14,18 @@ pub struct CollisionFilter {
 }
 
 impl Default for CollisionFilter {
-    /// Of the first category; meets all.
     fn default() -> Self {
-        Self {
-            category: 1,
-            mask: u32::MAX,
-        }
+        Self::ALL
     }
 }
 
 impl CollisionFilter {
+    /// Of the first category; meets all.
+    pub const ALL: Self = Self {
+        category: 1,
+        mask: u32::MAX,
+    };
+
     /// Whether both meet each other.
     pub(crate) fn meets(self, other: Self) -> bool {
         self.category & other.mask != 0 && other.category & self.mask != 0
@@ -31,7 +33,7 @@ impl CollisionFilter {
 }
 
 /// What a body asks of contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyContact {
     /// What tools and other tissue keep off its surface, m, at least 0: the thickness of a cloth on either side.
     pub thickness: f32,
@@ -50,7 +52,24 @@ pub struct BodyContact {
     pub filter: CollisionFilter,
 }
 
+impl Default for BodyContact {
+    fn default() -> Self {
+        Self::NOTHING
+    }
+}
+
 impl BodyContact {
+    /// It meets tools alone, and nothing keeps off its surface.
+    pub const NOTHING: Self = Self {
+        thickness: 0.0,
+        friction: 0.0,
+        with_bodies: false,
+        with_itself: false,
+        detection: Detection::Exact,
+        resolution: 0.0,
+        filter: CollisionFilter::ALL,
+    };
+
     pub(crate) fn check(&self) -> Result<()> {
         not_negative("contact_thickness", self.thickness)?;
         not_negative("contact_friction", self.friction)?;

@@ -49,6 +49,15 @@ impl Look {
         show_through: 0.8,
     };
 
+    /// Where an instrument presses, and how hard.
+    pub const CONTACT: Look = Look {
+        colour: [0.95, 0.80, 0.10],
+        gloss: 0.0,
+        two_sided: false,
+        mesh_edges: 0.0,
+        show_through: 0.9,
+    };
+
     /// A plane to stand on.
     pub const GROUND: Look = Look {
         colour: [0.85, 0.86, 0.88],

@@ -55,7 +55,9 @@ impl Side {
 
     pub fn used(&self) -> impl Iterator<Item = (usize, f32)> {
         let pairs = self.nodes.into_iter().zip(self.weights);
-        pairs.filter(|(_, weight)| *weight > 0.0).map(|(node, weight)| (node as usize, weight))
+        pairs
+            .filter(|(_, weight)| *weight > 0.0)
+            .map(|(node, weight)| (node as usize, weight))
     }
 
     /// The point's part of what nodes have.

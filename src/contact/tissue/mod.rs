@@ -93,7 +93,8 @@ impl Tissue {
 
     /// Forgets the contacts of a body: its nodes have been put elsewhere.
     pub fn forget(&mut self, place: usize) {
-        self.carried.retain(|carried| carried.sides.iter().all(|side| side.body != place));
+        self.carried
+            .retain(|carried| carried.sides.iter().all(|side| side.body != place));
     }
 
     fn room(&self) -> usize {
@@ -191,7 +192,8 @@ impl Tissue {
                 });
             }
         }
-        self.carried.sort_unstable_by_key(|carried| carried.sides.map(|side| side.key()));
+        self.carried
+            .sort_unstable_by_key(|carried| carried.sides.map(|side| side.key()));
     }
 
     /// Adds the contacts that are not known yet.
@@ -229,11 +231,15 @@ impl Tissue {
                 };
                 search.run(|touch| {
                     let sides = touch.sides.map(|side| side.key());
-                    let is_known = known.binary_search_by_key(&sides, |&link| key(&links[link as usize])).is_ok();
+                    let is_known = known
+                        .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
+                        .is_ok();
                     if is_known || links.len() == links.capacity() {
                         return;
                     }
-                    let of_sides = touch.sides.map(|side| if side.body == a { first.body } else { second.body });
+                    let of_sides = touch
+                        .sides
+                        .map(|side| if side.body == a { first.body } else { second.body });
                     if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
                         link.friction = friction;
                         link.allow_gap(touch.gap, dt);

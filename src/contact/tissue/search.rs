@@ -59,19 +59,21 @@ impl Search<'_> {
             };
             let mut closest: Option<(f32, usize, Separation)> = None;
             let around = Bounds::of([place, place + step].into_iter());
-            of_faces.skin.near(&around, self.radius + of_faces.skin.spread, |triangle| {
-                let nodes = of_faces.skin.triangles[triangle];
-                if self.is_of_one() && nodes.contains(&node) {
-                    return;
-                }
-                let corners = self.corners(of_faces, &nodes);
-                if let Some(found) = corners.approach(&segment, 0.0) {
-                    let start = corners.separation(&segment, 0.0).offset.length_squared();
-                    if closest.is_none_or(|(least, ..)| start < least) {
-                        closest = Some((start, triangle, found));
+            of_faces
+                .skin
+                .near(&around, self.radius + of_faces.skin.spread, |triangle| {
+                    let nodes = of_faces.skin.triangles[triangle];
+                    if self.is_of_one() && nodes.contains(&node) {
+                        return;
                     }
-                }
-            });
+                    let corners = self.corners(of_faces, &nodes);
+                    if let Some(found) = corners.approach(&segment, 0.0) {
+                        let start = corners.separation(&segment, 0.0).offset.length_squared();
+                        if closest.is_none_or(|(least, ..)| start < least) {
+                            closest = Some((start, triangle, found));
+                        }
+                    }
+                });
             if let Some((_, triangle, found)) = closest {
                 let nodes = of_faces.skin.triangles[triangle];
                 let sides = [
@@ -104,7 +106,9 @@ impl Search<'_> {
             let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
             second.skin.near(&around, self.radius + second.skin.spread, |triangle| {
                 for other in second.skin.owned(triangle) {
-                    if self.is_of_one() && (other <= first.skin.edges[index] || other.iter().any(|node| edge.contains(node))) {
+                    if self.is_of_one()
+                        && (other <= first.skin.edges[index] || other.iter().any(|node| edge.contains(node)))
+                    {
                         continue;
                     }
                     let corners = self.corners(second, &other);
