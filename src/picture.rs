@@ -123,8 +123,14 @@ impl World {
     /// A dot where a tool presses a body, and a line along the force on it.
     fn marks_of_contacts(&self, scene: &Scene) -> Vec<(raster::Shape, Look)> {
         let extent = scene.extent().map_or(0.0, |(low, high)| (high - low).max_element());
-        let contacts: Vec<Contact> = self.tool_ids().filter_map(|tool| self.contacts(tool).ok()).flatten().collect();
-        let largest = contacts.iter().fold(0.0_f32, |largest, contact| largest.max(contact.force.length()));
+        let contacts: Vec<Contact> = self
+            .tool_ids()
+            .filter_map(|tool| self.contacts(tool).ok())
+            .flatten()
+            .collect();
+        let largest = contacts
+            .iter()
+            .fold(0.0_f32, |largest, contact| largest.max(contact.force.length()));
         let marks = contacts.iter().flat_map(|contact| {
             let centre = contact.point;
             let radius = DOT * extent;
@@ -136,7 +142,11 @@ impl World {
             };
             [dot, arrow].map(|shape| (shape, Look::CONTACT))
         });
-        if largest > 0.0 && extent > 0.0 { marks.collect() } else { Vec::new() }
+        if largest > 0.0 && extent > 0.0 {
+            marks.collect()
+        } else {
+            Vec::new()
+        }
     }
 
     /// For each body the springs that stand for a surface it does not have.

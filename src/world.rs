@@ -7,7 +7,9 @@ use crate::contact::{Contact, ContactChange, Pose, TRIES, Tissue, Tool, ToolDefi
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
-use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, attempt, rest_state};
+use crate::solver::{
+    Outcome, RestStateDefinition, RestStateReport, StepRequest, Walk, attempt, attempt_together, rest_state,
+};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
 
@@ -87,6 +89,8 @@ pub struct World {
     paths: Vec<ToolPath>,
     /// Contacts of tissue with tissue, where bodies ask for them.
     tissue: Option<Box<Tissue>>,
+    /// The bodies that take their substeps together, by their places; none where none can.
+    walks: Vec<Option<Walk>>,
     /// How the step in progress ended for each body, at its place.
     outcomes: Vec<Option<Outcome>>,
 }
@@ -114,6 +118,7 @@ impl World {
             tools: Slots::new("tool"),
             paths: Vec::new(),
             tissue: None,
+            walks: Vec::new(),
             outcomes: Vec::new(),
         })
     }
@@ -163,6 +168,8 @@ impl World {
         if !body.meets_tissue() {
             return Ok(());
         }
+        self.walks.try_reserve((place + 1).saturating_sub(self.walks.len()))?;
+        self.walks.resize((place + 1).max(self.walks.len()), None);
         self.tissue.get_or_insert_default().join(place, body)
     }
 
@@ -351,6 +358,7 @@ impl World {
             paths,
             outcomes,
             tissue,
+            walks,
             ..
         } = self;
         let request = StepRequest {
@@ -366,23 +374,25 @@ impl World {
             },
             tools: paths,
         };
-        if let Some(tissue) = tissue {
-            tissue.lend(bodies);
-        }
+        let Some(tissue) = tissue else {
+            lead(threads, bodies, |bodies, team| {
+                attempt_bodies(bodies, outcomes, &request, |_| true, team);
+            });
+            return reported(bodies, outcomes);
+        };
+        tissue.plan(bodies, dt);
+        tissue.lend(bodies);
         lead(threads, bodies, |bodies, team| {
-            attempt_bodies(bodies, outcomes, &request, team)
+            attempt_bodies(bodies, outcomes, &request, |place| !tissue.goes_together(place), team);
+            attempt_together(bodies, tissue, walks, outcomes, &request, team);
+            if tissue.plan_again(bodies) {
+                attempt_together(bodies, tissue, walks, outcomes, &request, team);
+            }
         });
-        if let Some(tissue) = tissue {
-            tissue.take_back(bodies);
-        }
-        let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
-        if outcomes.iter().flatten().any(unstable) {
-            return Err(report(bodies, outcomes));
-        }
-        if let Some(tissue) = tissue {
-            let has_tried = |place: usize| matches!(outcomes[place], Some(Outcome::Done { .. }));
-            tissue.meet(bodies, dt, has_tried);
-        }
+        tissue.take_back(bodies);
+        reported(bodies, outcomes)?;
+        let has_tried = |place: usize| matches!(outcomes[place], Some(Outcome::Done { .. }));
+        tissue.meet(bodies, dt, has_tried);
         Ok(())
     }
 
@@ -509,6 +519,15 @@ impl World {
     }
 }
 
+/// What the step would come to where a body cannot take it.
+fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::Result<(), StepReport> {
+    let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
+    if outcomes.iter().flatten().any(unstable) {
+        return Err(report(bodies, outcomes));
+    }
+    Ok(())
+}
+
 /// Has the threads do something with bodies that are worth it, or the caller's own alone.
 fn lead(threads: &mut Threads, bodies: &mut Slots<Body>, act: impl FnOnce(&mut Slots<Body>, &Team) + Send) {
     if is_worth_sharing(bodies) {
@@ -525,7 +544,13 @@ fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
 }
 
 /// Attempts the step of every body: the small ones are shared among the threads, the large ones each by all threads.
-fn attempt_bodies(bodies: &mut Slots<Body>, outcomes: &mut Vec<Option<Outcome>>, request: &StepRequest, team: &Team) {
+fn attempt_bodies(
+    bodies: &mut Slots<Body>,
+    outcomes: &mut Vec<Option<Outcome>>,
+    request: &StepRequest,
+    goes_alone: impl Fn(usize) -> bool + Sync,
+    team: &Team,
+) {
     outcomes.clear();
     outcomes.resize(bodies.places(), None);
     let small = bodies
@@ -537,9 +562,10 @@ fn attempt_bodies(bodies: &mut Slots<Body>, outcomes: &mut Vec<Option<Outcome>>,
         team.pass(
             outcomes.len(),
             (contents, Items::new(outcomes)),
-            |_, (slot, outcome)| {
+            |place, (slot, outcome)| {
                 if let Some(body) = slot.content_mut()
                     && body.node_count() < SHARED_FROM
+                    && goes_alone(place)
                 {
                     *outcome = Some(attempt(body, request, &Team::alone()));
                 }
@@ -547,7 +573,7 @@ fn attempt_bodies(bodies: &mut Slots<Body>, outcomes: &mut Vec<Option<Outcome>>,
         );
     }
     for (place, body) in bodies.iter_mut() {
-        if outcomes[place].is_none() {
+        if outcomes[place].is_none() && goes_alone(place) {
             let alone = body.node_count() < SHARED_FROM;
             outcomes[place] = Some(if alone {
                 attempt(body, request, &Team::alone())

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::{Body, Bounds, Vectors};
+use crate::contact::Moment;
 use crate::error::Result;
 
 /// How far a step that was tried has been led elsewhere.
@@ -53,6 +54,37 @@ impl Body {
         }
     }
 
+    /// Gives a node this velocity, m/s, in a substep: it has received `impulse`, N s, which a pinned node hands on.
+    pub(crate) fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+        let held = self.pins.axes_of(node as u32);
+        if let Some(pin) = self.pins.get_mut(node as u32) {
+            pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
+        }
+        if self.inverse_masses[node] == 0.0 {
+            return;
+        }
+        let state = self.state.substep();
+        let was = state.velocities.get(node);
+        state.velocities.set(node, Vec3::select(held, was, velocity));
+        if moment.drifts {
+            let led = state.next_positions.get(node);
+            let moved = state.positions.get(node) + velocity * moment.duration;
+            state.next_positions.set(node, Vec3::select(held, led, moved));
+        }
+    }
+
+    /// Moves a node at the end of a substep, without giving it speed.
+    pub(crate) fn part_substep(&mut self, node: usize, way: Vec3) {
+        let next_positions = self.state.substep().next_positions;
+        let place = next_positions.get(node) + way;
+        next_positions.set(node, place);
+    }
+
+    /// A box about it, in its own coordinates.
+    pub(crate) fn bounds(&self) -> Bounds {
+        self.boxes.iter().fold(Bounds::EMPTY, Bounds::and)
+    }
+
     /// Has these nodes go through the step of `dt` seconds that was tried with these mean velocities, m/s.
     pub(crate) fn deflect(&mut self, nodes: &[u32], means: &Vectors, dt: f32) {
         for &node in nodes {
@@ -71,11 +103,14 @@ impl Body {
             let held = self.pins.partial_axes_of(node as u32);
             let place = Vec3::select(held, was, start + means.get(node) * dt);
             let velocity = velocities.get(node) + Vec3::select(held, Vec3::ZERO, given);
-            positions.set(node, place);
             velocities.set(node, velocity);
-            if let Some(implicit) = &mut self.implicit {
-                implicit.deflect(node, given);
-            }
+            // What is moved at the end of a step of many substeps stores energy in springs that nobody has put in.
+            let Some(implicit) = &mut self.implicit else {
+                self.note_deflection(0.0, velocity);
+                continue;
+            };
+            positions.set(node, place);
+            implicit.deflect(node, given);
             self.note_deflection(place.distance(was), velocity);
         }
     }

@@ -33,6 +33,6 @@ pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
 pub(crate) use path::ToolPath;
 pub use report::{Contact, ContactChange};
-pub(crate) use tissue::Tissue;
+pub(crate) use tissue::{Moment, Tissue};
 pub use tool::{Detection, Pose, Shape, ToolDefinition};
 pub(crate) use tool::{Form, Tool};

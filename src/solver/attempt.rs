@@ -81,6 +81,28 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
     if body.implicit.is_some() {
         return attempt_implicitly(body, request, team);
     }
+    let (start, beside_springs) = prepare(body, request, team);
+    if request.substeps > 0 {
+        return match verlet::run(body, request, request.substeps, 0, start, 0.0, team) {
+            Ok(taken) => finish(body, request.substeps, taken, 0.0),
+            Err(too_long) => Outcome::Unstable {
+                stable_substep: too_long.stable_substep,
+                error: 0.0,
+            },
+        };
+    }
+    match run_stably(body, request, start, beside_springs, team) {
+        Err(too_long) => Outcome::Unstable {
+            stable_substep: too_long.stable_substep,
+            error: 0.0,
+        },
+        Ok((substeps, taken)) if request.tolerance == 0.0 => finish(body, substeps, taken, 0.0),
+        Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry, team),
+    }
+}
+
+/// What a step of VERLET begins with, and the longest stable substep as far as springs are not concerned, s.
+fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) {
     let beside_springs = body.limit_beside_springs(team);
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
@@ -106,22 +128,41 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         stability,
         ..body.carry
     };
+    (start, beside_springs)
+}
+
+/// What a body needs for a step that it takes together with others.
+pub(super) struct Need {
+    pub start: Carry,
+    pub substeps: u32,
+    pub masses_for: f32,
+}
+
+/// What a step of VERLET needs by itself.
+pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Need {
+    let (start, beside_springs) = prepare(body, request, team);
     if request.substeps > 0 {
-        return match verlet::run(body, request, request.substeps, 0, start, 0.0, team) {
-            Ok(taken) => finish(body, request.substeps, taken, 0.0),
-            Err(too_long) => Outcome::Unstable {
-                stable_substep: too_long.stable_substep,
-                error: 0.0,
-            },
+        return Need {
+            start,
+            substeps: request.substeps,
+            masses_for: 0.0,
         };
     }
-    match run_stably(body, request, start, beside_springs, team) {
-        Err(too_long) => Outcome::Unstable {
-            stable_substep: too_long.stable_substep,
-            error: 0.0,
+    let stable_substep = first_substep(body, &start, beside_springs);
+    match fewer_substeps(body, request, stable_substep) {
+        Some((substeps, masses_for)) => Need {
+            start: Carry {
+                stability: start.stability.shortened_to(stable_substep),
+                ..start
+            },
+            substeps,
+            masses_for,
         },
-        Ok((substeps, taken)) if request.tolerance == 0.0 => finish(body, substeps, taken, 0.0),
-        Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry, team),
+        None => Need {
+            start,
+            substeps: substeps_needed(request, stable_substep).clamp(1.0, f64::from(u32::MAX)) as u32,
+            masses_for: 0.0,
+        },
     }
 }
 
@@ -164,14 +205,7 @@ fn run_stably(
     beside_springs: f32,
     team: &Team,
 ) -> Result<(u32, Taken), TooLong> {
-    let limit = start.stability.limit().unwrap_or(f32::INFINITY);
-    let is_anywhere = start.stability.is_coarse() || is_better_anywhere(body, &start.stability);
-    let mut stable_substep = if is_anywhere {
-        anywhere_with_less_reserve(&start.stability)
-    } else {
-        limit
-    };
-    stable_substep = stable_substep.min(beside_springs);
+    let mut stable_substep = first_substep(body, &start, beside_springs);
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
@@ -211,6 +245,17 @@ fn run_stably(
     Err(TooLong { stable_substep })
 }
 
+/// The longest stable substep as far as is known before the step, s.
+fn first_substep(body: &Body, start: &Carry, beside_springs: f32) -> f32 {
+    let is_anywhere = start.stability.is_coarse() || is_better_anywhere(body, &start.stability);
+    let of_springs = if is_anywhere {
+        anywhere_with_less_reserve(&start.stability)
+    } else {
+        start.stability.limit().unwrap_or(f32::INFINITY)
+    };
+    of_springs.min(beside_springs)
+}
+
 /// Whether substeps that are stable wherever the nodes are come cheaper than estimates of all nodes for slightly longer ones.
 /// It is not asked how fast the body moves: what is known of that is a box along the axes, and turns with them.
 fn is_better_anywhere(body: &Body, stability: &Stability) -> bool {
@@ -225,7 +270,7 @@ fn anywhere_with_less_reserve(stability: &Stability) -> f32 {
 }
 
 /// How many substeps a step takes of which the longest stable one is this long, s.
-fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
+pub(super) fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
     (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil()
 }
 
@@ -296,7 +341,7 @@ fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
         .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))
 }
 
-fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Outcome {
+pub(super) fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Outcome {
     if taken.finite && sums_fit(body) {
         Outcome::Done {
             substeps,

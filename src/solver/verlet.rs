@@ -48,13 +48,8 @@ pub(super) fn run(
         check(&start.stability, substep)?;
     }
     let mut step = Step {
-        request,
-        substeps,
-        substep,
         middle,
-        masses_for,
-        team,
-        pipeline: None,
+        ..Step::of(request, substeps, masses_for, team)
     };
     // What must be known between substeps cannot be known in a pipeline.
     if substeps > 2 && may_stay_open(body) && body.contacts.is_none() {
@@ -67,7 +62,7 @@ pub(super) fn run(
     Ok(step.take(body, start)?.expect("only a pipeline goes too far"))
 }
 
-fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
+pub(super) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
     match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
@@ -75,7 +70,7 @@ fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
 }
 
 /// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
-fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooLong> {
+pub(super) fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooLong> {
     let stable_substep = body.newest_limit_beside_springs();
     if substep <= stable_substep {
         Ok(())
@@ -85,7 +80,7 @@ fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooLong> {
 }
 
 /// A step to be taken.
-struct Step<'a> {
+pub(super) struct Step<'a> {
     request: &'a StepRequest<'a>,
     substeps: u32,
     /// s
@@ -97,7 +92,20 @@ struct Step<'a> {
     pipeline: Option<Plan>,
 }
 
-impl Step<'_> {
+impl<'a> Step<'a> {
+    /// In so many substeps, taken one by one.
+    pub fn of(request: &'a StepRequest<'a>, substeps: u32, masses_for: f32, team: &'a Team<'a>) -> Self {
+        Self {
+            request,
+            substeps,
+            substep: (f64::from(request.dt) / f64::from(substeps)) as f32,
+            middle: 0,
+            masses_for,
+            team,
+            pipeline: None,
+        }
+    }
+
     /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
     fn take(&self, body: &mut Body, start: Carry) -> Result<Option<Taken>, TooLong> {
         let Self {
@@ -183,12 +191,12 @@ impl Step<'_> {
 
     /// Whether what is known of stability still holds after a substep with velocities in this box. Masses that were made for
     /// the substep are enough wherever nodes go.
-    fn is_stable_after(&self, stability: &mut Stability, velocities: &Bounds) -> bool {
+    pub fn is_stable_after(&self, stability: &mut Stability, velocities: &Bounds) -> bool {
         self.masses_for > 0.0 || stability.holds_after(self.substep * diagonal(velocities))
     }
 
     /// The first kick: the half that opens the step, together with the half that closes the last where that was left open.
-    fn opening(&self, body: &mut Body, carry: &mut Carry) -> Part {
+    pub fn opening(&self, body: &mut Body, carry: &mut Carry) -> Part {
         let Self {
             request, substep, team, ..
         } = *self;
@@ -236,7 +244,7 @@ fn diagonal(velocities: &Bounds) -> f32 {
 }
 
 /// Takes one part of the step; whether what it leads to is finite, where it was looked at.
-fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
+pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
     let survey = kick_and_drift(body, request, part, team);
     carry.gravity.velocities = meet_tools(body, request, part, survey.velocities);
     // What tools have done was not looked at.

@@ -128,8 +128,8 @@ impl Link {
             if let Some(skin) = &mut skins[side.body] {
                 for (&node, answer) in side.nodes.iter().zip(answers) {
                     if *answer != Vec3::ZERO {
-                        let mean = skin.means.get(node as usize) + impulse * *answer * sign;
-                        skin.means.set(node as usize, mean);
+                        let mean = skin.velocities.get(node as usize) + impulse * *answer * sign;
+                        skin.velocities.set(node as usize, mean);
                     }
                 }
             }
@@ -154,7 +154,7 @@ impl Link {
     /// Of the first side against the second, m/s.
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
         let [first, second] = self.sides.map(|side| match &skins[side.body] {
-            Some(skin) => side.weighted(|node| skin.means.get(node)),
+            Some(skin) => side.weighted(|node| skin.velocities.get(node)),
             None => Vec3::ZERO,
         });
         first - second

@@ -1,10 +1,13 @@
-//! Tissue against tissue, and with itself: a stage of the step between what bodies try alone and what becomes of it.
+//! Tissue against tissue, and with itself. Both sides of a contact get the same impulse, with opposite signs, in the same place: no momentum
+//! is made.
 //!
-//! Each body first goes as it would alone, with the forces that the contacts of the last step gave, all through the step. What meets on
-//! the straight ways from where nodes were to where they came is stopped by impulses between both sides, with friction, as against a
-//! tool; they change the mean velocities of the step and so where it ends (Bridson, Fedkiw, Anderson 2002). What an impulse was over the
-//! step's length is the force of the next: at rest the impulses vanish and the forces hold the weight, however long a step is. Both
-//! sides get the same, with opposite signs, in the same place: no momentum is made.
+//! VERLET bodies that are near each other take their substeps together (`solver/lockstep.rs`). In each, what would come too close is
+//! stopped by impulses on velocities, with friction, as against a tool: never a pull, nothing stored, nothing that shortens the substep.
+//!
+//! A step of IMPLICIT is an equation of one body. There each body goes as it would alone, with the forces that contacts of the last step
+//! gave, all through the step. What meets on the straight ways from where nodes were to where they came is stopped by impulses that change the
+//! mean velocities of the step and so where it ends (Bridson, Fedkiw, Anderson 2002); what an impulse was over the step's length is the
+//! force of the next. At rest the impulses vanish and the forces hold the weight.
 
 mod link;
 mod search;
@@ -15,7 +18,7 @@ use glam::Vec3;
 use self::link::{Carried, Link, Side};
 use self::search::{Party, Search, shift};
 use self::skin::Skin;
-use crate::body::Body;
+use crate::body::{Body, Bounds};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
@@ -41,6 +44,15 @@ const WITH_ITSELF: f32 = 0.5;
 
 /// Contacts that there is room for, for each node, edge and face of the surfaces.
 const ROOM: usize = 1;
+
+/// What of a step is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// Of the substep or step, s.
+    pub duration: f32,
+    /// Whether positions change: not with the last half kick of a step.
+    pub drifts: bool,
+}
 
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
@@ -131,23 +143,142 @@ impl Tissue {
         }
     }
 
-    /// Stops what meets in a step of `dt` seconds that bodies have tried, those that `has_tried` tells.
+    /// Finds out which bodies take the next step of `dt` seconds together: those of VERLET that may come near each other, and those that
+    /// meet themselves.
+    pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
+        for place in 0..self.skins.len() {
+            let is_near = self.skins[place].as_ref().is_some_and(|skin| {
+                let Some(body) = bodies.at(place).filter(|_| skin.is_explicit) else {
+                    return false;
+                };
+                body.contact.with_itself
+                    || self.others(place).any(|other| {
+                        let Some(other) = bodies.at(other) else { return false };
+                        meet_each_other(body, other) && reach(body, dt, 2.0).overlaps(&reach(other, dt, 2.0))
+                    })
+            });
+            if let Some(skin) = &mut self.skins[place] {
+                skin.goes_together = is_near;
+            }
+        }
+    }
+
+    /// Has bodies go together that went alone in a step that was tried, and came near each other: whether there are such.
+    pub fn plan_again(&mut self, bodies: &Slots<Body>) -> bool {
+        let mut found = false;
+        for place in 0..self.skins.len() {
+            let Some(body) = bodies.at(place) else { continue };
+            let met = self.skins[place].as_ref().is_some_and(|skin| {
+                skin.is_explicit
+                    && !skin.goes_together
+                    && self.others(place).any(|other| {
+                        let Some(other) = bodies.at(other) else { return false };
+                        meet_each_other(body, other) && swept(body).overlaps(&swept(other))
+                    })
+            });
+            if let Some(skin) = self.skins[place].as_mut().filter(|_| met) {
+                skin.goes_together = true;
+                found = true;
+            }
+        }
+
+        found
+    }
+
+    /// The other bodies of VERLET.
+    fn others(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
+        let explicit = |skin: &Option<Skin>| skin.as_ref().is_some_and(|skin| skin.is_explicit);
+        let places = self.skins.iter().enumerate().filter(move |(_, skin)| explicit(skin));
+        places.map(|(other, _)| other).filter(move |&other| other != place)
+    }
+
+    /// Whether the body at a place takes its substeps together with others.
+    pub fn goes_together(&self, place: usize) -> bool {
+        let skin = self.skins.get(place).and_then(Option::as_ref);
+        skin.is_some_and(|skin| skin.goes_together)
+    }
+
+    /// The box of all velocities of a body, given that of those before the contacts of a substep.
+    pub fn velocities(&self, place: usize, before: Bounds) -> Bounds {
+        match self.skins.get(place) {
+            Some(Some(skin)) => before.and(&skin.given),
+            _ => before,
+        }
+    }
+
+    /// Stops what meets in a substep of bodies that go together.
+    pub fn meet_together(&mut self, bodies: &mut Slots<Body>, moment: &Moment) {
+        self.links.clear();
+        self.found.clear();
+        for (place, skin) in self.skins.iter_mut().enumerate() {
+            if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
+                && skin.goes_together
+            {
+                skin.follow_substep(body, moment.duration);
+            }
+        }
+        let meets = |first: &Skin, second: &Skin| first.goes_together && second.goes_together;
+        self.solve(bodies, moment.duration, meets, |_| ());
+        for link in &self.links {
+            for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
+                if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
+                    for (node, weight) in side.used() {
+                        let velocity = skin.velocities.get(node);
+                        skin.given = skin.given.with(velocity);
+                        body.nudge(node, velocity, link.given() * (sign * weight), moment);
+                    }
+                }
+            }
+        }
+        if moment.drifts {
+            self.part(bodies, Body::part_substep);
+        }
+    }
+
+    /// Stops what meets in a step of `dt` seconds that bodies have tried, those that `has_tried` tells, unless both went together.
     pub fn meet(&mut self, bodies: &mut Slots<Body>, dt: f32, has_tried: impl Fn(usize) -> bool) {
         self.links.clear();
         self.found.clear();
         self.found.resize(self.carried.len(), false);
+        if self.skins.iter().flatten().all(|skin| skin.is_explicit) {
+            return;
+        }
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at(place)) {
-                skin.follow(body, dt);
+                skin.follow_step(body, dt);
             }
         }
+        let meets = |first: &Skin, second: &Skin| !(first.is_explicit && second.is_explicit);
+        let places_tried =
+            |links: &mut Vec<Link>| links.retain(|link| link.sides.iter().all(|side| has_tried(side.body)));
+        self.solve(bodies, dt, meets, places_tried);
+        if self.links.is_empty() {
+            return;
+        }
+        for (place, skin) in self.skins.iter().enumerate() {
+            if let (Some(skin), Some(body), true) = (skin, bodies.at_mut(place), has_tried(place)) {
+                body.deflect(&skin.nodes, &skin.velocities, dt);
+            }
+        }
+        self.part(bodies, Body::part);
+    }
+
+    /// Finds contacts and gives their impulses, until they lead to no others.
+    fn solve(
+        &mut self,
+        bodies: &Slots<Body>,
+        duration: f32,
+        meets: impl Fn(&Skin, &Skin) -> bool,
+        sift: impl Fn(&mut Vec<Link>),
+    ) {
         let mut first = 0.0_f32;
         for search in 0..SEARCHES {
             let known = self.links.len();
-            self.find(bodies, dt, &has_tried);
+            self.find(bodies, duration, &meets);
             if search == 0 {
-                self.go_on(bodies, dt, &has_tried);
+                self.go_on(bodies, duration);
             }
+            sift(&mut self.links);
             if self.links.len() == known {
                 break;
             }
@@ -162,18 +293,14 @@ impl Tissue {
                 }
             }
         }
-        if self.links.is_empty() {
-            return;
-        }
-        for (place, skin) in self.skins.iter().enumerate() {
-            if let (Some(skin), Some(body), true) = (skin, bodies.at_mut(place), has_tried(place)) {
-                body.deflect(&skin.nodes, &skin.means, dt);
-            }
-        }
+    }
+
+    /// Moves what began too close apart.
+    fn part(&self, bodies: &mut Slots<Body>, part: impl Fn(&mut Body, usize, Vec3)) {
         for link in self.links.iter().filter(|link| link.depth > 0.0) {
             for (place, node, way) in link.parting(PARTED) {
                 if let Some(body) = bodies.at_mut(place) {
-                    body.part(node, way);
+                    part(body, node, way);
                 }
             }
         }
@@ -182,7 +309,11 @@ impl Tissue {
     /// What the step that was tried did goes on in the next.
     pub fn commit(&mut self, dt: f32) {
         self.carried.clear();
-        for link in &self.links {
+        let is_carried = |link: &&Link| {
+            let is_implicit = |side: &Side| matches!(&self.skins[side.body], Some(skin) if !skin.is_explicit);
+            link.sides.iter().all(is_implicit)
+        };
+        for link in self.links.iter().filter(is_carried) {
             let force = link.given() / dt;
             if force != Vec3::ZERO && force.is_finite() {
                 self.carried.push(Carried {
@@ -196,8 +327,8 @@ impl Tissue {
             .sort_unstable_by_key(|carried| carried.sides.map(|side| side.key()));
     }
 
-    /// Adds the contacts that are not known yet.
-    fn find(&mut self, bodies: &Slots<Body>, dt: f32, has_tried: &impl Fn(usize) -> bool) {
+    /// Adds the contacts that are not known yet, of those that meet.
+    fn find(&mut self, bodies: &Slots<Body>, duration: f32, meets: &impl Fn(&Skin, &Skin) -> bool) {
         let Self {
             skins,
             links,
@@ -211,22 +342,22 @@ impl Tissue {
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
         for (a, of_a) in skins.iter().enumerate() {
-            let (Some(skin), Some(body), true) = (of_a, bodies.at(a), has_tried(a)) else {
+            let (Some(skin), Some(body_a)) = (of_a, bodies.at(a)) else {
                 continue;
             };
-            let first = Party { place: a, skin, body };
+            let first = Party { place: a, skin };
             for (b, of_b) in skins.iter().enumerate().skip(a) {
-                let (Some(skin), Some(body), true) = (of_b, bodies.at(b), has_tried(b)) else {
+                let (Some(skin), Some(body_b)) = (of_b, bodies.at(b)) else {
                     continue;
                 };
-                let second = Party { place: b, skin, body };
-                let Some(radius) = radius(&first, &second) else {
+                let second = Party { place: b, skin };
+                let Some(radius) = radius(&first, &second, [body_a, body_b]).filter(|_| meets(first.skin, skin)) else {
                     continue;
                 };
-                let friction = first.body.contact.friction.max(second.body.contact.friction);
+                let friction = body_a.contact.friction.max(body_b.contact.friction);
                 let search = Search {
                     parties: [first, second],
-                    dt,
+                    dt: duration,
                     radius,
                 };
                 search.run(|touch| {
@@ -237,15 +368,13 @@ impl Tissue {
                     if is_known || links.len() == links.capacity() {
                         return;
                     }
-                    let of_sides = touch
-                        .sides
-                        .map(|side| if side.body == a { first.body } else { second.body });
+                    let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
                     if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
                         link.friction = friction;
-                        link.allow_gap(touch.gap, dt);
+                        link.allow_gap(touch.gap, duration);
                         if let Some(index) = going_on(carried, found, &touch.sides) {
                             found[index] = true;
-                            link.has_given(carried[index].force * dt);
+                            link.has_given(carried[index].force * duration);
                         }
                         links.push(link);
                     }
@@ -255,21 +384,24 @@ impl Tissue {
     }
 
     /// Contacts of the last step that were not found again have acted all the same: what was too much is taken back.
-    fn go_on(&mut self, bodies: &Slots<Body>, dt: f32, has_tried: &impl Fn(usize) -> bool) {
-        for (carried, is_found) in self.carried.iter().zip(&self.found) {
-            let places = carried.sides.map(|side| side.body);
-            let [Some(first), Some(second)] = places.map(|place| bodies.at(place)) else {
+    fn go_on(&mut self, bodies: &Slots<Body>, duration: f32) {
+        for (carried, _) in self.carried.iter().zip(&self.found).filter(|(_, is_found)| !**is_found) {
+            let [a, b] = carried.sides.map(|side| side.body);
+            let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) else {
                 continue;
             };
-            if *is_found || !places.into_iter().all(has_tried) || self.links.len() == self.links.capacity() {
+            let [Some(of_first), Some(of_second)] = [a, b].map(|place| bodies.at(place)) else {
                 continue;
+            };
+            if self.links.len() == self.links.capacity() {
+                return;
             }
-            let at = |body: &Body, side: &Side| side.weighted(|node| body.state.positions().get(node));
+            let at = |skin: &Skin, side: &Side| side.weighted(|node| skin.starts.get(node));
             let apart = at(first, &carried.sides[0]) + shift(first, second) - at(second, &carried.sides[1]);
-            if let Some(mut link) = Link::new(carried.sides, carried.normal, [first, second]) {
-                link.allow_gap(apart.dot(carried.normal).max(0.0), dt);
-                link.friction = first.contact.friction.max(second.contact.friction);
-                link.has_given(carried.force * dt);
+            if let Some(mut link) = Link::new(carried.sides, carried.normal, [of_first, of_second]) {
+                link.allow_gap(apart.dot(carried.normal).max(0.0), duration);
+                link.friction = of_first.contact.friction.max(of_second.contact.friction);
+                link.has_given(carried.force * duration);
                 self.links.push(link);
             }
         }
@@ -300,12 +432,42 @@ fn going_on(carried: &[Carried], found: &[bool], sides: &[Side; 2]) -> Option<us
 }
 
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
-fn radius(first: &Party, second: &Party) -> Option<f32> {
-    let (a, b) = (&first.body.contact, &second.body.contact);
+fn radius(first: &Party, second: &Party, bodies: [&Body; 2]) -> Option<f32> {
+    let [a, b] = bodies.map(|body| &body.contact);
     let shortest = first.skin.shortest.min(second.skin.shortest);
     let apart = (a.thickness + b.thickness).max(LEAST_THICKNESS * shortest);
     if first.place == second.place {
         return a.with_itself.then_some(apart.min(WITH_ITSELF * shortest));
     }
-    (a.with_bodies && b.with_bodies && a.filter.meets(b.filter)).then_some(apart)
+    meet_each_other(bodies[0], bodies[1]).then_some(apart)
+}
+
+fn meet_each_other(first: &Body, second: &Body) -> bool {
+    let (a, b) = (&first.contact, &second.contact);
+    a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
+}
+
+/// A box about what a body may touch in a step of `dt` seconds if it becomes no more than so many times as fast, in the caller's coordinates.
+fn reach(body: &Body, dt: f32, faster: f32) -> Bounds {
+    let velocities = body.carry.gravity.velocities;
+    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
+    let way = if fastest.is_finite() {
+        faster * fastest * dt
+    } else {
+        0.0
+    };
+    let bounds = body.bounds();
+    let origin = body.origin.as_vec3();
+    Bounds {
+        min: bounds.min + origin,
+        max: bounds.max + origin,
+    }
+    .extended(way + 2.0 * body.contact.thickness + 0.01 * body.extent())
+}
+
+/// A box about a body as a step that was tried begins and as it ends, and what keeps off it, in the caller's coordinates.
+fn swept(body: &Body) -> Bounds {
+    let origin = body.origin.as_vec3();
+    let both = body.state.positions().iter().chain(body.state.newest().0.iter());
+    Bounds::of(both.map(|position| position + origin)).extended(body.contact.thickness + 1e-3 * body.extent())
 }

@@ -1,19 +1,18 @@
 //! Which parts of two surfaces, or of one, meet within a step: the first touch of each node with a face and of each edge with an edge, both
 //! moving, by conservative advancement.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::link::Side;
 use super::skin::Skin;
-use crate::body::{Body, Bounds};
+use crate::body::Bounds;
 use crate::contact::sweep::{Corners, Segment, Separation};
 
-/// A body in a search.
+/// A body in a search, by its place in the world.
 #[derive(Clone, Copy)]
 pub(super) struct Party<'a> {
     pub place: usize,
     pub skin: &'a Skin,
-    pub body: &'a Body,
 }
 
 /// What was found.
@@ -49,7 +48,7 @@ impl Search<'_> {
     }
 
     fn nodes_with_faces(&self, of_nodes: Party, of_faces: Party, see: &mut impl FnMut(Touch)) {
-        let shift = shift(of_nodes.body, of_faces.body);
+        let shift = shift(of_nodes.skin, of_faces.skin);
         for &node in &of_nodes.skin.nodes {
             let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
             let segment = Segment {
@@ -94,7 +93,7 @@ impl Search<'_> {
     }
 
     fn edges_with_edges(&self, first: Party, second: Party, see: &mut impl FnMut(Touch)) {
-        let shift = shift(first.body, second.body);
+        let shift = shift(first.skin, second.skin);
         for (index, &edge) in first.skin.edges.iter().enumerate() {
             let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
             let segment = Segment {
@@ -161,7 +160,7 @@ impl Search<'_> {
             } else {
                 self.parties[1]
             };
-            sides[index].weighted(|node| party.body.state.positions().get(node))
+            sides[index].weighted(|node| party.skin.starts.get(node))
         });
         first + shift - second
     }
@@ -169,8 +168,8 @@ impl Search<'_> {
     /// Where a node begins and how far it goes, as seen from the other body, which goes with `drift`.
     fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> (Vec3, Vec3) {
         let node = node as usize;
-        let place = party.body.state.positions().get(node) + shift;
-        (place, (party.skin.means.get(node) - drift) * self.dt)
+        let place = party.skin.starts.get(node) + shift;
+        (place, (party.skin.velocities.get(node) - drift) * self.dt)
     }
 
     /// The corners of an edge or a face in its own body's coordinates, and how far they leave its drift.
@@ -188,7 +187,6 @@ impl Search<'_> {
 }
 
 /// From the coordinates of one body to those of another.
-pub(super) fn shift(from: &Body, to: &Body) -> Vec3 {
-    let shift: DVec3 = from.origin - to.origin;
-    shift.as_vec3()
+pub(super) fn shift(from: &Skin, to: &Skin) -> Vec3 {
+    (from.origin - to.origin).as_vec3()
 }

@@ -1,6 +1,6 @@
 //! The surface of a body that meets other tissue.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::body::{Body, Bounds, Vectors};
 use crate::contact::tree::Tree;
@@ -18,11 +18,20 @@ pub(super) struct Skin {
     /// The edges that are looked at with a triangle: each with one.
     owned: Vec<[u32; 3]>,
     tree: Tree,
-    /// The mean velocities of nodes over the step, m/s.
-    pub means: Vectors,
-    /// The mean of them all, m/s, and how far any node leaves that in the step, m.
+    /// Whether it is VERLET's.
+    pub is_explicit: bool,
+    /// Whether the body takes its substeps together with others, or looks after itself in each.
+    pub goes_together: bool,
+    /// Where the body's coordinates begin.
+    pub origin: DVec3,
+    /// Where nodes are as a step or substep begins, in the body's coordinates, and how fast they go through it, m/s.
+    pub starts: Vectors,
+    pub velocities: Vectors,
+    /// The middle of these velocities, m/s, and how far any node leaves that, m.
     pub drift: Vec3,
     pub spread: f32,
+    /// The box of all velocities that were given.
+    pub given: Bounds,
     /// How long its shortest edge was at first, m.
     pub shortest: f32,
 }
@@ -60,26 +69,54 @@ impl Skin {
             edges,
             owned,
             tree,
-            means: Vectors::zeros(body.node_count())?,
+            is_explicit: body.implicit.is_none(),
+            goes_together: false,
+            origin: body.origin,
+            starts: Vectors::zeros(body.node_count())?,
+            velocities: Vectors::zeros(body.node_count())?,
             drift: Vec3::ZERO,
             spread: 0.0,
+            given: Bounds::EMPTY,
             triangles,
         })
     }
 
-    /// Takes the body as it is when a step of `dt` seconds that was tried begins, and where that has led it.
-    pub fn follow(&mut self, body: &Body, dt: f32) {
-        let (start, end) = (body.state.positions(), body.state.newest().0);
-        self.tree
-            .refit(|triangle| self.triangles[triangle as usize].map(|node| start.get(node as usize)));
-        let mut ways = Bounds::EMPTY;
+    /// Takes a substep of `duration` seconds as it is to be.
+    pub fn follow_substep(&mut self, body: &mut Body, duration: f32) {
+        let state = body.state.substep();
+        let (starts, velocities) = (state.positions, &*state.velocities);
+        self.take(body.origin, duration, |node| (starts.get(node), velocities.get(node)));
+    }
+
+    /// Takes a step of `duration` seconds that the body has tried.
+    pub fn follow_step(&mut self, body: &Body, duration: f32) {
+        let (starts, ends) = (body.state.positions(), body.state.newest().0);
+        self.take(body.origin, duration, |node| {
+            let start = starts.get(node);
+            (start, (ends.get(node) - start) / duration)
+        });
+    }
+
+    fn take(&mut self, origin: DVec3, duration: f32, motion_of: impl Fn(usize) -> (Vec3, Vec3)) {
+        self.origin = origin;
+        self.given = Bounds::EMPTY;
+        let mut all = Bounds::EMPTY;
         for &node in &self.nodes {
-            let mean = (end.get(node as usize) - start.get(node as usize)) / dt;
-            self.means.set(node as usize, mean);
-            ways = ways.with(mean);
+            let (start, velocity) = motion_of(node as usize);
+            self.starts.set(node as usize, start);
+            self.velocities.set(node as usize, velocity);
+            all = all.with(velocity);
         }
-        self.drift = 0.5 * (ways.min + ways.max);
-        self.spread = 0.5 * dt * (ways.max - ways.min).length();
+        self.drift = 0.5 * (all.min + all.max);
+        self.spread = 0.5 * duration * (all.max - all.min).length();
+        let (triangles, starts) = (&self.triangles, &self.starts);
+        self.tree
+            .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
+    }
+
+    /// The box about it as it is when the step begins.
+    pub fn bounds(&self) -> Bounds {
+        self.tree.bounds()
     }
 
     /// Shows the triangles that a box comes within `reach` of.
