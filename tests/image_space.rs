@@ -312,7 +312,8 @@ fn edges_of_a_grid_enter_and_leave_a_ball_where_they_do_to_first_order() {
 fn the_volume_of_half_a_ball_and_its_gradient_converge() {
     // Symmetric about z = 0, down to which a box covers it.
     let ball = Shape::sphere(4).moved(|p| p + Vec3::new(0.013, 0.007, 0.0));
-    let half_space = Shape::cuboid(Vec3::new(-2.0, -2.0, -3.0), Vec3::new(2.0, 2.0, 0.0));
+    // The whole section lies in the triangle 4 7 6 of its upper side.
+    let half_space = Shape::cuboid(Vec3::new(-1.5, -8.0, -3.0), Vec3::new(8.0, 1.5, 0.0));
     let surfaces = [ball.closed(), half_space.closed()];
     let exact = ball.volume() / 2.0;
     let (mut pixels, mut errors) = (Vec::new(), Vec::new());
@@ -343,6 +344,18 @@ fn the_volume_of_half_a_ball_and_its_gradient_converge() {
             (sums[0] + sums[1]).length() < 0.1 * pixel,
             "moved together they keep it: {sums:?}"
         );
+        // The section's middle shares it among the corners.
+        let [a, b, c] = half_space.corners([4, 7, 6]);
+        let middle = DVec3::new(0.013, 0.007, 0.0);
+        let area = (b - a).cross(c - a).z;
+        for (node, from, to) in [(4, b, c), (7, c, a), (6, a, b)] {
+            let weight = (to - from).cross(middle - from).z / area;
+            let share = overlap.gradients[1][node].z / sums[1].z;
+            assert!(
+                (share - weight).abs() < 0.1 * pixel,
+                "1/{parts}: node {node} has {share} of {weight}"
+            );
+        }
         pixels.push(pixel);
         errors.push(error);
     }
@@ -395,6 +408,36 @@ fn edges_that_point_at_the_viewer_are_missed_where_edges_are_drawn_and_found_fro
             );
             assert!((part.depth - 1.0).abs() < 1e-5, "half of the block: {part:?}");
         }
+    }
+}
+
+#[test]
+fn of_edges_drawn_into_the_same_pixel_the_nearest_alone_is_counted() {
+    let block = Shape::cuboid(Vec3::splat(-1.0), Vec3::splat(1.0));
+    let inside = [
+        Vec3::new(-0.5, 0.013, 0.0),
+        Vec3::new(0.5, 0.013, 0.0),
+        Vec3::new(0.0, 0.013, 0.2),
+    ];
+    let pair = Shape {
+        positions: inside.into_iter().chain(inside.map(|p| p - Vec3::Z * 2.0)).collect(),
+        triangles: vec![[0, 1, 2], [3, 4, 5]],
+    };
+    let (occluder, other) = (block.closed(), pair.open());
+    for (view, count) in [(Vec3::Z, 0), (Vec3::NEG_Z, 1), (Vec3::Y, 3)] {
+        let mut detector = detector(1.0 / 64.0, Views::Along(view), Form::Counted, &[&occluder, &other]);
+        let overlap = detector
+            .detect(&[placed(&occluder, &block), placed(&other, &pair)])
+            .expect("an overlap");
+        let edges = &overlap.inside[1].edges;
+        assert!(
+            edges.len() >= count && edges.is_empty() == (count == 0),
+            "{view}: {edges:?}"
+        );
+        assert!(
+            edges.iter().all(|part| other.edges()[part.edge as usize][1] < 3),
+            "{view}: {edges:?}"
+        );
     }
 }
 
@@ -560,6 +603,25 @@ fn distances_from_a_layered_image_are_those_of_the_faces_but_for_a_pixel() {
             sum / f64::from(count)
         );
     }
+}
+
+#[test]
+fn the_nearest_face_of_a_ball_is_found_from_deep_inside_and_from_beside() {
+    let ball = Shape::sphere(4);
+    let pixel = 2.0 / 256.0;
+    let image = LayeredImage::new(&ball.positions, &ball.triangles, pixel).expect("a closed surface");
+    let mut random = Random(8);
+    for _ in 0..400 {
+        let direction = random.direction();
+        let radius = 0.5 + 0.6 * random.unit();
+        let (distance, normal) = image.distance(direction * radius, 1.0).expect("near");
+        assert!(
+            (distance - (radius - 1.0)).abs() < pixel,
+            "{direction} {radius}: {distance}"
+        );
+        assert!(normal.dot(direction) > 0.98, "{direction} {radius}: {normal}");
+    }
+    assert!(image.distance(Vec3::X * 1.2, 0.1).is_none() && image.distance(Vec3::X * 1.2, 0.3).is_some());
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! The method as its authors describe it (CInDeR; Halic et al., section 2.1): the edges of one body are drawn into a depth
 //! buffer, the faces of the other that lie in front of them are counted.
 
+use super::draw::draw_triangles;
 use super::overlap::{EdgeInside, Inside};
 use super::projection::Projection;
 use super::surface::Placed;
 use crate::error::Result;
 use crate::memory;
-use crate::raster::{Window, rasterise_line, rasterise_triangle};
+use crate::raster::rasterise_line;
 
 const NO_EDGE: u32 = u32::MAX;
 
@@ -52,7 +53,7 @@ impl Counted {
     pub fn detect(&mut self, projection: &Projection, body: &Placed, occluder: &Placed, inside: &mut Inside) {
         self.pixels.clear();
         self.pixels.resize(projection.pixel_count(), EMPTY);
-        let window = Window::new(projection.width, projection.height);
+        let window = projection.window();
         let place = |x: u32, y: u32| y as usize * projection.width as usize + x as usize;
         for (index, edge) in body.surface.edges().iter().enumerate() {
             let ends = edge.map(|node| projection.project(body.positions[node as usize]));
@@ -69,21 +70,19 @@ impl Counted {
             });
         }
         let thickness = body.thickness + occluder.thickness;
-        for triangle in occluder.surface.triangles() {
-            let corners = triangle.map(|node| projection.project(occluder.positions[node as usize]));
-            rasterise_triangle(&window, &corners, |fragment| {
-                let pixel = &mut self.pixels[place(fragment.x, fragment.y)];
-                if pixel.edge == NO_EDGE {
-                    return;
-                }
-                let outwards = if fragment.front { -thickness } else { thickness };
-                let behind = pixel.depth - (fragment.depth + outwards);
-                if behind > 0.0 {
-                    pixel.count += if fragment.front { 1 } else { -1 };
-                }
-                pixel.free = pixel.free.min(behind.abs());
-            });
-        }
+        let triangles = occluder.surface.triangles();
+        draw_triangles(projection, occluder.positions, triangles, |_, pixel, fragment| {
+            let pixel = &mut self.pixels[pixel];
+            if pixel.edge == NO_EDGE {
+                return;
+            }
+            let outwards = if fragment.front { -thickness } else { thickness };
+            let behind = pixel.depth - (fragment.depth + outwards);
+            if behind > 0.0 {
+                pixel.count += if fragment.front { 1 } else { -1 };
+            }
+            pixel.free = pixel.free.min(behind.abs());
+        });
         self.found.clear();
         self.found.resize(body.surface.edges().len(), None);
         for pixel in self

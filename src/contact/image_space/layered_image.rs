@@ -27,15 +27,20 @@ const EQUAL: f32 = 1e-4;
 /// is not seen at all.
 #[derive(Debug)]
 pub struct LayeredImage {
-    positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-    /// Of unit length; zero for a triangle without area.
-    normals: Vec<Vec3>,
+    triangles: Vec<Triangle>,
     images: [Image; 3],
     low: Vec3,
     high: Vec3,
     /// Metres.
     pixel: f32,
+}
+
+/// All that a search needs of a triangle, side by side.
+#[derive(Clone, Copy, Debug)]
+struct Triangle {
+    corners: [Vec3; 3],
+    /// Of unit length; zero for a triangle without area.
+    normal: Vec3,
 }
 
 /// One of the three images.
@@ -144,17 +149,19 @@ impl LayeredImage {
             low = low.min(positions[node as usize]);
             high = high.max(positions[node as usize]);
         }
-        let mut normals = memory::reserved(triangles.len())?;
-        normals.extend(triangles.iter().map(|triangle| {
-            let [a, b, c] = triangle.map(|node| positions[node as usize].as_dvec3());
-            (b - a).cross(c - a).normalize_or_zero().as_vec3()
+        let mut drawn = memory::reserved(triangles.len())?;
+        drawn.extend(triangles.iter().map(|triangle| {
+            let corners = triangle.map(|node| positions[node as usize]);
+            let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+            Triangle {
+                corners,
+                normal: (b - a).cross(c - a).normalize_or_zero().as_vec3(),
+            }
         }));
         let image = |axis: usize| Image::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
         Ok(Self {
             images: [image(0)?, image(1)?, image(2)?],
-            positions: memory::copied(positions)?,
-            triangles: memory::copied(triangles)?,
-            normals,
+            triangles: drawn,
             low,
             high,
             pixel,
@@ -221,16 +228,19 @@ impl LayeredImage {
     fn meet(&self, crossings: &[Crossing], point: Vec3, faces: &mut Faces) {
         for crossing in crossings {
             let triangle = crossing.triangle();
-            let normal = self.normals[triangle as usize];
-            if normal == Vec3::ZERO || faces.met().iter().any(|face| face.triangle == triangle) {
-                continue;
-            }
-            let corners = self.triangles[triangle as usize].map(|node| self.positions[node as usize]);
-            let weights = closest_on_triangle(point, corners[0], corners[1], corners[2]);
+            let Triangle { corners, normal } = self.triangles[triangle as usize];
             // As seen from the point, so that no digits are lost.
             let [a, b, c] = corners.map(|corner| corner - point);
-            let closest = a * weights[0] + b * weights[1] + c * weights[2];
             let height = -a.dot(normal);
+            let too_far = faces.closest().is_some_and(|closest| {
+                let reach = height.abs() - self.pixel;
+                reach > 0.0 && reach * reach > closest.squared_distance
+            });
+            if too_far || normal == Vec3::ZERO || faces.met().iter().any(|face| face.triangle == triangle) {
+                continue;
+            }
+            let weights = closest_on_triangle(Vec3::ZERO, a, b, c);
+            let closest = a * weights[0] + b * weights[1] + c * weights[2];
             let within = weights.iter().all(|&weight| weight > 0.0);
             faces.add(Face {
                 triangle,

@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
+use super::draw::draw_triangles;
 use super::projection::Projection;
 use crate::error::Result;
 use crate::memory;
-use crate::raster::{Window, rasterise_triangle};
 
 /// Where the ray of a pixel passes a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,7 +77,7 @@ impl Layers {
     fn count(&mut self, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> usize {
         self.ends.clear();
         self.ends.resize(projection.pixel_count(), 0);
-        for_each_fragment(projection, positions, triangles, |pixel, _| {
+        draw_triangles(projection, positions, triangles, |_, pixel, _| {
             self.ends[pixel] = self.ends[pixel].saturating_add(1);
         });
         let mut total = 0;
@@ -92,15 +92,17 @@ impl Layers {
     /// A counting sort by pixel, then a small sort in each.
     fn fill(&mut self, count: usize, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) {
         self.crossings.resize(count, Crossing::default());
-        for_each_fragment(projection, positions, triangles, |pixel, crossing| {
+        draw_triangles(projection, positions, triangles, |triangle, pixel, fragment| {
             let place = &mut self.ends[pixel];
-            self.crossings[*place as usize] = crossing;
+            self.crossings[*place as usize] = Crossing::new(fragment.depth, triangle, fragment.front);
             *place += 1;
         });
         let mut begin = 0;
         for &end in &self.ends {
-            let by_depth = |a: &Crossing, b: &Crossing| a.depth.total_cmp(&b.depth).then(a.code.cmp(&b.code));
-            self.crossings[begin as usize..end as usize].sort_unstable_by(by_depth);
+            if end > begin + 1 {
+                let by_depth = |a: &Crossing, b: &Crossing| a.depth.total_cmp(&b.depth).then(a.code.cmp(&b.code));
+                self.crossings[begin as usize..end as usize].sort_unstable_by(by_depth);
+            }
             begin = end;
         }
     }
@@ -109,22 +111,5 @@ impl Layers {
     pub fn at(&self, pixel: usize) -> &[Crossing] {
         let begin = pixel.checked_sub(1).map_or(0, |previous| self.ends[previous]);
         &self.crossings[begin as usize..self.ends[pixel] as usize]
-    }
-}
-
-/// Calls `sink` for each pixel whose middle a triangle covers.
-fn for_each_fragment(
-    projection: &Projection,
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
-    mut sink: impl FnMut(usize, Crossing),
-) {
-    let window = Window::new(projection.width, projection.height);
-    for (index, triangle) in triangles.iter().enumerate() {
-        let vertices = triangle.map(|node| projection.project(positions[node as usize]));
-        rasterise_triangle(&window, &vertices, |fragment| {
-            let pixel = fragment.y as usize * projection.width as usize + fragment.x as usize;
-            sink(pixel, Crossing::new(fragment.depth, index, fragment.front));
-        });
     }
 }

@@ -6,6 +6,7 @@
 mod counted;
 mod covered;
 mod detector;
+mod draw;
 mod intervals;
 mod layered_image;
 mod layers;

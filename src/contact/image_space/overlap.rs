@@ -92,12 +92,14 @@ impl Overlap {
 
     /// Nothing, between surfaces of so many nodes.
     pub(super) fn clear(&mut self, node_counts: [usize; 2], pixel: f32) {
-        for side in 0..2 {
-            self.inside[side].points.clear();
-            self.inside[side].edges.clear();
-            self.inside[side].unlisted = 0;
-            self.gradients[side].clear();
-            self.gradients[side].resize(node_counts[side], DVec3::ZERO);
+        for inside in &mut self.inside {
+            inside.points.clear();
+            inside.edges.clear();
+            inside.unlisted = 0;
+        }
+        for (gradient, node_count) in self.gradients.iter_mut().zip(node_counts) {
+            gradient.clear();
+            gradient.resize(node_count, DVec3::ZERO);
         }
         (self.volume, self.normal, self.depth, self.pixel) = (0.0, Vec3::ZERO, 0.0, pixel);
     }

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::error::{Error, Result};
-use crate::raster::{GUARD, PixelVertex};
+use crate::raster::{GUARD, PixelVertex, Window};
 
 /// The most pixels of one image.
 pub(super) const LARGEST_IMAGE: u64 = 1 << 24;
@@ -55,6 +55,7 @@ pub(super) struct Projection {
     low: [f64; 2],
     /// Metres.
     pub pixel: f64,
+    per_metre: f64,
     pub width: u32,
     pub height: u32,
 }
@@ -77,6 +78,7 @@ impl Projection {
             frame,
             low: [0, 1].map(|i| (middle[i] - counts[i] * pixel) / 2.0),
             pixel,
+            per_metre: 1.0 / pixel,
             width: counts[0] as u32,
             height: counts[1] as u32,
         })
@@ -94,12 +96,16 @@ impl Projection {
         self.width as usize * self.height as usize
     }
 
+    pub fn window(&self) -> Window {
+        Window::new(self.width, self.height)
+    }
+
     /// Where a point falls.
     pub fn project(&self, point: Vec3) -> PixelVertex {
         let at = self.frame.coordinates(point);
         PixelVertex {
-            x: (at.x - self.low[0]) / self.pixel,
-            y: (at.y - self.low[1]) / self.pixel,
+            x: (at.x - self.low[0]) * self.per_metre,
+            y: (at.y - self.low[1]) * self.per_metre,
             depth: at.z,
             reciprocal: 1.0,
         }

@@ -66,11 +66,16 @@ fn an_edge_across_a_corner_is_deepest_in_its_middle() {
                 .sum::<Vec3>();
             let exact = from_cuboid(at, half);
             // The distance is that of the point found, which is as deep as any that was sampled.
+            let slack = match corners.len() {
+                1 | 2 if least < -pixel => 0.25 * pixel,
+                3 if least < -pixel => 0.5 * pixel,
+                _ => pixel,
+            };
             assert!(
                 (exact - closest.distance).abs() < pixel,
                 "{corners:?}: {closest:?} {exact}"
             );
-            assert!(exact < least + pixel, "{corners:?}: {closest:?} {exact} {least}");
+            assert!(exact < least + slack, "{corners:?}: {closest:?} {exact} {least}");
             assert!((closest.normal.length() - 1.0).abs() < 1e-4);
         }
     }

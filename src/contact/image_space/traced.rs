@@ -9,7 +9,7 @@ use super::layers::Layers;
 use super::overlap::{EdgeInside, Inside, PointInside};
 use super::projection::Projection;
 use super::surface::Placed;
-use crate::raster::{Window, traverse_line};
+use crate::raster::traverse_line;
 
 /// Adds to `inside` the parts of the edges of `body` that lie inside the body of `layers`, thicker by `thickness`.
 pub(super) fn trace_edges(
@@ -19,7 +19,7 @@ pub(super) fn trace_edges(
     body: &Placed,
     inside: &mut Inside,
 ) {
-    let window = Window::new(projection.width, projection.height);
+    let window = projection.window();
     for (index, edge) in body.surface.edges().iter().enumerate() {
         let ends = edge.map(|node| projection.project(body.positions[node as usize]));
         let (start, way) = (ends[0].depth, ends[1].depth - ends[0].depth);

@@ -20,6 +20,7 @@ pub(super) fn add_volume(
 ) -> f64 {
     let area = projection.pixel * projection.pixel;
     let mut length = 0.0;
+    let mut seen = [Seen::new(projection, &bodies[0]), Seen::new(projection, &bodies[1])];
     for pixel in 0..projection.pixel_count() {
         let pieces = |side: usize| Intervals::new(layers[side].at(pixel), bodies[side].thickness.into());
         let (mut first, mut second) = (pieces(0), pieces(1));
@@ -35,7 +36,7 @@ pub(super) fn add_volume(
                     (entry, ends[entry].triangles[0], -area),
                     (exit, ends[exit].triangles[1], area),
                 ] {
-                    add_gradient(projection, pixel, &bodies[side], triangle, change, &mut gradients[side]);
+                    seen[side].add(projection, pixel, triangle, change, &mut gradients[side]);
                 }
             }
             if exit == 0 {
@@ -48,28 +49,49 @@ pub(super) fn add_volume(
     length * area
 }
 
-/// What moving the point of a triangle in the middle of a pixel along the view changes, shared among the triangle's nodes.
-fn add_gradient(
-    projection: &Projection,
-    pixel: usize,
-    body: &Placed,
+/// The triangle of a body that a gradient was added to last, as it is seen: the next pixel mostly shows the same.
+struct Seen<'a> {
+    body: &'a Placed<'a>,
     triangle: u32,
-    change: f64,
-    gradient: &mut [DVec3],
-) {
-    let nodes = body.surface.triangles()[triangle as usize].map(|node| node as usize);
-    let [a, b, c] = nodes.map(|node| {
-        let vertex = projection.project(body.positions[node]);
-        DVec2::new(vertex.x, vertex.y)
-    });
-    let middle = projection.middle_of(pixel);
-    let area = (b - a).perp_dot(c - a);
-    // A triangle seen edge on has no area here; then its nodes share alike.
-    let weight = |from: DVec2, to: DVec2| match (to - from).perp_dot(middle - from) / area {
-        weight if weight.is_finite() => weight.clamp(0.0, 1.0),
-        _ => 1.0 / 3.0,
-    };
-    for (node, weight) in nodes.into_iter().zip([weight(b, c), weight(c, a), weight(a, b)]) {
-        gradient[node] += projection.frame.forward * (change * weight);
+    corners: [DVec2; 3],
+}
+
+impl<'a> Seen<'a> {
+    fn new(projection: &Projection, body: &'a Placed<'a>) -> Self {
+        let mut seen = Self {
+            body,
+            triangle: 0,
+            corners: [DVec2::ZERO; 3],
+        };
+        seen.look_at(projection, 0);
+        seen
+    }
+
+    fn look_at(&mut self, projection: &Projection, triangle: u32) {
+        self.triangle = triangle;
+        self.corners = self.body.surface.triangles()[triangle as usize].map(|node| {
+            let vertex = projection.project(self.body.positions[node as usize]);
+            DVec2::new(vertex.x, vertex.y)
+        });
+    }
+
+    /// What moving the point of a triangle in the middle of a pixel along the view changes, shared among its nodes.
+    fn add(&mut self, projection: &Projection, pixel: usize, triangle: u32, change: f64, gradient: &mut [DVec3]) {
+        if triangle != self.triangle {
+            self.look_at(projection, triangle);
+        }
+        let [a, b, c] = self.corners;
+        let middle = projection.middle_of(pixel);
+        let area = (b - a).perp_dot(c - a);
+        // A triangle seen edge on has no area here; then its nodes share alike.
+        let weight = |from: DVec2, to: DVec2| match (to - from).perp_dot(middle - from) / area {
+            weight if weight.is_finite() => weight.clamp(0.0, 1.0),
+            _ => 1.0 / 3.0,
+        };
+        let weights = [weight(b, c), weight(c, a), weight(a, b)];
+        let nodes = self.body.surface.triangles()[triangle as usize];
+        for (node, weight) in nodes.into_iter().zip(weights) {
+            gradient[node as usize] += projection.frame.forward * (change * weight);
+        }
     }
 }

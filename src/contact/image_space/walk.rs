@@ -5,14 +5,17 @@ use glam::Vec3;
 use super::layered_image::LayeredImage;
 use crate::contact::closest::Closest;
 
-/// No point is further from its neighbours' nearest faces than what is seen of them says, divided by this.
-const CAUTION: f32 = 0.5;
+/// A point is no closer to the solid than what is seen of it says, times this.
+const CAUTION: f32 = 0.7;
 
 /// What a search must gain to go on, in pixels: less is rounding, and stays where it is.
 const GAIN: f32 = 1e-3;
 
 /// Halvings of a pixel in which a search ends.
 const HALVINGS: u32 = 6;
+
+/// Parts of a face whose corners are no further than this from their middle, in pixels, are not cut again: about a pixel each.
+const FINEST: f32 = 1.5;
 
 /// Room for the parts of a face that a search has still to see: three for each time that it is halved.
 const PARTS: usize = 64;
@@ -113,7 +116,7 @@ impl LayeredImage {
             if best.is_none_or(|best| sample.distance < best.distance - GAIN * self.pixel()) {
                 best = Some(sample);
             }
-            if reach <= self.pixel() || count + 4 > PARTS {
+            if reach <= FINEST * self.pixel() || count + 4 > PARTS {
                 continue;
             }
             let [ab, bc, ca] = [(0, 1), (1, 2), (2, 0)].map(|(from, to)| halfway(part[from], part[to]));

@@ -1,0 +1,38 @@
+//! Bodies to fragments.
+
+use glam::Vec3;
+
+use super::projection::Projection;
+use crate::raster::{Fragment, rasterise_triangle};
+
+/// More than what the rasteriser's rounding moves a vertex, in pixels.
+const ROUNDING: f64 = 1.0 / 2048.0;
+
+/// Calls `sink` with the triangle, the pixel and the fragment for each pixel whose middle a triangle covers.
+pub(super) fn draw_triangles(
+    projection: &Projection,
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    mut sink: impl FnMut(usize, usize, Fragment),
+) {
+    let window = projection.window();
+    for (index, triangle) in triangles.iter().enumerate() {
+        let vertices = triangle.map(|node| projection.project(positions[node as usize]));
+        // Most triangles of a fine mesh cover no middle, or lie beside the image.
+        let columns = vertices.each_ref().map(|vertex| vertex.x);
+        let rows = vertices.each_ref().map(|vertex| vertex.y);
+        if may_cover(columns, projection.width) && may_cover(rows, projection.height) {
+            rasterise_triangle(&window, &vertices, |fragment| {
+                let pixel = fragment.y as usize * projection.width as usize + fragment.x as usize;
+                sink(index, pixel, fragment);
+            });
+        }
+    }
+}
+
+/// Whether the middle of a column or row lies between the least and the largest coordinate.
+fn may_cover([a, b, c]: [f64; 3], count: u32) -> bool {
+    let first = (a.min(b).min(c) + 0.5 - ROUNDING).max(0.0) as u32;
+    let past = (a.max(b).max(c) + 0.5 + ROUNDING) as u32;
+    first < past && first < count
+}
