@@ -31,6 +31,13 @@ pub(crate) struct SlotId {
     pub generation: u32,
 }
 
+impl SlotId {
+    /// The place, counted from 0, of what is known to live.
+    pub fn index(self) -> usize {
+        self.index1 as usize - 1
+    }
+}
+
 impl<T> Slots<T> {
     pub fn new(noun: &'static str) -> Self {
         Self {
@@ -80,6 +87,13 @@ impl<T> Slots<T> {
         let index = self.index(id)?;
         let Slots { slots, noun } = self;
         slots[index].content.as_mut().ok_or_else(|| stale(noun, id))
+    }
+
+    /// Removes what is not to stay.
+    pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
+        for slot in &mut self.slots {
+            slot.content = slot.content.take().filter(&stays);
+        }
     }
 
     /// All that live, with their places.

@@ -1,5 +1,7 @@
 //! A world: bodies and tools that are stepped together.
 
+mod attachments;
+
 use glam::{Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
@@ -10,6 +12,8 @@ use crate::slots::{SlotId, Slots};
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, attempt, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
+use attachments::Attachment;
+pub use attachments::AttachmentId;
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
@@ -87,6 +91,10 @@ pub struct World {
     paths: Vec<ToolPath>,
     /// How the step in progress ended for each body, at its place.
     outcomes: Vec<Option<Outcome>>,
+    /// What tools hold.
+    attachments: Slots<Attachment>,
+    /// What of that ended with the last step.
+    slipped: Vec<AttachmentId>,
 }
 
 impl World {
@@ -112,6 +120,8 @@ impl World {
             tools: Slots::new("tool"),
             paths: Vec::new(),
             outcomes: Vec::new(),
+            attachments: Slots::new("attachment"),
+            slipped: Vec::new(),
         })
     }
 
@@ -146,12 +156,14 @@ impl World {
         Ok(BodyId(self.bodies.insert(body)?))
     }
 
-    /// Removes a body.
+    /// Removes a body, and with it what is attached of it.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_body(&mut self, body: BodyId) -> Result<()> {
-        self.bodies.remove(body.0).map(drop)
+        self.bodies.remove(body.0)?;
+        self.forget_attachments_of(body);
+        Ok(())
     }
 
     /// A body, to look at.
@@ -210,12 +222,13 @@ impl World {
         Ok(ToolId(id?))
     }
 
-    /// Removes a tool.
+    /// Removes a tool. What is attached to it is let go.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
         self.tools.remove(tool.0)?;
+        self.release_all_of(tool);
         if self.tools.iter().next().is_none() {
             self.drop_contacts();
         }
@@ -318,6 +331,7 @@ impl World {
         match report {
             Ok(report) => {
                 self.commit_tools(dt);
+                self.end_slipped();
                 Ok(report)
             }
             Err(report) => Err(Error::Unstable {
@@ -359,13 +373,17 @@ impl World {
 
     fn commit_tools(&mut self, dt: f32) {
         let dt = f64::from(dt);
-        for (index, (_, tool)) in self.tools.iter_mut().enumerate() {
+        for (index, (slot, tool)) in self.tools.iter_mut().enumerate() {
             let mut force = glam::DVec3::ZERO;
             let mut torque = glam::DVec3::ZERO;
             for (place, body) in self.bodies.iter() {
                 if let (Some(Outcome::Done { .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
                     force += contacts.loads()[index].impulse / dt;
                     torque += contacts.loads()[index].angular_impulse / dt;
+                    for grasp in body.grasps().filter(|grasp| grasp.tool == slot) {
+                        force -= grasp.force.as_dvec3();
+                        torque -= grasp.torque.as_dvec3();
+                    }
                 }
             }
             // Finite, whatever the step's length.

@@ -115,6 +115,7 @@ impl Body {
             return self.unpin(node);
         }
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         let own = self.order.own(node);
         let before = self.pins.axes_of(own);
         if axes == before {
@@ -147,6 +148,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         let own = self.order.own(node);
         let mass = self.mass_of_unpinned(node)?;
         if self.pins.get(own).is_some() {
@@ -166,6 +168,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, it is not pinned, or the position is not finite.
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         finite_vector("position", position)?;
         match self.pins.get_mut(self.order.own(node)) {
             Some(pin) => pin.target = Some(position),
@@ -181,6 +184,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, or it is not pinned.
     pub fn pin_force(&self, node: u32) -> Result<Vec3> {
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         let pin = self.pins.get(self.order.own(node)).ok_or_else(|| not_pinned(node))?;
         let closing = self.carry.closing.as_ref();
         let positions = self.state.positions();
@@ -341,7 +345,7 @@ impl Body {
     }
 
     /// Other nodes move now.
-    fn forget_matrix(&mut self) {
+    pub(super) fn forget_matrix(&mut self) {
         self.carry.stability = Stability::UNKNOWN;
         self.forget_rates();
         if let Some(implicit) = &mut self.implicit {

@@ -1,6 +1,6 @@
 //! The way of a tool over a step.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 
 use super::tool::{Pose, Shape, Tool};
 use crate::body::Bounds;
@@ -76,6 +76,29 @@ impl ToolPath {
             self.end.orientation
         } else {
             Quat::from_scaled_axis(self.turn * fraction as f32) * self.start.orientation
+        }
+    }
+
+    /// Where what lies in a place of the tool's own axes is after `fraction` of the step, in the coordinates of a body that begin at
+    /// `origin`.
+    pub fn carried(&self, offset: DVec3, fraction: f64, origin: DVec3) -> DVec3 {
+        let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
+        start.lerp(end, fraction) - origin + self.exact_orientation_at(fraction) * offset
+    }
+
+    /// The place in the tool's own axes of what is here when the step begins.
+    pub fn offset(&self, position: DVec3, origin: DVec3) -> DVec3 {
+        self.exact_orientation_at(0.0).conjugate() * (position + origin - self.start.position.as_dvec3())
+    }
+
+    fn exact_orientation_at(&self, fraction: f64) -> DQuat {
+        let [start, end] = [self.start, self.end].map(|pose| pose.orientation.as_dquat().normalize());
+        if self.turn == Vec3::ZERO || fraction <= 0.0 {
+            start
+        } else if fraction >= 1.0 {
+            end
+        } else {
+            DQuat::from_scaled_axis(self.turn.as_dvec3() * fraction) * start
         }
     }
 
