@@ -13,7 +13,7 @@ use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, 
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
 use attachments::Attachment;
-pub use attachments::AttachmentId;
+pub use attachments::{AttachmentId, SurfacePoint};
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
@@ -380,9 +380,9 @@ impl World {
                 if let (Some(Outcome::Done { .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
                     force += contacts.loads()[index].impulse / dt;
                     torque += contacts.loads()[index].angular_impulse / dt;
-                    for grasp in body.grasps().filter(|grasp| grasp.tool == slot) {
-                        force -= grasp.force.as_dvec3();
-                        torque -= grasp.torque.as_dvec3();
+                    for held in body.held_nodes().filter(|held| held.tool == slot) {
+                        force -= held.force.as_dvec3();
+                        torque -= held.torque.as_dvec3();
                     }
                 }
             }

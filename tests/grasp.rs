@@ -6,7 +6,8 @@ mod tissue;
 use glam::{DQuat, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    AttachmentId, BodyDefinition, BodyId, Error, Pose, Shape, Solver, Storage, ToolId, Values, World, WorldDefinition,
+    AttachmentId, BodyDefinition, BodyId, Error, Pose, Shape, Solver, Storage, SurfacePoint, ToolId, Values, World,
+    WorldDefinition,
 };
 use tissue::*;
 
@@ -328,9 +329,7 @@ fn the_impulse_on_the_tool_is_what_the_momentum_lacks() {
                 grip: APART,
                 ..SETUP
             };
-            if solver == Solver::Implicit { println!("default {}", unbalanced(Setup { accuracy: 0.0, ..setup }, dt)); }
             let off = unbalanced(setup, dt);
-            println!("{solver:?} {order} {dt} {off}");
             assert!(off < 1e-4, "{solver:?} of order {order}, dt {dt}: {off}");
         }
     }
@@ -650,6 +649,130 @@ fn let_go_it_moves_as_if_it_had_been_pinned() {
 }
 
 #[test]
+fn surface_points_are_where_the_tool_has_them() {
+    for solver in SOLVERS {
+        let mut held = Held::loose(Setup {
+            solver,
+            gravity: Vec3::Y * -9.81,
+            drag: 20.0,
+            ..SETUP
+        });
+        let surface = body(&held.world, held.body).surface().to_vec();
+        let above = |triangle: &[u32; 3]| triangle.iter().all(|corner| held.nodes.contains(corner));
+        let triangles: Vec<u32> = (0..)
+            .zip(&surface)
+            .filter(|(_, it)| above(it))
+            .map(|(it, _)| it)
+            .collect();
+        assert!(triangles.len() > 3);
+        // Within, on an edge, and in a corner; some corners are those of several.
+        let weights = [[0.2, 0.3, 0.5], [0.6, 0.0, 0.4], [0.0, 1.0, 0.0], [0.5, 0.25, 0.25]];
+        let points: Vec<SurfacePoint> = triangles
+            .iter()
+            .zip(weights)
+            .map(|(&triangle, weights)| SurfacePoint { triangle, weights })
+            .collect();
+        let at = |held: &Held| -> Vec<DVec3> {
+            let body = body(&held.world, held.body);
+            let place = |point: &SurfacePoint| {
+                let corners = corners(body, surface[point.triangle as usize]);
+                let parts = corners.iter().zip(point.weights);
+                parts.map(|(corner, weight)| *corner * f64::from(weight)).sum()
+            };
+            points.iter().map(place).collect()
+        };
+        let first = at(&held);
+        let turn = |held: &Held| {
+            held.world
+                .pose(held.tool)
+                .expect("a tool")
+                .orientation
+                .as_dquat()
+                .normalize()
+        };
+        let start = turn(&held);
+        let attached = held.world.attach_points(held.body, &points, held.tool, 0.0);
+        held.ids = attached.expect("attachments");
+        let mut time = 0.0;
+        for dt in [0.002, 1.0 / 60.0, 0.05, 0.003] {
+            time += dt;
+            held.world
+                .set_pose(held.tool, way(time), Some(turned(time)))
+                .expect("a pose");
+            held.world.step(dt).expect("a step");
+            let there =
+                |first: &DVec3| way(time).as_dvec3() + turn(&held) * (start.conjugate() * (*first - GRIP.as_dvec3()));
+            for (now, first) in at(&held).iter().zip(&first) {
+                let off = now.distance(there(first));
+                assert!(off < 1e-6 * 0.08, "{solver:?}: {off} m");
+            }
+            // Each has its share of what holds the corners.
+            let forces = held
+                .ids
+                .iter()
+                .map(|&id| held.world.attachment_force(id).expect("held").as_dvec3());
+            let (sum, size) = forces.fold((DVec3::ZERO, 0.0), |(sum, size), force| {
+                (sum + force, size + force.length())
+            });
+            assert!((sum + held.wrench()[0]).length() < 1e-5 * size, "{solver:?}: {sum} N");
+        }
+        // One is let go: what it shares with others stays held, and all go in the end.
+        let mut free = 0;
+        for (index, &id) in held.ids.iter().enumerate() {
+            held.world.release(id).expect("held");
+            let others: Vec<u32> = points[index + 1..]
+                .iter()
+                .flat_map(|point| surface[point.triangle as usize].into_iter().zip(point.weights))
+                .filter(|(_, weight)| *weight > 0.0)
+                .map(|(corner, _)| corner)
+                .collect();
+            for corner in surface[points[index].triangle as usize] {
+                let there = held.world.body_mut(held.body).expect("a body");
+                let is_held = there.pin(corner).is_err();
+                assert_eq!(
+                    is_held,
+                    others.contains(&corner),
+                    "{solver:?}: corner {corner} after {index}"
+                );
+                if !is_held {
+                    there.unpin(corner).expect("a pin");
+                    free += 1;
+                }
+            }
+        }
+        assert!(free > 4);
+    }
+}
+
+#[test]
+fn a_grip_shared_by_two_slips_in_parts() {
+    // A node held twice: each has half, and the weaker one leaves the whole to the other.
+    let mut held = Held::loose(Setup {
+        drag: 30.0,
+        gravity: Vec3::Y * -9.81,
+        ..SETUP
+    });
+    let weight = held.mass() as f32 * 9.81;
+    let top = held.nodes[held.nodes.len() / 2];
+    let [weak, strong] = [0.4, 2.0].map(|part| {
+        let attached = held.world.attach_node(held.body, top, held.tool, part * weight);
+        attached.expect("an attachment")
+    });
+    let report = held.world.rest_state(held.body, &Default::default());
+    report.expect("a state of rest");
+    for id in [weak, strong] {
+        let force = held.world.attachment_force(id).expect("held");
+        assert!((force.y / weight - 0.5).abs() < 1e-3, "{force} N of {weight} N");
+    }
+    held.world.step(0.01).expect("a step");
+    assert_eq!(held.world.slipped(), [weak]);
+    held.world.step(0.01).expect("a step");
+    assert!(held.world.slipped().is_empty());
+    let force = held.world.attachment_force(strong).expect("held");
+    assert!((force.y / weight - 1.0).abs() < 1e-2, "{force} N of {weight} N");
+}
+
+#[test]
 fn a_refused_step_changes_nothing_and_a_pose_can_be_taken_back() {
     let mut held = Held::new(Setup { substeps: 4, ..SETUP });
     let pose = |held: &mut Held, place: Vec3| {
@@ -721,7 +844,7 @@ fn threads_give_the_same_bits() {
             let (force, torque) = world.wrench(jaws[0]).expect("a tool");
             (world.state_hash(), force.to_array(), torque.to_array())
         };
-        assert_eq!(hash(1), hash(3), "{solver:?}");
+        assert_eq!(hash(1), hash(2), "{solver:?}");
     }
 }
 
@@ -816,8 +939,6 @@ fn what_cannot_be_held_is_refused() {
         (vec![free[2], 100_000], 0.0, "nodes[1]"),
         (vec![free[2], free[0]], 0.0, "nodes[1]"),
         (vec![free[1]], 0.0, "nodes[0]"),
-        (vec![free[3], free[2], taken], 0.0, "nodes[2]"),
-        (vec![free[2], free[3], free[2]], 0.0, "more than once"),
         (vec![free[2]], -1.0, "force_limit"),
         (vec![free[2]], f32::NAN, "force_limit"),
     ] {
@@ -836,6 +957,10 @@ fn what_cannot_be_held_is_refused() {
     ] {
         assert!(matches!(refused, Err(Error::InvalidArgument(_))), "{refused:?}");
     }
+    let other = sphere(&mut held.world, 0.001, Vec3::Y);
+    let before = (held.world.state_hash(), before).0;
+    let refused = held.world.attach_nodes(held.body, &[free[2], taken], other, 0.0);
+    assert!(matches!(refused, Err(Error::InvalidArgument(_))), "{refused:?}");
     let refused = held.world.wrench_about(&[held.tool, held.tool], Vec3::ZERO);
     assert!(matches!(refused, Err(Error::InvalidArgument(_))), "{refused:?}");
     assert_eq!(held.world.state_hash(), before);

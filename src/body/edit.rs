@@ -401,7 +401,7 @@ impl Body {
         }
     }
 
-    pub(super) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+    pub(crate) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
         if (node as usize) < self.node_count() {
             return Ok(());
         }

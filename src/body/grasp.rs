@@ -1,7 +1,10 @@
-//! What tools hold of a body: nodes that a tool leads as if they were part of it, and what that takes.
+//! What tools hold of a body: nodes that a tool leads as if they were part of it, and what that takes. A point of the surface is
+//! held by the corners of its triangle.
 //!
 //! A node that is held is a pin, so every solver holds it exactly. What holds it is all that acts on the tool in return: what
 //! pins tell, and what it takes to move the node's own mass, and to move it against what damps it.
+
+use std::fmt::Display;
 
 use glam::{BVec3, DVec3, Vec3};
 
@@ -9,30 +12,53 @@ use super::{Body, Pin, Vectors};
 use crate::contact::ToolPath;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::slots::SlotId;
 use crate::solver::close;
 
-/// A node that a tool holds.
+/// A part of a body that a tool holds: a node, or the corners of a triangle about a point on it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grasp {
     /// Its name among the world's attachments.
     pub id: SlotId,
     /// The holder's place among the world's tools.
-    pub tool: usize,
-    node: u32,
-    /// What is held in the tool's own axes, from its position, m; `None`: where it is when the next step begins.
-    offset: Option<DVec3>,
+    tool: usize,
+    corners: [u32; 3],
+    /// Its part in what holds each corner, beside those of other grasps; 0 for corners that it does not hold.
+    weights: [f32; 3],
     /// The mean force over a step with which the tool just holds it, N.
     limit: f32,
-    /// What the tool did to the tissue, mean over the last step: N, and N m about the tool's position.
+    /// What the tool did to the tissue, mean over the last step, N.
+    pub force: Vec3,
+}
+
+/// A node that a tool holds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HeldNode {
+    node: u32,
+    /// The holder's place among the world's tools.
+    pub tool: usize,
+    /// How many grasps hold it, and the sum of their weights.
+    grasp_count: u32,
+    weight: f32,
+    /// Where it is in the tool's own axes, from its position, m; `None`: where it is when the next step begins.
+    offset: Option<DVec3>,
+    /// What the tool did to it, mean over the last step: N, and N m about the tool's position.
     pub force: Vec3,
     pub torque: Vec3,
-    /// How much faster the node was led in the last step than before it, m/s.
+    /// How much faster it was led in the last step than before it, m/s.
     gain: Vec3,
     course: Course,
 }
 
-/// The step in progress of what is held.
+/// What is to be held: corners, of which one may have a weight of 0 and then is left free.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grip {
+    pub corners: [u32; 3],
+    pub weights: [f32; 3],
+}
+
+/// The step in progress of a held node.
 #[derive(Clone, Copy, Debug, Default)]
 struct Course {
     offset: DVec3,
@@ -62,38 +88,92 @@ pub(crate) struct Lapse {
     pub is_next: bool,
 }
 
-/// All that tools hold of a body, in the order in which they came.
+/// All that tools hold of a body.
 #[derive(Debug, Default)]
 pub(crate) struct Grasps {
+    /// In the order in which they came.
     grasps: Vec<Grasp>,
+    /// In their order.
+    nodes: Vec<HeldNode>,
+}
+
+impl Grip {
+    /// A node by itself.
+    pub fn of_node(node: u32) -> Self {
+        Self {
+            corners: [node; 3],
+            weights: [1.0, 0.0, 0.0],
+        }
+    }
+
+    /// The corners that are held, with their weights.
+    fn held(&self) -> impl Iterator<Item = (u32, f32)> {
+        let corners = self.corners.into_iter().zip(self.weights);
+        corners.filter(|(_, weight)| *weight > 0.0)
+    }
 }
 
 impl Grasps {
-    pub fn iter(&self) -> std::slice::Iter<'_, Grasp> {
-        self.grasps.iter()
+    /// The grasps of this name.
+    pub fn get(&self, id: SlotId) -> Option<&Grasp> {
+        self.grasps.iter().find(|grasp| grasp.id == id)
     }
 
     /// Whether what is to be told of them is finite.
     pub fn sums_fit(&self, fits: impl Fn(DVec3) -> bool) -> bool {
         let fit = |course: &Course| fits(course.force_sum) && fits(course.torque_sum);
-        self.grasps.iter().all(|grasp| fit(&grasp.course))
+        self.nodes.iter().all(|held| fit(&held.course))
     }
 
     pub fn hash(&self, hasher: &mut StateHasher) {
-        for grasp in &self.grasps {
-            hasher.write_u64(u64::from(grasp.node) << 32 | grasp.tool as u64);
-            hasher.write_u64(u64::from(grasp.offset.is_some()));
-            for value in grasp.offset.unwrap_or_default().to_array() {
+        for held in &self.nodes {
+            hasher.write_u64(u64::from(held.node) << 32 | held.tool as u64);
+            hasher.write_u64(u64::from(held.offset.is_some()));
+            for value in held.offset.unwrap_or_default().to_array() {
                 hasher.write_u64(value.to_bits());
             }
+            hasher.write_floats(&held.gain.to_array());
+        }
+        for grasp in &self.grasps {
+            grasp.corners.iter().for_each(|&corner| hasher.write_u64(corner.into()));
+            hasher.write_floats(&grasp.weights);
             hasher.write_floats(&[grasp.limit]);
-            hasher.write_floats(&grasp.gain.to_array());
+        }
+    }
+
+    fn place_of(&self, node: u32) -> std::result::Result<usize, usize> {
+        self.nodes.binary_search_by_key(&node, |held| held.node)
+    }
+
+    fn get_held(&self, node: u32) -> Option<&HeldNode> {
+        self.place_of(node).ok().map(|place| &self.nodes[place])
+    }
+
+    /// What each grasp has of what holds its corners.
+    fn share_forces(&mut self) {
+        let Self { grasps, nodes } = self;
+        for grasp in grasps {
+            grasp.force = Vec3::ZERO;
+            for (corner, weight) in grasp.grip().held() {
+                if let Ok(place) = nodes.binary_search_by_key(&corner, |held| held.node) {
+                    grasp.force += nodes[place].force * (weight / nodes[place].weight);
+                }
+            }
         }
     }
 }
 
 impl Grasp {
-    /// Where the tool has the node after this fraction of the step, in the coordinates of a body that begin at `origin`.
+    fn grip(&self) -> Grip {
+        Grip {
+            corners: self.corners,
+            weights: self.weights,
+        }
+    }
+}
+
+impl HeldNode {
+    /// Where the tool has it after this fraction of the step, in the coordinates of a body that begin at `origin`.
     fn place(&self, path: &ToolPath, fraction: f64, origin: DVec3) -> DVec3 {
         path.carried(self.course.offset, fraction, origin) + self.course.gap * (1.0 - fraction)
     }
@@ -106,40 +186,33 @@ fn path_of(tools: &[ToolPath], slot: usize) -> Option<&ToolPath> {
 }
 
 impl Body {
-    /// What tools hold of it.
-    pub(crate) fn grasps(&self) -> impl Iterator<Item = &Grasp> {
-        self.grasps.iter().flat_map(|grasps| grasps.iter())
+    /// The nodes that tools hold.
+    pub(crate) fn held_nodes(&self) -> impl Iterator<Item = &HeldNode> {
+        self.grasps.iter().flat_map(|grasps| &grasps.nodes)
     }
 
     /// Whether a tool holds anything of it.
     pub(crate) fn is_grasped(&self) -> bool {
-        self.grasps().next().is_some()
+        self.held_nodes().next().is_some()
     }
 
-    /// Whether these nodes can be held, each by itself.
-    pub(crate) fn check_graspable(&self, nodes: &[u32]) -> Result<()> {
-        let mut own = crate::memory::reserved(nodes.len())?;
-        for (index, &node) in nodes.iter().enumerate() {
-            self.check_node(&format_args!("nodes[{index}]"), node)?;
-            self.check_not_held(&format_args!("nodes[{index}]"), node)?;
-            if self.pins.get(self.order.own(node)).is_some() {
-                return Err(Error::invalid(format!(
-                    "nodes[{index}] is {node}: it is pinned, and stays where its pin leads it"
-                )));
-            }
-            own.push(node);
-        }
-        own.sort_unstable();
-        match own.windows(2).find(|pair| pair[0] == pair[1]) {
+    /// Whether the tool in this place can hold a node, which is there.
+    pub(crate) fn check_graspable(&self, name: &dyn Display, node: u32, tool: usize) -> Result<()> {
+        let own = self.order.own(node);
+        match self.grasps.as_ref().and_then(|grasps| grasps.get_held(own)) {
+            Some(held) if held.tool == tool => Ok(()),
+            Some(_) => Err(Error::invalid(format!("{name} is {node}: another tool holds it"))),
+            None if self.pins.get(own).is_some() => Err(Error::invalid(format!(
+                "{name} is {node}: it is pinned, and stays where its pin leads it"
+            ))),
             None => Ok(()),
-            Some(pair) => Err(Error::invalid(format!("nodes names {} more than once", pair[0]))),
         }
     }
 
     /// Refuses a node that a tool holds.
-    pub(super) fn check_not_held(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+    pub(super) fn check_not_held(&self, name: &dyn Display, node: u32) -> Result<()> {
         let own = self.order.own(node);
-        if self.grasps().any(|grasp| grasp.node == own) {
+        if self.grasps.as_ref().is_some_and(|grasps| grasps.place_of(own).is_ok()) {
             return Err(Error::invalid(format!("{name} is {node}: a tool holds it")));
         }
         Ok(())
@@ -147,51 +220,89 @@ impl Body {
 
     /// Makes room for so many grasps more.
     pub(crate) fn reserve_grasps(&mut self, count: usize) -> Result<()> {
-        self.pins.reserve(count, self.masses.len())?;
+        let corners = count.saturating_mul(3).min(self.masses.len());
+        self.pins.reserve(corners, self.masses.len())?;
         if let Some(contacts) = &mut self.contacts {
-            contacts.reserve_held(count)?;
+            contacts.reserve_held(corners)?;
         }
-        let grasps = self.grasps.get_or_insert_default();
-        Ok(grasps.grasps.try_reserve(count)?)
+        if let Some(grasps) = &mut self.grasps {
+            grasps.grasps.try_reserve(count)?;
+            grasps.nodes.try_reserve(corners)?;
+            return Ok(());
+        }
+        let grasps = Grasps {
+            grasps: memory::reserved(count)?,
+            nodes: memory::reserved(corners)?,
+        };
+        self.grasps = Some(Box::new(grasps));
+        Ok(())
     }
 
-    /// Has the tool in this place hold these nodes, for which there is room and which can be held, under these names.
-    pub(crate) fn grasp(
-        &mut self,
-        tool: usize,
-        nodes: &[u32],
-        ids: impl Iterator<Item = SlotId>,
-        limit: f32,
-    ) -> Result<()> {
+    /// Has the tool in this place hold these, for which there is room and whose nodes can be held, under these names.
+    pub(crate) fn grasp(&mut self, tool: usize, grips: impl Iterator<Item = (SlotId, Grip)>, limit: f32) -> Result<()> {
         close(self);
         // Damping is to be that of masses as they are.
         self.scale_masses(0.0);
-        for (&node, id) in nodes.iter().zip(ids) {
-            let node = self.order.own(node);
-            self.pins.hold(node, BVec3::TRUE)?;
-            self.inverse_masses[node as usize] = 0.0;
-            if let Some(applied) = &mut self.applied {
-                applied.set(node as usize, Vec3::ZERO);
+        for (id, grip) in grips {
+            let grip = Grip {
+                corners: grip.corners.map(|corner| self.order.own(corner)),
+                ..grip
+            };
+            for (node, weight) in grip.held() {
+                self.hold(node, weight, tool)?;
             }
-            if let Some(contacts) = &mut self.contacts {
-                contacts.hold(node, tool);
+            if let Some(grasps) = &mut self.grasps {
+                grasps.grasps.push(Grasp {
+                    id,
+                    tool,
+                    corners: grip.corners,
+                    weights: grip.weights,
+                    limit: if limit > 0.0 { limit } else { f32::INFINITY },
+                    force: Vec3::ZERO,
+                });
             }
-            self.grasps.get_or_insert_default().grasps.push(Grasp {
-                id,
-                tool,
-                node,
-                offset: None,
-                limit: if limit > 0.0 { limit } else { f32::INFINITY },
-                force: Vec3::ZERO,
-                torque: Vec3::ZERO,
-                gain: self
-                    .implicit
-                    .as_ref()
-                    .map_or(Vec3::ZERO, |implicit| implicit.gain_of(node as usize)),
-                course: Course::default(),
-            });
         }
         self.forget_held();
+        Ok(())
+    }
+
+    /// Has a tool hold a node, in one grasp more where it does so already.
+    fn hold(&mut self, node: u32, weight: f32, tool: usize) -> Result<()> {
+        let Some(grasps) = &mut self.grasps else {
+            return Ok(());
+        };
+        let place = match grasps.place_of(node) {
+            Ok(place) => {
+                let held = &mut grasps.nodes[place];
+                held.grasp_count += 1;
+                held.weight += weight;
+                return Ok(());
+            }
+            Err(place) => place,
+        };
+        self.pins.hold(node, BVec3::TRUE)?;
+        let gain = self.implicit.as_ref().map(|implicit| implicit.gain_of(node as usize));
+        grasps.nodes.insert(
+            place,
+            HeldNode {
+                node,
+                tool,
+                grasp_count: 1,
+                weight,
+                offset: None,
+                force: Vec3::ZERO,
+                torque: Vec3::ZERO,
+                gain: gain.unwrap_or_default(),
+                course: Course::default(),
+            },
+        );
+        self.inverse_masses[node as usize] = 0.0;
+        if let Some(applied) = &mut self.applied {
+            applied.set(node as usize, Vec3::ZERO);
+        }
+        if let Some(contacts) = &mut self.contacts {
+            contacts.hold(node, tool);
+        }
         Ok(())
     }
 
@@ -217,7 +328,7 @@ impl Body {
     }
 
     fn let_go_where(&mut self, ends: impl Fn(&Grasp) -> bool, mut see: impl FnMut(SlotId)) {
-        if !self.grasps().any(&ends) {
+        if !self.grasps.iter().flat_map(|grasps| &grasps.grasps).any(&ends) {
             return;
         }
         close(self);
@@ -226,15 +337,28 @@ impl Body {
         };
         let (pins, contacts) = (&mut self.pins, &mut self.contacts);
         let (masses, inverse_masses) = (&self.masses, &mut self.inverse_masses);
-        grasps.grasps.retain(|grasp| {
+        let Grasps { grasps, nodes } = &mut **grasps;
+        grasps.retain(|grasp| {
             let stays = !ends(grasp);
             if !stays {
-                pins.remove(grasp.node);
-                inverse_masses[grasp.node as usize] = 1.0 / masses[grasp.node as usize];
-                if let Some(contacts) = contacts {
-                    contacts.release(grasp.node, grasp.tool);
+                for (corner, weight) in grasp.grip().held() {
+                    if let Ok(place) = nodes.binary_search_by_key(&corner, |held| held.node) {
+                        nodes[place].grasp_count -= 1;
+                        nodes[place].weight -= weight;
+                    }
                 }
                 see(grasp.id);
+            }
+            stays
+        });
+        nodes.retain(|held| {
+            let stays = held.grasp_count > 0;
+            if !stays {
+                pins.remove(held.node);
+                inverse_masses[held.node as usize] = 1.0 / masses[held.node as usize];
+                if let Some(contacts) = contacts {
+                    contacts.release(held.node, held.tool);
+                }
             }
             stays
         });
@@ -249,26 +373,26 @@ impl Body {
 
     /// Nodes were put elsewhere: tools hold them there.
     pub(super) fn grasp_anew(&mut self) {
-        for grasp in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.grasps) {
-            grasp.offset = None;
+        for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
+            held.offset = None;
         }
     }
 
     /// Begins a step over, from what is current.
     pub(crate) fn begin_grasps(&mut self, tools: &[ToolPath]) {
         let state = &self.state;
-        for grasp in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.grasps) {
-            let Some(path) = path_of(tools, grasp.tool) else {
+        for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
+            let Some(path) = path_of(tools, held.tool) else {
                 continue;
             };
-            let node = grasp.node as usize;
+            let node = held.node as usize;
             let position = state.positions().get(node).as_dvec3();
-            let offset = grasp.offset.unwrap_or_else(|| path.offset(position, self.origin));
-            grasp.course = Course {
+            let offset = held.offset.unwrap_or_else(|| path.offset(position, self.origin));
+            held.course = Course {
                 offset,
                 gap: position - path.carried(offset, 0.0, self.origin),
                 velocity: state.velocities().get(node),
-                gain: grasp.gain,
+                gain: held.gain,
                 ..Course::default()
             };
         }
@@ -277,12 +401,12 @@ impl Body {
     /// Has the tools lead what they hold between these fractions of the step: from point to point of the way of a tool that turns.
     pub(crate) fn lead_grasps(&mut self, tools: &[ToolPath], [start, end]: [f64; 2]) {
         let origin = self.origin;
-        for grasp in self.grasps.iter().flat_map(|grasps| &grasps.grasps) {
-            let (Some(path), Some(pin)) = (path_of(tools, grasp.tool), self.pins.get_mut(grasp.node)) else {
+        for held in self.grasps.iter().flat_map(|grasps| &grasps.nodes) {
+            let (Some(path), Some(pin)) = (path_of(tools, held.tool), self.pins.get_mut(held.node)) else {
                 continue;
             };
-            let there = grasp.place(path, end, origin);
-            let travel = (there - grasp.place(path, start, origin)) / (end - start);
+            let there = held.place(path, end, origin);
+            let travel = (there - held.place(path, start, origin)) / (end - start);
             pin.travel = travel.as_vec3();
             pin.goal = (there + travel * (1.0 - end)).as_vec3();
         }
@@ -300,35 +424,41 @@ impl Body {
         } else {
             state.positions
         };
-        for grasp in &mut grasps.grasps {
-            let (Some(path), Some(pin)) = (path_of(tools, grasp.tool), self.pins.get(grasp.node)) else {
+        for held in &mut grasps.nodes {
+            let (Some(path), Some(pin)) = (path_of(tools, held.tool), self.pins.get(held.node)) else {
                 continue;
             };
-            let node = grasp.node as usize;
+            let node = held.node as usize;
             let arm = positions.get(node).as_dvec3() - path.carried(DVec3::ZERO, lapse.at, self.origin);
             let mass = f64::from(self.masses[node]);
             let drag = rates.map_or(0.0, |rates| f64::from(rates[node])) * mass * lapse.moved;
-            grasp.course.feel(pin, state.velocities, [mass, drag], &lapse, arm);
+            held.course.feel(pin, state.velocities, [mass, drag], &lapse, arm);
         }
     }
 
     /// The step in progress, of so many substeps, is the current state.
     pub(super) fn commit_grasps(&mut self, substeps: u32) {
-        for grasp in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.grasps) {
+        for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
             let mean = |sum: DVec3| (sum / f64::from(substeps)).as_vec3();
-            grasp.force = mean(grasp.course.force_sum);
-            grasp.torque = mean(grasp.course.torque_sum);
-            grasp.gain = grasp.course.gain;
-            grasp.offset = Some(grasp.course.offset);
+            held.force = mean(held.course.force_sum);
+            held.torque = mean(held.course.torque_sum);
+            held.gain = held.course.gain;
+            held.offset = Some(held.course.offset);
+        }
+        if let Some(grasps) = &mut self.grasps {
+            grasps.share_forces();
         }
     }
 
     /// What is held is at rest, as its pins tell.
     pub(super) fn rest_grasps(&mut self) {
         let pins = &self.pins;
-        for grasp in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.grasps) {
-            grasp.force = pins.get(grasp.node).map_or(Vec3::ZERO, |pin| pin.force);
-            grasp.gain = Vec3::ZERO;
+        for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
+            held.force = pins.get(held.node).map_or(Vec3::ZERO, |pin| pin.force);
+            held.gain = Vec3::ZERO;
+        }
+        if let Some(grasps) = &mut self.grasps {
+            grasps.share_forces();
         }
     }
 }

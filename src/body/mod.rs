@@ -26,7 +26,7 @@ pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{
     SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices, not_negative,
 };
-pub(crate) use grasp::{Grasps, Lapse};
+pub(crate) use grasp::{Grasps, Grip, Lapse};
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};

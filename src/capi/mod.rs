@@ -30,6 +30,8 @@ pub mod rest_state;
 
 pub mod tool;
 
+pub mod attachment;
+
 pub mod mesh;
 
 pub mod picture;

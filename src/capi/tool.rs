@@ -77,7 +77,7 @@ unsafe impl Versioned for sinew_tool_def {
 }
 
 impl sinew_tool_id {
-    fn id(self) -> ToolId {
+    pub(super) fn id(self) -> ToolId {
         ToolId(SlotId {
             index1: self.index1,
             generation: self.generation,
