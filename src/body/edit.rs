@@ -52,7 +52,7 @@ impl Body {
         Ok(())
     }
 
-    /// Puts all nodes, pinned ones too, at these places, in metres; velocities stay, and nothing is swept.
+    /// Puts all nodes, pinned ones too, at these places, in metres; velocities stay, and nothing is swept. What tools hold they hold there.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: not one position for each node, or one that is not finite.
@@ -90,7 +90,7 @@ impl Body {
     /// Holds `node` where it is, from now on; nothing where it is held already.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node.
+    /// [`Error::InvalidArgument`]: there is no such node, or a tool holds it.
     pub fn pin(&mut self, node: u32) -> Result<()> {
         self.pin_axes(node, [true; 3])
     }
@@ -108,7 +108,8 @@ impl Body {
     /// pinned node.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or it has no mass, and is pinned for good along all axes.
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass, and is pinned for good along all
+    /// axes.
     pub fn pin_axes(&mut self, node: u32, axes: [bool; 3]) -> Result<()> {
         let axes = BVec3::from(axes);
         if !axes.any() {
@@ -145,7 +146,7 @@ impl Body {
     /// Lets go of `node` along all axes: it goes on as it was led in the last step; nothing where it is not held.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or it has no mass and is pinned for good.
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
         self.check_not_held(&"node", node)?;
@@ -165,7 +166,7 @@ impl Body {
     /// some axes alone along those.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, it is not pinned, or the position is not finite.
+    /// [`Error::InvalidArgument`]: there is no such node, it is not pinned or a tool holds it, or the position is not finite.
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
         self.check_node(&"node", node)?;
         self.check_not_held(&"node", node)?;
@@ -181,7 +182,8 @@ impl Body {
     /// is not held.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or it is not pinned.
+    /// [`Error::InvalidArgument`]: there is no such node, it is not pinned, or a tool holds it
+    /// ([`World::attachment_force`](crate::World::attachment_force)).
     pub fn pin_force(&self, node: u32) -> Result<Vec3> {
         self.check_node(&"node", node)?;
         self.check_not_held(&"node", node)?;
