@@ -216,7 +216,9 @@ fn nor_does_one_of_what_tools_hold_and_lose() {
         let mut lost = 0;
         for step in 0..8 {
             let place = Vec3::Y * (1e-3 * (step * step) as f32);
-            world.set_pose(tool, place, Some(Quat::from_rotation_x(0.02 * step as f32))).expect("a pose");
+            world
+                .set_pose(tool, place, Some(Quat::from_rotation_x(0.02 * step as f32)))
+                .expect("a pose");
             assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
             lost += world.slipped().len();
         }

@@ -42,6 +42,7 @@ struct Setup {
     storage: Storage,
     order: u32,
     substeps: u32,
+    tolerance: f32,
     gravity: Vec3,
     drag: f32,
     away: Vec3,
@@ -55,6 +56,7 @@ const SETUP: Setup = Setup {
     storage: Storage::Packed,
     order: 0,
     substeps: 0,
+    tolerance: 0.0,
     gravity: GRAVITY,
     drag: 0.0,
     away: Vec3::ZERO,
@@ -88,6 +90,7 @@ impl Held {
         let mut world = World::new(WorldDefinition {
             gravity: setup.gravity,
             substeps: setup.substeps,
+            tolerance: setup.tolerance,
             ..Default::default()
         })
         .expect("a world");
@@ -197,6 +200,25 @@ fn what_is_held_is_where_the_tool_has_it() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_step_to_a_tolerance_holds_it_there_too() {
+    for solver in SOLVERS {
+        let mut held = Held::new(Setup {
+            solver,
+            tolerance: 1e-4,
+            ..SETUP
+        });
+        for step in 1..=4 {
+            let time = 0.002 * step as f32;
+            let turn = Some(turned(time));
+            held.world.set_pose(held.tool, way(time), turn).expect("a pose");
+            held.world.step(0.002).expect("a step");
+            assert!(held.off() < 1e-6 * 0.08, "{solver:?}: {} m", held.off());
+        }
+        assert!(held.wrench()[0].length() > 0.1);
     }
 }
 

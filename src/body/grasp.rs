@@ -9,7 +9,7 @@ use std::fmt::Display;
 use glam::{BVec3, DVec3, Vec3};
 
 use super::{Body, Pin, Vectors};
-use crate::contact::ToolPath;
+use crate::contact::{Frame, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -173,16 +173,43 @@ impl Grasp {
 }
 
 impl HeldNode {
-    /// Where the tool has it after this fraction of the step, in the coordinates of a body that begin at `origin`.
-    fn place(&self, path: &ToolPath, fraction: f64, origin: DVec3) -> DVec3 {
-        path.carried(self.course.offset, fraction, origin) + self.course.gap * (1.0 - fraction)
+    /// Where a tool with these axes after this fraction of the step has it, in the body's coordinates.
+    fn place(&self, frame: &Frame, fraction: f64) -> DVec3 {
+        frame.carried(self.course.offset) + self.course.gap * (1.0 - fraction)
     }
 }
 
-/// The way of the tool in this place.
-fn path_of(tools: &[ToolPath], slot: usize) -> Option<&ToolPath> {
-    let index = tools.binary_search_by_key(&slot, |path| path.slot).ok()?;
-    Some(&tools[index])
+/// The axes of tools at one or two instants of a step, worked out once where one tool holds many nodes.
+struct Frames<'a, const N: usize> {
+    tools: &'a [ToolPath],
+    fractions: [f64; N],
+    origin: DVec3,
+    last: Option<(usize, [Frame; N])>,
+}
+
+impl<'a, const N: usize> Frames<'a, N> {
+    fn new(tools: &'a [ToolPath], fractions: [f64; N], origin: DVec3) -> Self {
+        Self {
+            tools,
+            fractions,
+            origin,
+            last: None,
+        }
+    }
+
+    /// Those of the tool in this place.
+    fn of(&mut self, slot: usize) -> Option<[Frame; N]> {
+        match self.last {
+            Some((last, frames)) if last == slot => Some(frames),
+            _ => {
+                let index = self.tools.binary_search_by_key(&slot, |path| path.slot).ok()?;
+                let frame = |fraction| self.tools[index].frame_at(fraction, self.origin);
+                let frames = self.fractions.map(frame);
+                self.last = Some((slot, frames));
+                Some(frames)
+            }
+        }
+    }
 }
 
 impl Body {
@@ -381,16 +408,17 @@ impl Body {
     /// Begins a step over, from what is current.
     pub(crate) fn begin_grasps(&mut self, tools: &[ToolPath]) {
         let state = &self.state;
+        let mut frames = Frames::new(tools, [0.0], self.origin);
         for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
-            let Some(path) = path_of(tools, held.tool) else {
+            let Some([frame]) = frames.of(held.tool) else {
                 continue;
             };
             let node = held.node as usize;
             let position = state.positions().get(node).as_dvec3();
-            let offset = held.offset.unwrap_or_else(|| path.offset(position, self.origin));
+            let offset = held.offset.unwrap_or_else(|| frame.offset(position));
             held.course = Course {
                 offset,
-                gap: position - path.carried(offset, 0.0, self.origin),
+                gap: position - frame.carried(offset),
                 velocity: state.velocities().get(node),
                 gain: held.gain,
                 ..Course::default()
@@ -400,13 +428,13 @@ impl Body {
 
     /// Has the tools lead what they hold between these fractions of the step: from point to point of the way of a tool that turns.
     pub(crate) fn lead_grasps(&mut self, tools: &[ToolPath], [start, end]: [f64; 2]) {
-        let origin = self.origin;
+        let mut frames = Frames::new(tools, [start, end], self.origin);
         for held in self.grasps.iter().flat_map(|grasps| &grasps.nodes) {
-            let (Some(path), Some(pin)) = (path_of(tools, held.tool), self.pins.get_mut(held.node)) else {
+            let (Some([first, last]), Some(pin)) = (frames.of(held.tool), self.pins.get_mut(held.node)) else {
                 continue;
             };
-            let there = held.place(path, end, origin);
-            let travel = (there - held.place(path, start, origin)) / (end - start);
+            let there = held.place(&last, end);
+            let travel = (there - held.place(&first, start)) / (end - start);
             pin.travel = travel.as_vec3();
             pin.goal = (there + travel * (1.0 - end)).as_vec3();
         }
@@ -424,12 +452,13 @@ impl Body {
         } else {
             state.positions
         };
+        let mut frames = Frames::new(tools, [lapse.at], self.origin);
         for held in &mut grasps.nodes {
-            let (Some(path), Some(pin)) = (path_of(tools, held.tool), self.pins.get(held.node)) else {
+            let (Some([frame]), Some(pin)) = (frames.of(held.tool), self.pins.get(held.node)) else {
                 continue;
             };
             let node = held.node as usize;
-            let arm = positions.get(node).as_dvec3() - path.carried(DVec3::ZERO, lapse.at, self.origin);
+            let arm = positions.get(node).as_dvec3() - frame.centre;
             let mass = f64::from(self.masses[node]);
             let drag = rates.map_or(0.0, |rates| f64::from(rates[node])) * mass * lapse.moved;
             held.course.feel(pin, state.velocities, [mass, drag], &lapse, arm);

@@ -12,6 +12,6 @@ mod tool;
 
 pub(crate) use contacts::{Contacts, Meeting};
 pub(crate) use holds::Holds;
-pub(crate) use path::ToolPath;
+pub(crate) use path::{Frame, ToolPath};
 pub(crate) use tool::Tool;
 pub use tool::{Detection, Pose, Shape, ToolDefinition};

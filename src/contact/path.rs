@@ -41,6 +41,26 @@ pub(super) struct Motion {
     pub spin: Vec3,
 }
 
+/// The axes of a tool at one instant, in a body's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    /// The tool's position.
+    pub centre: DVec3,
+    orientation: DQuat,
+}
+
+impl Frame {
+    /// Where what lies in this place of the tool's axes is.
+    pub fn carried(&self, offset: DVec3) -> DVec3 {
+        self.centre + self.orientation * offset
+    }
+
+    /// The place in the tool's axes of what is here.
+    pub fn offset(&self, position: DVec3) -> DVec3 {
+        self.orientation.conjugate() * (position - self.centre)
+    }
+}
+
 impl ToolPath {
     pub fn new(slot: usize, tool: &Tool) -> Self {
         let start = tool.pose;
@@ -79,16 +99,13 @@ impl ToolPath {
         }
     }
 
-    /// Where what lies in a place of the tool's own axes is after `fraction` of the step, in the coordinates of a body that begin at
-    /// `origin`.
-    pub fn carried(&self, offset: DVec3, fraction: f64, origin: DVec3) -> DVec3 {
+    /// Its axes after `fraction` of the step, in the coordinates of a body that begin at `origin`.
+    pub fn frame_at(&self, fraction: f64, origin: DVec3) -> Frame {
         let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
-        start.lerp(end, fraction) - origin + self.exact_orientation_at(fraction) * offset
-    }
-
-    /// The place in the tool's own axes of what is here when the step begins.
-    pub fn offset(&self, position: DVec3, origin: DVec3) -> DVec3 {
-        self.exact_orientation_at(0.0).conjugate() * (position + origin - self.start.position.as_dvec3())
+        Frame {
+            centre: start.lerp(end, fraction) - origin,
+            orientation: self.exact_orientation_at(fraction),
+        }
     }
 
     fn exact_orientation_at(&self, fraction: f64) -> DQuat {
