@@ -1380,7 +1380,8 @@ sinew_status sinew_body_get_velocities(const struct sinew_world *world,
                                        struct sinew_vec3_view *out);
 
 /**
- * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is swept.
+ * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is
+ * swept. What tools hold they hold there.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
  *
@@ -1409,12 +1410,14 @@ sinew_status sinew_body_set_velocities(struct sinew_world *world,
 /**
  * Holds a node where it is, from now on; nothing where it is held already.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
  */
-sinew_status sinew_body_pin(struct sinew_world *world, struct sinew_body_id body, uint32_t node);
+sinew_status sinew_body_pin(struct sinew_world *world,
+                            struct sinew_body_id body,
+                            uint32_t node);
 
 /**
  * Holds a node where it is along some axes, from now on, and along no others: a symmetry plane, a rail, a sliding support.
@@ -1427,8 +1430,8 @@ sinew_status sinew_body_pin(struct sinew_world *world, struct sinew_body_id body
  * are forces that act on it along an axis which is held now. A tool acts on it along its free axes alone; what it does
  * along the others the pin takes.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, or the node has no mass and is pinned for
- * good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, a tool holds the node, or it has no mass and is
+ * pinned for good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
@@ -1441,7 +1444,8 @@ sinew_status sinew_body_pin_axes(struct sinew_world *world,
 /**
  * Lets go of a node along all axes: it goes on as it was led in the last step; nothing where it is not held.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node, or it has no mass and is pinned for good),
+ * SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
@@ -1454,7 +1458,7 @@ sinew_status sinew_body_unpin(struct sinew_world *world,
  * Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step; one that is held
  * along some axes alone along those.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
@@ -1468,7 +1472,7 @@ sinew_status sinew_body_move_pin(struct sinew_world *world,
  * Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step; 0 along axes
  * along which it is not held.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
@@ -1779,7 +1783,7 @@ sinew_status sinew_tool_create(struct sinew_world *world,
                                struct sinew_tool_id *out);
 
 /**
- * Destroys a tool.
+ * Destroys a tool. What is attached to it is let go.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
  *
