@@ -977,6 +977,20 @@ typedef struct sinew_tool_id {
 } sinew_tool_id;
 
 /**
+ * What a tool holds of a body: a plain value, all zero is "none".
+ */
+typedef struct sinew_attachment_id {
+  /**
+   * Which place, from 1.
+   */
+  uint32_t index1;
+  /**
+   * Which of the attachments that lived there.
+   */
+  uint32_t generation;
+} sinew_attachment_id;
+
+/**
  * What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
  */
 typedef struct sinew_mesh_view {
@@ -1366,7 +1380,8 @@ sinew_status sinew_body_get_velocities(const struct sinew_world *world,
                                        struct sinew_vec3_view *out);
 
 /**
- * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is swept.
+ * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is
+ * swept. What tools hold they hold there.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
  *
@@ -1395,12 +1410,14 @@ sinew_status sinew_body_set_velocities(struct sinew_world *world,
 /**
  * Holds a node where it is, from now on; nothing where it is held already.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
  */
-sinew_status sinew_body_pin(struct sinew_world *world, struct sinew_body_id body, uint32_t node);
+sinew_status sinew_body_pin(struct sinew_world *world,
+                            struct sinew_body_id body,
+                            uint32_t node);
 
 /**
  * Holds a node where it is along some axes, from now on, and along no others: a symmetry plane, a rail, a sliding support.
@@ -1413,8 +1430,8 @@ sinew_status sinew_body_pin(struct sinew_world *world, struct sinew_body_id body
  * are forces that act on it along an axis which is held now. A tool acts on it along its free axes alone; what it does
  * along the others the pin takes.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, or the node has no mass and is pinned for
- * good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, a tool holds the node, or it has no mass and is
+ * pinned for good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
@@ -1427,7 +1444,8 @@ sinew_status sinew_body_pin_axes(struct sinew_world *world,
 /**
  * Lets go of a node along all axes: it goes on as it was led in the last step; nothing where it is not held.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node, or it has no mass and is pinned for good),
+ * SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
@@ -1440,7 +1458,7 @@ sinew_status sinew_body_unpin(struct sinew_world *world,
  * Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step; one that is held
  * along some axes alone along those.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
@@ -1454,7 +1472,7 @@ sinew_status sinew_body_move_pin(struct sinew_world *world,
  * Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step; 0 along axes
  * along which it is not held.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
@@ -1765,7 +1783,7 @@ sinew_status sinew_tool_create(struct sinew_world *world,
                                struct sinew_tool_id *out);
 
 /**
- * Destroys a tool.
+ * Destroys a tool. What is attached to it is let go.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
  *
@@ -1801,6 +1819,128 @@ sinew_status sinew_tool_get_wrench(const struct sinew_world *world,
                                    struct sinew_tool_id tool,
                                    float *force,
                                    float *torque);
+
+/**
+ * Attaches a node of a body to a tool, as sinew_body_attach_nodes does.
+ *
+ * Errors: as there.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `out` is NULL or writable.
+ */
+sinew_status sinew_body_attach_node(struct sinew_world *world,
+                                    struct sinew_body_id body,
+                                    uint32_t node,
+                                    struct sinew_tool_id tool,
+                                    float force_limit,
+                                    struct sinew_attachment_id *out);
+
+/**
+ * Attaches `count` nodes of a body to a tool, each by an attachment of its own, whose ids are written to `out`: where they lie
+ * they become part of the tool, which carries them along and turns them, exactly and whatever the solver, until
+ * sinew_attachment_release. Their velocities become the tool's in the next step.
+ *
+ * What it takes to hold them, with their mass and what damps them, is part of the tool's wrench. The tool does not touch
+ * them any more, nor edges and faces that have one of them. `force_limit`, N: an attachment ends with the step in which its
+ * mean force was larger, and the node goes on as it was led (sinew_world_get_slipped); 0 or infinity: it holds whatever
+ * comes.
+ *
+ * An attached node cannot be pinned. Its position can be set: then it is attached where it was put. One tool may hold a node
+ * more than once; then each attachment has its share of the force. An attachment ends with its body and with its tool.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a node is pinned, without mass or held by another tool),
+ * SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then nothing is attached.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_nodes(struct sinew_world *world,
+                                     struct sinew_body_id body,
+                                     const uint32_t *nodes,
+                                     size_t count,
+                                     struct sinew_tool_id tool,
+                                     float force_limit,
+                                     struct sinew_attachment_id *out);
+
+/**
+ * Attaches `count` points of a body's surface to a tool, each by an attachment of its own, whose ids are written to `out`.
+ * `triangles` are their triangles' numbers: of those that the body was created with, or of the boundary of its tetrahedra or
+ * cells; `weights` are 3 `count` parts of corners, at least 0 and 1 in sum.
+ *
+ * It is sinew_body_attach_nodes for the corners of each point's triangle, but those whose weight is 0. So the patch about the
+ * point is bonded to the tool, and does not turn against it; a point on an edge holds the edge, one in a corner the node. An
+ * attachment's force is that on all its corners. Points whose triangles share corners share what holds those, by their
+ * weights.
+ *
+ * Errors: as there; SINEW_STATUS_INVALID_ARGUMENT also where there is no such triangle or weights are not as above.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_points(struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      const uint32_t *triangles,
+                                      const float *weights,
+                                      size_t count,
+                                      struct sinew_tool_id tool,
+                                      float force_limit,
+                                      struct sinew_attachment_id *out);
+
+/**
+ * Lets go of what is attached: it goes on as it was led in the last step.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or its body or tool is gone).
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_attachment_release(struct sinew_world *world,
+                                      struct sinew_attachment_id attachment);
+
+/**
+ * Writes the force by which a tool holds what is attached, on the tissue, 3 floats, N: world axes, mean over the last step; 0
+ * before the first. After sinew_body_rest_state it is that which holds the body at rest.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
+ */
+sinew_status sinew_attachment_get_force(const struct sinew_world *world,
+                                        struct sinew_attachment_id attachment,
+                                        float *force);
+
+/**
+ * Writes to `count` how many attachments ended with the last step because it took more to hold them than their limit, and to
+ * `out`, which has room for `capacity` and may be NULL where that is 0, the first of their ids. They are stale: to be
+ * compared with those that were kept.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or as long as stated; `count` is NULL or writable.
+ */
+sinew_status sinew_world_get_slipped(const struct sinew_world *world,
+                                     struct sinew_attachment_id *out,
+                                     size_t capacity,
+                                     size_t *count);
+
+/**
+ * Writes the force, 3 floats, N, on `count` tools together, and the torque about `point`, 3 floats, m, 3 floats, N m: world
+ * axes, mean over the last step. Of the two jaws of a forceps, say.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool is named more than once), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `tools` is NULL or as long as stated, `point` NULL or 3 floats; `force` and
+ * `torque` are NULL or writable for 3 floats.
+ */
+sinew_status sinew_tools_get_wrench(const struct sinew_world *world,
+                                    const struct sinew_tool_id *tools,
+                                    size_t count,
+                                    const float *point,
+                                    float *force,
+                                    float *torque);
 
 /**
  * Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements

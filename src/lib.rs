@@ -33,4 +33,4 @@ pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;
 pub use terms::SpringLaw;
 pub use threads::RunTasks;
-pub use world::{BodyId, StepReport, ToolId, World, WorldDefinition};
+pub use world::{AttachmentId, BodyId, StepReport, SurfacePoint, ToolId, World, WorldDefinition};

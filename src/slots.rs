@@ -31,6 +31,13 @@ pub(crate) struct SlotId {
     pub generation: u32,
 }
 
+impl SlotId {
+    /// The place, counted from 0, of what is known to live.
+    pub fn index(self) -> usize {
+        self.index1 as usize - 1
+    }
+}
+
 impl<T> Slots<T> {
     pub fn new(noun: &'static str) -> Self {
         Self {
@@ -90,6 +97,13 @@ impl<T> Slots<T> {
     /// What lives at a place.
     pub fn at_mut(&mut self, place: usize) -> Option<&mut T> {
         self.slots.get_mut(place)?.content.as_mut()
+    }
+
+    /// Removes what is not to stay.
+    pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
+        for slot in &mut self.slots {
+            slot.content = slot.content.take().filter(&stays);
+        }
     }
 
     /// All that live, with their places.

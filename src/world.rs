@@ -1,5 +1,7 @@
 //! A world: bodies and tools that are stepped together.
 
+mod attachments;
+
 use glam::{DVec3, Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
@@ -12,6 +14,8 @@ use crate::solver::{
 };
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
+use attachments::Attachment;
+pub use attachments::{AttachmentId, SurfacePoint};
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
@@ -93,6 +97,10 @@ pub struct World {
     walks: Vec<Option<Walk>>,
     /// How the step in progress ended for each body, at its place.
     outcomes: Vec<Option<Outcome>>,
+    /// What tools hold.
+    attachments: Slots<Attachment>,
+    /// What of that ended with the last step.
+    slipped: Vec<AttachmentId>,
 }
 
 impl World {
@@ -120,6 +128,8 @@ impl World {
             tissue: None,
             walks: Vec::new(),
             outcomes: Vec::new(),
+            attachments: Slots::new("attachment"),
+            slipped: Vec::new(),
         })
     }
 
@@ -173,7 +183,7 @@ impl World {
         self.tissue.get_or_insert_default().join(place, body)
     }
 
-    /// Removes a body.
+    /// Removes a body, and with it what is attached of it.
     ///
     /// # Errors
     /// [`Error::StaleId`].
@@ -182,7 +192,9 @@ impl World {
         if let Some(tissue) = &mut self.tissue {
             tissue.leave(place);
         }
-        self.bodies.remove(body.0).map(drop)
+        self.bodies.remove(body.0)?;
+        self.forget_attachments_of(body);
+        Ok(())
     }
 
     /// A body, to look at.
@@ -241,13 +253,14 @@ impl World {
         Ok(ToolId(id?))
     }
 
-    /// Removes a tool.
+    /// Removes a tool. What is attached to it is let go.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
         let slot = self.tools.place(tool.0)?;
         self.tools.remove(tool.0)?;
+        self.release_all_of(tool);
         if self.tool_places() == 0 {
             self.drop_contacts();
         }
@@ -418,6 +431,7 @@ impl World {
             tissue.commit(dt);
         }
         self.commit_tools(dt);
+        self.end_slipped();
         report
     }
 
@@ -439,10 +453,11 @@ impl World {
     fn wrench_of(&self, index: usize, dt: f32) -> [DVec3; 2] {
         let mut wrench = [DVec3::ZERO; 2];
         for (place, body) in self.bodies.iter() {
-            if let (Some(Outcome::Done { .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
+            if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
                 let load = contacts.loads()[index];
-                wrench[0] += load.impulse / f64::from(dt);
-                wrench[1] += load.angular_impulse / f64::from(dt);
+                let [force, torque] = body.pull_of(self.paths[index].slot, *substeps);
+                wrench[0] += load.impulse / f64::from(dt) - force;
+                wrench[1] += load.angular_impulse / f64::from(dt) - torque;
             }
         }
         wrench

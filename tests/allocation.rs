@@ -236,3 +236,38 @@ fn detection_in_image_space_allocates_nothing() {
     assert_eq!(count, 0);
     assert!(near > 20);
 }
+
+#[test]
+fn nor_does_one_of_what_tools_hold_and_lose() {
+    let mesh = Mesh::cloth([0.2, 0.2], [12, 12]).expect("a cloth");
+    for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let cloth = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(2e-4),
+            stiffnesses: Values::Uniform(50.0),
+            node_dampings: Values::Uniform(1e-3),
+            solver,
+            ..BodyDefinition::default()
+        };
+        let cloth = world.create_body(&cloth).expect("a body");
+        let tool = ToolDefinition::new(Shape::Sphere { radius: 0.02 });
+        let tool = world.create_tool(&tool).expect("a tool");
+        world.attach_nodes(cloth, &[0, 5, 80], tool, 0.0).expect("attachments");
+        // The first step loses some of these, what comes later the rest.
+        for (node, limit) in [(100, 1e-6), (101, 1e-6), (110, 0.05), (120, 0.1)] {
+            world.attach_node(cloth, node, tool, limit).expect("an attachment");
+        }
+        let mut lost = 0;
+        for step in 0..8 {
+            let place = Vec3::Y * (1e-3 * (step * step) as f32);
+            world
+                .set_pose(tool, place, Some(Quat::from_rotation_x(0.02 * step as f32)))
+                .expect("a pose");
+            assert_eq!(asked(|| drop(world.step(0.004))), 0, "{solver:?}, step {step}");
+            lost += world.slipped().len();
+        }
+        assert!(lost >= 2, "{solver:?}: {lost} lost");
+    }
+}

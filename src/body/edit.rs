@@ -52,7 +52,7 @@ impl Body {
         Ok(())
     }
 
-    /// Puts all nodes, pinned ones too, at these places, in metres; velocities stay, and nothing is swept.
+    /// Puts all nodes, pinned ones too, at these places, in metres; velocities stay, and nothing is swept. What tools hold they hold there.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: not one position for each node, or one that is not finite.
@@ -90,7 +90,7 @@ impl Body {
     /// Holds `node` where it is, from now on; nothing where it is held already.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node.
+    /// [`Error::InvalidArgument`]: there is no such node, or a tool holds it.
     pub fn pin(&mut self, node: u32) -> Result<()> {
         self.pin_axes(node, [true; 3])
     }
@@ -108,13 +108,15 @@ impl Body {
     /// pinned node.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or it has no mass, and is pinned for good along all axes.
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass, and is pinned for good along all
+    /// axes.
     pub fn pin_axes(&mut self, node: u32, axes: [bool; 3]) -> Result<()> {
         let axes = BVec3::from(axes);
         if !axes.any() {
             return self.unpin(node);
         }
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         let own = self.order.own(node);
         let before = self.pins.axes_of(own);
         if axes == before {
@@ -144,9 +146,10 @@ impl Body {
     /// Lets go of `node` along all axes: it goes on as it was led in the last step; nothing where it is not held.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or it has no mass and is pinned for good.
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         let own = self.order.own(node);
         let mass = self.mass_of_unpinned(node)?;
         if self.pins.get(own).is_some() {
@@ -163,9 +166,10 @@ impl Body {
     /// some axes alone along those.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, it is not pinned, or the position is not finite.
+    /// [`Error::InvalidArgument`]: there is no such node, it is not pinned or a tool holds it, or the position is not finite.
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         finite_vector("position", position)?;
         match self.pins.get_mut(self.order.own(node)) {
             Some(pin) => pin.target = Some(position),
@@ -178,9 +182,11 @@ impl Body {
     /// is not held.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or it is not pinned.
+    /// [`Error::InvalidArgument`]: there is no such node, it is not pinned, or a tool holds it
+    /// ([`World::attachment_force`](crate::World::attachment_force)).
     pub fn pin_force(&self, node: u32) -> Result<Vec3> {
         self.check_node(&"node", node)?;
+        self.check_not_held(&"node", node)?;
         let pin = self.pins.get(self.order.own(node)).ok_or_else(|| not_pinned(node))?;
         let closing = self.carry.closing.as_ref();
         let positions = self.state.positions();
@@ -341,7 +347,7 @@ impl Body {
     }
 
     /// Other nodes move now.
-    fn forget_matrix(&mut self) {
+    pub(super) fn forget_matrix(&mut self) {
         self.carry.stability = Stability::UNKNOWN;
         self.forget_rates();
         if let Some(implicit) = &mut self.implicit {
@@ -397,7 +403,7 @@ impl Body {
         }
     }
 
-    pub(super) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+    pub(crate) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
         if (node as usize) < self.node_count() {
             return Ok(());
         }

@@ -55,6 +55,9 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
+        if let Some(grasps) = &self.grasps {
+            grasps.hash(hasher);
+        }
         hasher.write_floats(&self.carry.stability.floats());
         if self.carry.stability.limit().is_some() {
             self.watched.floats().for_each(|limit| hasher.write_floats(&[limit]));

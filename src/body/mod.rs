@@ -4,6 +4,7 @@ mod coarse;
 mod damping;
 mod definition;
 mod edit;
+mod grasp;
 mod hash;
 mod nodes;
 mod order;
@@ -26,6 +27,7 @@ pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{
     SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices, not_negative,
 };
+pub(crate) use grasp::{Grasps, Grip, Lapse};
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
@@ -100,6 +102,8 @@ pub struct Body {
     pub(crate) contact: BodyContact,
     /// What other tissue did to the step in progress.
     deflection: Option<Deflection>,
+    /// What tools hold of it.
+    pub(crate) grasps: Option<Box<Grasps>>,
     pub(crate) carry: Carry,
     /// Whether the state's forces belong to its positions and velocities.
     pub(crate) forces_current: bool,
@@ -222,6 +226,7 @@ impl Body {
             contacts: None,
             contact: definition.contact,
             deflection: None,
+            grasps: None,
             carry: Carry {
                 stability: Stability::UNKNOWN,
                 gravity: GravityKicks::new(Bounds {
@@ -490,6 +495,7 @@ impl Body {
         for pin in self.pins.iter_mut() {
             pin.force = pin.held(held(pin.node as usize));
         }
+        self.rest_grasps();
         self.relax();
         self.forget_motion();
         self.publish(&Team::alone());
@@ -525,6 +531,7 @@ impl Body {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
         }
         self.published.positions_mut().copy_from_slice(positions);
+        self.grasp_anew();
         self.relax();
         self.forget_motion();
     }
@@ -559,6 +566,7 @@ impl Body {
             pin.force = pin.held((pin.force_sum / f64::from(substeps)).as_vec3());
             pin.closing_share = carry.closing.map_or(0.0, |_| 0.5 / substeps as f32);
         }
+        self.commit_grasps(substeps);
         if let Some(contacts) = &mut self.contacts {
             contacts.commit(tools);
         }

@@ -162,6 +162,13 @@ impl Pins {
         Ok(())
     }
 
+    /// Makes room for so many pins more of a body with so many nodes.
+    pub fn reserve(&mut self, count: usize, node_count: usize) -> Result<()> {
+        self.pins.try_reserve(count)?;
+        let tiles = node_count.div_ceil(TILE);
+        Ok(self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?)
+    }
+
     fn insert(&mut self, index: usize, node: u32, axes: BVec3) -> Result<()> {
         self.pins.try_reserve(1)?;
         let pin = Pin {

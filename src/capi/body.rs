@@ -226,7 +226,8 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
     }
 }
 
-/// Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is swept.
+/// Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is
+/// swept. What tools hold they hold there.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
 ///
@@ -275,7 +276,7 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
 
 /// Holds a node where it is, from now on; nothing where it is held already.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -295,8 +296,8 @@ pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_bod
 /// are forces that act on it along an axis which is held now. A tool acts on it along its free axes alone; what it does
 /// along the others the pin takes.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, or the node has no mass and is pinned for
-/// good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, a tool holds the node, or it has no mass and is
+/// pinned for good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -323,7 +324,8 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
 
 /// Lets go of a node along all axes: it goes on as it was led in the last step; nothing where it is not held.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node has no mass and is pinned for good), SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node, or it has no mass and is pinned for good),
+/// SINEW_STATUS_STALE_ID.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -336,7 +338,7 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
 /// Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step; one that is held
 /// along some axes alone along those.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
@@ -358,7 +360,7 @@ pub unsafe extern "C" fn sinew_body_move_pin(
 /// Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step; 0 along axes
 /// along which it is not held.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned), SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.

@@ -32,6 +32,8 @@ pub mod tool;
 
 pub mod contact;
 
+pub mod attachment;
+
 pub mod mesh;
 
 pub mod picture;

@@ -218,7 +218,7 @@ pub unsafe extern "C" fn sinew_tool_create(
     }
 }
 
-/// Destroys a tool.
+/// Destroys a tool. What is attached to it is let go.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
 ///

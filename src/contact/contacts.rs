@@ -73,6 +73,8 @@ pub(crate) struct Contacts {
     given: Bounds,
     /// Whether the step that was begun last became current.
     committed: bool,
+    /// Nodes that tools hold, each with its tool's place among those of the world, in order.
+    held: Vec<(u32, usize)>,
 }
 
 /// One substep of a body near tools.
@@ -134,6 +136,7 @@ impl Contacts {
             touched: Vec::new(),
             given: Bounds::EMPTY,
             committed: true,
+            held: Vec::new(),
         };
         contacts.reserve(tools)?;
         Ok(contacts)
@@ -215,6 +218,31 @@ impl Contacts {
         if let Some(pair) = self.touched.get_mut(slot) {
             *pair = [false; 2];
         }
+    }
+
+    /// Makes room for so many nodes more that tools hold.
+    pub fn reserve_held(&mut self, count: usize) -> Result<()> {
+        Ok(self.held.try_reserve(count)?)
+    }
+
+    /// A tool holds this node, and does not touch it any more.
+    pub fn hold(&mut self, node: u32, slot: usize) {
+        let place = self.held.partition_point(|&held| held < (node, slot));
+        self.held.insert(place, (node, slot));
+    }
+
+    /// The tool does so no longer.
+    pub fn release(&mut self, node: u32, slot: usize) {
+        if let Ok(place) = self.held.binary_search(&(node, slot)) {
+            self.held.remove(place);
+        }
+    }
+
+    /// Whether the tool in this place holds a node of the feature. What it holds may lie within it, and edges and faces from there
+    /// on pass its surface: so it does not touch those either.
+    fn is_held(&self, feature: Feature, slot: usize) -> bool {
+        let held = |&node: &u32| self.held.binary_search(&(node, slot)).is_ok();
+        !self.held.is_empty() && feature.nodes().iter().any(held)
     }
 
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
@@ -354,6 +382,9 @@ impl Contacts {
 
     /// Adds the contacts of one feature with one tool.
     fn touch(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, motion: &Motion, feature: Feature) {
+        if self.is_held(feature, meeting.tools[tool].slot) {
+            return;
+        }
         match motion.from {
             Solid::HalfSpace { point, .. } => {
                 if feature.nodes().len() == 1 {

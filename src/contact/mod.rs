@@ -31,7 +31,7 @@ pub(crate) use contacts::{Contacts, Meeting};
 pub use filter::{BodyContact, CollisionFilter};
 pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
-pub(crate) use path::ToolPath;
+pub(crate) use path::{Frame, ToolPath};
 pub use report::{Contact, ContactChange};
 pub(crate) use tissue::{Moment, Tissue};
 pub use tool::{Detection, Pose, Shape, ToolDefinition};

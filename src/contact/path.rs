@@ -1,6 +1,6 @@
 //! The way of a tool over a step.
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{DQuat, DVec3, Quat, Vec3};
 
 use super::filter::CollisionFilter;
 use super::mesh_solid::MeshSolid;
@@ -67,6 +67,26 @@ pub(super) struct Motion<'a> {
     pub spin: Vec3,
 }
 
+/// The axes of a tool at one instant, in a body's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    /// The tool's position.
+    pub centre: DVec3,
+    orientation: DQuat,
+}
+
+impl Frame {
+    /// Where what lies in this place of the tool's axes is.
+    pub fn carried(&self, offset: DVec3) -> DVec3 {
+        self.centre + self.orientation * offset
+    }
+
+    /// The place in the tool's axes of what is here.
+    pub fn offset(&self, position: DVec3) -> DVec3 {
+        self.orientation.conjugate() * (position - self.centre)
+    }
+}
+
 impl ToolPath {
     pub fn new(slot: usize, tool: &Tool) -> Self {
         let start = tool.pose;
@@ -101,6 +121,26 @@ impl ToolPath {
             self.end.orientation
         } else {
             Quat::from_scaled_axis(self.turn * fraction as f32) * self.start.orientation
+        }
+    }
+
+    /// Its axes after `fraction` of the step, in the coordinates of a body that begin at `origin`.
+    pub fn frame_at(&self, fraction: f64, origin: DVec3) -> Frame {
+        let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
+        Frame {
+            centre: start.lerp(end, fraction) - origin,
+            orientation: self.exact_orientation_at(fraction),
+        }
+    }
+
+    fn exact_orientation_at(&self, fraction: f64) -> DQuat {
+        let [start, end] = [self.start, self.end].map(|pose| pose.orientation.as_dquat().normalize());
+        if self.turn == Vec3::ZERO || fraction <= 0.0 {
+            start
+        } else if fraction >= 1.0 {
+            end
+        } else {
+            DQuat::from_scaled_axis(self.turn.as_dvec3() * fraction) * start
         }
     }
 

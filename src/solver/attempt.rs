@@ -356,6 +356,7 @@ pub(super) fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Ou
 /// Whether what is told of pins and tools is finite.
 fn sums_fit(body: &Body) -> bool {
     body.pins.iter().all(|pin| fits(pin.force_sum))
+        && body.grasps.iter().all(|grasps| grasps.sums_fit(fits))
         && body
             .contacts
             .iter()

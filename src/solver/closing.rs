@@ -53,13 +53,14 @@ impl ClosingKick {
     }
 }
 
-/// Whether a step of `body` may be left open. Damping along springs and comparisons need velocities at its end, and forces
-/// from outside end with it; those of elements, terms and cavities are not worked out by who only reads.
+/// Whether a step of `body` may be left open. Damping along springs, comparisons and tools that hold it need velocities at its end, and
+/// forces from outside end with it; those of elements, terms and cavities are not worked out by who only reads.
 pub(super) fn may_stay_open(body: &Body) -> bool {
     !body.has_more_than_springs()
         && body.predicted_velocities.is_none()
         && body.coarse.is_none()
         && !body.forces_applied
+        && !body.is_grasped()
 }
 
 /// Velocities brought up to the time of the positions, to the side.

@@ -13,7 +13,7 @@ use super::closing::{ClosingKick, close_aside, may_stay_open};
 use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
-use crate::body::{Body, Bounds, Mobility};
+use crate::body::{Body, Bounds, Lapse, Mobility};
 use crate::contact::{Contacts, Meeting};
 use crate::threads::Team;
 
@@ -245,8 +245,21 @@ fn diagonal(velocities: &Bounds) -> f32 {
 
 /// Takes one part of the step; whether what it leads to is finite, where it was looked at.
 pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
+    if part.drifts {
+        body.lead_grasps(request.tools, [part.start, part.end]);
+    }
     let survey = kick_and_drift(body, request, part, team);
     carry.gravity.velocities = meet_tools(body, request, part, survey.velocities);
+    body.feel_grasps(
+        request.tools,
+        Lapse {
+            time: f64::from(part.substep),
+            carried: 0.0,
+            at: part.start,
+            moved: if part.drifts { 1.0 } else { 0.0 },
+            is_next: false,
+        },
+    );
     // What tools have done was not looked at.
     if part.last && body.contacts.as_ref().is_some_and(|contacts| !contacts.are_far()) {
         body.state.newest_is_finite()
@@ -268,6 +281,7 @@ pub(super) fn begin(body: &mut Body, request: &StepRequest) {
         pin.travel = pin.goal - position;
         pin.force_sum = DVec3::ZERO;
     }
+    body.begin_grasps(request.tools);
     if let Some(contacts) = &mut body.contacts {
         contacts.begin(request.tools, body.origin);
     }

@@ -51,6 +51,8 @@ static struct outputs {
     uint32_t pairs[2];
     float numbers[2][9];
     sinew_strain strain;
+    sinew_attachment_id attachments[2];
+    size_t count;
 } out, untouched;
 
 /* Floats that are refused: the first three everywhere, a negative one often, zero sometimes. */
@@ -151,6 +153,22 @@ static const char *const bad_id_names[BAD_IDS] = {
     "id zero",       "an id whose place was given to another", "an id of something destroyed", "an index out of range",
     "all bits set", "a generation that was not yet",
 };
+
+/* The same for a call on `world` and `attachment`, of which these are the bad ones. */
+#define REFUSES_NO_ATTACHMENT(bad_attachments, good, call)                     \
+    do {                                                                       \
+        int i_;                                                                \
+        {                                                                      \
+            sinew_world *const world = NULL;                                   \
+            const sinew_attachment_id attachment = (good);                     \
+            REFUSED_WITH(INVALID, "world", call, "no world");                  \
+        }                                                                      \
+        for (i_ = 0; i_ < BAD_IDS; i_++) {                                     \
+            sinew_world *const world = the.world;                              \
+            const sinew_attachment_id attachment = (bad_attachments)[i_];      \
+            REFUSED_WITH(STALE, "attachment", call, bad_id_names[i_]);         \
+        }                                                                      \
+    } while (0)
 
 /* Sizes that no header ever gave the struct; the call may use `size`. A definition is known to the byte, a result struct
  * may be a newer header's, of which the library fills what it knows: so only too small a one is refused. */

@@ -21,6 +21,8 @@ mod step;
 
 pub(super) use step::run;
 
+use glam::Vec3;
+
 use crate::body::{Records, Vectors};
 use crate::diagnostics::{SolverReport, StateHasher};
 use crate::elements::{Elements, Sums};
@@ -35,6 +37,7 @@ use coarse::Coarse;
 use energy::Total;
 use estimate::Spectrum;
 use gradient::Partial;
+use step::Formula;
 
 /// What rounding makes of a coordinate, as a fraction of the body's extent.
 const ROUNDING: f64 = 1e-7;
@@ -105,6 +108,8 @@ pub(crate) struct Implicit {
     histories: [History; 2],
     /// Which of them belongs to the current state.
     settled: usize,
+    /// How the last equation that was solved makes velocities of what forces do.
+    taken: Formula,
     /// s: what forces do within the step, m.
     pushes: Vectors,
     /// Where there are tools: how fast nodes go on their way, m/s.
@@ -194,6 +199,7 @@ impl Implicit {
                 History::new(node_count, solved_count)?,
             ],
             settled: 0,
+            taken: Formula::new(1, 0.0, 0.0),
             pushes: Vectors::zeros(node_count)?,
             means: None,
             corrections: vectors()?,
@@ -331,6 +337,11 @@ impl Implicit {
             newton.forget_remainders(self.settled);
         }
         self.forget_energy();
+    }
+
+    /// How much faster a node became in the last step, m/s.
+    pub fn gain_of(&self, node: usize) -> Vec3 {
+        self.histories[self.settled].gains.get(node)
     }
 
     /// Springs or pins have changed.

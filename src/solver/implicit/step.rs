@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::energy::Before;
 use super::loops::{Add, Finish, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
-use crate::body::{Body, Records, Vectors, WriteRecords};
+use crate::body::{Body, Lapse, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
@@ -22,7 +22,7 @@ pub(super) const MULTIPLIERS: u32 = 3;
 
 /// How one step is made from what was before.
 #[derive(Clone, Copy, Debug)]
-struct Formula {
+pub(super) struct Formula {
     /// t, s.
     time: f64,
     /// c: what part of the last way and of the last gain goes on.
@@ -30,7 +30,7 @@ struct Formula {
 }
 
 impl Formula {
-    fn new(order: u32, step: f64, last_step: f64) -> Self {
+    pub(super) fn new(order: u32, step: f64, last_step: f64) -> Self {
         let ratio = if last_step > 0.0 { step / last_step } else { 0.0 };
         if order == 1 || ratio == 0.0 || ratio > LARGEST_RATIO {
             Self {
@@ -137,6 +137,7 @@ fn run_in_parts(
             formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
             team,
         };
+        body.lead_grasps(request.tools, [substep.start, substep.end]);
         let end = substep.take_safely(body, implicit, is_last_resort);
         if end != End::Fine {
             return end;
@@ -144,6 +145,17 @@ fn run_in_parts(
         for pin in body.pins.iter_mut() {
             pin.force_sum += pin.solved.as_dvec3();
         }
+        let Formula { time, carried } = implicit.taken;
+        body.feel_grasps(
+            request.tools,
+            Lapse {
+                time,
+                carried,
+                at: substep.end,
+                moved: 1.0,
+                is_next: true,
+            },
+        );
         body.state.advance();
         if index + 1 == middle
             && let Some(coarse) = &mut body.coarse
@@ -433,6 +445,7 @@ impl Substep<'_> {
 
     /// Makes velocities and history of what was found; whether all is finite.
     fn finish(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
+        implicit.taken = self.formula;
         let node_count = body.node_count();
         let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;

@@ -1,0 +1,255 @@
+//! Attachments: what tools hold of bodies, by their names.
+
+use glam::{DVec3, Vec3};
+
+use super::{BodyId, ToolId, World};
+use crate::body::Grip;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::slots::SlotId;
+use crate::solver::Outcome;
+
+/// What a tool holds of a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct AttachmentId(pub(crate) SlotId);
+
+/// Whose attachment it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Attachment {
+    body: BodyId,
+    tool: ToolId,
+}
+
+/// A name that is made where it is needed.
+struct Lazy<F>(F);
+
+impl<F: Fn() -> String> std::fmt::Display for Lazy<F> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        formatter.write_str(&(self.0)())
+    }
+}
+
+/// A point of a body's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Which triangle of [`Body::surface`](crate::Body::surface).
+    pub triangle: u32,
+    /// The parts of its corners in the point: at least 0, and 1 in sum.
+    pub weights: [f32; 3],
+}
+
+/// How far the sum of a point's weights may be from 1.
+const SUM_OFF: f32 = 1e-3;
+
+impl World {
+    /// Attaches a node of a body to a tool: [`World::attach_nodes`] for one.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn attach_node(&mut self, body: BodyId, node: u32, tool: ToolId, force_limit: f32) -> Result<AttachmentId> {
+        self.check_nodes(body, &[node], tool, |_| "node".into())?;
+        Ok(self.attach(body, tool, [Grip::of_node(node)].into_iter(), force_limit)?[0])
+    }
+
+    /// Attaches nodes of a body to a tool, each by an attachment of its own: where they lie they become part of the tool, which carries
+    /// them along and turns them, exactly and whatever the solver, until [`World::release`]. Their velocities become the tool's in the
+    /// next step.
+    ///
+    /// What it takes to hold them, with their mass and what damps them, is part of the tool's wrench. The tool does not touch them any
+    /// more, nor edges and faces that have one of them. `force_limit`, N: an attachment ends with the step in which its mean force was
+    /// larger, and the node goes on as it was led ([`World::slipped`]); 0 or infinite: it holds whatever comes.
+    ///
+    /// An attached node cannot be pinned. Its position can be set: then it is attached where it was put. One tool may hold a node more than
+    /// once; then each attachment has its share of the force. An attachment ends with its body and with its tool.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node, it is pinned, without mass or held by another tool, or the
+    /// limit is negative or not a number. [`Error::OutOfMemory`]. Nothing is attached then.
+    pub fn attach_nodes(
+        &mut self,
+        body: BodyId,
+        nodes: &[u32],
+        tool: ToolId,
+        force_limit: f32,
+    ) -> Result<Vec<AttachmentId>> {
+        self.check_nodes(body, nodes, tool, |index| format!("nodes[{index}]"))?;
+        self.attach(body, tool, nodes.iter().copied().map(Grip::of_node), force_limit)
+    }
+
+    /// Attaches points of a body's surface to a tool, each by an attachment of its own: [`World::attach_nodes`] for the corners of the
+    /// point's triangle, but those whose weight is 0. So the patch about the point is bonded to the tool, and does not turn against it; a
+    /// point on an edge holds the edge, one in a corner the node.
+    ///
+    /// An attachment's force is that on all its corners. Points whose triangles share corners share what holds those, by their weights.
+    ///
+    /// # Errors
+    /// As there; [`Error::InvalidArgument`] too: there is no such triangle, or weights are negative, not finite or not 1 in sum.
+    pub fn attach_points(
+        &mut self,
+        body: BodyId,
+        points: &[SurfacePoint],
+        tool: ToolId,
+        force_limit: f32,
+    ) -> Result<Vec<AttachmentId>> {
+        let surface = self.bodies.get(body.0)?.surface();
+        let mut grips = memory::reserved(points.len())?;
+        for (index, &SurfacePoint { triangle, weights }) in points.iter().enumerate() {
+            let Some(&corners) = surface.get(triangle as usize) else {
+                return Err(Error::invalid(format!(
+                    "triangles[{index}] is {triangle}: the surface has {} triangles",
+                    surface.len()
+                )));
+            };
+            let sum: f32 = weights.iter().sum();
+            if !(weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF) {
+                return Err(Error::invalid(format!(
+                    "weights[{index}] are {weights:?}: must be at least 0, and 1 in sum"
+                )));
+            }
+            grips.push(Grip { corners, weights });
+        }
+        for (index, grip) in grips.iter().enumerate() {
+            let held = grip.corners.into_iter().zip(grip.weights);
+            for (corner, _) in held.filter(|(_, weight)| *weight > 0.0) {
+                let name = |_| format!("a corner of triangles[{index}]");
+                self.check_nodes(body, &[corner], tool, name)?;
+            }
+        }
+        self.attach(body, tool, grips.into_iter(), force_limit)
+    }
+
+    /// Refuses nodes that cannot be held by this tool, by these names.
+    fn check_nodes(&self, body: BodyId, nodes: &[u32], tool: ToolId, name: impl Fn(usize) -> String) -> Result<()> {
+        let body = self.bodies.get(body.0)?;
+        self.tools.get(tool.0)?;
+        for (index, &node) in nodes.iter().enumerate() {
+            let name = Lazy(|| name(index));
+            body.check_node(&name, node)?;
+            body.check_graspable(&name, node, tool.0.index())?;
+        }
+        Ok(())
+    }
+
+    /// Attaches what was found fit for it.
+    fn attach(
+        &mut self,
+        body: BodyId,
+        tool: ToolId,
+        grips: impl ExactSizeIterator<Item = Grip>,
+        force_limit: f32,
+    ) -> Result<Vec<AttachmentId>> {
+        self.tools.get(tool.0)?;
+        let held = self.bodies.get_mut(body.0)?;
+        if force_limit.is_nan() || force_limit < 0.0 {
+            return Err(Error::invalid(format!(
+                "force_limit is {force_limit}: must be at least 0"
+            )));
+        }
+        let mut ids = memory::reserved(grips.len())?;
+        // All may slip in one step.
+        let count = self.attachments.iter().count() + grips.len();
+        self.slipped.try_reserve(count)?;
+        if grips.len() == 0 {
+            return Ok(ids);
+        }
+        held.reserve_grasps(grips.len())?;
+        for _ in 0..grips.len() {
+            match self.attachments.insert(Attachment { body, tool }) {
+                Ok(id) => ids.push(AttachmentId(id)),
+                Err(error) => {
+                    for AttachmentId(id) in ids {
+                        self.attachments.remove(id)?;
+                    }
+                    return Err(error);
+                }
+            }
+        }
+        held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit)?;
+        Ok(ids)
+    }
+
+    /// Lets go of what is attached: it goes on as it was led in the last step.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]: it was let go already, or slipped, or its body or its tool is gone.
+    pub fn release(&mut self, attachment: AttachmentId) -> Result<()> {
+        let Attachment { body, .. } = self.attachments.remove(attachment.0)?;
+        self.bodies.get_mut(body.0)?.let_go(attachment.0);
+        Ok(())
+    }
+
+    /// The force by which a tool holds what is attached, on the tissue, world axes, mean over the last step, N; 0 before the first.
+    /// Where the state of the body was set to one of rest it is that which holds it there.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`].
+    pub fn attachment_force(&self, attachment: AttachmentId) -> Result<Vec3> {
+        let Attachment { body, .. } = self.attachments.get(attachment.0)?;
+        let body = self.bodies.get(body.0)?;
+        let grasp = body.grasps.as_ref().and_then(|grasps| grasps.get(attachment.0));
+        Ok(grasp.map_or(Vec3::ZERO, |grasp| grasp.force))
+    }
+
+    /// The attachments that ended with the last step, because it took more to hold them than their limit. Their ids are stale.
+    pub fn slipped(&self) -> &[AttachmentId] {
+        &self.slipped
+    }
+
+    /// The force on some tools together, and the torque about a point, world axes, mean over the last step, N and N m: of the two jaws of
+    /// a forceps, say.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a tool is named more than once, or the point is not finite.
+    pub fn wrench_about(&self, tools: &[ToolId], point: Vec3) -> Result<(Vec3, Vec3)> {
+        crate::body::finite_vector("point", point)?;
+        let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+        for (index, tool) in tools.iter().enumerate() {
+            if tools[..index].contains(tool) {
+                return Err(Error::invalid(format!("tools[{index}] is named before")));
+            }
+            let tool = self.tools.get(tool.0)?;
+            let arm = tool.pose.position.as_dvec3() - point.as_dvec3();
+            force += tool.force.as_dvec3();
+            torque += tool.torque.as_dvec3() + arm.cross(tool.force.as_dvec3());
+        }
+        let finite = |sum: DVec3| sum.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+        Ok((finite(force), finite(torque)))
+    }
+
+    /// A body is gone, and with it what is attached of it.
+    pub(super) fn forget_attachments_of(&mut self, body: BodyId) {
+        self.attachments.retain(|attachment| attachment.body != body);
+    }
+
+    /// A tool is gone: lets go of what is attached to it.
+    pub(super) fn release_all_of(&mut self, tool: ToolId) {
+        let Self {
+            attachments, bodies, ..
+        } = self;
+        attachments.retain(|attachment| attachment.tool != tool);
+        for (_, body) in bodies.iter_mut() {
+            body.let_go_of(tool.0.index());
+        }
+    }
+
+    /// Ends what the last step was too much for.
+    pub(super) fn end_slipped(&mut self) {
+        let Self {
+            bodies,
+            attachments,
+            slipped,
+            outcomes,
+            ..
+        } = self;
+        slipped.clear();
+        for (place, body) in bodies.iter_mut() {
+            if let Some(Outcome::Done { .. }) = outcomes[place] {
+                body.slip(|id| {
+                    if attachments.remove(id).is_ok() {
+                        slipped.push(AttachmentId(id));
+                    }
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,166 @@
+/* What is refused of attachments and of the wrench of several tools; and that they do what they should where they are not. */
+#include "refusals.h"
+
+static sinew_attachment_id bad_attachments[BAD_IDS], held;
+static sinew_tool_id other;
+
+static sinew_attachment_id attached(uint32_t node)
+{
+    sinew_attachment_id attachment = {0, 0};
+    MUST(sinew_body_attach_node(the.world, the.body, node, the.tool, 0, &attachment));
+    return attachment;
+}
+
+static void set_up_attachments(void)
+{
+    sinew_attachment_id replaced, gone;
+    other = a_sphere();
+    replaced = attached(4);
+    MUST(sinew_attachment_release(the.world, replaced));
+    held = attached(4);
+    gone = attached(5);
+    MUST(sinew_attachment_release(the.world, gone));
+    FILL_BAD_IDS(bad_attachments, replaced, gone, held);
+    MUST(sinew_world_get_state_hash(the.world, &the.hash));
+}
+
+static void nodes(void)
+{
+    const uint32_t good[] = {7, 8}, pinned[] = {8, 0}, massless[] = {8, 2}, beyond[] = {8, 9}, taken[] = {8, 4};
+    const sinew_tool_id tool = the.tool;
+    const sinew_body_id body = the.body;
+    int i;
+    REFUSES_NO_BODY(sinew_body_attach_node(world, body, 8, tool, 0, out.attachments));
+    REFUSES_NO_TOOL(sinew_body_attach_node(world, body, 8, tool, 0, out.attachments));
+    REFUSES_NO_BODY(sinew_body_attach_nodes(world, body, good, 2, tool, 0, out.attachments));
+    REFUSES_NO_TOOL(sinew_body_attach_nodes(world, body, good, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "node", sinew_body_attach_node(the.world, body, 9, tool, 0, out.attachments));
+    REFUSED(INVALID, "node", sinew_body_attach_node(the.world, body, UINT32_MAX, tool, 0, out.attachments));
+    REFUSED(INVALID, "node", sinew_body_attach_node(the.world, body, 0, tool, 0, out.attachments));
+    REFUSED(INVALID, "node", sinew_body_attach_node(the.world, body, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "node", sinew_body_attach_node(the.world, body, 4, other, 0, out.attachments));
+    REFUSED(INVALID, "out", sinew_body_attach_node(the.world, body, 8, tool, 0, NULL));
+    REFUSED(INVALID, "nodes", sinew_body_attach_nodes(the.world, body, NULL, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "out", sinew_body_attach_nodes(the.world, body, good, 2, tool, 0, NULL));
+    REFUSED(INVALID, "nodes", sinew_body_attach_nodes(the.world, body, good, SIZE_MAX, tool, 0, out.attachments));
+    REFUSED(INVALID, "nodes[1]", sinew_body_attach_nodes(the.world, body, pinned, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "nodes[1]", sinew_body_attach_nodes(the.world, body, massless, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "nodes[1]", sinew_body_attach_nodes(the.world, body, beyond, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "nodes[1]", sinew_body_attach_nodes(the.world, body, taken, 2, other, 0, out.attachments));
+    for (i = 0; i < OR_NEGATIVE; i++)
+        if (i != 1) /* infinity: no limit */
+            REFUSED(INVALID, "force_limit", sinew_body_attach_nodes(the.world, body, good, 2, tool, bad[i], out.attachments));
+}
+
+static void points(void)
+{
+    /* Triangle 3 is 2 4 5, 0 is 0 3 1, 7 is 5 7 8. */
+    static const float good[] = {0.5f, 0.25f, 0.25f, 0, 0.5f, 0.5f};
+    const uint32_t free_ones[] = {7, 7}, pinned[] = {7, 0}, beyond[] = {7, 8};
+    const sinew_tool_id tool = the.tool;
+    const sinew_body_id body = the.body;
+    size_t i, corner;
+    REFUSES_NO_BODY(sinew_body_attach_points(world, body, free_ones, good, 2, tool, 0, out.attachments));
+    REFUSES_NO_TOOL(sinew_body_attach_points(world, body, free_ones, good, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "triangles", sinew_body_attach_points(the.world, body, NULL, good, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "weights", sinew_body_attach_points(the.world, body, free_ones, NULL, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "out", sinew_body_attach_points(the.world, body, free_ones, good, 2, tool, 0, NULL));
+    REFUSED(INVALID, "triangles[1]", sinew_body_attach_points(the.world, body, beyond, good, 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "triangles[0]", sinew_body_attach_points(the.world, body, pinned + 1, good, 1, tool, 0, out.attachments));
+    REFUSED(INVALID, "force_limit", sinew_body_attach_points(the.world, body, free_ones, good, 2, tool, -1, out.attachments));
+    for (i = 0; i < OR_NEGATIVE; i++)
+        for (corner = 0; corner < 6; corner++)
+            REFUSED(INVALID, corner < 3 ? "weights[0]" : "weights[1]",
+                    sinew_body_attach_points(the.world, body, free_ones, spoiled(good, 6, corner, bad[i]), 2, tool, 0, out.attachments));
+    REFUSED(INVALID, "weights[0]",
+            sinew_body_attach_points(the.world, body, free_ones, spoiled(good, 6, 0, 0.6f), 2, tool, 0, out.attachments));
+}
+
+static void attachments(void)
+{
+    const float place[3] = {0, 0, 0};
+    REFUSES_NO_ATTACHMENT(bad_attachments, held, sinew_attachment_release(world, attachment));
+    REFUSES_NO_ATTACHMENT(bad_attachments, held, sinew_attachment_get_force(world, attachment, out.force));
+    REFUSED(INVALID, "force", sinew_attachment_get_force(the.world, held, NULL));
+    REFUSED(INVALID, "world", sinew_world_get_slipped(NULL, out.attachments, 2, &out.count));
+    REFUSED(INVALID, "out", sinew_world_get_slipped(the.world, NULL, 2, &out.count));
+    REFUSED(INVALID, "count", sinew_world_get_slipped(the.world, out.attachments, 2, NULL));
+    /* What is held cannot be pinned. */
+    REFUSED(INVALID, "node", sinew_body_pin(the.world, the.body, 4));
+    REFUSED(INVALID, "node", sinew_body_pin_axes(the.world, the.body, 4, SINEW_AXIS_Y));
+    REFUSED(INVALID, "node", sinew_body_unpin(the.world, the.body, 4));
+    REFUSED(INVALID, "node", sinew_body_move_pin(the.world, the.body, 4, place));
+    REFUSED(INVALID, "node", sinew_body_get_pin_force(the.world, the.body, 4, out.force));
+}
+
+static void wrenches(void)
+{
+    static const float point[3] = {0, 1, 0};
+    sinew_tool_id tools[2];
+    int i;
+    tools[0] = the.tool;
+    tools[1] = other;
+    REFUSED(INVALID, "world", sinew_tools_get_wrench(NULL, tools, 2, point, out.force, out.torque));
+    REFUSED(INVALID, "tools", sinew_tools_get_wrench(the.world, NULL, 2, point, out.force, out.torque));
+    REFUSED(INVALID, "point", sinew_tools_get_wrench(the.world, tools, 2, NULL, out.force, out.torque));
+    REFUSED(INVALID, "force", sinew_tools_get_wrench(the.world, tools, 2, point, NULL, out.torque));
+    REFUSED(INVALID, "torque", sinew_tools_get_wrench(the.world, tools, 2, point, out.force, NULL));
+    for (i = 0; i < NOT_FINITE; i++)
+        REFUSED(INVALID, "point", sinew_tools_get_wrench(the.world, tools, 2, spoiled(point, 3, 1, bad[i]), out.force, out.torque));
+    for (i = 0; i < BAD_IDS; i++) {
+        tools[1] = the.bad_tools[i];
+        /* An id that was not yet is one of a tool by now. */
+        if (tools[1].index1 != other.index1 || tools[1].generation != other.generation)
+            REFUSED(STALE, "tool", sinew_tools_get_wrench(the.world, tools, 2, point, out.force, out.torque));
+    }
+    tools[1] = the.tool;
+    REFUSED(INVALID, "tools[1]", sinew_tools_get_wrench(the.world, tools, 2, point, out.force, out.torque));
+}
+
+/* A node is held, carried, let go and lost. */
+static void use(void)
+{
+    static const float none[3] = {0, 0, 0}, somewhere[3] = {0.5f, 3, 0}, up[3] = {0, 2.9f, 0};
+    const uint32_t triangles[] = {7};
+    const float weights[] = {0, 0.5f, 0.5f};
+    sinew_attachment_id point[1], weak, slipped[2];
+    sinew_vec3_view view;
+    float before[3], force[3], torque[3], more[3];
+    size_t count = 7;
+    MUST(sinew_body_attach_points(the.world, the.body, triangles, weights, 1, the.tool, INFINITY, point));
+    MUST(sinew_attachment_get_force(the.world, held, force));
+    CHECK(memcmp(force, none, sizeof none) == 0);
+    MUST(sinew_body_get_positions(the.world, the.body, &view));
+    memcpy(before, view.data + 3 * 4, sizeof before);
+    /* The tool, which waits to go down by half a metre, goes down by a tenth. */
+    MUST(sinew_tool_set_pose(the.world, the.tool, up, NULL));
+    MUST(sinew_world_step(the.world, 0.01f, NULL));
+    MUST(sinew_body_get_positions(the.world, the.body, &view));
+    CHECK(fabsf(view.data[3 * 4 + 1] - (before[1] - 0.1f)) < 1e-5f && fabsf(view.data[3 * 4] - before[0]) < 1e-6f);
+    MUST(sinew_attachment_get_force(the.world, held, force));
+    MUST(sinew_attachment_get_force(the.world, point[0], more));
+    MUST(sinew_tools_get_wrench(the.world, &the.tool, 1, somewhere, out.force, torque));
+    CHECK(force[1] != 0 && fabsf(out.force[1] + force[1] + more[1]) < 1e-4f * (fabsf(force[1]) + fabsf(more[1])));
+    MUST(sinew_world_get_slipped(the.world, NULL, 0, &count));
+    CHECK(count == 0);
+    MUST(sinew_attachment_release(the.world, held));
+    MUST(sinew_attachment_release(the.world, point[0]));
+    MUST(sinew_body_attach_node(the.world, the.body, 8, the.tool, 1e-6f, &weak));
+    MUST(sinew_world_step(the.world, 0.01f, NULL));
+    MUST(sinew_world_get_slipped(the.world, slipped, 2, &count));
+    CHECK(count == 1 && memcmp(&slipped[0], &weak, sizeof weak) == 0);
+    CHECK(sinew_attachment_release(the.world, weak) == SINEW_STATUS_STALE_ID);
+    MUST(sinew_body_pin(the.world, the.body, 8));
+}
+
+int main(void)
+{
+    set_up();
+    set_up_attachments();
+    nodes();
+    points();
+    attachments();
+    wrenches();
+    use();
+    return tear_down();
+}
