@@ -394,7 +394,6 @@ impl World {
             return reported(bodies, outcomes);
         };
         tissue.plan(bodies, dt);
-        tissue.lend(bodies);
         lead(threads, bodies, |bodies, team| {
             attempt_bodies(bodies, outcomes, &request, |place| !tissue.goes_together(place), team);
             attempt_together(bodies, tissue, walks, outcomes, &request, team);
@@ -402,11 +401,7 @@ impl World {
                 attempt_together(bodies, tissue, walks, outcomes, &request, team);
             }
         });
-        tissue.take_back(bodies);
-        reported(bodies, outcomes)?;
-        let has_tried = |place: usize| matches!(outcomes[place], Some(Outcome::Done { .. }));
-        tissue.meet(bodies, dt, has_tried);
-        Ok(())
+        reported(bodies, outcomes)
     }
 
     /// Takes back what bodies have tried.
@@ -427,9 +422,6 @@ impl World {
         lead(threads, bodies, |bodies, team| {
             commit_bodies(bodies, outcomes, paths, team)
         });
-        if let Some(tissue) = &mut self.tissue {
-            tissue.commit(dt);
-        }
         self.commit_tools(dt);
         self.end_slipped();
         report
@@ -504,9 +496,6 @@ impl World {
         for (place, tool) in self.tools.iter() {
             hasher.write_u64(place as u64);
             tool.hash_state(&mut hasher);
-        }
-        if let Some(tissue) = &self.tissue {
-            tissue.hash_state(&mut hasher);
         }
         hasher.finish()
     }

@@ -31,7 +31,6 @@ pub(crate) use grasp::{Grasps, Grip, Lapse};
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
-use tissue::Deflection;
 pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
@@ -100,8 +99,6 @@ pub struct Body {
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
     pub(crate) contact: BodyContact,
-    /// What other tissue did to the step in progress.
-    deflection: Option<Deflection>,
     /// What tools hold of it.
     pub(crate) grasps: Option<Box<Grasps>>,
     pub(crate) carry: Carry,
@@ -225,7 +222,6 @@ impl Body {
             applied: None,
             contacts: None,
             contact: definition.contact,
-            deflection: None,
             grasps: None,
             carry: Carry {
                 stability: Stability::UNKNOWN,
@@ -541,13 +537,6 @@ impl Body {
         self.state.commit();
         self.carry = carry;
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
-        if let Some(deflection) = self.deflection.take() {
-            self.forces_current = false;
-            self.carry.gravity.velocities = self.carry.gravity.velocities.and(&deflection.velocities);
-            if carry.masses_for == 0.0 && !self.carry.stability.holds_after(2.0 * deflection.furthest) {
-                self.carry.stability = Stability::UNKNOWN;
-            }
-        }
         if let Some(elements) = &mut self.elements {
             elements.settle();
         }
@@ -577,7 +566,6 @@ impl Body {
 
     /// Prepares again what an attempted step that is not committed has changed.
     pub(crate) fn put_back(&mut self) {
-        self.deflection = None;
         if let Some(implicit) = &mut self.implicit {
             implicit.put_back();
         }

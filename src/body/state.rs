@@ -126,11 +126,6 @@ impl State {
         (&self.positions[self.latest], &self.velocities[1 - self.settled])
     }
 
-    /// The same, to be changed.
-    pub fn newest_mut(&mut self) -> (&mut Vectors, &mut Vectors) {
-        (&mut self.positions[self.latest], &mut self.velocities[1 - self.settled])
-    }
-
     /// Whether those, and their squares, are finite.
     pub fn newest_is_finite(&self) -> bool {
         let (positions, velocities) = self.newest();

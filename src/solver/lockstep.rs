@@ -1,6 +1,10 @@
-//! VERLET bodies that touch each other, or themselves, take their substeps together: what one does to the other is part of each.
+//! Bodies that touch each other, or themselves, take their substeps together: what one does to the other is part of each.
+//!
+//! All take as many as the one that needs most: one of VERLET what its stability asks for, one of the other solvers substeps of 1 ms as
+//! near a tool.
 
 use super::attempt::{Carry, Outcome, StepRequest, finish, needed, substeps_needed};
+use super::implicit::{begin_parts, next_part, parts_near};
 use super::substep::Part;
 use super::verlet::{Step, Taken, TooLong, begin, check, check_beside_springs, pass};
 use crate::body::Body;
@@ -20,7 +24,7 @@ pub(crate) struct Walk {
     part: Part,
 }
 
-/// Takes the step of the bodies that are to go together, those that `walks` has a place for, without making it current.
+/// Takes the step of the bodies that go together, as `tissue` tells, without making it current. `walks` has a place for each.
 pub(crate) fn attempt_together(
     bodies: &mut Slots<Body>,
     tissue: &mut Tissue,
@@ -29,80 +33,101 @@ pub(crate) fn attempt_together(
     request: &StepRequest,
     team: &Team,
 ) {
-    let mut substeps = 1;
+    let mut substeps = 0;
     for (place, walk) in walks.iter_mut().enumerate() {
         *walk = None;
         if let Some(body) = bodies.at_mut(place)
             && tissue.goes_together(place)
         {
-            let need = needed(body, request, team);
-            substeps = substeps.max(need.substeps);
-            *walk = Some(Walk {
-                start: need.start,
-                masses_for: need.masses_for,
-                carry: need.start,
-                part: Part::opening(0.0),
-            });
+            let (begun, wanted) = Walk::of(body, request, team);
+            substeps = substeps.max(wanted);
+            *walk = Some(begun);
         }
+    }
+    if substeps == 0 {
+        return;
     }
     let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
     let mut stable_substep = f32::INFINITY;
+    let mut is_taken = false;
     for attempt in 0..=allowed {
-        if request.substeps == 0 && substeps > request.max_substeps {
-            stable_substep = stable_substep.min(request.dt / substeps as f32);
-            break;
-        }
-        match go(bodies, tissue, walks, request, substeps, team) {
+        let is_last = attempt == allowed;
+        match go(bodies, tissue, walks, request, substeps, is_last, team) {
             Ok(()) => {
-                for (place, walk) in walks.iter().enumerate() {
-                    if let (Some(walk), Some(body)) = (walk, bodies.at(place)) {
-                        let finite = body.state.newest_is_finite();
-                        let taken = Taken {
-                            carry: walk.carry,
-                            finite,
-                        };
-                        outcomes[place] = Some(finish(body, substeps, taken, 0.0));
-                    }
-                }
-                return;
+                is_taken = true;
+                break;
             }
             Err(found) => {
                 stable_substep = stable_substep.min(found.stable_substep);
                 let wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
                 substeps = wanted.max(substeps.saturating_add(substeps / 4 + 1));
-                if attempt + 1 == allowed {
-                    substeps = substeps.saturating_mul(2);
+                if request.substeps == 0 && substeps > request.max_substeps {
+                    break;
                 }
             }
         }
     }
-    for (walk, outcome) in walks.iter().zip(outcomes) {
-        if walk.is_some() {
-            *outcome = Some(Outcome::Unstable {
+    for (place, (walk, outcome)) in walks.iter().zip(outcomes).enumerate() {
+        let (Some(walk), Some(body)) = (walk, bodies.at(place)) else {
+            continue;
+        };
+        *outcome = Some(if is_taken {
+            let taken = Taken {
+                carry: walk.carry,
+                finite: body.state.newest_is_finite(),
+            };
+            finish(body, substeps, taken, 0.0)
+        } else {
+            Outcome::Unstable {
                 stable_substep,
                 error: 0.0,
-            });
-        }
+            }
+        });
     }
 }
 
-/// Takes it in so many substeps.
+impl Walk {
+    /// A body's way through a step that is to begin, and how many substeps it wants by itself.
+    fn of(body: &mut Body, request: &StepRequest, team: &Team) -> (Self, u32) {
+        let (start, masses_for, substeps) = if body.implicit.is_none() {
+            let need = needed(body, request, team);
+            (need.start, need.masses_for, need.substeps)
+        } else {
+            let parts = parts_near(request.dt).max(request.substeps);
+            (body.carry, 0.0, parts)
+        };
+        let walk = Self {
+            start,
+            masses_for,
+            carry: start,
+            part: Part::opening(0.0),
+        };
+        (walk, substeps)
+    }
+}
+
+/// Takes it in so many substeps, the last time that it is tried or not.
 fn go(
     bodies: &mut Slots<Body>,
     tissue: &mut Tissue,
     walks: &mut [Option<Walk>],
     request: &StepRequest,
     substeps: u32,
+    is_last: bool,
     team: &Team,
 ) -> Result<(), TooLong> {
-    let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
+    let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
     let gravity = request.gravity.as_dvec3();
     each(bodies, walks, |_, body, walk| {
+        walk.carry = walk.start;
+        if body.implicit.is_some() {
+            begin_parts(body, request, substeps);
+            return Ok(());
+        }
         if walk.masses_for == 0.0 {
             check(&walk.start.stability, substep)?;
         }
-        walk.carry = walk.start;
         begin(body, request);
         walk.part = step(walk).opening(body, &mut walk.carry);
         if let Some(damping) = &mut body.damping {
@@ -116,6 +141,13 @@ fn go(
     };
     for index in 0..substeps {
         each(bodies, walks, |_, body, walk| {
+            if body.implicit.is_some() {
+                let is_fine = next_part(body, request, [index, substeps], is_last, team);
+                let shorter = TooLong {
+                    stable_substep: 0.25 * substep,
+                };
+                return if is_fine { Ok(()) } else { Err(shorter) };
+            }
             if index > 0 {
                 walk.part.go_on(walk.carry.gravity.next(gravity * f64::from(substep)));
             }
@@ -126,11 +158,14 @@ fn go(
         })?;
         tissue.meet_together(bodies, &moment);
         each(bodies, walks, |place, body, walk| {
+            if body.implicit.is_some() {
+                body.state.advance();
+                return Ok(());
+            }
             body.age(f64::from(substep), team);
             body.state.advance();
-            let velocities = &mut walk.carry.gravity.velocities;
-            *velocities = tissue.velocities(place, *velocities);
-            let velocities = *velocities;
+            let velocities = tissue.velocities(place, walk.carry.gravity.velocities);
+            walk.carry.gravity.velocities = velocities;
             if !step(walk).is_stable_after(&mut walk.carry.stability, &velocities) {
                 let known = walk.carry.stability.for_short(substep);
                 walk.carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
@@ -141,6 +176,9 @@ fn go(
     }
     moment.drifts = false;
     each(bodies, walks, |_, body, walk| {
+        if body.implicit.is_some() {
+            return Ok(());
+        }
         let fall = gravity * f64::from(0.5 * substep);
         walk.part.close(walk.carry.gravity.next(fall));
         pass(body, request, &walk.part, &mut walk.carry, team);

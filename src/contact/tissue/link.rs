@@ -18,16 +18,6 @@ pub(super) struct Side {
     pub weights: [f32; 3],
 }
 
-/// What goes on from one step to the next: the force of a contact acts on both sides all through the next step, which then
-/// adds to it or takes from it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Carried {
-    pub sides: [Side; 2],
-    pub normal: Vec3,
-    /// On the first side, N.
-    pub force: Vec3,
-}
-
 /// A contact over one step: the first side stays clear of the second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
@@ -99,19 +89,12 @@ impl Link {
         self.least_speed = -gap.max(0.0) / duration;
     }
 
-    /// The first side has already received this, N s.
-    pub fn has_given(&mut self, given: Vec3) {
-        self.impulse = given.dot(self.normal).max(0.0);
-        self.friction_impulse = given - self.normal * self.impulse;
-    }
-
     /// Gives what is missing, or takes back what was too much: how much faster the sides move against each other for it, m/s.
     pub fn solve(&mut self, skins: &mut [Option<Skin>]) -> f32 {
         let velocity = self.velocity(skins);
         let impulse = (self.impulse + (self.least_speed - velocity.dot(self.normal)) * self.mass).max(0.0);
         let mut given = self.normal * (impulse - self.impulse);
         self.impulse = impulse;
-        // What was carried over and is no longer along this normal's friction is taken back too.
         let slip = velocity.reject_from_normalized(self.normal);
         let wanted = self.friction_impulse - slip * self.mass;
         let friction = wanted.clamp_length_max(self.friction * impulse);

@@ -1,25 +1,20 @@
-//! Tissue against tissue, and with itself. Both sides of a contact get the same impulse, with opposite signs, in the same place: no momentum
-//! is made.
+//! Tissue against tissue, and with itself.
 //!
-//! VERLET bodies that are near each other take their substeps together (`solver/lockstep.rs`). In each, what would come too close is
-//! stopped by impulses on velocities, with friction, as against a tool: never a pull, nothing stored, nothing that shortens the substep.
-//!
-//! A step of IMPLICIT is an equation of one body. There each body goes as it would alone, with the forces that contacts of the last step
-//! gave, all through the step. What meets on the straight ways from where nodes were to where they came is stopped by impulses that change the
-//! mean velocities of the step and so where it ends (Bridson, Fedkiw, Anderson 2002); what an impulse was over the step's length is the
-//! force of the next. At rest the impulses vanish and the forces hold the weight.
+//! Bodies that are near each other take their substeps together (`solver/lockstep.rs`). In each, what would come too close on the straight ways of
+//! the nodes is stopped by impulses, with friction, as against a tool: never a pull, nothing stored, nothing that shortens the substep
+//! (sequential impulses, Catto 2005, on the pairs of Bridson, Fedkiw, Anderson 2002: nodes with faces, edges with edges). Both sides get the same
+//! impulse, with opposite signs, in the same place: no momentum is made.
 
 mod link;
 mod search;
 mod skin;
 
+use self::link::Link;
+use self::search::{Party, Search};
+use self::skin::Skin;
 use glam::Vec3;
 
-use self::link::{Carried, Link, Side};
-use self::search::{Party, Search, shift};
-use self::skin::Skin;
 use crate::body::{Body, Bounds};
-use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 use crate::slots::Slots;
@@ -54,22 +49,21 @@ pub(crate) struct Moment {
     pub drifts: bool,
 }
 
+impl Moment {
+    /// Whether a body has a part in it: that which closes a step is VERLET's.
+    fn concerns(&self, body: &Body) -> bool {
+        self.drifts || body.implicit.is_none()
+    }
+}
+
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
 pub(crate) struct Tissue {
     /// By a body's place in the world.
     skins: Vec<Option<Skin>>,
     links: Vec<Link>,
-    /// Of the last step that became current, in the order of their sides.
-    carried: Vec<Carried>,
-    /// Which of them the step that is tried has found again.
-    found: Vec<bool>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
-    /// What was in place of the forces that are carried over, while a step is tried: body, node, force.
-    before: Vec<(usize, u32, Vec3)>,
-    /// By a body's place: whether forces acted on it before.
-    were_applied: Vec<bool>,
 }
 
 impl Tissue {
@@ -79,17 +73,12 @@ impl Tissue {
             return Ok(());
         }
         let skin = Skin::new(body)?;
-        body.make_room_for_forces()?;
         let more = ROOM * (skin.nodes.len() + skin.edges.len() + skin.triangles.len());
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
-        self.carried.try_reserve(room.saturating_sub(self.carried.len()))?;
-        self.found.try_reserve(room.saturating_sub(self.found.len()))?;
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
-        self.before.try_reserve((6 * room).saturating_sub(self.before.len()))?;
         while self.skins.len() <= place {
             memory::push(&mut self.skins, None)?;
-            self.were_applied.try_reserve(self.skins.len())?;
         }
         self.skins[place] = Some(skin);
         Ok(())
@@ -100,13 +89,6 @@ impl Tissue {
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }
-        self.forget(place);
-    }
-
-    /// Forgets the contacts of a body: its nodes have been put elsewhere.
-    pub fn forget(&mut self, place: usize) {
-        self.carried
-            .retain(|carried| carried.sides.iter().all(|side| side.body != place));
     }
 
     fn room(&self) -> usize {
@@ -114,41 +96,12 @@ impl Tissue {
         self.skins.iter().flatten().map(of).sum()
     }
 
-    /// Adds the forces of the last step's contacts to those that act on the bodies in the step to be tried.
-    pub fn lend(&mut self, bodies: &mut Slots<Body>) {
-        self.before.clear();
-        self.were_applied.clear();
-        let were_applied = (0..self.skins.len()).map(|place| bodies.at(place).is_some_and(|body| body.forces_applied));
-        self.were_applied.extend(were_applied);
-        for carried in &self.carried {
-            for (side, sign) in carried.sides.iter().zip([1.0, -1.0]) {
-                let Some(body) = bodies.at_mut(side.body) else {
-                    continue;
-                };
-                for (node, weight) in side.used() {
-                    let before = body.push_node(node, carried.force * (weight * sign));
-                    self.before.push((side.body, node as u32, before));
-                }
-            }
-        }
-    }
-
-    /// Takes them back.
-    pub fn take_back(&mut self, bodies: &mut Slots<Body>) {
-        while let Some((place, node, before)) = self.before.pop() {
-            if let Some(body) = bodies.at_mut(place) {
-                body.set_push(node as usize, before);
-                body.forces_applied = self.were_applied[place];
-            }
-        }
-    }
-
-    /// Finds out which bodies take the next step of `dt` seconds together: those of VERLET that may come near each other, and those that
-    /// meet themselves.
+    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, and those that meet
+    /// themselves.
     pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
         for place in 0..self.skins.len() {
-            let is_near = self.skins[place].as_ref().is_some_and(|skin| {
-                let Some(body) = bodies.at(place).filter(|_| skin.is_explicit) else {
+            let is_near = self.skins[place].as_ref().is_some_and(|_| {
+                let Some(body) = bodies.at(place) else {
                     return false;
                 };
                 body.contact.with_itself
@@ -169,8 +122,7 @@ impl Tissue {
         for place in 0..self.skins.len() {
             let Some(body) = bodies.at(place) else { continue };
             let met = self.skins[place].as_ref().is_some_and(|skin| {
-                skin.is_explicit
-                    && !skin.goes_together
+                !skin.goes_together
                     && self.others(place).any(|other| {
                         let Some(other) = bodies.at(other) else { return false };
                         meet_each_other(body, other) && swept(body).overlaps(&swept(other))
@@ -185,10 +137,9 @@ impl Tissue {
         found
     }
 
-    /// The other bodies of VERLET.
+    /// The other bodies that meet tissue.
     fn others(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
-        let explicit = |skin: &Option<Skin>| skin.as_ref().is_some_and(|skin| skin.is_explicit);
-        let places = self.skins.iter().enumerate().filter(move |(_, skin)| explicit(skin));
+        let places = self.skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
         places.map(|(other, _)| other).filter(move |&other| other != place)
     }
 
@@ -209,16 +160,15 @@ impl Tissue {
     /// Stops what meets in a substep of bodies that go together.
     pub fn meet_together(&mut self, bodies: &mut Slots<Body>, moment: &Moment) {
         self.links.clear();
-        self.found.clear();
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
                 && skin.goes_together
+                && moment.concerns(body)
             {
-                skin.follow_substep(body, moment.duration);
+                skin.follow(body, moment.duration);
             }
         }
-        let meets = |first: &Skin, second: &Skin| first.goes_together && second.goes_together;
-        self.solve(bodies, moment.duration, meets, |_| ());
+        self.solve(bodies, moment);
         for link in &self.links {
             for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
@@ -235,50 +185,12 @@ impl Tissue {
         }
     }
 
-    /// Stops what meets in a step of `dt` seconds that bodies have tried, those that `has_tried` tells, unless both went together.
-    pub fn meet(&mut self, bodies: &mut Slots<Body>, dt: f32, has_tried: impl Fn(usize) -> bool) {
-        self.links.clear();
-        self.found.clear();
-        self.found.resize(self.carried.len(), false);
-        if self.skins.iter().flatten().all(|skin| skin.is_explicit) {
-            return;
-        }
-        for (place, skin) in self.skins.iter_mut().enumerate() {
-            if let (Some(skin), Some(body)) = (skin, bodies.at(place)) {
-                skin.follow_step(body, dt);
-            }
-        }
-        let meets = |first: &Skin, second: &Skin| !(first.is_explicit && second.is_explicit);
-        let places_tried =
-            |links: &mut Vec<Link>| links.retain(|link| link.sides.iter().all(|side| has_tried(side.body)));
-        self.solve(bodies, dt, meets, places_tried);
-        if self.links.is_empty() {
-            return;
-        }
-        for (place, skin) in self.skins.iter().enumerate() {
-            if let (Some(skin), Some(body), true) = (skin, bodies.at_mut(place), has_tried(place)) {
-                body.deflect(&skin.nodes, &skin.velocities, dt);
-            }
-        }
-        self.part(bodies, Body::part);
-    }
-
     /// Finds contacts and gives their impulses, until they lead to no others.
-    fn solve(
-        &mut self,
-        bodies: &Slots<Body>,
-        duration: f32,
-        meets: impl Fn(&Skin, &Skin) -> bool,
-        sift: impl Fn(&mut Vec<Link>),
-    ) {
+    fn solve(&mut self, bodies: &Slots<Body>, moment: &Moment) {
         let mut first = 0.0_f32;
         for search in 0..SEARCHES {
             let known = self.links.len();
-            self.find(bodies, duration, &meets);
-            if search == 0 {
-                self.go_on(bodies, duration);
-            }
-            sift(&mut self.links);
+            self.find(bodies, moment);
             if self.links.len() == known {
                 break;
             }
@@ -306,36 +218,10 @@ impl Tissue {
         }
     }
 
-    /// What the step that was tried did goes on in the next.
-    pub fn commit(&mut self, dt: f32) {
-        self.carried.clear();
-        let is_carried = |link: &&Link| {
-            let is_implicit = |side: &Side| matches!(&self.skins[side.body], Some(skin) if !skin.is_explicit);
-            link.sides.iter().all(is_implicit)
-        };
-        for link in self.links.iter().filter(is_carried) {
-            let force = link.given() / dt;
-            if force != Vec3::ZERO && force.is_finite() {
-                self.carried.push(Carried {
-                    sides: link.sides,
-                    normal: link.normal,
-                    force,
-                });
-            }
-        }
-        self.carried
-            .sort_unstable_by_key(|carried| carried.sides.map(|side| side.key()));
-    }
-
     /// Adds the contacts that are not known yet, of those that meet.
-    fn find(&mut self, bodies: &Slots<Body>, duration: f32, meets: &impl Fn(&Skin, &Skin) -> bool) {
+    fn find(&mut self, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
-            skins,
-            links,
-            carried,
-            found,
-            known,
-            ..
+            skins, links, known, ..
         } = self;
         let key = |link: &Link| link.sides.map(|side| side.key());
         known.clear();
@@ -351,13 +237,16 @@ impl Tissue {
                     continue;
                 };
                 let second = Party { place: b, skin };
-                let Some(radius) = radius(&first, &second, [body_a, body_b]).filter(|_| meets(first.skin, skin)) else {
+                let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
+                let Some(radius) = radius(&first, &second, [body_a, body_b])
+                    .filter(|_| is_looked_at && first.skin.goes_together && skin.goes_together)
+                else {
                     continue;
                 };
                 let friction = body_a.contact.friction.max(body_b.contact.friction);
                 let search = Search {
                     parties: [first, second],
-                    dt: duration,
+                    dt: moment.duration,
                     radius,
                 };
                 search.run(|touch| {
@@ -371,64 +260,13 @@ impl Tissue {
                     let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
                     if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
                         link.friction = friction;
-                        link.allow_gap(touch.gap, duration);
-                        if let Some(index) = going_on(carried, found, &touch.sides) {
-                            found[index] = true;
-                            link.has_given(carried[index].force * duration);
-                        }
+                        link.allow_gap(touch.gap, moment.duration);
                         links.push(link);
                     }
                 });
             }
         }
     }
-
-    /// Contacts of the last step that were not found again have acted all the same: what was too much is taken back.
-    fn go_on(&mut self, bodies: &Slots<Body>, duration: f32) {
-        for (carried, _) in self.carried.iter().zip(&self.found).filter(|(_, is_found)| !**is_found) {
-            let [a, b] = carried.sides.map(|side| side.body);
-            let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) else {
-                continue;
-            };
-            let [Some(of_first), Some(of_second)] = [a, b].map(|place| bodies.at(place)) else {
-                continue;
-            };
-            if self.links.len() == self.links.capacity() {
-                return;
-            }
-            let at = |skin: &Skin, side: &Side| side.weighted(|node| skin.starts.get(node));
-            let apart = at(first, &carried.sides[0]) + shift(first, second) - at(second, &carried.sides[1]);
-            if let Some(mut link) = Link::new(carried.sides, carried.normal, [of_first, of_second]) {
-                link.allow_gap(apart.dot(carried.normal).max(0.0), duration);
-                link.friction = of_first.contact.friction.max(of_second.contact.friction);
-                link.has_given(carried.force * duration);
-                self.links.push(link);
-            }
-        }
-    }
-
-    /// Adds the bits that the next step depends on.
-    pub fn hash_state(&self, hasher: &mut StateHasher) {
-        for carried in &self.carried {
-            for side in &carried.sides {
-                hasher.write_u64(side.body as u64);
-                side.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
-                hasher.write_floats(&side.weights);
-            }
-            hasher.write_floats(&carried.force.to_array());
-            hasher.write_floats(&carried.normal.to_array());
-        }
-    }
-}
-
-/// Which contact of the last step goes on in one of these sides: of the first with the same body, wherever it touches that now.
-fn going_on(carried: &[Carried], found: &[bool], sides: &[Side; 2]) -> Option<usize> {
-    let key = sides[0].key();
-    let first = carried.partition_point(|carried| carried.sides[0].key() < key);
-    let same = carried[first..].iter().zip(&found[first..]);
-    same.take_while(|(carried, _)| carried.sides[0].key() == key)
-        .position(|(carried, found)| carried.sides[1].body == sides[1].body && !found)
-        .map(|place| first + place)
 }
 
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.

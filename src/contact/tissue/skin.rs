@@ -18,8 +18,6 @@ pub(super) struct Skin {
     /// The edges that are looked at with a triangle: each with one.
     owned: Vec<[u32; 3]>,
     tree: Tree,
-    /// Whether it is VERLET's.
-    pub is_explicit: bool,
     /// Whether the body takes its substeps together with others, or looks after itself in each.
     pub goes_together: bool,
     /// Where the body's coordinates begin.
@@ -69,7 +67,6 @@ impl Skin {
             edges,
             owned,
             tree,
-            is_explicit: body.implicit.is_none(),
             goes_together: false,
             origin: body.origin,
             starts: Vectors::zeros(body.node_count())?,
@@ -82,19 +79,14 @@ impl Skin {
     }
 
     /// Takes a substep of `duration` seconds as it is to be.
-    pub fn follow_substep(&mut self, body: &mut Body, duration: f32) {
+    pub fn follow(&mut self, body: &mut Body, duration: f32) {
+        let origin = body.origin;
         let state = body.state.substep();
         let (starts, velocities) = (state.positions, &*state.velocities);
-        self.take(body.origin, duration, |node| (starts.get(node), velocities.get(node)));
-    }
-
-    /// Takes a step of `duration` seconds that the body has tried.
-    pub fn follow_step(&mut self, body: &Body, duration: f32) {
-        let (starts, ends) = (body.state.positions(), body.state.newest().0);
-        self.take(body.origin, duration, |node| {
-            let start = starts.get(node);
-            (start, (ends.get(node) - start) / duration)
-        });
+        match &body.implicit {
+            None => self.take(origin, duration, |node| (starts.get(node), velocities.get(node))),
+            Some(implicit) => self.take(origin, duration, |node| (starts.get(node), implicit.mean(node))),
+        }
     }
 
     fn take(&mut self, origin: DVec3, duration: f32, motion_of: impl Fn(usize) -> (Vec3, Vec3)) {
@@ -112,11 +104,6 @@ impl Skin {
         let (triangles, starts) = (&self.triangles, &self.starts);
         self.tree
             .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
-    }
-
-    /// The box about it as it is when the step begins.
-    pub fn bounds(&self) -> Bounds {
-        self.tree.bounds()
     }
 
     /// Shows the triangles that a box comes within `reach` of.

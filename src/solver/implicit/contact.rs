@@ -189,14 +189,23 @@ impl Substep<'_> {
 }
 
 impl Implicit {
-    /// Other tissue gave a node this velocity at the end of a step, m/s.
-    pub fn deflect(&mut self, node: usize, given: Vec3) {
+    /// How fast a node goes on its way in the substep that was just solved, m/s.
+    pub fn mean(&self, node: usize) -> Vec3 {
+        let history = &self.histories[1 - self.settled];
+        history.ways.get(node) / history.step
+    }
+
+    /// Other tissue has a node go with this mean velocity instead, m/s: by how much it becomes faster.
+    pub fn deflect(&mut self, node: usize, mean: Vec3) -> Vec3 {
+        let given = mean - self.mean(node);
         let history = &mut self.histories[1 - self.settled];
-        let way = history.ways.get(node) + given * history.step;
-        history.ways.set(node, way);
-        // What it gives is no gain that will go on.
-        history.gains.set(node, Vec3::ZERO);
-        history.energy = None;
+        if given != Vec3::ZERO {
+            history.ways.set(node, mean * history.step);
+            // What it gives is no gain that will go on.
+            history.gains.set(node, Vec3::ZERO);
+            history.energy = None;
+        }
+        given
     }
 
     /// Makes the preconditioner what it is without contacts.

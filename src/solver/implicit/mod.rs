@@ -19,7 +19,7 @@ mod loops;
 mod rigid;
 mod step;
 
-pub(super) use step::run;
+pub(super) use step::{begin_parts, next_part, parts_near, run};
 
 use glam::Vec3;
 

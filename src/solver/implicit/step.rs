@@ -125,37 +125,11 @@ fn run_in_parts(
 ) -> End {
     begin(body, request);
     implicit.begin();
-    let step = f64::from(request.dt) / f64::from(substeps);
     for index in 0..substeps {
-        let substep = Substep {
-            request,
-            step,
-            start: f64::from(index) / f64::from(substeps),
-            end: f64::from(index + 1) / f64::from(substeps),
-            is_first: index == 0,
-            equations: substeps - index,
-            formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
-            team,
-        };
-        body.lead_grasps(request.tools, [substep.start, substep.end]);
-        let end = substep.take_safely(body, implicit, is_last_resort);
+        let end = take_part(body, implicit, request, [index, substeps], is_last_resort, team);
         if end != End::Fine {
             return end;
         }
-        for pin in body.pins.iter_mut() {
-            pin.force_sum += pin.solved.as_dvec3();
-        }
-        let Formula { time, carried } = implicit.taken;
-        body.feel_grasps(
-            request.tools,
-            Lapse {
-                time,
-                carried,
-                at: substep.end,
-                moved: 1.0,
-                is_next: true,
-            },
-        );
         body.state.advance();
         if index + 1 == middle
             && let Some(coarse) = &mut body.coarse
@@ -164,6 +138,81 @@ fn run_in_parts(
         }
     }
     End::Fine
+}
+
+/// Takes one of equal parts of a step, up to where it becomes current.
+fn take_part(
+    body: &mut Body,
+    implicit: &mut Implicit,
+    request: &StepRequest,
+    [index, substeps]: [u32; 2],
+    is_last_resort: bool,
+    team: &Team,
+) -> End {
+    let step = f64::from(request.dt) / f64::from(substeps);
+    let substep = Substep {
+        request,
+        step,
+        start: f64::from(index) / f64::from(substeps),
+        end: f64::from(index + 1) / f64::from(substeps),
+        is_first: index == 0,
+        equations: substeps - index,
+        formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
+        team,
+    };
+    body.lead_grasps(request.tools, [substep.start, substep.end]);
+    let end = substep.take_safely(body, implicit, is_last_resort);
+    if end != End::Fine {
+        return end;
+    }
+    for pin in body.pins.iter_mut() {
+        pin.force_sum += pin.solved.as_dvec3();
+    }
+    let Formula { time, carried } = implicit.taken;
+    let lapse = Lapse {
+        time,
+        carried,
+        at: substep.end,
+        moved: 1.0,
+        is_next: true,
+    };
+    body.feel_grasps(request.tools, lapse);
+    End::Fine
+}
+
+/// In how many parts a step near a tool or other tissue is to be taken at least.
+pub(in crate::solver) fn parts_near(dt: f32) -> u32 {
+    (f64::from(dt) / contact::LONGEST)
+        .ceil()
+        .clamp(1.0, f64::from(u32::MAX / 4)) as u32
+}
+
+/// Begins a step of so many parts that are taken one by one.
+pub(in crate::solver) fn begin_parts(body: &mut Body, request: &StepRequest, parts: u32) {
+    begin(body, request);
+    if let Some(implicit) = &mut body.implicit {
+        implicit.report = SolverReport::BEFORE;
+        implicit.left = implicit.budget;
+        implicit.grant(parts);
+        implicit.begin();
+    }
+}
+
+/// Takes one of equal parts of such a step, up to where it becomes current: whether it gained no energy, or as a last resort was slowed
+/// down.
+pub(in crate::solver) fn next_part(
+    body: &mut Body,
+    request: &StepRequest,
+    part_of: [u32; 2],
+    is_last_resort: bool,
+    team: &Team,
+) -> bool {
+    let Some(mut implicit) = body.implicit.take() else {
+        return true;
+    };
+    let end = take_part(body, &mut implicit, request, part_of, is_last_resort, team);
+    body.implicit = Some(implicit);
+    end == End::Fine
 }
 
 /// One solved equation.
