@@ -57,7 +57,9 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 pub(crate) fn crosses(p: Vec3, q: Vec3, triangle: [Vec3; 3], depth: f64) -> bool {
     let corners = triangle.map(|corner| corner.as_dvec3());
     let (p, q) = (p.as_dvec3(), q.as_dvec3());
-    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+    let normal = (corners[1] - corners[0])
+        .cross(corners[2] - corners[0])
+        .normalize_or_zero();
     let [before, after] = [p, q].map(|end| normal.dot(end - corners[0]));
     if !(before.abs() > depth && after.abs() > depth && (before < 0.0) != (after < 0.0)) {
         return false;

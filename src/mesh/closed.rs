@@ -355,7 +355,8 @@ impl ClosedSurface {
 /// Whether an edge of the first triangle passes through the second, with which it shares no node.
 fn pierces(nodes: &[u32; 3], corners: [Vec3; 3], others: &[u32; 3], triangle: [Vec3; 3], depth: f64) -> bool {
     super::TRIANGLE_EDGES.iter().any(|ends| {
-        ends.iter().all(|&end| !others.contains(&nodes[end])) && crosses(corners[ends[0]], corners[ends[1]], triangle, depth)
+        ends.iter().all(|&end| !others.contains(&nodes[end]))
+            && crosses(corners[ends[0]], corners[ends[1]], triangle, depth)
     })
 }
 
