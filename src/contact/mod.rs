@@ -7,7 +7,9 @@ mod constraint;
 mod contacts;
 mod deepest;
 mod distance;
+pub(crate) mod distance_field;
 pub(crate) mod exact;
+pub(crate) mod exact_overlap;
 #[cfg(test)]
 mod exact_tests;
 mod facets;
