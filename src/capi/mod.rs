@@ -33,3 +33,5 @@ pub mod tool;
 pub mod mesh;
 
 pub mod picture;
+
+pub mod query;

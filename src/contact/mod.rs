@@ -5,6 +5,8 @@ pub(crate) mod closest;
 mod coarse;
 mod constraint;
 mod contacts;
+#[allow(dead_code)] // for tissue against tissue
+pub(crate) mod continuous;
 mod deepest;
 mod distance;
 pub(crate) mod distance_field;
