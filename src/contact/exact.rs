@@ -49,6 +49,7 @@ pub(crate) struct Nearest {
     /// From the surface to the point.
     offset: DVec3,
     squared: f64,
+    point: Vec3,
 }
 
 /// Where a segment passes through the surface.
@@ -191,6 +192,7 @@ impl ExactSolid {
                     weights,
                     offset,
                     squared,
+                    point,
                 });
                 return Some(limit as f32);
             }
@@ -261,7 +263,12 @@ impl ExactSolid {
     /// The side that a point lies on, by what it is closest to.
     fn signed(&self, nearest: &Nearest) -> Signed {
         let normal = self.facets.normal(nearest.place, nearest.part);
-        let side = if nearest.offset.dot(normal) < 0.0 { -1.0 } else { 1.0 };
+        let is_inside = if self.facets.are_doubtful() {
+            self.is_wound_about(nearest.point)
+        } else {
+            nearest.offset.dot(normal) < 0.0
+        };
+        let side = if is_inside { -1.0 } else { 1.0 };
         let distance = nearest.squared.sqrt();
         let normal = if distance > TOUCHING * self.size {
             nearest.offset * (side / distance)
@@ -275,6 +282,17 @@ impl ExactSolid {
             distance: side * distance,
             normal,
         }
+    }
+
+    /// Whether a way from a point to far outside comes out once more than it goes in.
+    fn is_wound_about(&self, point: Vec3) -> bool {
+        let bounds = self.tree.bounds();
+        let reach = (bounds.max - bounds.min).length() + point.distance(bounds.min);
+        let mut winding = 0;
+        self.crossings(point, point + Vec3::new(0.8, 0.5, 0.33) * 2.0 * reach, |crossing| {
+            winding += if crossing.enters { -1 } else { 1 };
+        });
+        winding > 0
     }
 
     fn closest_to_point(&self, point: Vec3, within: f32) -> Option<Closest> {
@@ -343,6 +361,7 @@ impl ExactSolid {
                     along > 0.0 && along < 1.0 && self.facets.leads_off_node(node, offset)
                 });
             }
+            distance = (pairs.limit as f32).sqrt() * (1.0 + ROUNDING);
             pairs.limit as f32
         });
         if count > 0 {
