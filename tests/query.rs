@@ -9,9 +9,10 @@ fn add(world: &mut World, mesh: &Mesh, by: Vec3) -> BodyId {
     let masses = vec![0.001; positions.len()];
     let surface = mesh.surface().expect("a surface");
     let definition = BodyDefinition {
-        masses: &masses,
+        positions: &positions,
+        masses: sinew::Values::Each(&masses),
         triangles: &surface,
-        ..BodyDefinition::new(&positions)
+        ..BodyDefinition::default()
     };
     world.create_body(&definition).expect("a body")
 }
