@@ -1,5 +1,10 @@
 //! Which parts of two surfaces overlap, and by how much, without a world.
 
+/// By exact tests of points, edges and triangles.
+pub mod exact {
+    pub use crate::contact::exact::overlap::{EdgeInside, Exact, Overlap, PointInside};
+}
+
 /// In image space: rays through the pixels of a parallel view (CInDeR; Halic et al., section 2.1).
 pub mod image_space {
     pub use crate::contact::image_space::{

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Body, Bounds};
+use super::Body;
 use crate::contact::Moment;
 use crate::error::Result;
 
@@ -45,10 +45,5 @@ impl Body {
         let next_positions = self.state.substep().next_positions;
         let place = next_positions.get(node) + way;
         next_positions.set(node, place);
-    }
-
-    /// A box about it, in its own coordinates.
-    pub(crate) fn bounds(&self) -> Bounds {
-        self.boxes.iter().fold(Bounds::EMPTY, Bounds::and)
     }
 }

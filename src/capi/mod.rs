@@ -37,3 +37,5 @@ pub mod attachment;
 pub mod mesh;
 
 pub mod picture;
+
+pub mod query;

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::closest::Closest;
+use super::distance_field::DistanceField;
 use super::exact::ExactSolid;
 use super::image_space::LayeredImage;
 use super::tool::Detection;
 use crate::body::Bounds;
 use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::mesh::ClosedSurface;
 
 /// What a mesh encloses.
@@ -27,11 +28,13 @@ pub(crate) struct MeshSolid {
 #[derive(Debug)]
 enum Found {
     Exact(Box<ExactSolid>),
+    Field(Box<DistanceField>),
     Image(LayeredImage),
 }
 
-/// The longest extent is this many pixels, where it is not said how fine an image is.
+/// The longest extent is this many pixels or cells, where it is not said how fine an image or a field is.
 const PIXELS: f32 = 256.0;
+const CELLS: f32 = 96.0;
 
 impl MeshSolid {
     /// What this surface encloses, to be found in this way; `resolution` as in a tool's definition.
@@ -56,10 +59,9 @@ impl MeshSolid {
                 let image = LayeredImage::new(surface.positions(), surface.triangles(), fine(PIXELS))?;
                 Found::Image(image)
             }
-            other => {
-                return Err(Error::Unsupported(format!(
-                    "detection is {other:?}: this version finds meshes exactly or in image space"
-                )));
+            Detection::DistanceField => {
+                let field = DistanceField::new(&ExactSolid::new(&surface)?, fine(CELLS))?;
+                Found::Field(Box::new(field))
             }
         };
         let mut hasher = StateHasher::new();
@@ -119,6 +121,7 @@ impl MeshSolid {
     pub(super) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         match &self.found {
             Found::Exact(solid) => solid.closest(corners, within),
+            Found::Field(field) => field.closest(corners, within),
             Found::Image(image) => image.closest(corners, within),
         }
     }

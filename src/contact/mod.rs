@@ -2,15 +2,11 @@
 
 mod candidates;
 pub(crate) mod closest;
-mod coarse;
 mod constraint;
 mod contacts;
-mod deepest;
 mod distance;
+pub(crate) mod distance_field;
 pub(crate) mod exact;
-#[cfg(test)]
-mod exact_tests;
-mod facets;
 mod features;
 mod filter;
 mod holds;

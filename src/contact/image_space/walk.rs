@@ -33,7 +33,6 @@ struct Sample {
 
 impl LayeredImage {
     /// The deepest point of a node, edge or face; `None` where it is outside and further away than `within`.
-    #[allow(dead_code, reason = "tools of meshes ask for it")]
     pub(in crate::contact) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         let best = match corners {
             [node] => {

@@ -294,7 +294,7 @@ fn reach(body: &Body, dt: f32, faster: f32) -> Bounds {
     } else {
         0.0
     };
-    let bounds = body.bounds();
+    let bounds = body.local_bounds();
     let origin = body.origin.as_vec3();
     Bounds {
         min: bounds.min + origin,
