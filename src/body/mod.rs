@@ -480,6 +480,7 @@ impl Body {
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
+            contacts.holds.forget();
         }
     }
 

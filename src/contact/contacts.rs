@@ -140,7 +140,7 @@ impl Contacts {
             self.candidates.invalidate();
         }
         self.committed = false;
-        self.holds.clear();
+        self.holds.begin_step();
     }
 
     /// Makes room for contacts within equations, where the body has such: for how many.
@@ -153,6 +153,12 @@ impl Contacts {
     /// The step that was begun last is current now.
     pub fn commit(&mut self) {
         self.committed = true;
+        self.holds.settle();
+    }
+
+    /// An equation with the contacts that were foreseen has been solved: its holds are what the next begins with.
+    pub fn remember(&mut self, tools: &[ToolPath]) {
+        self.holds.remember(&self.constraints, |place| tools[place].slot);
     }
 
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
@@ -206,7 +212,9 @@ impl Contacts {
         self.find(&mut meeting, &slice, [start, end]);
         self.constraints.truncate(HELD);
         let way = |node: usize| meeting.velocities.get(node) * meeting.substep;
-        self.holds.begin(&self.constraints, meeting.substep, stiffness_of, way);
+        let slot = |place: usize| meeting.tools[place].slot;
+        self.holds
+            .begin(&self.constraints, slot, meeting.substep, stiffness_of, way);
     }
 
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.
@@ -236,9 +244,7 @@ impl Contacts {
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
             if is_foreseen {
-                for (index, constraint) in self.constraints.iter_mut().enumerate() {
-                    constraint.has_given(self.holds.force(index) * meeting.substep);
-                }
+                self.take_up(&meeting);
             } else {
                 self.constraints.clear();
             }
@@ -252,12 +258,31 @@ impl Contacts {
         }
     }
 
+    /// Makes the contacts that a solved equation has seen what it found.
+    fn take_up(&mut self, meeting: &Meeting) {
+        for (index, constraint) in self.constraints.iter_mut().enumerate() {
+            let (meets, force, open) = self.holds.found(index);
+            let given = force as f32 * meeting.substep;
+            let answering = (&meeting.mobility, meeting.held_axes(constraint.feature));
+            *constraint = constraint.after(
+                &meets,
+                (given, if force > 0.0 { 0.0 } else { open as f32 }),
+                meeting.substep,
+                meeting.velocities,
+                answering,
+            );
+        }
+    }
+
     /// Adds the contacts of a slice between these fractions of the step.
     fn find(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
         for place in 0..meeting.tools.len() {
             let motion = meeting.tools[place].motion(start, end, meeting.dt, meeting.origin);
             for candidate in 0..self.candidates.near().len() {
                 let feature = self.features.get(self.candidates.near()[candidate]);
+                if !slice.foresees && self.holds.know(place, feature) {
+                    continue;
+                }
                 self.touch(meeting, slice, place, &motion, feature);
             }
         }
@@ -318,7 +343,7 @@ impl Contacts {
             self.constraints.push(constraint);
         } else if !slice.foresees {
             constraint.solve(meeting.velocities);
-            self.settle(meeting, slice, &constraint);
+            self.settle(meeting, slice, &constraint, true);
         }
     }
 
@@ -336,9 +361,11 @@ impl Contacts {
                 break;
             }
         }
+        // Where nothing was given beside what an equation found the nodes are where that has put them.
+        let moves = first > 0.0 || self.holds.is_empty();
         for index in 0..self.constraints.len() {
             let constraint = self.constraints[index];
-            self.settle(meeting, slice, &constraint);
+            self.settle(meeting, slice, &constraint, moves);
         }
         if meeting.drifts {
             for constraint in &self.constraints {
@@ -350,7 +377,7 @@ impl Contacts {
     }
 
     /// Adds what a contact gave to its tool's load, and moves its nodes.
-    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint) {
+    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint, moves: bool) {
         let load = &mut self.loads[constraint.tool];
         let received = -constraint.given().as_dvec3();
         load.impulse += received;
@@ -365,7 +392,7 @@ impl Contacts {
             }
             let velocity = meeting.velocities.get(node as usize);
             self.given = self.given.with(velocity);
-            if meeting.drifts {
+            if meeting.drifts && moves {
                 let held = meeting.pins.partial_axes_of(node);
                 let led = meeting.next_positions.get(node as usize);
                 let moved = start + velocity * slice.remains;
@@ -527,5 +554,7 @@ fn meet_rounded(
     constraint.arm = start + step * if meeting.drifts { 1.0 } else { 0.0 } + surface - motion.centre;
     constraint.friction = motion.friction;
     constraint.allow_gap((matter - start).dot(normal) - segment.radius, slice.duration);
+    let ends = [0, 1].map(|end| segment.ends[end] + segment.steps[end]);
+    constraint.rounded = Some((ends, segment.radius));
     Some(constraint)
 }

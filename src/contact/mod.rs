@@ -5,6 +5,7 @@ mod constraint;
 mod contacts;
 mod distance;
 mod features;
+mod gauge;
 mod holds;
 mod path;
 mod sweep;
