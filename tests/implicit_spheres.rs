@@ -141,6 +141,7 @@ struct Course {
     energies: Vec<f64>,
     /// The deepest that the surface is within the sphere after any frame, m.
     deepest: f64,
+    /// In the last frame.
     converged: bool,
 }
 
@@ -164,7 +165,7 @@ fn course(tissue: Tissue, solver: Solver, radius: f32, frames: usize) -> Course 
         course.products.push(report.iterations);
         course.energies.push(scene.energy());
         course.deepest = course.deepest.max(scene.depth());
-        course.converged &= report.converged;
+        course.converged = report.converged;
     }
     course
 }
