@@ -73,6 +73,9 @@ impl Body {
         if let Some(implicit) = &self.implicit {
             implicit.hash(hasher);
         }
+        if let Some(contacts) = &self.contacts {
+            contacts.holds.hash(hasher);
+        }
         for bits in self.carry.gravity.bits() {
             hasher.write_u64(bits);
         }

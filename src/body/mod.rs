@@ -518,6 +518,7 @@ impl Body {
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();
+            contacts.holds.forget();
         }
     }
 

@@ -1,8 +1,9 @@
 //! One contact: a node, edge or face that a tool does not let pass.
 
-use glam::{BVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 use super::features::Feature;
+use super::gauge::{Gauge, Meets};
 use crate::body::{Mobility, Vectors};
 
 /// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
@@ -44,6 +45,8 @@ pub(super) struct Constraint {
     impulse: f32,
     /// What friction has given so far, N s.
     friction_impulse: Vec3,
+    /// For a rounded tool: the ends of the segment within it when the contact ends, as far as this feature meets it, and its radius.
+    pub rounded: Option<([Vec3; 2], f32)>,
 }
 
 impl Constraint {
@@ -92,6 +95,7 @@ impl Constraint {
             give: 1.0 - rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            rounded: None,
         })
     }
 
@@ -102,15 +106,53 @@ impl Constraint {
         self.least_speed = self.surface_velocity.dot(self.normal) - gap.max(0.0) / duration;
     }
 
-    /// The least weighted velocity of its nodes along the normal, m/s.
-    pub fn least_speed(&self) -> f32 {
-        self.least_speed
+    /// How its feature meets the tool after `duration` seconds, wherever its nodes are then.
+    pub fn gauge(&self, duration: f32) -> Gauge {
+        if let Some((ends, radius)) = self.rounded {
+            return Gauge::Rounded {
+                ends: ends.map(|end| end.as_dvec3()),
+                radius: f64::from(radius),
+            };
+        }
+        let starts = self.starts.iter().zip(self.weights);
+        let matter: DVec3 = starts.map(|(start, weight)| start.as_dvec3() * f64::from(weight)).sum();
+        let normal = self.normal.as_dvec3();
+        Gauge::Flat {
+            weights: self.weights.map(f64::from),
+            normal,
+            level: matter.dot(normal) + f64::from(self.least_speed * duration + self.depth.max(0.0)),
+        }
     }
 
-    /// Its nodes have already received this, N s.
-    pub fn has_given(&mut self, given: Vec3) {
-        self.impulse = given.dot(self.normal);
-        self.friction_impulse = given - self.normal * self.impulse;
+    /// The same contact after an equation has been solved with it: its nodes meet the tool thus, with these velocities, and have
+    /// received the impulse, N s. What is left open, m, may still be closed within `duration` seconds.
+    pub fn after(
+        &self,
+        meets: &Meets,
+        (impulse, open): (f32, f32),
+        duration: f32,
+        velocities: &Vectors,
+        (mobility, held): (&Mobility, [BVec3; 3]),
+    ) -> Self {
+        let (weights, normal) = (meets.weights.map(|weight| weight as f32), meets.normal.as_vec3());
+        let found = Self::new(self.feature, self.starts, weights, normal, mobility, held);
+        let mut after = Self {
+            surface_velocity: self.surface_velocity,
+            arm: self.arm,
+            depth: self.depth,
+            friction: self.friction,
+            tool: self.tool,
+            rounded: self.rounded,
+            ..found.unwrap_or(*self)
+        };
+        if let Some((_, radius)) = self.rounded {
+            after.arm += (after.normal - self.normal) * radius;
+        }
+        after.impulse = impulse;
+        after.give = 0.0;
+        let velocity = after.velocity(velocities).dot(after.normal);
+        after.least_speed = velocity - open.max(0.0) / duration;
+        after
     }
 
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.

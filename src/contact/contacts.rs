@@ -166,7 +166,7 @@ impl Contacts {
             self.candidates.invalidate();
         }
         self.committed = false;
-        self.holds.clear();
+        self.holds.begin_step();
     }
 
     /// Makes room for contacts within equations, where the body has such: for how many.
@@ -179,6 +179,7 @@ impl Contacts {
     /// The step that was begun last is current now.
     pub fn commit(&mut self, tools: &[ToolPath]) {
         self.committed = true;
+        self.holds.settle();
         self.touches.clear();
         for pair in &mut self.touched {
             *pair = [false, pair[0]];
@@ -245,6 +246,11 @@ impl Contacts {
         !self.held.is_empty() && feature.nodes().iter().any(held)
     }
 
+    /// An equation with the contacts that were foreseen has been solved: its holds are what the next begins with.
+    pub fn remember(&mut self, tools: &[ToolPath]) {
+        self.holds.remember(&self.constraints, |place| tools[place].slot);
+    }
+
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
     pub fn forget(&mut self) {
         self.candidates.invalidate();
@@ -296,7 +302,9 @@ impl Contacts {
         self.find(&mut meeting, &slice, [start, end]);
         self.constraints.truncate(HELD);
         let way = |node: usize| meeting.velocities.get(node) * meeting.substep;
-        self.holds.begin(&self.constraints, meeting.substep, stiffness_of, way);
+        let slot = |place: usize| meeting.tools[place].slot;
+        self.holds
+            .begin(&self.constraints, slot, meeting.substep, stiffness_of, way);
     }
 
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.
@@ -328,9 +336,7 @@ impl Contacts {
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
             if is_foreseen {
-                for (index, constraint) in self.constraints.iter_mut().enumerate() {
-                    constraint.has_given(self.holds.force(index) * meeting.substep);
-                }
+                self.take_up(&meeting);
             } else {
                 self.constraints.clear();
             }
@@ -344,6 +350,22 @@ impl Contacts {
         }
     }
 
+    /// Makes the contacts that a solved equation has seen what it found.
+    fn take_up(&mut self, meeting: &Meeting) {
+        for (index, constraint) in self.constraints.iter_mut().enumerate() {
+            let (meets, force, open) = self.holds.found(index);
+            let given = force as f32 * meeting.substep;
+            let answering = (&meeting.mobility, meeting.held_axes(constraint.feature));
+            *constraint = constraint.after(
+                &meets,
+                (given, if force > 0.0 { 0.0 } else { open as f32 }),
+                meeting.substep,
+                meeting.velocities,
+                answering,
+            );
+        }
+    }
+
     /// Adds the contacts of a slice between these fractions of the step.
     fn find(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
         for (place, tool) in meeting.tools.iter().enumerate() {
@@ -353,6 +375,9 @@ impl Contacts {
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
             for candidate in 0..self.candidates.near().len() {
                 let feature = self.features.get(self.candidates.near()[candidate]);
+                if !slice.foresees && self.holds.know(place, feature) {
+                    continue;
+                }
                 self.touch(meeting, slice, place, &motion, feature);
             }
         }
@@ -422,7 +447,7 @@ impl Contacts {
             self.constraints.push(constraint);
         } else if !slice.foresees {
             constraint.solve(meeting.velocities);
-            self.settle(meeting, slice, &constraint);
+            self.settle(meeting, slice, &constraint, true);
         }
     }
 
@@ -440,9 +465,11 @@ impl Contacts {
                 break;
             }
         }
+        // Where nothing was given beside what an equation found the nodes are where that has put them.
+        let moves = first > 0.0 || self.holds.is_empty();
         for index in 0..self.constraints.len() {
             let constraint = self.constraints[index];
-            self.settle(meeting, slice, &constraint);
+            self.settle(meeting, slice, &constraint, moves);
         }
         if meeting.drifts {
             for constraint in &self.constraints {
@@ -454,7 +481,7 @@ impl Contacts {
     }
 
     /// Adds what a contact gave to its tool's load, and moves its nodes.
-    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint) {
+    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint, moves: bool) {
         let load = &mut self.loads[constraint.tool];
         let received = -constraint.given().as_dvec3();
         load.impulse += received;
@@ -469,7 +496,7 @@ impl Contacts {
             }
             let velocity = meeting.velocities.get(node as usize);
             self.given = self.given.with(velocity);
-            if meeting.drifts {
+            if meeting.drifts && moves {
                 let held = meeting.pins.partial_axes_of(node);
                 let led = meeting.next_positions.get(node as usize);
                 let moved = start + velocity * slice.remains;

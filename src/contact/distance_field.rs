@@ -220,8 +220,8 @@ impl DistanceField {
 
 #[cfg(test)]
 mod tests {
-    use crate::contact::exact::tests::{cube, sphere};
     use super::*;
+    use crate::contact::exact::tests::{cube, sphere};
     use crate::random::Random;
 
     /// The largest error against EXACT of points outside of a sphere of 0.05 m, at most 5 mm away.

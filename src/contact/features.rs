@@ -14,7 +14,7 @@ pub(super) struct Features {
 }
 
 /// One node, edge or face.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Feature {
     nodes: [u32; 3],
     count: u8,
@@ -23,6 +23,24 @@ pub(super) struct Feature {
 impl Feature {
     pub fn nodes(&self) -> &[u32] {
         &self.nodes[..self.count as usize]
+    }
+
+    /// That part of it whose corners have weight: a smaller feature where it is met at its border.
+    pub fn part(&self, weights: [f64; 3]) -> Self {
+        let mut part = Self {
+            nodes: [0; 3],
+            count: 0,
+        };
+        for (&node, weight) in self.nodes().iter().zip(weights) {
+            if weight > 0.0 {
+                part.nodes[part.count as usize] = node;
+                part.count += 1;
+            }
+        }
+        if part.count == 2 {
+            part.nodes[..2].sort_unstable();
+        }
+        part
     }
 }
 

@@ -10,26 +10,31 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use super::constraint::Constraint;
+use super::features::Feature;
+use super::gauge::{Gauge, Meets};
+use crate::diagnostics::StateHasher;
 use crate::error::Result;
 
 /// How much stiffer a contact is than its nodes.
-const STIFFER: f32 = 100.0;
+const STIFFER: f32 = 10.0;
 
 /// A contact as the equation sees it.
 #[derive(Clone, Copy, Debug)]
 struct Hold {
     nodes: [u32; 3],
-    /// 0 for corners that it does not have.
-    weights: [f32; 3],
-    normal: DVec3,
-    /// The matter's way along the normal is at least this, m.
+    count: usize,
+    /// Where its nodes are without a push, m.
+    free: [DVec3; 3],
+    gauge: Gauge,
+    /// The gap is at least this, m: below 0 where it began inside.
     least: f64,
     /// N/m
     stiffness: f64,
     /// N
     multiplier: f64,
-    /// The matter's way along the normal without a push, m.
-    free_way: f64,
+    /// Whether it may pull: where it pushed before, the first solution takes it for one that goes on, though a node that were left
+    /// alone might go away from the tool for once.
+    holds_on: bool,
     /// What acts on the tissue with the nodes where they were last.
     answer: Answer,
 }
@@ -37,10 +42,11 @@ struct Hold {
 /// What a contact does.
 #[derive(Clone, Copy, Debug, Default)]
 struct Answer {
+    meets: Meets,
     /// Along the normal, N.
     force: f64,
-    /// N/m
-    stiffness: f64,
+    /// How it falls as each node goes along the normal, for each that goes, N/m.
+    stiffness: [[f64; 3]; 3],
 }
 
 /// The part of a node in a hold.
@@ -48,7 +54,18 @@ struct Answer {
 struct Share {
     node: u32,
     hold: u32,
-    weight: f32,
+    /// Which of its nodes it is.
+    corner: usize,
+}
+
+/// What a contact did at the end of a step: where it is found again the next begins with it.
+#[derive(Clone, Copy, Debug)]
+struct Push {
+    /// The tool's place in the world.
+    slot: usize,
+    feature: Feature,
+    /// N
+    force: f64,
 }
 
 /// The contacts of a body with all tools in the equation in progress.
@@ -57,6 +74,11 @@ pub(crate) struct Holds {
     holds: Vec<Hold>,
     /// In the order of nodes.
     shares: Vec<Share>,
+    /// The tool and the feature of each, in their order.
+    order: Vec<(usize, Feature)>,
+    /// What contacts did before the equation in progress, and before the step; both in the order of tools and features.
+    last: Vec<Push>,
+    settled: Vec<Push>,
 }
 
 impl Holds {
@@ -64,7 +86,64 @@ impl Holds {
     pub fn reserve(&mut self, count: usize) -> Result<()> {
         self.holds.try_reserve(count.saturating_sub(self.holds.len()))?;
         let shares = 3 * count;
-        Ok(self.shares.try_reserve(shares.saturating_sub(self.shares.len()))?)
+        self.shares.try_reserve(shares.saturating_sub(self.shares.len()))?;
+        self.order.try_reserve(count.saturating_sub(self.order.len()))?;
+        for pushes in [&mut self.last, &mut self.settled] {
+            pushes.try_reserve(count.saturating_sub(pushes.len()))?;
+        }
+        Ok(())
+    }
+
+    /// Begins a step anew.
+    pub fn begin_step(&mut self) {
+        self.clear();
+        self.last.clone_from(&self.settled);
+    }
+
+    /// What contacts do now is what the next equation begins with: of these.
+    pub(super) fn remember(&mut self, constraints: &[Constraint], slot_of: impl Fn(usize) -> usize) {
+        self.last.clear();
+        for (hold, constraint) in self.holds.iter().zip(constraints) {
+            if hold.answer.force > 0.0 {
+                self.last.push(Push {
+                    slot: slot_of(constraint.tool),
+                    feature: constraint.feature.part(hold.answer.meets.weights),
+                    force: hold.answer.force,
+                });
+            }
+        }
+        // At its border a feature is met as a smaller one is, and leaves to that what it did. By force too: sums depend on the order.
+        self.last
+            .sort_unstable_by(|a, b| a.key().cmp(&b.key()).then(a.force.total_cmp(&b.force)));
+        self.last.dedup_by(|again, first| {
+            let is_same = again.key() == first.key();
+            if is_same {
+                first.force += again.force;
+            }
+            is_same
+        });
+    }
+
+    /// The step that was begun last is current now.
+    pub fn settle(&mut self) {
+        self.settled.clone_from(&self.last);
+    }
+
+    /// Nothing is known any more of what contacts did.
+    pub fn forget(&mut self) {
+        self.settled.clear();
+    }
+
+    /// What the next step depends on.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for push in &self.settled {
+            hasher.write_u64(push.slot as u64);
+            push.feature
+                .nodes()
+                .iter()
+                .for_each(|&node| hasher.write_u64(node.into()));
+            hasher.write_u64(push.force.to_bits());
+        }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -74,6 +153,7 @@ impl Holds {
     pub fn clear(&mut self) {
         self.holds.clear();
         self.shares.clear();
+        self.order.clear();
     }
 
     /// Begins anew with these contacts over `duration` seconds, of nodes that are as stiff as `stiffness_of` tells, N/m; infinite
@@ -81,50 +161,71 @@ impl Holds {
     pub(super) fn begin(
         &mut self,
         constraints: &[Constraint],
+        slot_of: impl Fn(usize) -> usize,
         duration: f32,
         stiffness_of: impl Fn(usize) -> f32,
         way_of: impl Fn(usize) -> Vec3,
     ) {
         self.clear();
         for constraint in constraints {
-            let mut nodes = [0; 3];
-            let mut weights = [0.0; 3];
+            let mut hold = Hold {
+                nodes: [0; 3],
+                count: constraint.feature.nodes().len(),
+                free: [DVec3::ZERO; 3],
+                gauge: constraint.gauge(duration),
+                least: -f64::from(constraint.depth.max(0.0)),
+                stiffness: 0.0,
+                multiplier: 0.0,
+                holds_on: false,
+                answer: Answer::default(),
+            };
             let mut softness = 0.0;
             for (corner, &node) in constraint.feature.nodes().iter().enumerate() {
-                nodes[corner] = node;
-                weights[corner] = constraint.weights[corner];
-                softness += weights[corner] * weights[corner] / stiffness_of(node as usize);
+                let weight = constraint.weights[corner];
+                hold.nodes[corner] = node;
+                hold.free[corner] = constraint.starts[corner].as_dvec3() + way_of(node as usize).as_dvec3();
+                softness += weight * weight / stiffness_of(node as usize);
                 self.shares.push(Share {
                     node,
                     hold: self.holds.len() as u32,
-                    weight: weights[corner],
+                    corner,
                 });
             }
             let stiffness = STIFFER / softness;
-            let mut hold = Hold {
-                nodes,
-                weights,
-                normal: constraint.normal.as_dvec3(),
-                least: f64::from(constraint.least_speed() * duration),
-                stiffness: if stiffness.is_finite() {
-                    f64::from(stiffness)
-                } else {
-                    0.0
-                },
-                multiplier: 0.0,
-                free_way: 0.0,
-                answer: Answer::default(),
-            };
-            hold.free_way = hold.weighted(|node| way_of(node).as_dvec3());
+            if stiffness.is_finite() {
+                hold.stiffness = f64::from(stiffness);
+            }
+            let key = (slot_of(constraint.tool), constraint.feature);
+            if let Ok(place) = self.last.binary_search_by_key(&key, Push::key) {
+                hold.multiplier = self.last[place].force;
+                hold.holds_on = true;
+            }
             self.holds.push(hold);
         }
         self.shares.sort_unstable_by_key(|share| (share.node, share.hold));
+        self.order.extend(
+            constraints
+                .iter()
+                .map(|constraint| (constraint.tool, constraint.feature)),
+        );
+        self.order.sort_unstable();
     }
 
     /// Finds out what each contact does with these pushes of the nodes, m.
     pub fn press(&mut self, push_of: impl Fn(usize) -> DVec3) {
         for hold in &mut self.holds {
-            hold.answer = hold.answer_to(hold.weighted(&push_of));
+            hold.answer = hold.answer_to(&push_of);
+        }
+    }
+
+    /// From now on no contact pulls.
+    pub fn let_go(&mut self) {
+        for hold in &mut self.holds {
+            hold.holds_on = false;
+            if hold.answer.force < 0.0 {
+                hold.answer.force = 0.0;
+                hold.answer.stiffness = [[0.0; 3]; 3];
+            }
         }
     }
 
@@ -136,7 +237,7 @@ impl Holds {
                 multiplier: hold.answer.force,
                 ..*hold
             };
-            let force = better.answer_to(hold.weighted(&push_of)).force;
+            let force = better.answer_to(&push_of).force;
             missing += (force - hold.answer.force).abs();
             all += hold.answer.force;
         }
@@ -149,14 +250,14 @@ impl Holds {
         for hold in &mut self.holds {
             let before = hold.answer.force;
             hold.multiplier = before;
-            hold.answer = hold.answer_to(hold.weighted(&push_of));
-            hold.share_out(hold.answer.force - before, &mut add);
+            hold.answer = hold.answer_to(&push_of);
+            hold.share_out(&hold.answer, hold.answer.force - before, &mut add);
         }
     }
 
     /// What the residuals lack of balance along the contacts' normals, as a part of what those do.
     pub fn imbalance(&self, residual_of: impl Fn(usize) -> DVec3) -> f64 {
-        let pressed = || self.holds.iter().filter(|hold| hold.answer.force > 0.0);
+        let pressed = || self.holds.iter().filter(|hold| hold.answer.force != 0.0);
         let off: f64 = pressed().map(|hold| hold.weighted(&residual_of).abs()).sum();
         let all: f64 = pressed().map(|hold| hold.answer.force).sum();
         if all > 0.0 { off / all } else { 0.0 }
@@ -164,20 +265,24 @@ impl Holds {
 
     /// Whether a contact pushes.
     pub fn are_pressed(&self) -> bool {
-        self.holds.iter().any(|hold| hold.answer.stiffness > 0.0)
+        self.holds.iter().any(|hold| hold.answer.force != 0.0)
     }
 
     /// Shows each node what acts on it with these pushes, N.
     pub fn show_forces(&self, push_of: impl Fn(usize) -> DVec3, mut add: impl FnMut(usize, DVec3)) {
         for hold in &self.holds {
-            hold.share_out(hold.answer_to(hold.weighted(&push_of)).force, &mut add);
+            let answer = hold.answer_to(&push_of);
+            hold.share_out(&answer, answer.force, &mut add);
         }
     }
 
     /// Shows each node the product of the contacts' stiffness with the vectors.
     pub fn show_products(&self, vector_of: impl Fn(usize) -> DVec3, mut add: impl FnMut(usize, DVec3)) {
-        for hold in self.holds.iter().filter(|hold| hold.answer.stiffness > 0.0) {
-            hold.share_out(hold.answer.stiffness * hold.weighted(&vector_of), &mut add);
+        for hold in self.holds.iter().filter(|hold| hold.answer.force != 0.0) {
+            let products = hold.products(&vector_of);
+            for (&node, product) in hold.nodes.iter().zip(products).take(hold.count) {
+                add(node as usize, hold.answer.meets.normal * product);
+            }
         }
     }
 
@@ -189,12 +294,11 @@ impl Holds {
         mut add: impl FnMut(f64),
     ) {
         for hold in &self.holds {
-            let (push, more) = (hold.weighted(&push_of), hold.weighted(&vector_of));
-            let [before, after] = [push, push + more].map(|push| hold.answer_to(push));
+            let before = hold.answer_to(&push_of);
+            let after = hold.answer_to(|node| push_of(node) + vector_of(node));
             // Where it pushes all along, nothing small is found as a difference of what is large.
-            let both = before.stiffness * after.stiffness > 0.0;
-            let growth = if both {
-                -hold.stiffness * more
+            let growth = if before.force.min(after.force) > 0.0 {
+                -hold.stiffness * (after.meets.gap - before.meets.gap)
             } else {
                 after.force - before.force
             };
@@ -209,8 +313,9 @@ impl Holds {
         for shares in self.shares.chunk_by(|a, b| a.node == b.node) {
             let mut block = [0.0; 6];
             for share in shares {
-                let Hold { normal: n, answer, .. } = self.holds[share.hold as usize];
-                let more = n * (f64::from(share.weight * share.weight) * answer.stiffness);
+                let answer = &self.holds[share.hold as usize].answer;
+                let n = answer.meets.normal;
+                let more = n * answer.stiffness[share.corner][share.corner];
                 let entries = [
                     more.x * n.x,
                     more.y * n.y,
@@ -233,7 +338,8 @@ impl Holds {
     pub fn add_forces(&self, nodes: &Range<usize>, to: &mut [&mut [f32]; 3]) {
         for share in self.shares_of(nodes) {
             let hold = &self.holds[share.hold as usize];
-            let force = hold.normal * hold.answer.force * f64::from(share.weight);
+            let Answer { meets, force, .. } = hold.answer;
+            let force = meets.normal * (force * meets.weights[share.corner]);
             add(to, share.node as usize - nodes.start, force.as_vec3());
         }
     }
@@ -248,10 +354,9 @@ impl Holds {
         let mut sum = 0.0;
         for share in self.shares_of(nodes) {
             let hold = &self.holds[share.hold as usize];
-            if hold.answer.stiffness > 0.0 {
-                let vector = hold.weighted(|node| vector_of(node).as_dvec3());
-                let product = hold.normal * (hold.answer.stiffness * vector * f64::from(share.weight));
-                let product = product.as_vec3();
+            if hold.answer.force != 0.0 {
+                let products = hold.products(|node| vector_of(node).as_dvec3());
+                let product = (hold.answer.meets.normal * products[share.corner]).as_vec3();
                 add(to, share.node as usize - nodes.start, product);
                 sum += f64::from(product.dot(vector_of(share.node as usize)));
             }
@@ -263,14 +368,25 @@ impl Holds {
     /// solved has them push would pass for energy put in.
     pub fn work(&self, way_of: impl Fn(usize) -> Vec3) -> f64 {
         let way_of = |node: usize| way_of(node).as_dvec3();
-        let work = |hold: &Hold| hold.answer.force * hold.weighted(way_of).min(hold.least);
-        self.holds.iter().map(work).sum()
+        let work = |hold: &Hold| {
+            let beyond = (hold.answer.meets.gap - hold.least).max(0.0);
+            hold.answer.force * (hold.weighted(way_of) - beyond)
+        };
+        let pressed = self.holds.iter().filter(|hold| hold.answer.force > 0.0);
+        pressed.map(work).sum()
     }
 
-    /// What contact number `index` does, N.
-    pub(super) fn force(&self, index: usize) -> Vec3 {
-        let hold = &self.holds[index];
-        (hold.normal * hold.answer.force).as_vec3()
+    /// How contact number `index` meets its tool with the nodes where they were last, what it does, N, and how far it is open, m.
+    pub(super) fn found(&self, index: usize) -> (Meets, f64, f64) {
+        let Hold { answer, least, .. } = &self.holds[index];
+        (answer.meets, answer.force, answer.meets.gap - least)
+    }
+
+    /// Whether a feature is among the contacts with this tool of the step.
+    pub(super) fn know(&self, tool: usize, feature: Feature) -> bool {
+        self.order
+            .binary_search_by_key(&(tool, feature), |&(tool, feature)| (tool, feature))
+            .is_ok()
     }
 
     fn shares_of(&self, nodes: &Range<usize>) -> &[Share] {
@@ -279,29 +395,64 @@ impl Holds {
     }
 }
 
+impl Push {
+    fn key(&self) -> (usize, Feature) {
+        (self.slot, self.feature)
+    }
+}
+
 impl Hold {
-    /// What it does where its matter is pushed so far along the normal, m.
-    fn answer_to(&self, push: f64) -> Answer {
-        let force = (self.multiplier + self.stiffness * (self.least - self.free_way - push)).max(0.0);
+    /// What it does with these pushes of the nodes, m.
+    fn answer_to(&self, push_of: impl Fn(usize) -> DVec3) -> Answer {
+        let mut corners = self.free;
+        for (corner, &node) in corners.iter_mut().zip(&self.nodes).take(self.count) {
+            *corner += push_of(node as usize);
+        }
+        let meets = self.gauge.meet(&corners[..self.count]);
+        let mut force = self.multiplier + self.stiffness * (self.least - meets.gap);
+        if !self.holds_on {
+            force = force.max(0.0);
+        }
+        let mut stiffness = [[0.0; 3]; 3];
+        if force != 0.0 {
+            let Meets { weights, tilts, .. } = &meets;
+            for (row, entries) in stiffness.iter_mut().enumerate() {
+                for (column, entry) in entries.iter_mut().enumerate() {
+                    *entry = self.stiffness * weights[row] * weights[column] + force.max(0.0) * tilts[row][column];
+                }
+            }
+        }
         Answer {
+            meets,
             force,
-            stiffness: if force > 0.0 { self.stiffness } else { 0.0 },
+            stiffness,
         }
     }
 
     /// The matter's part along the normal.
     fn weighted(&self, vector_of: impl Fn(usize) -> DVec3) -> f64 {
-        let corners = self.nodes.iter().zip(self.weights);
-        let sum: DVec3 = corners
-            .map(|(&node, weight)| vector_of(node as usize) * f64::from(weight))
-            .sum();
-        sum.dot(self.normal)
+        let meets = &self.answer.meets;
+        let corners = self.nodes.iter().zip(meets.weights).take(self.count);
+        let sum: DVec3 = corners.map(|(&node, weight)| vector_of(node as usize) * weight).sum();
+        sum.dot(meets.normal)
     }
 
-    fn share_out(&self, force: f64, add: &mut impl FnMut(usize, DVec3)) {
-        for (&node, weight) in self.nodes.iter().zip(self.weights) {
+    /// The product of its stiffness with the vectors, for each of its nodes along the normal.
+    fn products(&self, vector_of: impl Fn(usize) -> DVec3) -> [f64; 3] {
+        let mut products = [0.0; 3];
+        for (corner, &node) in self.nodes.iter().enumerate().take(self.count) {
+            let along = vector_of(node as usize).dot(self.answer.meets.normal);
+            for (product, row) in products.iter_mut().zip(&self.answer.stiffness) {
+                *product += row[corner] * along;
+            }
+        }
+        products
+    }
+
+    fn share_out(&self, answer: &Answer, force: f64, add: &mut impl FnMut(usize, DVec3)) {
+        for (&node, weight) in self.nodes.iter().zip(answer.meets.weights).take(self.count) {
             if weight > 0.0 && force != 0.0 {
-                add(node as usize, self.normal * (force * f64::from(weight)));
+                add(node as usize, answer.meets.normal * (force * weight));
             }
         }
     }

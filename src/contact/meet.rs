@@ -109,6 +109,8 @@ pub(super) fn meet_rounded(
     constraint.friction = motion.friction;
     let gap = (matter - start).dot(normal) - segment.radius;
     constraint.allow_gap(gap - meeting.thickness, slice.duration);
+    let ends = [0, 1].map(|end| segment.ends[end] + segment.steps[end]);
+    constraint.rounded = Some((ends, around.radius));
     Some(constraint)
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod distance_field;
 pub(crate) mod exact;
 mod features;
 mod filter;
+mod gauge;
 mod holds;
 pub(crate) mod image_space;
 mod limit;

@@ -12,7 +12,7 @@ use crate::random::Random;
 /// m, as all of these solids are about 0.1 m across.
 const WITHIN: f32 = 0.004;
 
-pub(super) fn cube() -> ClosedSurface {
+pub(in crate::contact) fn cube() -> ClosedSurface {
     let mesh = Mesh::lattice(0.02, [4; 3]).expect("a lattice");
     ClosedSurface::new(&mesh.positions, &mesh.surface().expect("a surface")).expect("a cube")
 }
@@ -41,7 +41,7 @@ fn wound(rings: u32, section: &[(f32, f32)], closes: bool) -> ClosedSurface {
 }
 
 /// Its quadrangles are flat: it is convex.
-pub(super) fn sphere(rings: u32) -> ClosedSurface {
+pub(in crate::contact) fn sphere(rings: u32) -> ClosedSurface {
     let bands = rings / 2;
     let angle = |index: u32| std::f32::consts::PI * (index as f32 / bands as f32 - 0.5);
     let at = |index: u32| {

@@ -111,7 +111,7 @@ impl Substep<'_> {
         let after = elastic.plus(kinetic);
         let allowed = before.total.energy + work + before.credit;
         let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).square;
-        if !(after.energy.is_finite() && after.size.is_finite()) {
+        if !(after.energy.is_finite() && after.size.is_finite() && work.is_finite()) {
             return End::NotFinite;
         }
         let history = &mut implicit.histories[next];

@@ -153,6 +153,9 @@ impl Substep<'_> {
                 implicit.wear(solved.products);
             }
             solved_error = solved.error;
+            if let Some(contacts) = &mut body.contacts {
+                contacts.holds.let_go();
+            }
             // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
             if solved.size.max(solved.error) <= absolute && is_held && implicit.stiffened.is_empty() {
@@ -185,6 +188,9 @@ impl Substep<'_> {
             }
         }
         implicit.soften();
+        if let Some(contacts) = &mut body.contacts {
+            contacts.holds.let_go();
+        }
         let is_touched = body
             .contacts
             .as_ref()

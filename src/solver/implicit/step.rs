@@ -17,8 +17,8 @@ use crate::threads::{Items, Team};
 /// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.
 const LARGEST_RATIO: f64 = 2.0;
 
-/// The multipliers of contacts are improved so often: then what is left has a function to minimise.
-pub(super) const MULTIPLIERS: u32 = 3;
+/// The multipliers of contacts are improved so often at most: then what is left has a function to minimise.
+pub(super) const MULTIPLIERS: u32 = 20;
 
 /// How one step is made from what was before.
 #[derive(Clone, Copy, Debug)]
@@ -252,6 +252,9 @@ impl Substep<'_> {
             end = self.meet(body, implicit);
         }
         if end == End::Fine {
+            if let Some(contacts) = &mut body.contacts {
+                contacts.remember(self.request.tools);
+            }
             body.age(self.step, self.team);
             if body.remembers() {
                 // What was stored is lost by then.

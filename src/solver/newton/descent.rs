@@ -139,6 +139,7 @@ impl Descent {
                 found.error = size;
                 break;
             }
+            self.equation.holds.let_go();
             let (gone, gain) = self.go(promised);
             farthest = farthest.max(longest(&self.equation.ways));
             if gain > 0.75 && gone >= 1.0 {
