@@ -71,6 +71,9 @@ pub struct StepReport {
     /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
     /// anything to compare.
     pub error_estimate: f32,
+    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
+    /// apart. Those of one that is closed come out again by themselves.
+    pub crossings: u32,
 }
 
 /// A body of a world.
@@ -93,6 +96,8 @@ pub struct World {
     paths: Vec<ToolPath>,
     /// Contacts of tissue with tissue, where bodies ask for them.
     tissue: Option<Box<Tissue>>,
+    /// How many edges pass through tissue as the step in progress ends.
+    crossings: u32,
     /// The bodies that take their substeps together, by their places; none where none can.
     walks: Vec<Option<Walk>>,
     /// How the step in progress ended for each body, at its place.
@@ -126,6 +131,7 @@ impl World {
             tools: Slots::new("tool"),
             paths: Vec::new(),
             tissue: None,
+            crossings: 0,
             walks: Vec::new(),
             outcomes: Vec::new(),
             attachments: Slots::new("attachment"),
@@ -376,6 +382,7 @@ impl World {
             paths,
             outcomes,
             tissue,
+            crossings,
             walks,
             ..
         } = self;
@@ -401,12 +408,16 @@ impl World {
         tissue.plan(bodies, dt);
         lead(threads, bodies, |bodies, team| {
             attempt_bodies(bodies, outcomes, &request, |place| !tissue.goes_together(place), team);
+            tissue.find_crossings(bodies, false);
             attempt_together(bodies, tissue, walks, outcomes, &request, team);
             if tissue.plan_again(bodies) {
+                tissue.find_crossings(bodies, false);
                 attempt_together(bodies, tissue, walks, outcomes, &request, team);
             }
         });
-        reported(bodies, outcomes)
+        reported(bodies, outcomes)?;
+        *crossings = tissue.find_crossings(bodies, true);
+        Ok(())
     }
 
     /// Takes back what bodies have tried.
@@ -423,7 +434,8 @@ impl World {
             outcomes,
             ..
         } = self;
-        let report = report(bodies, outcomes);
+        let mut report = report(bodies, outcomes);
+        report.crossings = self.crossings;
         lead(threads, bodies, |bodies, team| {
             commit_bodies(bodies, outcomes, paths, team)
         });
@@ -599,6 +611,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
         stable_substep: f32::INFINITY,
         bodies_restored: 0,
         error_estimate: 0.0,
+        crossings: 0,
     };
     for (place, body) in bodies.iter() {
         let stable_substep = match outcomes[place] {

@@ -5,6 +5,7 @@
 //! (sequential impulses, Catto 2005, on the pairs of Bridson, Fedkiw, Anderson 2002: nodes with faces, edges with edges). Both sides get the same
 //! impulse, with opposite signs, in the same place: no momentum is made.
 
+mod crossing;
 mod link;
 mod search;
 mod skin;
@@ -135,6 +136,43 @@ impl Tissue {
         }
 
         found
+    }
+
+    /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
+    /// there are.
+    pub fn find_crossings(&mut self, bodies: &Slots<Body>, at_end: bool) -> u32 {
+        let mut count = 0_u32;
+        for (place, skin) in self.skins.iter_mut().enumerate() {
+            if let (Some(skin), Some(body)) = (skin, bodies.at(place))
+                && skin.goes_together
+            {
+                skin.stand(body, at_end);
+            }
+        }
+        for a in 0..self.skins.len() {
+            // It is written to while others are read.
+            let Some(mut first) = self.skins[a].take() else {
+                continue;
+            };
+            let mut pierces = std::mem::take(&mut first.pierces);
+            pierces.fill(false);
+            if let (Some(body), true) = (bodies.at(a), first.goes_together) {
+                if body.contact.with_itself {
+                    count = count.saturating_add(crossing::mark(&first, &first, true, &mut pierces));
+                }
+                for (b, second) in self.skins.iter().enumerate() {
+                    if let (Some(second), Some(other)) = (second, bodies.at(b))
+                        && second.goes_together
+                        && meet_each_other(body, other)
+                    {
+                        count = count.saturating_add(crossing::mark(&first, second, false, &mut pierces));
+                    }
+                }
+            }
+            first.pierces = pierces;
+            self.skins[a] = Some(first);
+        }
+        count
     }
 
     /// The other bodies that meet tissue.

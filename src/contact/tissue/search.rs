@@ -56,7 +56,8 @@ impl Search<'_> {
                 steps: [step; 2],
                 radius: self.radius,
             };
-            let mut closest: Option<(f32, usize, Separation)> = None;
+            let mut closest: Option<(usize, Separation)> = None;
+            let mut nearest = f32::INFINITY;
             let around = Bounds::of([place, place + step].into_iter());
             of_faces
                 .skin
@@ -66,14 +67,23 @@ impl Search<'_> {
                         return;
                     }
                     let corners = self.corners(of_faces, &nodes);
-                    if let Some(found) = corners.approach(&segment, 0.0) {
-                        let start = corners.separation(&segment, 0.0).offset.length_squared();
-                        if closest.is_none_or(|(least, ..)| start < least) {
-                            closest = Some((start, triangle, found));
+                    let start = corners.separation(&segment, 0.0);
+                    let distance = start.offset.length();
+                    if distance >= nearest {
+                        return;
+                    }
+                    if self.is_behind(of_faces.skin, &corners, &start) {
+                        if start.inside {
+                            // On the wrong side: let out, or led out where it is near the surface.
+                            nearest = distance;
+                            closest = (distance < self.radius).then_some((triangle, start));
                         }
+                    } else if let Some(found) = corners.approach(&segment, 0.0) {
+                        nearest = distance;
+                        closest = Some((triangle, found));
                     }
                 });
-            if let Some((_, triangle, found)) = closest {
+            if let Some((triangle, found)) = closest {
                 let nodes = of_faces.skin.triangles[triangle];
                 let sides = [
                     Side {
@@ -87,14 +97,24 @@ impl Search<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, -found.offset, shift, see);
+                let is_behind = self.is_behind(of_faces.skin, &self.corners(of_faces, &nodes), &found);
+                self.show(sides, if is_behind { found.offset } else { -found.offset }, shift, see);
             }
         }
+    }
+
+    /// Whether what is compared with a face of a closed surface begins on its inner side.
+    fn is_behind(&self, of_face: &Skin, face: &Corners, start: &Separation) -> bool {
+        let [a, b, c] = face.points;
+        of_face.is_closed && !self.is_of_one() && start.offset.dot((b - a).cross(c - a)) > 0.0
     }
 
     fn edges_with_edges(&self, first: Party, second: Party, see: &mut impl FnMut(Touch)) {
         let shift = shift(first.skin, second.skin);
         for (index, &edge) in first.skin.edges.iter().enumerate() {
+            if first.skin.pierces[index] {
+                continue;
+            }
             let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
             let segment = Segment {
                 ends: ways.map(|(place, _)| place),
