@@ -9,9 +9,7 @@ use crate::contact::{Contact, ContactChange, Pose, TRIES, Tissue, Tool, ToolDefi
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
-use crate::solver::{
-    Outcome, RestStateDefinition, RestStateReport, StepRequest, Walk, attempt, attempt_together, rest_state,
-};
+use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, Together, Walk, attempt, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
 use attachments::Attachment;
@@ -407,12 +405,19 @@ impl World {
         };
         tissue.plan(bodies, dt);
         lead(threads, bodies, |bodies, team| {
-            attempt_bodies(bodies, outcomes, &request, |place| !tissue.goes_together(place), team);
-            tissue.find_crossings(bodies, false);
-            attempt_together(bodies, tissue, walks, outcomes, &request, team);
-            if tissue.plan_again(bodies) {
+            attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);
+            loop {
                 tissue.find_crossings(bodies, false);
-                attempt_together(bodies, tissue, walks, outcomes, &request, team);
+                let mut together = Together {
+                    tissue,
+                    walks,
+                    request: &request,
+                    team,
+                };
+                together.attempt(bodies, outcomes);
+                if !tissue.plan_again(bodies) {
+                    break;
+                }
             }
         });
         reported(bodies, outcomes)?;

@@ -27,13 +27,16 @@ const SWEEPS: u32 = 128;
 const CONVERGED: f32 = 1e-5;
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
-const SEARCHES: u32 = 4;
+const SEARCHES: u32 = 16;
 
 /// The part of what is too close that comes apart in a step.
 const PARTED: f32 = 0.2;
 
 /// What keeps off a surface without thickness, as a part of its shortest edge: in `f32` something must.
 const LEAST_THICKNESS: f32 = 1e-3;
+
+/// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
+const FASTER: f32 = 2.0;
 
 /// With itself a surface keeps off no further than this part of its shortest edge, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
@@ -97,45 +100,62 @@ impl Tissue {
         self.skins.iter().flatten().map(of).sum()
     }
 
-    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, and those that meet
-    /// themselves.
+    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, and by themselves those
+    /// that meet themselves.
     pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
-        for place in 0..self.skins.len() {
-            let is_near = self.skins[place].as_ref().is_some_and(|_| {
-                let Some(body) = bodies.at(place) else {
-                    return false;
-                };
-                body.contact.with_itself
-                    || self.others(place).any(|other| {
-                        let Some(other) = bodies.at(other) else { return false };
-                        meet_each_other(body, other) && reach(body, dt, 2.0).overlaps(&reach(other, dt, 2.0))
-                    })
-            });
-            if let Some(skin) = &mut self.skins[place] {
-                skin.goes_together = is_near;
+        for (place, skin) in self.skins.iter_mut().enumerate() {
+            if let Some(skin) = skin {
+                let meets_itself = bodies.at(place).is_some_and(|body| body.contact.with_itself);
+                skin.group = meets_itself.then_some(place);
             }
         }
+        self.join_those(bodies, |first, second| reach(first, dt).overlaps(&reach(second, dt)));
     }
 
-    /// Has bodies go together that went alone in a step that was tried, and came near each other: whether there are such.
+    /// Has bodies go together that came near each other in a step that was tried, and did not go together: whether there are such.
     pub fn plan_again(&mut self, bodies: &Slots<Body>) -> bool {
-        let mut found = false;
-        for place in 0..self.skins.len() {
-            let Some(body) = bodies.at(place) else { continue };
-            let met = self.skins[place].as_ref().is_some_and(|skin| {
-                !skin.goes_together
-                    && self.others(place).any(|other| {
-                        let Some(other) = bodies.at(other) else { return false };
-                        meet_each_other(body, other) && swept(body).overlaps(&swept(other))
-                    })
-            });
-            if let Some(skin) = self.skins[place].as_mut().filter(|_| met) {
-                skin.goes_together = true;
-                found = true;
+        self.join_those(bodies, |first, second| swept(first).overlaps(&swept(second)))
+    }
+
+    /// Joins the groups of bodies that meet each other and are near, as this tells: whether that changed any.
+    fn join_those(&mut self, bodies: &Slots<Body>, are_near: impl Fn(&Body, &Body) -> bool) -> bool {
+        let mut changed = false;
+        for a in 0..self.skins.len() {
+            for b in 0..a {
+                let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) else {
+                    continue;
+                };
+                let groups = [first.group, second.group];
+                let [Some(first), Some(second)] = [a, b].map(|place| bodies.at(place)) else {
+                    continue;
+                };
+                if groups[0].is_some() && groups[0] == groups[1]
+                    || !(meet_each_other(first, second) && are_near(first, second))
+                {
+                    continue;
+                }
+                changed = true;
+                let joined = groups[1].unwrap_or(b);
+                for (place, skin) in self.skins.iter_mut().enumerate() {
+                    if let Some(skin) = skin
+                        && (place == a || place == b || groups[0].is_some() && skin.group == groups[0])
+                    {
+                        skin.group = Some(joined);
+                    }
+                }
             }
         }
+        changed
+    }
 
-        found
+    /// How many groups there may be: their numbers are below.
+    pub fn groups(&self) -> usize {
+        self.skins.len()
+    }
+
+    /// The group of bodies that the one at a place takes its substeps together with.
+    pub fn group(&self, place: usize) -> Option<usize> {
+        self.skins.get(place)?.as_ref()?.group
     }
 
     /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
@@ -144,7 +164,7 @@ impl Tissue {
         let mut count = 0_u32;
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at(place))
-                && skin.goes_together
+                && skin.group.is_some()
             {
                 skin.stand(body, at_end);
             }
@@ -156,13 +176,13 @@ impl Tissue {
             };
             let mut pierces = std::mem::take(&mut first.pierces);
             pierces.fill(false);
-            if let (Some(body), true) = (bodies.at(a), first.goes_together) {
+            if let (Some(body), true) = (bodies.at(a), first.group.is_some()) {
                 if body.contact.with_itself {
                     count = count.saturating_add(crossing::mark(&first, &first, true, &mut pierces));
                 }
                 for (b, second) in self.skins.iter().enumerate() {
                     if let (Some(second), Some(other)) = (second, bodies.at(b))
-                        && second.goes_together
+                        && second.group == first.group
                         && meet_each_other(body, other)
                     {
                         count = count.saturating_add(crossing::mark(&first, second, false, &mut pierces));
@@ -175,18 +195,6 @@ impl Tissue {
         count
     }
 
-    /// The other bodies that meet tissue.
-    fn others(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
-        let places = self.skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
-        places.map(|(other, _)| other).filter(move |&other| other != place)
-    }
-
-    /// Whether the body at a place takes its substeps together with others.
-    pub fn goes_together(&self, place: usize) -> bool {
-        let skin = self.skins.get(place).and_then(Option::as_ref);
-        skin.is_some_and(|skin| skin.goes_together)
-    }
-
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
     pub fn velocities(&self, place: usize, before: Bounds) -> Bounds {
         match self.skins.get(place) {
@@ -195,18 +203,18 @@ impl Tissue {
         }
     }
 
-    /// Stops what meets in a substep of bodies that go together.
-    pub fn meet_together(&mut self, bodies: &mut Slots<Body>, moment: &Moment) {
+    /// Stops what meets in a substep of the bodies of a group.
+    pub fn meet(&mut self, group: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         self.links.clear();
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
-                && skin.goes_together
+                && skin.group == Some(group)
                 && moment.concerns(body)
             {
                 skin.follow(body, moment.duration);
             }
         }
-        self.solve(bodies, moment);
+        self.solve(group, bodies, moment);
         for link in &self.links {
             for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
@@ -224,11 +232,11 @@ impl Tissue {
     }
 
     /// Finds contacts and gives their impulses, until they lead to no others.
-    fn solve(&mut self, bodies: &Slots<Body>, moment: &Moment) {
+    fn solve(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
         let mut first = 0.0_f32;
         for search in 0..SEARCHES {
             let known = self.links.len();
-            self.find(bodies, moment);
+            self.find(group, bodies, moment);
             if self.links.len() == known {
                 break;
             }
@@ -257,7 +265,7 @@ impl Tissue {
     }
 
     /// Adds the contacts that are not known yet, of those that meet.
-    fn find(&mut self, bodies: &Slots<Body>, moment: &Moment) {
+    fn find(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
             skins, links, known, ..
         } = self;
@@ -277,7 +285,7 @@ impl Tissue {
                 let second = Party { place: b, skin };
                 let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
                 let Some(radius) = radius(&first, &second, [body_a, body_b])
-                    .filter(|_| is_looked_at && first.skin.goes_together && skin.goes_together)
+                    .filter(|_| is_looked_at && [first.skin.group, skin.group] == [Some(group); 2])
                 else {
                     continue;
                 };
@@ -323,12 +331,12 @@ fn meet_each_other(first: &Body, second: &Body) -> bool {
     a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
 }
 
-/// A box about what a body may touch in a step of `dt` seconds if it becomes no more than so many times as fast, in the caller's coordinates.
-fn reach(body: &Body, dt: f32, faster: f32) -> Bounds {
+/// A box about what a body may touch in a step of `dt` seconds, in the caller's coordinates.
+fn reach(body: &Body, dt: f32) -> Bounds {
     let velocities = body.carry.gravity.velocities;
     let fastest = velocities.min.abs().max(velocities.max.abs()).length();
     let way = if fastest.is_finite() {
-        faster * fastest * dt
+        FASTER * fastest * dt
     } else {
         0.0
     };

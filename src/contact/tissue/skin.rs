@@ -18,8 +18,8 @@ pub(super) struct Skin {
     /// The edges that are looked at with a triangle: each with one.
     owned: Vec<[u32; 3]>,
     tree: Tree,
-    /// Whether the body takes its substeps together with others, or looks after itself in each.
-    pub goes_together: bool,
+    /// Those that the body takes its substeps together with, or itself alone where it meets itself: by one of their places.
+    pub group: Option<usize>,
     /// Whether it encloses something.
     pub is_closed: bool,
     /// The edges that pass through other tissue, or the body's own, as the step begins.
@@ -72,7 +72,7 @@ impl Skin {
             edges,
             owned,
             tree,
-            goes_together: false,
+            group: None,
             is_closed: mesh::is_closed(&triangles)?,
             pierces,
             origin: body.origin,
