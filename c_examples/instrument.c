@@ -263,8 +263,8 @@ int main(int argc, char **argv) {
   pair = create_forceps(world, now, &chosen);
 
   CHECK(sinew_picture_def_init(&picture, sizeof picture));
-  picture.eye[0] = 0.115f, picture.eye[1] = 0.085f, picture.eye[2] = 0.09f, picture.target[0] = 0.035f, picture.target[1] = 0.004f;
-  picture.show_contacts = 1;
+  picture.eye[0] = 0.115f, picture.eye[1] = 0.085f, picture.eye[2] = 0.09f, picture.target[0] = 0.04f, picture.target[1] = 0.002f;
+  picture.field_of_view = 0.55f, picture.show_contacts = 1;
   fprintf(curve, "time_s,phase");
   for (i = 0; i < 18; i++) fprintf(curve, ",%s_%s_%c", i < 6 ? "upper" : i < 12 ? "lower" : "both", i % 6 < 3 ? "N" : "Nm", "xyz"[i % 3]);
   fprintf(curve, ",contacts,held\n");
