@@ -7,3 +7,8 @@ pub mod image_space {
         Surface, Views,
     };
 }
+
+/// By exact tests of points, edges and triangles.
+pub mod exact {
+    pub use crate::contact::exact_overlap::{EdgeInside, Exact, Overlap, PointInside};
+}

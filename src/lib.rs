@@ -12,6 +12,7 @@ pub mod material;
 mod memory;
 pub mod mesh;
 mod picture;
+mod query;
 #[cfg(test)]
 mod random;
 pub mod raster;
@@ -29,6 +30,7 @@ pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
 pub use material::{Material, Model, Viscosity, Yielding};
 pub use picture::{BodyValues, PictureDefinition};
+pub use query::SurfacePoint;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;
 pub use terms::SpringLaw;

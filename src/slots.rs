@@ -100,6 +100,16 @@ impl<T> Slots<T> {
             .filter_map(|(index, slot)| slot.content.as_ref().map(|content| (index, content)))
     }
 
+    /// All that live, with their ids.
+    pub fn iter_ids(&self) -> impl Iterator<Item = (SlotId, &T)> {
+        (1..).zip(&self.slots).filter_map(|(index1, slot)| {
+            let generation = slot.generation;
+            slot.content
+                .as_ref()
+                .map(|content| (SlotId { index1, generation }, content))
+        })
+    }
+
     /// All that live, with their places.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
         self.slots

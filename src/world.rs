@@ -221,6 +221,11 @@ impl World {
         self.bodies.iter().map(|(_, body)| body)
     }
 
+    /// All bodies, with their ids.
+    pub(crate) fn bodies_by_id(&self) -> impl Iterator<Item = (BodyId, &Body)> {
+        self.bodies.iter_ids().map(|(id, body)| (BodyId(id), body))
+    }
+
     /// Adds a tool.
     ///
     /// # Errors

@@ -468,6 +468,16 @@ impl Body {
         })
     }
 
+    /// The box about its nodes, in its own coordinates.
+    pub(crate) fn local_bounds(&self) -> Bounds {
+        self.boxes.iter().fold(Bounds::EMPTY, Bounds::and)
+    }
+
+    /// Where its own coordinates begin.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     /// How far it reaches along an axis, m.
     pub(crate) fn extent(&self) -> f32 {
         let bounds = self.boxes.iter().fold(Bounds::EMPTY, Bounds::and);

@@ -35,3 +35,5 @@ pub mod contact;
 pub mod mesh;
 
 pub mod picture;
+
+pub mod query;

@@ -13,19 +13,32 @@ const CELLS: std::ops::RangeInclusive<usize> = 1 << 12..=1 << 16;
 /// What rounding may make of a distance, as a part of the largest coordinate.
 const ROUNDING: f32 = 1e-6;
 
+/// The signed distance at a cell's centre, and the place of the triangle that is closest there.
+pub(super) type Sample = (f32, u32);
+
+/// What is known of a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Between {
+    /// Its signed distance is no less, and no more.
+    pub least: f32,
+    pub most: f32,
+    /// The place of a triangle that may be closest.
+    pub hint: Option<u32>,
+}
+
 /// Signed distances at the centres of cubes.
 #[derive(Debug)]
 pub(super) struct Coarse {
     low: Vec3,
     cell: f32,
     counts: UVec3,
-    distances: Vec<f32>,
+    distances: Vec<Sample>,
     doubt: f32,
 }
 
 impl Coarse {
-    /// About a solid of so many triangles within `bounds`. `measure` tells the signed distance of a point, with a bound on its size.
-    pub fn new(bounds: Bounds, triangles: usize, mut measure: impl FnMut(Vec3, f32) -> f32) -> Result<Self> {
+    /// About a solid of so many triangles within `bounds`. `measure` tells of a point, given a triangle that may be closest.
+    pub fn new(bounds: Bounds, triangles: usize, measure: impl Fn(Vec3, u32) -> Sample) -> Result<Self> {
         let sides = bounds.max - bounds.min;
         let cells = (triangles * CELLS_PER_TRIANGLE).clamp(*CELLS.start(), *CELLS.end());
         let longest = sides.max_element();
@@ -46,19 +59,13 @@ impl Coarse {
             distances: memory::reserved(count)?,
             doubt: ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element(),
         };
-        let mut before = f32::INFINITY;
+        let mut hint = 0;
         for z in 0..counts.z {
             for y in 0..counts.y {
                 for x in 0..counts.x {
-                    let centre = grid.centre(UVec3::new(x, y, z));
-                    // No point is further from the surface than its neighbour and the way to it.
-                    let most = if x == 0 {
-                        f32::INFINITY
-                    } else {
-                        before.abs() + 1.01 * cell
-                    };
-                    before = measure(centre, most + grid.doubt);
-                    grid.distances.push(before);
+                    let sample = measure(grid.centre(UVec3::new(x, y, z)), hint);
+                    hint = sample.1;
+                    grid.distances.push(sample);
                 }
             }
         }
@@ -69,17 +76,21 @@ impl Coarse {
         self.low + (place.as_vec3() + 0.5) * self.cell
     }
 
-    /// What the signed distance of a point lies between; `None` outside of the grid.
+    /// What is known of a point; `None` outside of the grid.
     #[inline]
-    pub fn between(&self, point: Vec3) -> Option<(f32, f32)> {
+    pub fn between(&self, point: Vec3) -> Option<Between> {
         let place = (point - self.low) / self.cell;
         if !(place.cmpge(Vec3::ZERO).all() && place.cmplt(self.counts.as_vec3()).all()) {
             return None;
         }
         let place = place.as_uvec3();
         let index = (place.z * self.counts.y + place.y) * self.counts.x + place.x;
-        let distance = self.distances[index as usize];
+        let (distance, hint) = self.distances[index as usize];
         let away = point.distance(self.centre(place)) + self.doubt;
-        Some((distance - away, distance + away))
+        Some(Between {
+            least: distance - away,
+            most: distance + away,
+            hint: Some(hint),
+        })
     }
 }

@@ -8,6 +8,9 @@ const CUTS: usize = 12;
 /// It ends where nothing can be deeper by more than this part of the depth.
 const CLOSE: f64 = 1e-3;
 
+/// A point is at a feature's border where a weight is no more.
+const BORDER: f64 = 1e-6;
+
 /// A point's signed distance from a solid, and the direction away from it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Signed {
@@ -23,13 +26,21 @@ pub(super) struct Deepest {
 }
 
 /// The deepest point of a feature (2 or 3 corners) from `start` on: exact where the solid is convex, to a thousandth; elsewhere the deepest
-/// of those looked at.
+/// of those looked at, and rather one between the ends.
 ///
 /// Each look gives a plane below which the distance from a convex solid does not lie; the next is where the highest of them is lowest.
-pub(super) fn deepest(corners: &[Vec3], start: [f64; 3], measure: impl Fn(Vec3) -> Option<Signed>) -> Option<Deepest> {
+pub(super) fn deepest(
+    corners: &[Vec3],
+    start: [f64; 3],
+    mut measure: impl FnMut(Vec3) -> Option<Signed>,
+) -> Option<Deepest> {
     let count = corners.len();
     let mut cuts = [[0.0; 3]; CUTS];
     let mut best: Option<Deepest> = None;
+    // The deepest between the ends, for where the planes prove wrong.
+    let mut inner: Option<Deepest> = None;
+    let mut is_convex = true;
+    let mut bound = f64::NEG_INFINITY;
     let mut weights = start;
     for looks in 0..CUTS {
         let point: DVec3 = corners
@@ -43,17 +54,28 @@ pub(super) fn deepest(corners: &[Vec3], start: [f64; 3], measure: impl Fn(Vec3) 
         if best.is_none_or(|best| signed.distance < best.signed.distance) {
             best = Some(Deepest { weights, signed });
         }
+        if signed.distance < inner.map_or(0.0, |inner| inner.signed.distance) && lies_between(&weights[..count]) {
+            inner = Some(Deepest { weights, signed });
+        }
+        is_convex &= signed.distance >= bound - CLOSE * bound.abs();
         for (cut, corner) in cuts[looks].iter_mut().zip(corners) {
             *cut = signed.distance + signed.normal.dot(corner.as_dvec3() - point);
         }
-        let (next, bound) = lowest(&cuts[..=looks], count);
+        let (next, least) = lowest(&cuts[..=looks], count);
+        bound = least;
         let found = best.map_or(0.0, |best| best.signed.distance);
         if bound >= found - CLOSE * found.abs() {
             break;
         }
         weights = next;
     }
-    best
+    let at_border = best.is_some_and(|best| !lies_between(&best.weights[..count]));
+    if at_border && !is_convex { inner.or(best) } else { best }
+}
+
+/// Whether a point with these weights lies within its feature, and not at its border.
+pub(super) fn lies_between(weights: &[f64]) -> bool {
+    weights.iter().all(|&weight| weight > BORDER)
 }
 
 /// Where the highest of some planes, given by their heights at the corners, is lowest, and how high it is there: a corner, or where

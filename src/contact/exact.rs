@@ -6,12 +6,12 @@
 use glam::{DVec3, Vec3};
 
 use super::closest::Closest;
-use super::coarse::Coarse;
-use super::deepest::{Deepest, Signed, deepest};
+use super::coarse::{Between, Coarse};
+use super::deepest::{Deepest, Signed, deepest, lies_between};
 use super::facets::Facets;
 use super::nearest::{Part, nearest_of_segments, nearest_on_triangle};
 use super::predicates::pierce;
-use super::tree::Tree;
+use super::tree::{Placed, Tree};
 use crate::body::Bounds;
 use crate::error::Result;
 use crate::mesh::ClosedSurface;
@@ -22,8 +22,8 @@ const CROSSINGS: usize = 16;
 /// What is closer than this part of the solid's size looks the way that its surface does.
 const TOUCHING: f64 = 1e-9;
 
-/// A point is at a feature's border where a weight is no more.
-const BORDER: f64 = 1e-6;
+/// Where a way that begins on the surface is on it no more.
+const BEGUN: f64 = 1e-6;
 
 /// The rounding of a radius, as a part of it.
 const ROUNDING: f32 = 1e-5;
@@ -49,6 +49,7 @@ pub(crate) struct Nearest {
     /// From the surface to the point.
     offset: DVec3,
     squared: f64,
+    point: Vec3,
 }
 
 /// Where a segment passes through the surface.
@@ -85,11 +86,10 @@ impl ExactSolid {
     pub fn new(surface: &ClosedSurface) -> Result<Self> {
         let mut solid = Self::changing(surface)?;
         let count = solid.tree.triangle_count();
-        let coarse = Coarse::new(solid.tree.bounds(), count, |point, within| {
-            let nearest = solid
-                .nearest(point, within)
-                .or_else(|| solid.nearest(point, f32::INFINITY));
-            nearest.map_or(0.0, |nearest| solid.signed(&nearest).distance as f32)
+        let coarse = Coarse::new(solid.tree.bounds(), count, |point, hint| {
+            let nearest = solid.nearest_from(point, f32::INFINITY, Some(hint));
+            let sample = |nearest: Nearest| (solid.signed(&nearest).distance as f32, nearest.place as u32);
+            nearest.map_or((0.0, 0), sample)
         })?;
         solid.coarse = Some(coarse);
         Ok(solid)
@@ -142,28 +142,45 @@ impl ExactSolid {
 
     /// Whether a point lies within the solid.
     pub fn is_inside(&self, point: Vec3) -> bool {
-        let (least, most) = self.between(point);
-        if least > 0.0 || most < 0.0 {
-            return most < 0.0;
+        let known = self.between(point);
+        if known.least > 0.0 || known.most < 0.0 {
+            return known.most < 0.0;
         }
-        self.nearest(point, reach(least, most))
+        self.nearest_from(point, known.reach(), known.hint)
             .is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
     }
 
     /// The signed distance of a point, and the direction away from the solid there; `None` further outside than `within`.
     pub fn measure(&self, point: Vec3, within: f32) -> Option<(f32, Vec3)> {
-        let signed = self.signed_at(point, within)?;
-        Some((signed.distance as f32, signed.normal.as_vec3()))
+        let known = self.between(point);
+        if known.least > within {
+            return None;
+        }
+        let reach = if known.least > 0.0 {
+            within
+        } else {
+            known.reach().max(within)
+        };
+        let signed = self.signed(&self.nearest_from(point, reach, known.hint)?);
+        (signed.distance <= f64::from(within)).then(|| (signed.distance as f32, signed.normal.as_vec3()))
     }
 
     /// The point of the surface that is closest to `point`, within a distance of it.
     pub fn nearest(&self, point: Vec3, within: f32) -> Option<Nearest> {
+        self.nearest_from(point, within, self.between(point).hint)
+    }
+
+    /// The same, with the place of a triangle that may be closest.
+    fn nearest_from(&self, point: Vec3, within: f32, hint: Option<u32>) -> Option<Nearest> {
         let exact = point.as_dvec3();
         let mut limit = f64::from(within) * f64::from(within);
         let mut found = None;
-        let bounds = Bounds { min: point, max: point };
-        self.tree.near(&bounds, limit as f32, |place| {
-            let corners = self.tree.corners(place).map(|corner| corner.as_dvec3());
+        let mut look = |place: usize, distance: f32| {
+            let placed = self.tree.placed(place);
+            if placed.is_beside(&[point], distance) {
+                return None;
+            }
+            let corners = placed.exact();
             let (weights, part) = nearest_on_triangle(exact, corners);
             let offset = exact - (corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]);
             let squared = offset.length_squared();
@@ -175,9 +192,24 @@ impl ExactSolid {
                     weights,
                     offset,
                     squared,
+                    point,
                 });
+                return Some(limit as f32);
             }
-            limit as f32
+            None
+        };
+        let mut limit_squared = within * within;
+        if let Some(hint) = hint {
+            limit_squared = look(hint as usize, f32::INFINITY).unwrap_or(limit_squared);
+        }
+        let mut distance = limit_squared.sqrt() * (1.0 + ROUNDING);
+        let bounds = Bounds { min: point, max: point };
+        self.tree.near(&bounds, limit_squared, |place| {
+            if let Some(closer) = look(place, distance) {
+                limit_squared = closer;
+                distance = closer.sqrt() * (1.0 + ROUNDING);
+            }
+            limit_squared
         });
         found
     }
@@ -205,43 +237,38 @@ impl ExactSolid {
     }
 
     fn crossing(&self, [p, q]: [DVec3; 2], place: usize) -> Option<(f64, bool)> {
-        let corners = self.tree.corners(place).map(|corner| corner.as_dvec3());
+        let corners = self.tree.placed(place).exact();
         pierce(p, q, corners, self.facets.nodes(place))
     }
 
-    /// What the signed distance of a point lies between.
-    fn between(&self, point: Vec3) -> (f32, f32) {
-        if let Some(between) = self.coarse.as_ref().and_then(|coarse| coarse.between(point)) {
-            return between;
+    /// What is known of a point without looking for what is closest.
+    fn between(&self, point: Vec3) -> Between {
+        if let Some(known) = self.coarse.as_ref().and_then(|coarse| coarse.between(point)) {
+            return known;
         }
         let bounds = self.tree.bounds();
         let apart = (bounds.min - point).max(point - bounds.max);
         let gap = apart.max(Vec3::ZERO).length();
-        if gap > 0.0 {
-            (gap * (1.0 - ROUNDING), f32::INFINITY)
-        } else {
-            (f32::NEG_INFINITY, f32::INFINITY)
+        Between {
+            least: if gap > 0.0 {
+                gap * (1.0 - ROUNDING)
+            } else {
+                f32::NEG_INFINITY
+            },
+            most: f32::INFINITY,
+            hint: None,
         }
-    }
-
-    fn signed_at(&self, point: Vec3, within: f32) -> Option<Signed> {
-        let (least, most) = self.between(point);
-        if least > within {
-            return None;
-        }
-        let reach = if least > 0.0 {
-            within
-        } else {
-            reach(least, most).max(within)
-        };
-        let signed = self.signed(&self.nearest(point, reach)?);
-        (signed.distance <= f64::from(within)).then_some(signed)
     }
 
     /// The side that a point lies on, by what it is closest to.
     fn signed(&self, nearest: &Nearest) -> Signed {
         let normal = self.facets.normal(nearest.place, nearest.part);
-        let side = if nearest.offset.dot(normal) < 0.0 { -1.0 } else { 1.0 };
+        let is_inside = if self.facets.are_doubtful() {
+            self.is_wound_about(nearest.point)
+        } else {
+            nearest.offset.dot(normal) < 0.0
+        };
+        let side = if is_inside { -1.0 } else { 1.0 };
         let distance = nearest.squared.sqrt();
         let normal = if distance > TOUCHING * self.size {
             nearest.offset * (side / distance)
@@ -257,6 +284,17 @@ impl ExactSolid {
         }
     }
 
+    /// Whether a way from a point to far outside comes out once more than it goes in.
+    fn is_wound_about(&self, point: Vec3) -> bool {
+        let bounds = self.tree.bounds();
+        let reach = (bounds.max - bounds.min).length() + point.distance(bounds.min);
+        let mut winding = 0;
+        self.crossings(point, point + Vec3::new(0.8, 0.5, 0.33) * 2.0 * reach, |crossing| {
+            winding += if crossing.enters { -1 } else { 1 };
+        });
+        winding > 0
+    }
+
     fn closest_to_point(&self, point: Vec3, within: f32) -> Option<Closest> {
         let (distance, normal) = self.measure(point, within)?;
         Some(Closest {
@@ -270,8 +308,8 @@ impl ExactSolid {
     fn closest_to_edge(&self, corners: [Vec3; 2], within: f32) -> Option<Closest> {
         let middle = (corners[0] + corners[1]) * 0.5;
         let radius = corners[0].distance(corners[1]) * 0.5;
-        let (least, most) = self.between(middle);
-        if least > (radius + within) * (1.0 + ROUNDING) {
+        let known = self.between(middle);
+        if known.least > (radius + within) * (1.0 + ROUNDING) {
             return None;
         }
         let ends = corners.map(|corner| corner.as_dvec3());
@@ -279,7 +317,11 @@ impl ExactSolid {
         let mut crossings = [(0.0, false); CROSSINGS];
         let mut count = 0;
         let bounds = Bounds::of(corners.into_iter());
+        let mut distance = within;
         self.tree.near(&bounds, pairs.limit as f32, |place| {
+            if self.tree.placed(place).is_beside(&corners, distance) {
+                return pairs.limit as f32;
+            }
             if let Some(crossing) = self.crossing(ends, place)
                 && count < CROSSINGS
             {
@@ -319,13 +361,14 @@ impl ExactSolid {
                     along > 0.0 && along < 1.0 && self.facets.leads_off_node(node, offset)
                 });
             }
+            distance = (pairs.limit as f32).sqrt() * (1.0 + ROUNDING);
             pairs.limit as f32
         });
         if count > 0 {
             let start = longest_within(&mut crossings[..count]);
             return self.deepest_of(&corners, [1.0 - start, start, 0.0], &pairs);
         }
-        self.apart_or_within(&corners, middle, (least, most), &pairs)
+        self.apart_or_within(&corners, middle, known, &pairs)
     }
 
     fn closest_to_face(&self, corners: [Vec3; 3], within: f32) -> Option<Closest> {
@@ -333,16 +376,22 @@ impl ExactSolid {
         let radius = corners
             .iter()
             .fold(0.0_f32, |radius, corner| radius.max(corner.distance(middle)));
-        let (least, most) = self.between(middle);
-        if least > (radius + within) * (1.0 + ROUNDING) {
+        let known = self.between(middle);
+        if known.least > (radius + within) * (1.0 + ROUNDING) {
             return None;
         }
         let face = corners.map(|corner| corner.as_dvec3());
         let mut pairs = Pairs::within(within);
-        let mut crossed = DVec3::ZERO;
+        let mut crossed = None;
         let bounds = Bounds::of(corners.into_iter());
+        let plane = Placed::new(corners);
         self.tree.near(&bounds, pairs.limit as f32, |place| {
-            crossed += self.crossed(face, place);
+            if plane.is_beside(&self.tree.placed(place).corners, within) {
+                return pairs.limit as f32;
+            }
+            if crossed.is_none() {
+                crossed = self.crossed(face, place);
+            }
             for node in self.facets.salient_nodes(place) {
                 let position = self.facets.position(node);
                 let (weights, part) = nearest_on_triangle(position, face);
@@ -356,54 +405,82 @@ impl ExactSolid {
             }
             pairs.limit as f32
         });
-        if crossed != DVec3::ZERO {
-            let start = crossed / crossed.element_sum();
-            return self.deepest_of(&corners, start.to_array(), &pairs);
+        if let Some((weights, normal)) = crossed {
+            let start = self.start_within(face, weights, normal);
+            return self.deepest_of(&corners, start, &pairs);
         }
-        self.apart_or_within(&corners, middle, (least, most), &pairs)
+        self.apart_or_within(&corners, middle, known, &pairs)
     }
 
-    /// The sum of the points, as weights, where a face and the border of the triangle at a place pass through each other.
-    fn crossed(&self, face: [DVec3; 3], place: usize) -> DVec3 {
-        let mut sum = DVec3::ZERO;
-        let triangle = self.tree.corners(place).map(|corner| corner.as_dvec3());
+    /// A point, as weights, where a face and the border of the triangle at a place pass through each other, and the way that this looks.
+    fn crossed(&self, face: [DVec3; 3], place: usize) -> Option<([f64; 3], DVec3)> {
+        let triangle = self.tree.placed(place).exact();
         if lies_beside(triangle, face) || lies_beside(face, triangle) {
-            return sum;
+            return None;
         }
+        let normal = self.facets.normal(place, Part::Face);
         for [p, q] in self.facets.edges(place) {
             let (p, q) = (p.as_dvec3(), q.as_dvec3());
             if let Some((fraction, _)) = pierce(p, q, face, [0, 1, 2]) {
-                sum += DVec3::from_array(nearest_on_triangle(p.lerp(q, fraction), face).0);
+                return Some((nearest_on_triangle(p.lerp(q, fraction), face).0, normal));
             }
         }
         for side in 0..3 {
             let next = (side + 1) % 3;
             if let Some((fraction, _)) = self.crossing([face[side], face[next]], place) {
-                sum[side] += 1.0 - fraction;
-                sum[next] += fraction;
+                let mut weights = [0.0; 3];
+                weights[side] = 1.0 - fraction;
+                weights[next] = fraction;
+                return Some((weights, normal));
             }
         }
-        sum
+        None
+    }
+
+    /// A point of a face within the solid, found from one of its points on the surface on, where that looks along `normal`.
+    fn start_within(&self, face: [DVec3; 3], weights: [f64; 3], normal: DVec3) -> [f64; 3] {
+        let across = (face[1] - face[0]).cross(face[2] - face[0]);
+        let inward = -normal.reject_from(across);
+        // How fast each weight grows on the way, and where the first is used up.
+        let rate = |from: usize, to: usize| across.dot((face[to] - face[from]).cross(inward)) / across.length_squared();
+        let rates = [rate(1, 2), rate(2, 0), rate(0, 1)];
+        let furthest = (0..3).fold(f64::INFINITY, |furthest: f64, corner| {
+            if rates[corner] < 0.0 {
+                furthest.min(weights[corner] / -rates[corner])
+            } else {
+                furthest
+            }
+        });
+        if !(furthest > 0.0 && furthest.is_finite()) {
+            return weights;
+        }
+        let from = face[0] * weights[0] + face[1] * weights[1] + face[2] * weights[2];
+        let ends = [from, from + inward * furthest];
+        let mut leaves = 1.0_f64;
+        let bounds = Bounds::of(ends.map(|end| end.as_vec3()).into_iter());
+        self.tree.near(&bounds, 0.0, |place| {
+            if let Some((fraction, false)) = self.crossing(ends, place)
+                && fraction > BEGUN
+            {
+                leaves = leaves.min(fraction);
+            }
+            0.0
+        });
+        std::array::from_fn(|corner| weights[corner] + rates[corner] * furthest * 0.5 * leaves)
     }
 
     /// The answer of an edge or face that passes through no triangle.
-    fn apart_or_within(
-        &self,
-        corners: &[Vec3],
-        middle: Vec3,
-        (least, most): (f32, f32),
-        pairs: &Pairs,
-    ) -> Option<Closest> {
+    fn apart_or_within(&self, corners: &[Vec3], middle: Vec3, known: Between, pairs: &Pairs) -> Option<Closest> {
         // All of it is on one side: that of any of its points.
-        let is_inside = match pairs.inner {
-            Some(pair) if most >= 0.0 && least <= 0.0 => {
-                let point = point_of(corners, pair.weights);
-                let reach = pair.squared.sqrt() as f32 * (1.0 + ROUNDING) + (TOUCHING * self.size) as f32;
-                let nearest = self.nearest(point, reach);
-                nearest.is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
-            }
-            _ if least > 0.0 || most < 0.0 => most < 0.0,
-            _ => self.is_inside(middle),
+        let is_inside = if known.least > 0.0 || known.most < 0.0 {
+            known.most < 0.0
+        } else if let Some(pair) = pairs.inner {
+            let reach = pair.squared.sqrt() as f32 * (1.0 + ROUNDING) + (TOUCHING * self.size) as f32;
+            let nearest = self.nearest_from(point_of(corners, pair.weights), reach, None);
+            nearest.is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
+        } else {
+            self.nearest_from(middle, known.reach(), known.hint)
+                .is_some_and(|nearest| self.signed(&nearest).distance < 0.0)
         };
         if is_inside {
             let part = 1.0 / corners.len() as f64;
@@ -420,7 +497,8 @@ impl ExactSolid {
         let normal = if distance > TOUCHING * self.size {
             pair.offset / distance
         } else {
-            self.signed_at(point_of(corners, pair.weights), f32::INFINITY)?.normal
+            let nearest = self.nearest(point_of(corners, pair.weights), f32::INFINITY)?;
+            self.signed(&nearest).normal
         };
         Some(Closest {
             weights: pair.weights.map(|weight| weight as f32),
@@ -431,7 +509,14 @@ impl ExactSolid {
     }
 
     fn deepest_of(&self, corners: &[Vec3], start: [f64; 3], pairs: &Pairs) -> Option<Closest> {
-        let measure = |point: Vec3| self.signed_at(point, f32::INFINITY);
+        // What was closest to the last point may be to the next.
+        let mut hint = None;
+        let measure = |point: Vec3| {
+            let known = self.between(point);
+            let nearest = self.nearest_from(point, known.reach(), hint.or(known.hint))?;
+            hint = Some(nearest.place as u32);
+            Some(self.signed(&nearest))
+        };
         let Some(Deepest { weights, signed }) = deepest(corners, start, measure) else {
             return self.answer(corners, pairs);
         };
@@ -439,7 +524,7 @@ impl ExactSolid {
             weights: weights.map(|weight| weight as f32),
             distance: signed.distance as f32,
             normal: signed.normal.as_vec3(),
-            inside: weights[..corners.len()].iter().all(|&weight| weight > BORDER),
+            inside: lies_between(&weights[..corners.len()]),
         })
     }
 }
@@ -477,9 +562,11 @@ impl Pairs {
     }
 }
 
-/// How far the surface is at most, where the signed distance lies between these.
-fn reach(least: f32, most: f32) -> f32 {
-    (-least).max(most).max(0.0) * (1.0 + ROUNDING)
+impl Between {
+    /// How far the surface is at most.
+    fn reach(&self) -> f32 {
+        (-self.least).max(self.most).max(0.0) * (1.0 + ROUNDING)
+    }
 }
 
 fn point_of(corners: &[Vec3], weights: [f64; 3]) -> Vec3 {

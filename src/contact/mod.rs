@@ -1,15 +1,24 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod candidates;
+#[allow(dead_code)] // until the response asks
 pub(crate) mod closest;
 mod coarse;
 mod constraint;
 mod contacts;
+#[allow(dead_code)] // until the response asks
+pub(crate) mod continuous;
+#[allow(dead_code)]
 mod deepest;
 mod distance;
+#[allow(dead_code)] // until the response asks
+pub(crate) mod distance_field;
+#[allow(dead_code)] // until the response asks
 pub(crate) mod exact;
+pub(crate) mod exact_overlap;
 #[cfg(test)]
 mod exact_tests;
+#[allow(dead_code)]
 mod facets;
 mod features;
 mod filter;
@@ -25,6 +34,7 @@ mod report;
 mod sweep;
 mod tissue;
 mod tool;
+#[allow(dead_code)]
 pub(crate) mod tree;
 
 pub(crate) use contacts::{Contacts, Meeting};

@@ -1,6 +1,6 @@
 //! A tree of boxes over triangles: what is near, and what a ray meets, without looking at all of them.
 
-use glam::{Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 
 use crate::body::Bounds;
 use crate::error::Result;
@@ -21,7 +21,15 @@ pub(crate) struct Tree {
     nodes: Vec<Node>,
     /// The triangle at each place.
     order: Vec<u32>,
-    corners: Vec<[Vec3; 3]>,
+    triangles: Vec<Placed>,
+}
+
+/// A triangle where it is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub corners: [Vec3; 3],
+    /// Of unit length; 0 where it has no area.
+    pub normal: Vec3,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +85,7 @@ impl Tree {
         }
         let mut tree = Self {
             nodes,
-            corners: memory::filled([Vec3::ZERO; 3], count)?,
+            triangles: memory::filled(Placed::new([Vec3::ZERO; 3]), count)?,
             order,
         };
         tree.refit(corners);
@@ -87,15 +95,15 @@ impl Tree {
     /// Takes the triangles where they are now.
     pub fn refit(&mut self, corners: impl Fn(u32) -> [Vec3; 3]) {
         for (place, &triangle) in self.order.iter().enumerate() {
-            self.corners[place] = corners(triangle);
+            self.triangles[place] = Placed::new(corners(triangle));
         }
         self.fit();
     }
 
     /// The same, of triangles known by their places.
     pub fn refit_places(&mut self, corners: impl Fn(usize) -> [Vec3; 3]) {
-        for (place, taken) in self.corners.iter_mut().enumerate() {
-            *taken = corners(place);
+        for (place, taken) in self.triangles.iter_mut().enumerate() {
+            *taken = Placed::new(corners(place));
         }
         self.fit();
     }
@@ -109,7 +117,8 @@ impl Tree {
                 let [a, b] = [self.nodes[first], self.nodes[first + 1]];
                 (a.min.min(b.min), a.max.max(b.max))
             } else {
-                let bounds = Bounds::of(self.corners[first..][..node.count as usize].iter().flatten().copied());
+                let triangles = &self.triangles[first..][..node.count as usize];
+                let bounds = Bounds::of(triangles.iter().flat_map(|triangle| triangle.corners));
                 (bounds.min.into(), bounds.max.into())
             };
             self.nodes[index] = Node { min, max, ..node };
@@ -133,10 +142,10 @@ impl Tree {
         self.order[place]
     }
 
-    /// The corners of the triangle at a place.
+    /// The triangle at a place, where it is.
     #[inline]
-    pub fn corners(&self, place: usize) -> &[Vec3; 3] {
-        &self.corners[place]
+    pub fn placed(&self, place: usize) -> &Placed {
+        &self.triangles[place]
     }
 
     /// Shows the places of all triangles whose boxes come within a distance of `bounds`, and some more, the nearer half first. The
@@ -171,7 +180,7 @@ impl Tree {
                     continue;
                 }
                 for place in node.first..node.first + node.count {
-                    let [a, b, c] = self.corners[place as usize].map(Vec3A::from);
+                    let [a, b, c] = self.triangles[place as usize].corners.map(Vec3A::from);
                     let of_triangle = Node {
                         min: a.min(b).min(c),
                         max: a.max(b).max(c),
@@ -244,6 +253,40 @@ impl Tree {
             waits -= 1;
             next = Some(waiting[waits]);
         }
+    }
+}
+
+impl Placed {
+    pub fn new(corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+        Self { corners, normal }
+    }
+
+    pub fn exact(&self) -> [DVec3; 3] {
+        self.corners.map(|corner| corner.as_dvec3())
+    }
+
+    /// What the height of a point above its plane lies between, with rounding.
+    #[inline]
+    pub fn height(&self, point: Vec3) -> (f32, f32) {
+        let from = point - self.corners[0];
+        let height = from.dot(self.normal);
+        let doubt = ROUNDING * from.abs().element_sum();
+        (height - doubt, height + doubt)
+    }
+
+    /// Whether all of these points are further than `distance` from its plane, on one side.
+    #[inline]
+    pub fn is_beside(&self, points: &[Vec3], distance: f32) -> bool {
+        let mut least = f32::INFINITY;
+        let mut most = f32::NEG_INFINITY;
+        for &point in points {
+            let (low, high) = self.height(point);
+            least = least.min(low);
+            most = most.max(high);
+        }
+        least > distance || most < -distance
     }
 }
 

@@ -46,6 +46,7 @@ static struct outputs {
     sinew_rest_state_report rest;
     sinew_mesh *mesh;
     sinew_mesh_view mesh_view;
+    sinew_surface_point surface_point;
     sinew_material_preset preset;
     sinew_picture_def picture_def;
     uint32_t pairs[2];
@@ -275,6 +276,7 @@ static inline void set_up(void)
     untouched.solver.struct_size = sizeof untouched.solver;
     untouched.enclosed.struct_size = sizeof untouched.enclosed;
     untouched.mesh_view.struct_size = sizeof untouched.mesh_view;
+    untouched.surface_point.struct_size = sizeof untouched.surface_point;
     memcpy(&out, &untouched, sizeof out);
 }
 

@@ -117,6 +117,33 @@ static void pictures(void)
     CHECK(fopen("must_not_be_written.png", "rb") == NULL);
 }
 
+static void queries(void)
+{
+    const float place[] = {0.1f, 0.2f, 0.3f}, none[] = {0, 0, 0};
+    sinew_surface_point *point = &out.surface_point;
+    size_t i, axis;
+    REFUSED(INVALID, "world", sinew_world_cast_ray(NULL, place, place, 1.0f, point));
+    REFUSED(INVALID, "origin", sinew_world_cast_ray(the.world, NULL, place, 1.0f, point));
+    REFUSED(INVALID, "direction", sinew_world_cast_ray(the.world, place, NULL, 1.0f, point));
+    REFUSED(INVALID, "direction", sinew_world_cast_ray(the.world, place, none, 1.0f, point));
+    REFUSED(INVALID, "out", sinew_world_cast_ray(the.world, place, place, 1.0f, NULL));
+    REFUSED(INVALID, "max_distance", sinew_world_cast_ray(the.world, place, place, -1.0f, point));
+    REFUSED(INVALID, "world", sinew_world_find_nearest(NULL, place, 1.0f, point));
+    REFUSED(INVALID, "point", sinew_world_find_nearest(the.world, NULL, 1.0f, point));
+    REFUSED(INVALID, "out", sinew_world_find_nearest(the.world, place, 1.0f, NULL));
+    REFUSED(INVALID, "max_distance", sinew_world_find_nearest(the.world, place, -1.0f, point));
+    for (i = 0; i < NOT_FINITE; i++)
+        for (axis = 0; axis < 3; axis++) {
+            REFUSED(INVALID, "origin", sinew_world_cast_ray(the.world, spoiled(place, 3, axis, bad[i]), place, 1.0f, point));
+            REFUSED(INVALID, "direction", sinew_world_cast_ray(the.world, place, spoiled(place, 3, axis, bad[i]), 1.0f, point));
+            REFUSED(INVALID, "point", sinew_world_find_nearest(the.world, spoiled(place, 3, axis, bad[i]), 1.0f, point));
+        }
+    REFUSES_RESULT_SIZES(sinew_surface_point, sizeof(sinew_surface_point), surface_point,
+                         sinew_world_cast_ray(the.world, place, place, 1.0f, point));
+    REFUSES_RESULT_SIZES(sinew_surface_point, sizeof(sinew_surface_point), surface_point,
+                         sinew_world_find_nearest(the.world, place, 1.0f, point));
+}
+
 int main(void)
 {
     set_up();
@@ -125,5 +152,6 @@ int main(void)
     views();
     presets();
     pictures();
+    queries();
     return tear_down();
 }

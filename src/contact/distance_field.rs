@@ -1,0 +1,316 @@
+//! DISTANCE_FIELD: a solid's signed distance on a grid, sampled once from EXACT.
+//!
+//! Between samples it is interpolated linearly along each axis: its error is of second order in the size of a cell where the distance is
+//! smooth, and of first order at what is sharper than a cell. The least distance of an edge or face is looked for on the grid (Macklin et al.
+//! 2020, Local Optimization for Robust Signed Distance Field Collision).
+
+use glam::{UVec3, Vec3};
+
+use super::closest::Closest;
+use super::exact::ExactSolid;
+use crate::body::Bounds;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// Cells along the longest side of a solid where nothing else is asked for.
+const CELLS: f32 = 64.0;
+
+/// Cells around a solid on each side.
+const MARGIN: f32 = 3.0;
+
+/// Samples at most: 64 MiB.
+const SAMPLES: u64 = 1 << 24;
+
+/// Stretches that an edge, or the side of a face, is first looked at by, at most.
+const STRETCHES: u32 = 24;
+const STRETCHES_OF_A_SIDE: u32 = 8;
+
+/// How often a search is then made half as wide.
+const HALVINGS: u32 = 8;
+
+/// A point is at a feature's border where a weight is no more: what the search cannot tell apart.
+const BORDER: f32 = 1e-4;
+
+/// Signed distances at the corners of cubes.
+#[derive(Debug)]
+pub(crate) struct DistanceField {
+    low: Vec3,
+    cell: f32,
+    counts: UVec3,
+    distances: Vec<f32>,
+    /// About the solid itself.
+    bounds: Bounds,
+}
+
+impl DistanceField {
+    /// Samples a solid with cells of this size, m; 0: a 64th of its longest side.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] where the cell is negative, not finite, or so small that there would be more than 16.8 million samples;
+    /// [`Error::OutOfMemory`].
+    pub fn new(solid: &ExactSolid, cell: f32) -> Result<Self> {
+        if !(cell >= 0.0 && cell.is_finite()) {
+            return Err(Error::invalid(format!(
+                "cell is {cell} m: must be finite and at least 0"
+            )));
+        }
+        let bounds = solid.bounds();
+        let sides = bounds.max - bounds.min;
+        let cell = if cell > 0.0 { cell } else { sides.max_element() / CELLS };
+        let along = (sides / cell).ceil() + 2.0 * MARGIN + 1.0;
+        let samples = along.as_dvec3().element_product();
+        if !(samples <= SAMPLES as f64) {
+            return Err(Error::invalid(format!(
+                "cell is {cell} m: a solid of {} x {} x {} m would take {samples:.0} samples, at most {SAMPLES} are possible",
+                sides.x, sides.y, sides.z
+            )));
+        }
+        let counts = along.as_uvec3();
+        let mut field = Self {
+            low: bounds.min - MARGIN * cell,
+            cell,
+            counts,
+            distances: memory::reserved(samples as usize)?,
+            bounds,
+        };
+        for z in 0..counts.z {
+            for y in 0..counts.y {
+                for x in 0..counts.x {
+                    let point = field.low + UVec3::new(x, y, z).as_vec3() * cell;
+                    let measured = solid.measure(point, f32::INFINITY);
+                    field
+                        .distances
+                        .push(measured.map_or(f32::INFINITY, |(distance, _)| distance));
+                }
+            }
+        }
+        Ok(field)
+    }
+
+    /// The size of a cell, m.
+    pub fn cell(&self) -> f32 {
+        self.cell
+    }
+
+    /// The closest that a node, edge or face (1, 2 or 3 corners) comes; `None` where it is outside and further than `within`.
+    pub fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
+        let count = corners.len();
+        let part = 1.0 / count as f32;
+        let middle = corners.iter().sum::<Vec3>() * part;
+        let radius = corners
+            .iter()
+            .fold(0.0_f32, |radius, corner| radius.max(corner.distance(middle)));
+        let reach = within + radius;
+        let apart = (self.bounds.min - middle).max(middle - self.bounds.max).max(Vec3::ZERO);
+        if apart.length_squared() > reach * reach * 1.000_01 {
+            return None;
+        }
+        // Interpolated distances are off by a part of a cell.
+        if self.distance(middle) > reach + self.cell {
+            return None;
+        }
+        let weights = match count {
+            1 => [1.0, 0.0, 0.0],
+            2 => self.least_of_edge([corners[0], corners[1]]),
+            3 => self.least_of_face([corners[0], corners[1], corners[2]]),
+            _ => return None,
+        };
+        let point = corners
+            .iter()
+            .zip(weights)
+            .map(|(corner, weight)| *corner * weight)
+            .sum();
+        let (distance, slope) = self.measure(point);
+        if !(distance <= within) {
+            return None;
+        }
+        Some(Closest {
+            weights,
+            distance,
+            normal: slope.normalize_or(Vec3::Y),
+            inside: weights[..count].iter().all(|&weight| weight > BORDER),
+        })
+    }
+
+    /// The signed distance of a point, m.
+    pub fn distance(&self, point: Vec3) -> f32 {
+        self.measure(point).0
+    }
+
+    /// The signed distance of a point, and how it grows there.
+    pub fn measure(&self, point: Vec3) -> (f32, Vec3) {
+        let last = self.low + (self.counts - 1).as_vec3() * self.cell;
+        let inside = point.clamp(self.low, last);
+        let (distance, slope) = self.interpolate(inside);
+        if inside == point {
+            return (distance, slope);
+        }
+        // Beyond the grid: from what is closest to where the grid ends.
+        let offset = point - (inside - slope.normalize_or_zero() * distance);
+        (offset.length(), offset)
+    }
+
+    fn interpolate(&self, point: Vec3) -> (f32, Vec3) {
+        let place = (point - self.low) / self.cell;
+        let first = place.floor().max(Vec3::ZERO).as_uvec3().min(self.counts - 2);
+        let part = place - first.as_vec3();
+        let row = self.counts.x as usize;
+        let layer = row * self.counts.y as usize;
+        let start = first.z as usize * layer + first.y as usize * row + first.x as usize;
+        let at = |offset: usize| self.distances[start + offset];
+        let mix = |a: f32, b: f32, part: f32| a + (b - a) * part;
+        let along = |offset: usize| (mix(at(offset), at(offset + 1), part.x), at(offset + 1) - at(offset));
+        let (near, far) = ([along(0), along(row)], [along(layer), along(layer + row)]);
+        let plane = |[a, b]: [(f32, f32); 2]| (mix(a.0, b.0, part.y), mix(a.1, b.1, part.y), b.0 - a.0);
+        let (near, far) = (plane(near), plane(far));
+        let slope = Vec3::new(mix(near.1, far.1, part.z), mix(near.2, far.2, part.z), far.0 - near.0);
+        (mix(near.0, far.0, part.z), slope / self.cell)
+    }
+
+    /// Where an edge is closest: the least of points a cell apart, and then the way of halves about it.
+    fn least_of_edge(&self, [a, b]: [Vec3; 2]) -> [f32; 3] {
+        let stretches = ((a.distance(b) / self.cell).ceil() as u32).clamp(2, STRETCHES);
+        let mut width = 1.0 / stretches as f32;
+        let mut best = (f32::INFINITY, 0.0);
+        let mut look = |along: f32, best: &mut (f32, f32)| {
+            let here = self.distance(a.lerp(b, along));
+            if here < best.0 {
+                *best = (here, along);
+            }
+        };
+        for index in 0..=stretches {
+            look(index as f32 * width, &mut best);
+        }
+        for _ in 0..HALVINGS {
+            width *= 0.5;
+            let centre = best.1;
+            look((centre - width).max(0.0), &mut best);
+            look((centre + width).min(1.0), &mut best);
+        }
+        [1.0 - best.1, best.1, 0.0]
+    }
+
+    /// The same over a face, towards and away from each corner.
+    fn least_of_face(&self, corners: [Vec3; 3]) -> [f32; 3] {
+        let [a, b, c] = corners;
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        let stretches = ((longest / self.cell).ceil() as u32).clamp(3, STRETCHES_OF_A_SIDE);
+        let mut width = 1.0 / stretches as f32;
+        let mut best = (f32::INFINITY, [1.0, 0.0, 0.0]);
+        let look = |weights: [f32; 3], best: &mut (f32, [f32; 3])| {
+            let here = self.distance(a * weights[0] + b * weights[1] + c * weights[2]);
+            if here < best.0 {
+                *best = (here, weights);
+            }
+        };
+        for i in 0..=stretches {
+            for j in 0..=stretches - i {
+                let (u, v) = (i as f32 * width, j as f32 * width);
+                look([(1.0 - u - v).max(0.0), u, v], &mut best);
+            }
+        }
+        for _ in 0..HALVINGS {
+            width *= 0.5;
+            let centre = best.1;
+            for (from, to) in [(0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)] {
+                let step = width.min(centre[from]);
+                let mut weights = centre;
+                weights[from] -= step;
+                weights[to] += step;
+                look(weights, &mut best);
+            }
+        }
+        best.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::exact_tests::{cube, sphere};
+    use super::*;
+    use crate::random::Random;
+
+    /// The largest error against EXACT of points outside of a sphere of 0.05 m, at most 5 mm away.
+    fn error(cell: f32) -> f64 {
+        let solid = ExactSolid::new(&sphere(96)).expect("a solid");
+        let field = DistanceField::new(&solid, cell).expect("a field");
+        let mut random = Random(3);
+        let mut largest = 0.0_f64;
+        for _ in 0..2000 {
+            let point = random.vector().normalize_or(Vec3::X) * (0.05 + 0.005 * random.unit());
+            let (exact, normal) = solid.measure(point, f32::INFINITY).expect("a distance");
+            let told = field.closest(&[point], 0.1).expect("a distance");
+            largest = largest.max(f64::from(told.distance - exact).abs());
+            assert!(told.normal.dot(normal) > 0.98, "{point}: {} for {normal}", told.normal);
+        }
+        largest
+    }
+
+    #[test]
+    fn the_error_is_of_second_order() {
+        let errors = [0.008, 0.004, 0.002].map(|cell| error(cell));
+        // Two second derivatives are 1 / 0.05 m; the mesh turns by 2 pi / 96 from face to face.
+        for (error, cell) in errors.iter().zip([0.008_f64, 0.004, 0.002]) {
+            assert!(
+                *error < cell * cell / 8.0 * 2.0 / 0.05 * 1.5 + 0.065 * cell / 4.0,
+                "{error} with cells of {cell}"
+            );
+        }
+        assert!(errors[0] > 2.5 * errors[1], "{errors:?}");
+    }
+
+    #[test]
+    fn features_are_found_as_by_exact() {
+        let solid = ExactSolid::new(&cube()).expect("a solid");
+        let field = DistanceField::new(&solid, 0.0).expect("a field");
+        let cell = field.cell();
+        let mut random = Random(9);
+        let mut found = 0;
+        for turn in 0..2000 {
+            let count = 1 + turn % 3;
+            let first = random.vector() * 0.06;
+            let corners = [first, first + random.vector() * 0.02, first + random.vector() * 0.02];
+            let corners = &corners[..count];
+            let within = 0.01;
+            let (told, exact) = (field.closest(corners, within), solid.closest(corners, within));
+            if let Some(exact) = exact
+                && exact.inside
+                && exact.distance < within - cell
+            {
+                let told = told.expect("something near");
+                assert!(
+                    (told.distance - exact.distance).abs() < 0.6 * cell,
+                    "{corners:?}: {told:?} for {exact:?}"
+                );
+                found += 1;
+            }
+            if let Some(told) = told {
+                let point = corners
+                    .iter()
+                    .zip(told.weights)
+                    .map(|(corner, weight)| *corner * weight)
+                    .sum();
+                let (exact, _) = solid.measure(point, f32::INFINITY).expect("a distance");
+                assert!((told.distance - exact).abs() < 0.6 * cell);
+            }
+        }
+        assert!(found > 300, "{found}");
+        // Far from the grid distances are exact but for what was sampled at its end.
+        let far = field.closest(&[Vec3::new(0.3, 0.0, 0.0)], 0.5).expect("within 0.5 m");
+        assert!((far.distance - 0.26).abs() < cell && far.normal.x > 0.99);
+        assert!(field.closest(&[Vec3::new(0.3, 0.0, 0.0)], 0.2).is_none());
+    }
+
+    #[test]
+    fn too_many_samples_are_refused() {
+        let solid = ExactSolid::new(&cube()).expect("a solid");
+        for (cell, says) in [
+            (1e-5, "at most 16777216"),
+            (-1.0, "cell is -1 m"),
+            (f32::NAN, "cell is NaN m"),
+        ] {
+            let error = DistanceField::new(&solid, cell).expect_err("refused").to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! EXACT by itself: the points and edges of a surface that lie within a solid.
+
+use glam::Vec3;
+
+use super::exact::ExactSolid;
+use crate::error::{Error, Result};
+use crate::mesh::ClosedSurface;
+
+/// A solid, rigid or changing its shape, that finds what lies within it.
+#[derive(Debug)]
+pub struct Exact {
+    solid: ExactSolid,
+    node_count: usize,
+}
+
+/// What lies within a solid. Its memory is used again by the next search.
+#[derive(Clone, Debug, Default)]
+pub struct Overlap {
+    /// In the order of the points.
+    pub points: Vec<PointInside>,
+    /// In the order of the edges, and along them.
+    pub edges: Vec<EdgeInside>,
+    crossings: Vec<(f64, bool)>,
+}
+
+/// A point within a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointInside {
+    /// Its number.
+    pub point: u32,
+    /// How far the solid's surface is, m.
+    pub depth: f32,
+    /// The shortest way out, of unit length.
+    pub normal: Vec3,
+}
+
+/// A stretch of an edge within a solid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeInside {
+    /// The edge's number.
+    pub edge: u32,
+    /// Where it goes in, as a fraction of the edge; 0 where it begins inside.
+    pub enters: f32,
+    /// Where it comes out; 1 where it ends inside.
+    pub leaves: f32,
+}
+
+impl Exact {
+    /// For a rigid solid.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(surface: &ClosedSurface) -> Result<Self> {
+        Ok(Self {
+            solid: ExactSolid::new(surface)?,
+            node_count: surface.positions().len(),
+        })
+    }
+
+    /// For a solid that will change its shape: without the grid that makes points far from the surface of a rigid one cheap.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn changing(surface: &ClosedSurface) -> Result<Self> {
+        Ok(Self {
+            solid: ExactSolid::changing(surface)?,
+            node_count: surface.positions().len(),
+        })
+    }
+
+    /// Takes the solid's nodes where they are now, in m, without allocating. Whether their triangles still enclose a solid is not asked.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] where there are not as many as the surface was made of, or one is not finite; then nothing changed.
+    pub fn refit(&mut self, positions: &[Vec3]) -> Result<()> {
+        if positions.len() != self.node_count {
+            return Err(Error::invalid(format!(
+                "{} positions: the surface has {} nodes",
+                positions.len(),
+                self.node_count
+            )));
+        }
+        check_positions(positions)?;
+        self.solid.refit(|node| positions[node]);
+        Ok(())
+    }
+
+    /// Finds which of `points` (m, in the solid's own coordinates) lie within it, and which stretches of `edges` (two point numbers each).
+    /// Allocates only where `overlap` has no room left.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] where a point is not finite or an edge names no point; [`Error::OutOfMemory`].
+    pub fn find(&self, points: &[Vec3], edges: &[[u32; 2]], overlap: &mut Overlap) -> Result<()> {
+        check_positions(points)?;
+        if let Some(edge) = edges
+            .iter()
+            .position(|edge| edge.iter().any(|&end| end as usize >= points.len()))
+        {
+            return Err(Error::invalid(format!(
+                "edge {edge} joins points {:?}; there are {}",
+                edges[edge],
+                points.len()
+            )));
+        }
+        overlap.points.clear();
+        overlap.edges.clear();
+        for (point, &position) in (0..).zip(points) {
+            if let Some((distance, normal)) = self.solid.measure(position, 0.0)
+                && distance < 0.0
+            {
+                overlap.points.try_reserve(1)?;
+                overlap.points.push(PointInside {
+                    point,
+                    depth: -distance,
+                    normal,
+                });
+            }
+        }
+        for (edge, ends) in (0..).zip(edges) {
+            let [from, to] = ends.map(|end| points[end as usize]);
+            overlap.add_edge(&self.solid, edge, from, to)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a point lies within the solid.
+    pub fn is_inside(&self, point: Vec3) -> bool {
+        self.solid.is_inside(point)
+    }
+
+    /// The distance of a point from the surface, m, below 0 inside, and the direction away from the solid; `None` where it is outside and
+    /// further than `within`.
+    pub fn distance(&self, point: Vec3, within: f32) -> Option<(f32, Vec3)> {
+        self.solid.measure(point, within)
+    }
+}
+
+impl Overlap {
+    fn add_edge(&mut self, solid: &ExactSolid, edge: u32, from: Vec3, to: Vec3) -> Result<()> {
+        let crossings = &mut self.crossings;
+        crossings.clear();
+        let mut full = Ok(());
+        solid.crossings(from, to, |crossing| {
+            if let Err(error) = crossings.try_reserve(1) {
+                full = Err(error);
+                return;
+            }
+            crossings.push((crossing.fraction, crossing.enters));
+        });
+        full?;
+        // What goes in where something comes out stays inside.
+        crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+        let step = |enters: bool| if enters { 1 } else { -1 };
+        let mut winding = 0;
+        let mut lowest = 0;
+        for &(_, enters) in crossings.iter() {
+            winding += step(enters);
+            lowest = lowest.min(winding);
+        }
+        // It begins inside where it comes out more often than it has gone in before.
+        winding = if crossings.is_empty() {
+            i32::from(solid.is_inside(from))
+        } else {
+            -lowest
+        };
+        let mut begins = 0.0;
+        for &(fraction, enters) in crossings.iter().chain(&[(1.0, false)]) {
+            let before = winding;
+            winding += step(enters);
+            if before == 0 {
+                begins = fraction;
+            }
+            let ends = before > 0 && (winding <= 0 || fraction == 1.0);
+            if ends && fraction > begins {
+                self.edges.try_reserve(1)?;
+                self.edges.push(EdgeInside {
+                    edge,
+                    enters: begins as f32,
+                    leaves: fraction as f32,
+                });
+                begins = fraction;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_positions(positions: &[Vec3]) -> Result<()> {
+    match positions.iter().position(|position| !position.is_finite()) {
+        Some(point) => Err(Error::invalid(format!(
+            "the position of point {point} is {}: must be finite",
+            positions[point]
+        ))),
+        None => Ok(()),
+    }
+}
