@@ -123,17 +123,6 @@ impl<T> Slots<T> {
         &mut self.slots
     }
 
-    /// All that live, with their ids.
-    pub fn iter_ids(&self) -> impl Iterator<Item = (SlotId, &T)> {
-        (1..).zip(&self.slots).filter_map(|(index1, slot)| {
-            let id = SlotId {
-                index1,
-                generation: slot.generation,
-            };
-            slot.content.as_ref().map(|content| (id, content))
-        })
-    }
-
     /// Where something lives.
     pub fn place(&self, id: SlotId) -> Result<usize> {
         self.index(id)

@@ -468,11 +468,6 @@ impl Body {
         })
     }
 
-    /// The box about its nodes, in its own coordinates.
-    pub(crate) fn local_bounds(&self) -> Bounds {
-        self.boxes.iter().fold(Bounds::EMPTY, Bounds::and)
-    }
-
     /// Where its own coordinates begin.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin
