@@ -12,3 +12,8 @@ pub mod image_space {
 pub mod exact {
     pub use crate::contact::exact_overlap::{EdgeInside, Exact, Overlap, PointInside};
 }
+
+/// By signed distances sampled on a grid.
+pub mod distance_field {
+    pub use crate::contact::distance_field::DistanceField;
+}

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::closest::Closest;
+use super::distance_field::DistanceField;
 use super::exact::ExactSolid;
 use super::image_space::LayeredImage;
 use super::tool::Detection;
 use crate::body::Bounds;
 use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::mesh::ClosedSurface;
 
 /// What a mesh encloses.
@@ -28,6 +29,7 @@ pub(crate) struct MeshSolid {
 enum Found {
     Exact(Box<ExactSolid>),
     Image(LayeredImage),
+    Field(DistanceField),
 }
 
 /// The longest extent is this many pixels, where it is not said how fine an image is.
@@ -56,11 +58,7 @@ impl MeshSolid {
                 let image = LayeredImage::new(surface.positions(), surface.triangles(), fine(PIXELS))?;
                 Found::Image(image)
             }
-            other => {
-                return Err(Error::Unsupported(format!(
-                    "detection is {other:?}: this version finds meshes exactly or in image space"
-                )));
-            }
+            Detection::DistanceField => Found::Field(DistanceField::of(&ExactSolid::new(&surface)?, resolution)?),
         };
         let mut hasher = StateHasher::new();
         hasher.write_u64(detection as u64);
@@ -120,6 +118,7 @@ impl MeshSolid {
         match &self.found {
             Found::Exact(solid) => solid.closest(corners, within),
             Found::Image(image) => image.closest(corners, within),
+            Found::Field(field) => field.closest(corners, within),
         }
     }
 }
