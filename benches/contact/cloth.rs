@@ -102,7 +102,8 @@ impl Drape {
     }
 
     fn force(&self) -> Vec3 {
-        self.tool.map_or(Vec3::ZERO, |tool| self.world.wrench(tool).expect("a tool").0)
+        self.tool
+            .map_or(Vec3::ZERO, |tool| self.world.wrench(tool).expect("a tool").0)
     }
 }
 
@@ -135,7 +136,10 @@ impl Lie {
         let mean = forces.iter().sum::<Vec3>() / STEPS as f32;
         let jitter = forces.iter().map(|force| force.distance(mean)).fold(0.0, f32::max);
         let positions = drape.world.body(drape.cloth).expect("a body").positions();
-        let distances: Vec<f64> = positions.iter().map(|node| truth.signed_distance(node.as_dvec3())).collect();
+        let distances: Vec<f64> = positions
+            .iter()
+            .map(|node| truth.signed_distance(node.as_dvec3()))
+            .collect();
         let contacts: Vec<f64> = drape
             .tool
             .into_iter()
@@ -148,7 +152,9 @@ impl Lie {
             jitter: f64::from(jitter / weight),
             inside: distances.iter().filter(|distance| **distance < 0.0).count(),
             nodes: distances.len(),
-            deepest: distances.iter().fold(0.0, |deepest, distance| f64::max(deepest, -distance)),
+            deepest: distances
+                .iter()
+                .fold(0.0, |deepest, distance| f64::max(deepest, -distance)),
             off: (squares / contacts.len().max(1) as f64).sqrt(),
             worst: contacts.iter().fold(0.0, |worst, off| f64::max(worst, off.abs())),
             contacts: contacts.len(),
@@ -167,8 +173,18 @@ pub fn run(report: &mut Report, claims: &mut Claims, extent: &Extent, effort: Ef
         1e3 * STEP
     ));
     let mut table = Table::new(&[
-        "solver", "tool", "detection", "ms a step", "over a free cloth", "force off %", "step to step %", "contacts", "off RMS mm", "worst mm",
-        "inside", "deepest mm",
+        "solver",
+        "tool",
+        "detection",
+        "ms a step",
+        "over a free cloth",
+        "force off %",
+        "step to step %",
+        "contacts",
+        "off RMS mm",
+        "worst mm",
+        "inside",
+        "deepest mm",
     ]);
     for solver in [Solver::Verlet, Solver::Implicit] {
         for &triangles in extent.tools {

@@ -20,7 +20,9 @@ impl Found {
     fn has(&self, edge: u32, share: f32) -> bool {
         let first = self.edges.partition_point(|part| part.0 < edge);
         let parts = self.edges[first..].iter().take_while(|part| part.0 == edge);
-        parts.into_iter().any(|(_, [entry, exit])| (*entry..=*exit).contains(&share))
+        parts
+            .into_iter()
+            .any(|(_, [entry, exit])| (*entry..=*exit).contains(&share))
     }
 
     fn depth(&self, node: u32) -> Option<f32> {

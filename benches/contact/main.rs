@@ -146,7 +146,11 @@ fn main() -> ExitCode {
     for failure in &failures {
         eprintln!("!! NO LONGER SO: {failure}");
     }
-    if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if failures.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
 }
 
 fn introduction(quick: bool) -> String {

@@ -44,7 +44,11 @@ const LINEAR: f64 = 1.15;
 /// One way to detect.
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
-    Image { form: Form, axes: bool, pixels: u32 },
+    Image {
+        form: Form,
+        axes: bool,
+        pixels: u32,
+    },
     Exact,
     /// The part of that which takes the tissue's new shape.
     Refit,
@@ -125,7 +129,9 @@ impl Solids {
         self.tissue.refit(positions).expect("positions");
         let [first, second] = overlaps;
         let found = self.rings[pair].find(positions, scene.tissue_surface.edges(), first);
-        found.and_then(|()| self.tissue.find(&ring.positions, ring_surface.edges(), second)).expect("an overlap");
+        found
+            .and_then(|()| self.tissue.find(&ring.positions, ring_surface.edges(), second))
+            .expect("an overlap");
     }
 }
 
@@ -193,27 +199,28 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
             Way::Refit => (Errors::default(), None),
         })
         .collect();
-    let contenders = Way::all().into_iter().map(|way| match way {
-        Way::Image { form, axes, pixels } => {
+    let mut contenders: Vec<Contender> = Vec::new();
+    for way in Way::all() {
+        if let Way::Image { form, axes, pixels } = way {
             let mut detector = detector(scene, form, axes, pixels);
-            Contender::new(way.name(), 1, move |units| {
+            contenders.push(Contender::new(way.name(), 1, move |units| {
                 for pair in std::iter::repeat_n(&scene.pairs, units).flatten() {
                     std::hint::black_box(detector.detect(&scene.placed(pair)).expect("an overlap"));
                 }
-            })
+            }));
         }
-        Way::Exact => Contender::new(way.name(), 1, |units| {
-            for pair in (0..scene.pairs.len()).cycle().take(units * scene.pairs.len()) {
-                solids.detect(scene, pair, &mut overlaps);
-            }
-        }),
-        Way::Refit => Contender::new(way.name(), 1, |units| {
-            for pair in std::iter::repeat_n(&scene.pairs, units).flatten() {
-                refitted.refit(&pair.positions).expect("positions");
-            }
-        }),
-    });
-    let results = interleave(contenders.collect(), effort);
+    }
+    contenders.push(Contender::new(Way::Exact.name(), 1, |units| {
+        for pair in (0..scene.pairs.len()).cycle().take(units * scene.pairs.len()) {
+            solids.detect(scene, pair, &mut overlaps);
+        }
+    }));
+    contenders.push(Contender::new(Way::Refit.name(), 1, |units| {
+        for pair in std::iter::repeat_n(&scene.pairs, units).flatten() {
+            refitted.refit(&pair.positions).expect("positions");
+        }
+    }));
+    let results = interleave(contenders, effort);
     report.disturbed(results.waited);
     for (way, (errors, volume)) in Way::all().into_iter().zip(errors) {
         let time = results.get(&way.name()).map_or(f64::NAN, |samples| samples.minimum());
@@ -248,7 +255,11 @@ fn image_errors(
         all.push(overlap.inside.each_ref().map(|inside| {
             Some(Found {
                 nodes: inside.points.iter().map(|point| (point.node, point.depth)).collect(),
-                edges: inside.edges.iter().map(|part| (part.edge, [part.entry, part.exit])).collect(),
+                edges: inside
+                    .edges
+                    .iter()
+                    .map(|part| (part.edge, [part.entry, part.exit]))
+                    .collect(),
             })
         }));
     }
@@ -258,7 +269,11 @@ fn image_errors(
 fn found_exactly(overlap: &exact::Overlap) -> Found {
     Found {
         nodes: overlap.points.iter().map(|point| (point.point, point.depth)).collect(),
-        edges: overlap.edges.iter().map(|part| (part.edge, [part.enters, part.leaves])).collect(),
+        edges: overlap
+            .edges
+            .iter()
+            .map(|part| (part.edge, [part.enters, part.leaves]))
+            .collect(),
     }
 }
 
@@ -267,16 +282,36 @@ fn true_volume(scene: &Scene, pair: usize) -> f64 {
     let truths = bodies.map(|body| Truth::new(body.positions, body.surface.triangles()));
     let insides = [0, 1].map(|side: usize| -> Vec<bool> {
         let points = bodies[side].positions.iter();
-        points.map(|point| truths[1 - side].is_inside(point.as_dvec3())).collect()
+        points
+            .map(|point| truths[1 - side].is_inside(point.as_dvec3()))
+            .collect()
     });
-    volume::common(&bodies, [&|node| insides[0][node as usize], &|node| insides[1][node as usize]])
+    volume::common(
+        &bodies,
+        [&|node| insides[0][node as usize], &|node| insides[1][node as usize]],
+    )
 }
 
 fn write_table(report: &mut Report, rows: &[Row]) {
     let mut table = Table::new(&[
-        "triangles", "way", "ms", "missed %", "deepest missed", "false %", "furthest false", "depth RMS", "worst", "volume %",
+        "triangles",
+        "way",
+        "ms",
+        "missed %",
+        "deepest missed",
+        "false %",
+        "furthest false",
+        "depth RMS",
+        "worst",
+        "volume %",
     ]);
-    let length = |value: f64| if value > 0.0 { format!("{value:.1e}") } else { "0".into() };
+    let length = |value: f64| {
+        if value > 0.0 {
+            format!("{value:.1e}")
+        } else {
+            "0".into()
+        }
+    };
     for row in rows {
         let errors = &row.errors;
         let known = errors.inside() > 0;
@@ -326,9 +361,17 @@ fn write_plots(report: &mut Report, rows: &[Row]) {
         })
         .collect();
     let title = format!("Time of a detection, pixels of 1/{COMPARED} of the size");
-    report.plot("contact_time.svg", &title, plot(&title, "triangles of each surface", "ms", &lines));
+    report.plot(
+        "contact_time.svg",
+        &title,
+        plot(&title, "triangles of each surface", "ms", &lines),
+    );
     let largest = rows.last().map_or(0, |row| row.triangles);
-    let middle = rows.iter().map(|row| row.triangles).find(|&n| n > 15_000).unwrap_or(largest);
+    let middle = rows
+        .iter()
+        .map(|row| row.triangles)
+        .find(|&n| n > 15_000)
+        .unwrap_or(largest);
     let lines: Vec<Series> = kinds()
         .iter()
         .map(|kind| Series {
@@ -340,8 +383,15 @@ fn write_plots(report: &mut Report, rows: &[Row]) {
             dashed: false,
         })
         .collect();
-    let title = format!("What is missed against time, {} triangles (EXACT: nothing)", count(middle));
-    report.plot("contact_missed.svg", &title, plot(&title, "ms", "points inside that are missed, %", &lines));
+    let title = format!(
+        "What is missed against time, {} triangles (EXACT: nothing)",
+        count(middle)
+    );
+    report.plot(
+        "contact_missed.svg",
+        &title,
+        plot(&title, "ms", "points inside that are missed, %", &lines),
+    );
     let lines: Vec<Series> = kinds()
         .iter()
         .map(|kind| Series {
@@ -355,12 +405,23 @@ fn write_plots(report: &mut Report, rows: &[Row]) {
         })
         .collect();
     let title = format!("The worst error of a place against time, {} triangles", count(middle));
-    report.plot("contact_error.svg", &title, plot(&title, "ms", "deepest missed or furthest false, parts of the size", &lines));
+    report.plot(
+        "contact_error.svg",
+        &title,
+        plot(
+            &title,
+            "ms",
+            "deepest missed or furthest false, parts of the size",
+            &lines,
+        ),
+    );
 }
 
 /// How steeply times rise with the triangles: 1 is linear, less where pixels count too.
 fn write_slopes(report: &mut Report, claims: &mut Claims, rows: &[Row]) {
-    report.write(&format!("\nTimes rise with the triangles, from {MANY:.0} on, to the power of:\n"));
+    report.write(&format!(
+        "\nTimes rise with the triangles, from {MANY:.0} on, to the power of:\n"
+    ));
     let mut table = Table::new(&["way", "power"]);
     for kind in kinds() {
         let points = of_kind(rows, &kind).filter(|row| is_compared(row) && row.triangles as f64 >= MANY);
@@ -368,7 +429,11 @@ fn write_slopes(report: &mut Report, claims: &mut Claims, rows: &[Row]) {
         let slope = slope(&points);
         table.row(vec![kind.clone(), digits(slope)]);
         if !kind.starts_with("EXACT") {
-            claims.at_most(format!("{kind}: time rises with the triangles to the power of"), slope, LINEAR);
+            claims.at_most(
+                format!("{kind}: time rises with the triangles to the power of"),
+                slope,
+                LINEAR,
+            );
         }
     }
     report.table(&table);
@@ -377,7 +442,9 @@ fn write_slopes(report: &mut Report, claims: &mut Claims, rows: &[Row]) {
 /// Of the straight line closest to the points.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let count = points.len() as f64;
-    let mean = points.iter().fold((0.0, 0.0), |sum, point| (sum.0 + point.0 / count, sum.1 + point.1 / count));
+    let mean = points.iter().fold((0.0, 0.0), |sum, point| {
+        (sum.0 + point.0 / count, sum.1 + point.1 / count)
+    });
     let (mut products, mut squares) = (0.0, 0.0);
     for (x, y) in points {
         products += (x - mean.0) * (y - mean.1);
@@ -391,7 +458,15 @@ fn hold(claims: &mut Claims, rows: &[Row]) {
     let worst = |pick: &dyn Fn(&Row) -> bool, value: &dyn Fn(&Row) -> f64| {
         rows.iter().filter(|row| pick(row)).map(value).fold(0.0, f64::max)
     };
-    let intervals = |row: &Row| matches!(row.way, Way::Image { form: Form::Intervals, .. });
+    let intervals = |row: &Row| {
+        matches!(
+            row.way,
+            Way::Image {
+                form: Form::Intervals,
+                ..
+            }
+        )
+    };
     let off = |row: &Row| (row.errors.deepest_missed.max(row.errors.furthest_false) - ROUNDING) / row.way.pixel();
     let what = "Intervals: the deepest missed and the furthest false, in pixels";
     claims.at_most(what, worst(&intervals, &off), SEEN);
@@ -399,7 +474,12 @@ fn hold(claims: &mut Claims, rows: &[Row]) {
     let what = "Intervals: missed at 1/256 of the size and finer";
     claims.at_most(what, worst(&fine, &|row| row.errors.missed()), 0.01);
     let exact = |row: &Row| row.way == Way::Exact;
-    let place = |row: &Row| row.errors.deepest_missed.max(row.errors.furthest_false).max(row.errors.worst_depth);
+    let place = |row: &Row| {
+        row.errors
+            .deepest_missed
+            .max(row.errors.furthest_false)
+            .max(row.errors.worst_depth)
+    };
     let what = "EXACT: the worst error of a place or a depth, in parts of the size";
     claims.at_most(what, worst(&exact, &place), ROUNDING);
     // The volume: an order 1 bound over all that are known.
@@ -407,12 +487,16 @@ fn hold(claims: &mut Claims, rows: &[Row]) {
     let what = "Intervals: the error of the volume, in itself, over pixels in parts of the size";
     claims.at_most(what, worst(&intervals, &volume), 1.0);
     let lost = |form: Form| {
-        let same = move |row: &&Row| matches!(row.way, Way::Image { form: own, axes: true, pixels: COMPARED } if own == form);
+        let same =
+            move |row: &&Row| matches!(row.way, Way::Image { form: own, axes: true, pixels: COMPARED } if own == form);
         rows.iter().filter(same).map(|row| row.errors.missed()).sum::<f64>()
     };
     claims.claim(
         format!("Counted misses more than Intervals, 3 axes, 1/{COMPARED}"),
-        format!("{:.1} times as much", lost(Form::Counted) / lost(Form::Intervals).max(1e-9)),
+        format!(
+            "{:.1} times as much",
+            lost(Form::Counted) / lost(Form::Intervals).max(1e-9)
+        ),
         lost(Form::Counted) > lost(Form::Intervals),
     );
 }

@@ -90,9 +90,17 @@ pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Ef
     }
     write(report, &rows);
     for row in &rows {
-        let off = row.errors.worst_depth.max(row.errors.deepest_missed).max(row.errors.furthest_false);
+        let off = row
+            .errors
+            .worst_depth
+            .max(row.errors.deepest_missed)
+            .max(row.errors.furthest_false);
         claims.at_most(
-            format!("a tool of {} triangles, {}: the worst error of a distance", count(row.triangles), row.name),
+            format!(
+                "a tool of {} triangles, {}: the worst error of a distance",
+                count(row.triangles),
+                row.name
+            ),
             off,
             row.allowed,
         );
@@ -151,7 +159,11 @@ fn points(scene: &Scene) -> Vec<Vec3> {
     let mut points = thinned(near(&pair.positions, &pair.ring.positions, WITHIN));
     let mut random = crate::random::Random(8);
     let mut off = || Vec3::new(random.signed(), random.signed(), random.signed()) * WITHIN;
-    points.extend(thinned(pair.ring.positions.clone()).into_iter().map(|point| point + off()));
+    points.extend(
+        thinned(pair.ring.positions.clone())
+            .into_iter()
+            .map(|point| point + off()),
+    );
     points
 }
 
@@ -164,7 +176,14 @@ fn make(scene: &Scene) -> Vec<Made> {
         let mut tool = None;
         let time = clock::time(|| tool = Some(make())).processor;
         let tool = tool.expect("a tool");
-        all.push(Made { name, kind, tool, time, part: 0.8 * part, off });
+        all.push(Made {
+            name,
+            kind,
+            tool,
+            time,
+            part: 0.8 * part,
+            off,
+        });
     };
     add("EXACT".into(), "EXACT", 0.0, 0.0, &|| {
         Tool::Exact(Box::new(Exact::new(&surface).expect("a solid")))
@@ -187,7 +206,14 @@ fn make(scene: &Scene) -> Vec<Made> {
 
 fn write(report: &mut Report, rows: &[Row]) {
     let mut table = Table::new(&[
-        "triangles", "way", "made in ms", "ns a query", "missed %", "false %", "distance RMS", "worst",
+        "triangles",
+        "way",
+        "made in ms",
+        "ns a query",
+        "missed %",
+        "false %",
+        "distance RMS",
+        "worst",
     ]);
     for row in rows {
         let errors = &row.errors;
@@ -214,8 +240,15 @@ fn write(report: &mut Report, rows: &[Row]) {
             .collect(),
         dashed: false,
     });
-    let title = format!("A tool of {} triangles: error of a distance against time", count(largest));
-    report.plot("contact_tool.svg", &title, plot(&title, "ns a query", "RMS, parts of the size", &lines));
+    let title = format!(
+        "A tool of {} triangles: error of a distance against time",
+        count(largest)
+    );
+    report.plot(
+        "contact_tool.svg",
+        &title,
+        plot(&title, "ns a query", "RMS, parts of the size", &lines),
+    );
     let mut lines = Vec::new();
     for name in ["EXACT", "IMAGE_SPACE, 1/256", "DISTANCE_FIELD, 1/64"] {
         let of_name = || rows.iter().filter(|row| row.name == name);

@@ -39,9 +39,11 @@ impl Truth {
     fn distance(&self, point: DVec3) -> f64 {
         // The nearest centre is close to the nearest triangle: begun there, almost all others are left out.
         let squared = self.centres.iter().map(|centre| centre.distance_squared(point));
-        let nearest = squared.enumerate().fold((0, f64::INFINITY), |nearest, (index, squared)| {
-            if squared < nearest.1 { (index, squared) } else { nearest }
-        });
+        let nearest = squared
+            .enumerate()
+            .fold((0, f64::INFINITY), |nearest, (index, squared)| {
+                if squared < nearest.1 { (index, squared) } else { nearest }
+            });
         let mut least = to_triangle(point, self.corners[nearest.0]);
         for (index, centre) in self.centres.iter().enumerate() {
             let reach = least + self.radii[index];
@@ -89,9 +91,7 @@ fn crossing(from: DVec3, direction: DVec3, corners: [DVec3; 3]) -> i32 {
 fn to_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let sides = [(a, b), (b, c), (c, a)];
     let normal = (b - a).cross(c - a);
-    let above = sides
-        .iter()
-        .all(|(p, q)| (q - p).cross(point - p).dot(normal) >= 0.0);
+    let above = sides.iter().all(|(p, q)| (q - p).cross(point - p).dot(normal) >= 0.0);
     if above && normal != DVec3::ZERO {
         return (point - a).dot(normal).abs() / normal.length();
     }

@@ -81,7 +81,11 @@ impl Faces {
             let into = middle - from;
             let along_both = own.cross(normal);
             let across = into - way * (into.dot(way) / way.length_squared());
-            let line = if along_both.dot(across) > 0.0 { along_both } else { -along_both };
+            let line = if along_both.dot(across) > 0.0 {
+                along_both
+            } else {
+                -along_both
+            };
             term(at, inward, into, own) + term(at, line, -normal, own) + term(at, line, -own, normal)
         });
         faces[0] + faces[1]
