@@ -85,12 +85,13 @@ const FULL: Plan = Plan {
     tools: &[1_000, 20_000, 200_000],
     cloth: Extent {
         tools: &[5_000, 50_000],
-        cells: 63,
-        settling: 200,
+        cells: 31,
+        settling: 60,
+        implicit: true,
     },
     effort: Effort {
         quick: false,
-        rounds: 5,
+        rounds: 4,
         patience: Duration::from_secs(8),
         sample: 5e-3,
     },
@@ -101,8 +102,9 @@ const QUICK: Plan = Plan {
     tools: &[5_000],
     cloth: Extent {
         tools: &[5_000],
-        cells: 31,
-        settling: 200,
+        cells: 12,
+        settling: 60,
+        implicit: false,
     },
     effort: Effort {
         quick: true,

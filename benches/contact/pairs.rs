@@ -14,8 +14,12 @@ use crate::svg::{Series, plot};
 use crate::truth::Truth;
 use crate::volume;
 
-/// Pixels along the size.
+/// Pixels along the size; where time is short, every second one.
 const PIXELS: [u32; 4] = [64, 128, 256, 512];
+const FEW_PIXELS: [u32; 2] = [64, 256];
+
+/// From so many triangles on time is short.
+const LARGE: usize = 50_000;
 
 /// Pixels of the size at which the forms of image space are compared over the triangles.
 const COMPARED: u32 = 256;
@@ -56,9 +60,14 @@ enum Way {
 
 impl Way {
     fn all() -> Vec<Self> {
+        Self::with(&PIXELS)
+    }
+
+    fn with(pixels: &[u32]) -> Vec<Self> {
         let forms = [Form::Counted, Form::Intervals].into_iter();
         let views = forms.flat_map(|form| [false, true].map(|axes| (form, axes)));
-        let images = views.flat_map(|(form, axes)| PIXELS.map(|pixels| Self::Image { form, axes, pixels }));
+        let images =
+            views.flat_map(|(form, axes)| pixels.iter().map(move |&pixels| Self::Image { form, axes, pixels }));
         images.chain([Self::Exact, Self::Refit]).collect()
     }
 
@@ -153,7 +162,7 @@ pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Ef
          the three. Missed and false: of points on edges and at nodes, in parts of those inside, with the deepest that was missed \
          and the furthest outside that was found; depths: RMS and worst difference to the shortest way out, of which image space tells that \
          along its views; all lengths in parts of the size.\n",
-        1e3 * SIZE
+        digits(1e3 * f64::from(SIZE))
     ));
     let mut rows = Vec::new();
     for &triangles in sizes {
@@ -169,7 +178,15 @@ pub fn run(report: &mut Report, claims: &mut Claims, sizes: &[usize], effort: Ef
 
 fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Row>) {
     let triangles = scene.triangle_count();
-    let samples = Samples::new(scene, (LOOKS / triangles / 6).clamp(100, 2000));
+    let is_short = effort.quick || triangles > LARGE;
+    let ways = Way::with(if is_short { &FEW_PIXELS } else { &PIXELS });
+    let effort = if triangles > LARGE {
+        Effort { rounds: 2, ..effort }
+    } else {
+        effort
+    };
+    let looks = if effort.quick { LOOKS / 4 } else { LOOKS };
+    let samples = Samples::new(scene, (looks / triangles / 6).clamp(100, 2000));
     let mut solids = None;
     let built = clock::time(|| solids = Some(Solids::new(scene)));
     let mut solids = solids.expect("solids");
@@ -183,8 +200,9 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
         .take_while(|_| triangles < TOO_MANY)
         .map(|pair| true_volume(scene, pair))
         .collect();
-    let errors: Vec<(Errors, Option<f64>)> = Way::all()
-        .into_iter()
+    let errors: Vec<(Errors, Option<f64>)> = ways
+        .iter()
+        .copied()
         .map(|way| match way {
             Way::Image { form, axes, pixels } => image_errors(scene, &samples, &volumes, form, axes, pixels),
             Way::Exact => {
@@ -200,7 +218,7 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
         })
         .collect();
     let mut contenders: Vec<Contender> = Vec::new();
-    for way in Way::all() {
+    for &way in &ways {
         if let Way::Image { form, axes, pixels } = way {
             let mut detector = detector(scene, form, axes, pixels);
             contenders.push(Contender::new(way.name(), 1, move |units| {
@@ -222,7 +240,7 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
     }));
     let results = interleave(contenders, effort);
     report.disturbed(results.waited);
-    for (way, (errors, volume)) in Way::all().into_iter().zip(errors) {
+    for (way, (errors, volume)) in ways.into_iter().zip(errors) {
         let time = results.get(&way.name()).map_or(f64::NAN, |samples| samples.minimum());
         rows.push(Row {
             triangles,
