@@ -18,8 +18,9 @@ use crate::volume;
 const PIXELS: [u32; 4] = [64, 128, 256, 512];
 const FEW_PIXELS: [u32; 2] = [64, 256];
 
-/// From so many triangles on time is short.
+/// From so many triangles on time is short, and shorter.
 const LARGE: usize = 50_000;
+const LARGEST: usize = 150_000;
 
 /// Pixels of the size at which the forms of image space are compared over the triangles.
 const COMPARED: u32 = 256;
@@ -180,11 +181,12 @@ fn measure(report: &mut Report, scene: &Scene, effort: Effort, rows: &mut Vec<Ro
     let triangles = scene.triangle_count();
     let is_short = effort.quick || triangles > LARGE;
     let ways = Way::with(if is_short { &FEW_PIXELS } else { &PIXELS });
-    let effort = if triangles > LARGE {
-        Effort { rounds: 2, ..effort }
-    } else {
-        effort
+    let rounds = match triangles {
+        0..LARGE => effort.rounds,
+        LARGE..LARGEST => 2,
+        _ => 1,
     };
+    let effort = Effort { rounds, ..effort };
     let looks = if effort.quick { LOOKS / 4 } else { LOOKS };
     let samples = Samples::new(scene, (looks / triangles / 6).clamp(100, 2000));
     let mut solids = None;
@@ -438,21 +440,33 @@ fn write_plots(report: &mut Report, rows: &[Row]) {
 /// How steeply times rise with the triangles: 1 is linear, less where pixels count too.
 fn write_slopes(report: &mut Report, claims: &mut Claims, rows: &[Row]) {
     report.write(&format!(
-        "\nTimes rise with the triangles, from {MANY:.0} on, to the power of:\n"
+        "\nTimes rise with the triangles, from {MANY:.0} on, to the power of this; as a straight line through the first and the last they \
+         are so much at no triangles, for the pixels, and so much more for each; between them they are off that line by so much at most:\n"
     ));
-    let mut table = Table::new(&["way", "power"]);
+    let mut table = Table::new(&["way", "power", "ms", "ns a triangle", "off the line %"]);
     for kind in kinds() {
-        let points = of_kind(rows, &kind).filter(|row| is_compared(row) && row.triangles as f64 >= MANY);
-        let points: Vec<(f64, f64)> = points.map(|row| ((row.triangles as f64).ln(), row.time.ln())).collect();
-        let slope = slope(&points);
-        table.row(vec![kind.clone(), digits(slope)]);
+        let points: Vec<(f64, f64)> = of_kind(rows, &kind)
+            .filter(|row| is_compared(row) && row.triangles as f64 >= MANY)
+            .map(|row| (row.triangles as f64, row.time))
+            .collect();
+        let power = slope(&points.iter().map(|(x, y)| (x.ln(), y.ln())).collect::<Vec<_>>());
         if !kind.starts_with("EXACT") {
-            claims.at_most(
-                format!("{kind}: time rises with the triangles to the power of"),
-                slope,
-                LINEAR,
-            );
+            let what = format!("{kind}: time rises with the triangles to the power of");
+            claims.at_most(what, power, LINEAR);
         }
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            continue;
+        };
+        let each = (last.1 - first.1) / (last.0 - first.0);
+        let start = first.1 - each * first.0;
+        let off = points.iter().map(|(x, y)| (y / (start + each * x) - 1.0).abs());
+        table.row(vec![
+            kind.clone(),
+            digits(power),
+            milliseconds(start),
+            digits(1e9 * each),
+            digits(100.0 * off.fold(0.0, f64::max)),
+        ]);
     }
     report.table(&table);
 }

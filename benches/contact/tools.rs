@@ -25,13 +25,16 @@ const CHECKED: usize = 150_000_000;
 const PIXELS: [u32; 3] = [64, 128, 256];
 const CELLS: [u32; 3] = [32, 64, 128];
 
+/// Of larger tools the finest field is left out: it takes long to sample.
+const LARGE: usize = 50_000;
+
 /// Which ring of the scene is the tool: that of 0.8 times the size.
 const TOOL: usize = 1;
 
 /// How far off a distance may be as close to the surface as contact asks, in pixels or cells.
 const CLOSE: f64 = 1e-3;
-const IMAGE_OFF: f64 = 2.0;
-const FIELD_OFF: f64 = 1.0;
+const IMAGE_OFF: f64 = 0.5;
+const FIELD_OFF: f64 = 0.5;
 
 /// A tool in one of the ways.
 enum Tool {
@@ -201,7 +204,8 @@ fn make(scene: &Scene) -> Vec<Made> {
             Tool::Image(LayeredImage::new(&ring.positions, &ring.triangles, pixel).expect("an image"))
         });
     }
-    for cells in CELLS {
+    let few = if ring.triangles.len() > LARGE { 2 } else { CELLS.len() };
+    for &cells in &CELLS[..few] {
         let name = format!("DISTANCE_FIELD, 1/{cells}");
         add(name, "DISTANCE_FIELD", 1.0 / f64::from(cells), FIELD_OFF, &|| {
             Tool::Field(DistanceField::new(&surface, width / cells as f32).expect("a field"))
