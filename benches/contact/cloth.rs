@@ -32,17 +32,17 @@ const DETECTIONS: [(&str, Detection); 3] = [
     ("DISTANCE_FIELD, 1/64", Detection::DistanceField),
 ];
 
-/// How much is measured.
+/// A cloth and a tool that are measured.
 pub struct Extent {
-    /// Triangles of the tools.
-    pub tools: &'static [usize],
+    pub solver: Solver,
+    /// Triangles of the tool.
+    pub tool: usize,
     /// Cells along the cloth.
     pub cells: u32,
-    /// Steps until it lies still.
-    pub settling: u32,
-    /// Whether IMPLICIT is tried too, on the first tool.
-    pub implicit: bool,
 }
+
+/// Steps until a cloth lies still.
+const SETTLING: usize = 40;
 
 /// A cloth and perhaps a tool.
 struct Drape {
@@ -167,10 +167,9 @@ impl Lie {
     }
 }
 
-pub fn run(report: &mut Report, claims: &mut Claims, extent: &Extent, effort: Effort) {
-    let nodes = (extent.cells + 1) * (extent.cells + 1);
+pub fn run(report: &mut Report, claims: &mut Claims, extents: &[Extent], effort: Effort) {
     report.write(&format!(
-        "\n## A cloth on a tool\n\n{nodes} nodes, {} g, on the upper side of a bumpy ball of {} mm, steps of {} ms on one thread. Over a free \
+        "\n## A cloth on a tool\n\n{} g, on the upper side of a bumpy ball of {} mm, steps of {} ms on one thread. Over a free \
          cloth: the median of the ratios within rounds. Force: the mean on the tool over 10 steps against the weight, and by how much a single step's \
          differs from it. Off: of the points in contact, from the cloth's thickness.\n",
         digits(1e3 * f64::from(MASS)),
@@ -179,6 +178,7 @@ pub fn run(report: &mut Report, claims: &mut Claims, extent: &Extent, effort: Ef
     ));
     let mut table = Table::new(&[
         "solver",
+        "nodes",
         "tool",
         "detection",
         "ms a step",
@@ -191,38 +191,23 @@ pub fn run(report: &mut Report, claims: &mut Claims, extent: &Extent, effort: Ef
         "inside",
         "deepest mm",
     ]);
-    for solver in [Solver::Verlet, Solver::Implicit] {
-        let implicit = solver == Solver::Implicit;
-        let tools = match (implicit, extent.implicit) {
-            (false, _) => extent.tools,
-            (true, true) => &extent.tools[..1],
-            (true, false) => &[],
-        };
-        for &triangles in tools {
-            lie(report, claims, &mut table, solver, triangles, extent, effort);
-        }
+    for extent in extents {
+        lie(report, claims, &mut table, extent, effort);
     }
     report.table(&table);
 }
 
-fn lie(
-    report: &mut Report,
-    claims: &mut Claims,
-    table: &mut Table,
-    solver: Solver,
-    triangles: usize,
-    extent: &Extent,
-    effort: Effort,
-) {
-    let tool = Shape::bumpy(SIZE, triangles);
+fn lie(report: &mut Report, claims: &mut Claims, table: &mut Table, extent: &Extent, effort: Effort) {
+    let Extent { solver, tool, cells } = *extent;
+    let tool = Shape::bumpy(SIZE, tool);
     let truth = Truth::new(&tool.positions, &tool.triangles);
     let triangles = tool.triangles.len();
     report.progress(&format!("{solver:?}, a cloth on a tool of {triangles} triangles"));
     let mut drapes = Vec::new();
     for (name, detection) in DETECTIONS {
-        match Drape::new(Some(detection), &tool, solver, extent.cells) {
+        match Drape::new(Some(detection), &tool, solver, cells) {
             Ok(mut drape) => {
-                drape.step(extent.settling as usize);
+                drape.step(SETTLING);
                 report.progress(&format!("{name} has settled"));
                 drapes.push((name, drape));
             }
@@ -230,7 +215,7 @@ fn lie(
         }
     }
     let lies: Vec<Lie> = drapes.iter_mut().map(|(_, drape)| Lie::of(drape, &truth)).collect();
-    if let Ok(free) = Drape::new(None, &tool, solver, extent.cells) {
+    if let Ok(free) = Drape::new(None, &tool, solver, cells) {
         drapes.push((FREE, free));
     }
     let contenders = drapes
@@ -244,6 +229,7 @@ fn lie(
         let ratio = free.map_or(f64::NAN, |free| samples.ratio(free));
         table.row(vec![
             format!("{solver:?}"),
+            lie.nodes.to_string(),
             count(triangles),
             (*name).into(),
             milliseconds(samples.minimum()),
@@ -253,7 +239,7 @@ fn lie(
             lie.contacts.to_string(),
             digits(1e3 * lie.off),
             digits(1e3 * lie.worst),
-            format!("{} of {}", lie.inside, lie.nodes),
+            lie.inside.to_string(),
             digits(1e3 * lie.deepest),
         ]);
         let what = format!("{solver:?}, a cloth on {} triangles, {name}:", count(triangles));

@@ -37,6 +37,7 @@ use claims::Claims;
 use cloth::Extent;
 use report::Report;
 use rounds::Effort;
+use sinew::Solver;
 
 const PARTS: [&str; 3] = ["pairs", "tools", "cloth"];
 
@@ -76,19 +77,22 @@ impl Options {
 struct Plan {
     pairs: &'static [usize],
     tools: &'static [usize],
-    cloth: Extent,
+    cloth: &'static [Extent],
     effort: Effort,
+}
+
+const fn cloth_of(solver: Solver, tool: usize, cells: u32) -> Extent {
+    Extent { solver, tool, cells }
 }
 
 const FULL: Plan = Plan {
     pairs: &[1_000, 5_000, 20_000, 70_000, 200_000],
     tools: &[1_000, 20_000, 200_000],
-    cloth: Extent {
-        tools: &[5_000, 50_000],
-        cells: 31,
-        settling: 60,
-        implicit: true,
-    },
+    cloth: &[
+        cloth_of(Solver::Verlet, 5_000, 31),
+        cloth_of(Solver::Verlet, 50_000, 15),
+        cloth_of(Solver::Implicit, 5_000, 15),
+    ],
     effort: Effort {
         quick: false,
         rounds: 4,
@@ -100,12 +104,7 @@ const FULL: Plan = Plan {
 const QUICK: Plan = Plan {
     pairs: &[1_000, 5_000, 20_000],
     tools: &[5_000],
-    cloth: Extent {
-        tools: &[5_000],
-        cells: 12,
-        settling: 60,
-        implicit: false,
-    },
+    cloth: &[cloth_of(Solver::Verlet, 5_000, 12)],
     effort: Effort {
         quick: true,
         rounds: 3,
@@ -134,7 +133,7 @@ fn main() -> ExitCode {
         tools::run(&mut report, &mut claims, plan.tools, plan.effort);
     }
     if asked("cloth") {
-        cloth::run(&mut report, &mut claims, &plan.cloth, plan.effort);
+        cloth::run(&mut report, &mut claims, plan.cloth, plan.effort);
     }
     claims.write(&mut report);
     match report.finish() {
