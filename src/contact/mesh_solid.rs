@@ -60,7 +60,7 @@ impl MeshSolid {
                 Found::Image(image)
             }
             Detection::DistanceField => {
-                let field = DistanceField::new(&ExactSolid::new(&surface)?, fine(CELLS))?;
+                let field = DistanceField::of(&ExactSolid::new(&surface)?, fine(CELLS))?;
                 Found::Field(Box::new(field))
             }
         };
