@@ -100,6 +100,11 @@ impl Together<'_> {
                 *walk = Some(begun);
             }
         }
+        if substeps > 0 && self.request.substeps == 0 {
+            // A wish, where stability is a need.
+            let wished = self.tissue.substeps_wished(group, bodies, self.request.dt);
+            substeps = substeps.max(wished.min(self.request.max_substeps));
+        }
         substeps
     }
 

@@ -38,6 +38,9 @@ const LEAST_THICKNESS: f32 = 1e-3;
 /// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
 const FASTER: f32 = 2.0;
 
+/// How far bodies come against each other in a substep, as a part of the shortest edge.
+const TRAVEL: f32 = 0.5;
+
 /// With itself a surface keeps off no further than this part of its shortest edge, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
 
@@ -195,6 +198,19 @@ impl Tissue {
         count
     }
 
+    /// In how many substeps bodies of a group come no further against each other in one than what they are made of is small.
+    pub fn substeps_wished(&self, group: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
+        let members = self.skins.iter().enumerate().filter_map(|(place, skin)| {
+            let skin = skin.as_ref().filter(|skin| skin.group == Some(group))?;
+            Some((skin.shortest, speed(bodies.at(place)?)))
+        });
+        let (shortest, speeds) = members.fold((f32::INFINITY, 0.0), |(least, sum), (shortest, speed)| {
+            (shortest.min(least), sum + speed)
+        });
+        let wished = (dt * speeds / (TRAVEL * shortest)).ceil();
+        wished.clamp(1.0, 1e6) as u32
+    }
+
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
     pub fn velocities(&self, place: usize, before: Bounds) -> Bounds {
         match self.skins.get(place) {
@@ -333,13 +349,7 @@ fn meet_each_other(first: &Body, second: &Body) -> bool {
 
 /// A box about what a body may touch in a step of `dt` seconds, in the caller's coordinates.
 fn reach(body: &Body, dt: f32) -> Bounds {
-    let velocities = body.carry.gravity.velocities;
-    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
-    let way = if fastest.is_finite() {
-        FASTER * fastest * dt
-    } else {
-        0.0
-    };
+    let way = FASTER * speed(body) * dt;
     let bounds = body.local_bounds();
     let origin = body.origin.as_vec3();
     Bounds {
@@ -347,6 +357,13 @@ fn reach(body: &Body, dt: f32) -> Bounds {
         max: bounds.max + origin,
     }
     .extended(way + 2.0 * body.contact.thickness + 0.01 * body.extent())
+}
+
+/// No node of a body is faster, m/s, as far as that is kept.
+fn speed(body: &Body) -> f32 {
+    let velocities = body.carry.gravity.velocities;
+    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
+    if fastest.is_finite() { fastest } else { 0.0 }
 }
 
 /// A box about a body as a step that was tried begins and as it ends, and what keeps off it, in the caller's coordinates.
