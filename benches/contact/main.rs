@@ -91,7 +91,6 @@ const FULL: Plan = Plan {
     cloth: &[
         cloth_of(Solver::Verlet, 5_000, 31),
         cloth_of(Solver::Verlet, 50_000, 15),
-        cloth_of(Solver::Implicit, 5_000, 15),
     ],
     effort: Effort {
         quick: false,
