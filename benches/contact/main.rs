@@ -101,7 +101,7 @@ const FULL: Plan = Plan {
 };
 
 const QUICK: Plan = Plan {
-    pairs: &[1_000, 5_000, 20_000],
+    pairs: &[1_000, 5_000, 12_000],
     tools: &[5_000],
     cloth: &[cloth_of(Solver::Verlet, 5_000, 12)],
     effort: Effort {
