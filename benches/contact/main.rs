@@ -91,7 +91,6 @@ const FULL: Plan = Plan {
     cloth: &[
         cloth_of(Solver::Verlet, 5_000, 31),
         cloth_of(Solver::Verlet, 50_000, 15),
-        cloth_of(Solver::Implicit, 5_000, 15),
     ],
     effort: Effort {
         quick: false,
@@ -102,7 +101,7 @@ const FULL: Plan = Plan {
 };
 
 const QUICK: Plan = Plan {
-    pairs: &[1_000, 5_000, 20_000],
+    pairs: &[1_000, 5_000, 12_000],
     tools: &[5_000],
     cloth: &[cloth_of(Solver::Verlet, 5_000, 12)],
     effort: Effort {
