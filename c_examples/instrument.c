@@ -145,8 +145,8 @@ static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *sha
   CHECK(sinew_body_def_init(&def, sizeof def));
   def.positions = shape->positions, def.node_count = shape->node_count;
   def.tetrahedra = shape->tetrahedra, def.tetrahedron_count = shape->tetrahedron_count;
-  def.material = SINEW_MATERIAL_SPRINGS;
-  def.young_modulus = liver.young_modulus, def.density = liver.density;
+  def.material = SINEW_MATERIAL_TETRAHEDRA;
+  def.young_modulus = liver.young_modulus, def.poisson_ratio = 0.3f, def.density = liver.density;
   def.node_damping = DAMPING;
   CHECK(sinew_body_create(world, &def, &organ));
   for (i = 0; i < shape->node_count; i++) {
@@ -202,8 +202,8 @@ static double between(double a, double b, double share) { return a + (b - a) * s
 
 enum { COME, STROKE, LEAVE, TURN, REACH, CLOSE, RAISE, STAY, LET_GO, BACK, REST, PHASES };
 static const struct { const char *name; double seconds; } phases[PHASES] = {
-    {"come", 0.3}, {"stroke", 1.0}, {"leave", 0.2}, {"turn", 0.4}, {"reach", 0.3}, {"close", 0.8},
-    {"lift", 0.8}, {"stay", 0.5}, {"let go", 0.3}, {"back", 0.3}, {"rest", 0.4}};
+    {"come", 0.3}, {"stroke", 0.8}, {"leave", 0.2}, {"turn", 0.4}, {"reach", 0.3}, {"close", 0.6},
+    {"lift", 0.8}, {"stay", 0.4}, {"let go", 0.3}, {"back", 0.3}, {"rest", 0.3}};
 
 /* Where the forceps is at the end of each phase until it closes: side by side its tips stroke, one above the other they grip. */
 static void make_plan(const sinew_world *world, posture plan[PHASES]) {
