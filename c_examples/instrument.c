@@ -2,9 +2,9 @@
  *
  *   instrument [-o DIRECTORY] [-n FRAMES] [FILE [SCALE]]
  *
- * FILE is a jaw of your own, a closed surface (.stl .obj), SCALE what one of its units is in metres (1; 0.001 for millimetres). It begins
- * at the hinge, in its origin, and reaches along +x with its teeth at y = 0, looking down; the other jaw is the same, turned over. Without
- * a file a jaw is made. Leaves instrument_stroke.png, _grip.png and _lift.png, with a dot where a jaw presses and a line along the force
+ * FILE is a jaw of your own, a closed surface (.stl .obj), SCALE what one of its units is in metres (1; 0.001 for millimetres). It has its
+ * hinge in the origin, reaches along +z and meets the other, which is the same, turned over, at y = 0, lying below. Without a file a jaw is
+ * made. Leaves instrument_stroke.png, _grip.png and _lift.png, with a dot where a jaw presses and a line along the force
  * on it, and instrument.csv in the directory. Fails where the jaws do not touch, hold or let go as they should. */
 #include "example.h"
 
@@ -103,6 +103,7 @@ static forceps create_forceps(sinew_world *world, posture held, const options *c
   sinew_tool_def def;
   sinew_mesh *mesh = NULL;
   sinew_mesh_view shape;
+  float *turned_over = NULL;
   size_t i;
   int jaw;
   made.length = JAW, made.held_count = 0;
@@ -114,9 +115,14 @@ static forceps create_forceps(sinew_world *world, posture held, const options *c
     shape.struct_size = sizeof shape;
     CHECK(sinew_mesh_load(chosen->arguments[0], SINEW_MESH_FORMAT_AUTO, (float)scale, &mesh));
     CHECK(sinew_mesh_get_view(mesh, &shape));
-    def.positions = shape.positions, def.node_count = shape.node_count;
+    turned_over = (float *)allocate(3 * shape.node_count, sizeof(float));
+    for (made.length = 0, i = 0; i < shape.node_count; i++) {
+      const float *from = shape.positions + 3 * i;
+      turned_over[3 * i] = from[2], turned_over[3 * i + 1] = -from[1], turned_over[3 * i + 2] = from[0];
+      made.length = fmax(made.length, from[2]);
+    }
+    def.positions = turned_over, def.node_count = shape.node_count;
     def.triangles = shape.surface, def.triangle_count = shape.surface_triangle_count;
-    for (made.length = 0, i = 0; i < shape.node_count; i++) made.length = fmax(made.length, shape.positions[3 * i]);
   }
   for (jaw = 0; jaw < 2; jaw++) {
     const quaternion q = jaw_pose(held, made.length, jaw, def.position);
@@ -124,7 +130,7 @@ static forceps create_forceps(sinew_world *world, posture held, const options *c
     if (mesh != NULL) CHECK(sinew_tool_create(world, &def, made.jaws + jaw));
     else made.jaws[jaw] = make_jaw(world, &def);
   }
-  sinew_mesh_destroy(mesh);
+  sinew_mesh_destroy(mesh), free(turned_over);
   return made;
 }
 
@@ -139,8 +145,8 @@ static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *sha
   CHECK(sinew_body_def_init(&def, sizeof def));
   def.positions = shape->positions, def.node_count = shape->node_count;
   def.tetrahedra = shape->tetrahedra, def.tetrahedron_count = shape->tetrahedron_count;
-  def.material = SINEW_MATERIAL_SPRINGS;
-  def.young_modulus = liver.young_modulus, def.density = liver.density;
+  def.material = SINEW_MATERIAL_TETRAHEDRA;
+  def.young_modulus = liver.young_modulus, def.poisson_ratio = 0.3f, def.density = liver.density;
   def.node_damping = DAMPING;
   CHECK(sinew_body_create(world, &def, &organ));
   for (i = 0; i < shape->node_count; i++) {
@@ -196,8 +202,8 @@ static double between(double a, double b, double share) { return a + (b - a) * s
 
 enum { COME, STROKE, LEAVE, TURN, REACH, CLOSE, RAISE, STAY, LET_GO, BACK, REST, PHASES };
 static const struct { const char *name; double seconds; } phases[PHASES] = {
-    {"come", 0.3}, {"stroke", 1.0}, {"leave", 0.2}, {"turn", 0.4}, {"reach", 0.3}, {"close", 0.8},
-    {"lift", 0.8}, {"stay", 0.5}, {"let go", 0.3}, {"back", 0.3}, {"rest", 0.4}};
+    {"come", 0.3}, {"stroke", 0.8}, {"leave", 0.2}, {"turn", 0.4}, {"reach", 0.3}, {"close", 0.6},
+    {"lift", 0.8}, {"stay", 0.4}, {"let go", 0.3}, {"back", 0.3}, {"rest", 0.3}};
 
 /* Where the forceps is at the end of each phase until it closes: side by side its tips stroke, one above the other they grip. */
 static void make_plan(const sinew_world *world, posture plan[PHASES]) {
