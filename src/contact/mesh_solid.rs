@@ -38,6 +38,12 @@ enum Found {
 const PIXELS: f32 = 256.0;
 const CELLS: f32 = 96.0;
 
+/// How far beside a feature's deepest point is looked at least, as a part of half the least extent.
+const BESIDE: f32 = 1e-3;
+
+/// The least that a normal looks across a face which it leads out, as a cosine.
+const ACROSS: f32 = 0.2;
+
 /// What rounding may take from a distance to the box, as a part of the largest coordinate.
 const ROUNDING: f32 = 1e-6;
 
@@ -147,7 +153,7 @@ impl MeshSolid {
     fn led_out(&self, corners: &[Vec3], closest: Closest) -> Closest {
         let weighted = corners.iter().zip(closest.weights);
         let point: Vec3 = weighted.map(|(corner, weight)| *corner * weight).sum();
-        let aside = (-0.5 * closest.distance).max(self.grain);
+        let aside = (-0.5 * closest.distance).max(self.grain).max(BESIDE * self.thickness());
         let normal_beside = |way: Vec3| {
             let beside = self.deepest(&[point + way * aside], 2.0 * aside);
             beside.map_or(closest.normal, |beside| beside.normal)
@@ -163,10 +169,17 @@ impl MeshSolid {
             }
         } else {
             let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
-            // What looks across the face the most tells its side.
-            let ways = corners.iter().map(|corner| (*corner - point).normalize_or_zero());
-            let looks = ways.map(|way| normal_beside(way).dot(across));
-            across * looks.fold(closest.normal.dot(across), |most, look| if look.abs() > most.abs() { look } else { most })
+            // What looks across the face the most tells its side; where nothing does, that is not where it came in.
+            let u = (corners[1] - corners[0]).normalize_or_zero();
+            let v = across.cross(u);
+            let ways = [u, u + v, v, v - u, -u, -u - v, -v, u - v];
+            let looks = ways.map(|way| normal_beside(way.normalize_or_zero()).dot(across));
+            let further = |most: f32, look: f32| if look.abs() > most.abs() { look } else { most };
+            let most = looks.into_iter().fold(closest.normal.dot(across), further);
+            if most.abs() < ACROSS {
+                return closest;
+            }
+            across * most
         };
         Closest {
             normal: normal.try_normalize().unwrap_or(closest.normal),
