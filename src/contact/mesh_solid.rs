@@ -60,7 +60,11 @@ impl MeshSolid {
         let grain = if resolution > 0.0 {
             resolution
         } else {
-            let count = if detection == Detection::ImageSpace { PIXELS } else { CELLS };
+            let count = if detection == Detection::ImageSpace {
+                PIXELS
+            } else {
+                CELLS
+            };
             (bounds.max - bounds.min).max_element() / count
         };
         let found = match detection {
@@ -168,7 +172,9 @@ impl MeshSolid {
                 closest.normal - along * closest.normal.dot(along)
             }
         } else {
-            let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+            let across = (corners[1] - corners[0])
+                .cross(corners[2] - corners[0])
+                .normalize_or_zero();
             // What looks across the face the most tells its side; where nothing does, that is not where it came in.
             let u = (corners[1] - corners[0]).normalize_or_zero();
             let v = across.cross(u);
