@@ -232,7 +232,7 @@ fn carried_past(world: &World, cloth: BodyId, first: &Mesh, point: DVec3) -> f64
     let nodes = body(world, cloth).positions();
     let row = CELLS + 1;
     let (mut rim, last) = (Vec::new(), row - 1);
-    rim.extend((0..last));
+    rim.extend(0..last);
     rim.extend((0..last).map(|i| i * row + last));
     rim.extend((0..last).map(|i| last * row + last - i));
     rim.extend((0..last).map(|i| (last - i) * row));
