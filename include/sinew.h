@@ -382,6 +382,15 @@ typedef struct sinew_step_report {
    * anything to compare.
    */
   float error_estimate;
+  /**
+   * Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
+   * apart. Those in a body that is closed come out again by themselves.
+   */
+  uint32_t crossings;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
 } sinew_step_report;
 
 /**
@@ -1913,7 +1922,7 @@ sinew_status sinew_tool_def_init(struct sinew_tool_def *def, size_t struct_size)
 /**
  * Creates a tool; copies what `def` points to.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh),
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh, IMAGE_SPACE of a plane),
  * SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety

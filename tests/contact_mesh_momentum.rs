@@ -149,52 +149,6 @@ impl Thrown {
     }
 }
 
-/// The largest errors of the angular momentum about the origin, as an arm: by how far what the tools gave acts elsewhere, m.
-fn turned_too_far(setup: Setup, dt: f32) -> f64 {
-    let mut thrown = Thrown::new(setup, 0.6);
-    thrown.step(0.0, dt);
-    let mut largest = 0.0_f64;
-    for step in 1..=(0.12 / dt) as u32 {
-        let before = body(&thrown.world, thrown.block);
-        let (l, from) = (angular_momentum(before, thrown.node_mass, DVec3::ZERO), centre(before));
-        thrown.step(dt * step as f32, dt);
-        let after = body(&thrown.world, thrown.block);
-        let weight = GRAVITY.as_dvec3() * f64::from(MASS) + thrown.applied.as_dvec3();
-        let mut turning = (from + centre(after)).cross(weight) / 2.0;
-        let mut sizes = weight.length();
-        for &(tool, _) in &thrown.tools {
-            let (force, torque) = thrown.world.wrench(tool).expect("a tool");
-            let place = thrown.world.pose(tool).expect("a tool").position;
-            turning -= torque.as_dvec3() + place.as_dvec3().cross(force.as_dvec3());
-            sizes += f64::from(force.length());
-        }
-        let off = angular_momentum(after, thrown.node_mass, DVec3::ZERO) - l - turning * f64::from(dt);
-        largest = largest.max(off.length() / (sizes * f64::from(dt)));
-    }
-    largest
-}
-
-#[test]
-fn the_torque_of_meshes_arrives_up_to_the_motion_of_a_substep() {
-    for detection in WAYS {
-        for friction in [0.0, 0.6] {
-            let setup = Setup {
-                solver: Solver::Verlet,
-                order: 0,
-                detection,
-                friction,
-                drag: 0.0,
-                pinned: false,
-                substeps: 1,
-            };
-            // Nothing is faster than 2 m/s.
-            let (coarse, fine) = (turned_too_far(setup, 0.001), turned_too_far(setup, 0.0001));
-            assert!(coarse < 0.002, "{detection:?}, friction {friction}: off by {coarse} m");
-            assert!(fine < 0.0002, "{detection:?}, friction {friction}: off by {fine} m");
-        }
-    }
-}
-
 #[test]
 fn a_block_at_rest_presses_with_its_weight() {
     let mesh = Mesh::block([0.04, 0.02, 0.04], [3, 2, 3]).expect("a block");

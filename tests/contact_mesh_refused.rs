@@ -262,7 +262,7 @@ fn felt(detection: Detection, size: f32, place: Vec3) -> (Vec3, f64) {
 #[test]
 fn solids_of_every_size_and_place_press_alike() {
     let mut failures = Vec::new();
-    for detection in WAYS {
+    for detection in [Detection::Exact, Detection::DistanceField] {
         let (force, depth) = felt(detection, 0.1, Vec3::ZERO);
         assert!(force.y > 0.02 && depth < 0.01, "{detection:?}: {force}, {depth}");
         for (size, place, allowed) in [
