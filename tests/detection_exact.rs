@@ -134,7 +134,8 @@ fn real_meshes() {
         .map(|above| above.join("shared/meshes"))
         .find(|folder| folder.is_dir())
     else {
-        eprintln!("SKIPPED: ../shared/meshes is missing");
+        use std::io::Write;
+        let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes is missing");
         return;
     };
     for (name, scale) in [

@@ -39,7 +39,7 @@ const FIELD_OFF: f64 = 0.5;
 /// A tool in one of the ways.
 enum Tool {
     Exact(Box<Exact>),
-    Image(LayeredImage),
+    Image(Box<LayeredImage>),
     Field(DistanceField),
 }
 
@@ -201,7 +201,9 @@ fn make(scene: &Scene) -> Vec<Made> {
         let name = format!("IMAGE_SPACE, 1/{pixels}");
         add(name, "IMAGE_SPACE", 1.0 / f64::from(pixels), IMAGE_OFF, &|| {
             let pixel = width / pixels as f32;
-            Tool::Image(LayeredImage::new(&ring.positions, &ring.triangles, pixel).expect("an image"))
+            Tool::Image(Box::new(
+                LayeredImage::new(&ring.positions, &ring.triangles, pixel).expect("an image"),
+            ))
         });
     }
     let few = if ring.triangles.len() > LARGE { 2 } else { CELLS.len() };

@@ -31,7 +31,7 @@ pub(crate) struct MeshSolid {
 enum Found {
     Exact(Box<ExactSolid>),
     Field(Box<DistanceField>),
-    Image(LayeredImage),
+    Image(Box<LayeredImage>),
 }
 
 /// The longest extent is this many pixels or cells, where it is not said how fine an image or a field is.
@@ -71,7 +71,7 @@ impl MeshSolid {
             Detection::Exact => Found::Exact(Box::new(ExactSolid::new(&surface)?)),
             Detection::ImageSpace => {
                 let image = LayeredImage::new(surface.positions(), surface.triangles(), grain)?;
-                Found::Image(image)
+                Found::Image(Box::new(image))
             }
             Detection::DistanceField => {
                 let field = DistanceField::of(&ExactSolid::new(&surface)?, grain)?;

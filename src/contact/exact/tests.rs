@@ -45,7 +45,7 @@ pub(in crate::contact) fn sphere(rings: u32) -> ClosedSurface {
     let bands = rings / 2;
     let angle = |index: u32| std::f32::consts::PI * (index as f32 / bands as f32 - 0.5);
     let at = |index: u32| {
-        let radius = if index % bands == 0 {
+        let radius = if index.is_multiple_of(bands) {
             0.0
         } else {
             0.05 * angle(index).cos()
