@@ -498,7 +498,7 @@ static void tool_definitions(void)
     TOOL(SPHERE, INVALID, "shape", def.shape = UINT32_MAX);
     TOOL(SPHERE, INVALID, "detection", def.detection = 3);
     TOOL(SPHERE, INVALID, "detection", def.detection = UINT32_MAX);
-    TOOL(SPHERE, UNSUPPORTED, "detection", def.detection = SINEW_DETECTION_IMAGE_SPACE);
+    TOOL(PLANE, UNSUPPORTED, "detection", def.detection = SINEW_DETECTION_IMAGE_SPACE);
     TOOL(SPHERE, UNSUPPORTED, "detection", def.detection = SINEW_DETECTION_DISTANCE_FIELD);
     for (i = 0; i < OR_ZERO; i++) {
         TOOL(SPHERE, INVALID, "radius", def.radius = bad[i]);
