@@ -32,6 +32,8 @@ struct Hold {
     stiffness: f64,
     /// N
     multiplier: f64,
+    /// What part of its force becomes its multiplier: less than 1 where it gives way, as what holds nodes leaves them no way out.
+    kept: f64,
     /// Whether it may pull: where it pushed before, the first solution takes it for one that goes on, though a node that were left
     /// alone might go away from the tool for once.
     holds_on: bool,
@@ -176,6 +178,7 @@ impl Holds {
                 least: -f64::from(constraint.depth.max(0.0)),
                 stiffness: 0.0,
                 multiplier: 0.0,
+                kept: f64::from(1.0 - constraint.give),
                 holds_on: false,
                 answer: Answer::default(),
             };
@@ -191,13 +194,13 @@ impl Holds {
                     corner,
                 });
             }
-            let stiffness = STIFFER / softness;
+            let stiffness = STIFFER * constraint.firmness / softness;
             if stiffness.is_finite() {
                 hold.stiffness = f64::from(stiffness);
             }
             let key = (slot_of(constraint.tool), constraint.feature);
             if let Ok(place) = self.last.binary_search_by_key(&key, Push::key) {
-                hold.multiplier = self.last[place].force;
+                hold.multiplier = hold.kept * self.last[place].force;
                 hold.holds_on = true;
             }
             self.holds.push(hold);
@@ -234,7 +237,7 @@ impl Holds {
         let (mut missing, mut all) = (0.0, 0.0);
         for hold in &self.holds {
             let better = Hold {
-                multiplier: hold.answer.force,
+                multiplier: hold.kept * hold.answer.force,
                 ..*hold
             };
             let force = better.answer_to(&push_of).force;
@@ -249,7 +252,7 @@ impl Holds {
     pub fn improve(&mut self, push_of: impl Fn(usize) -> DVec3, mut add: impl FnMut(usize, DVec3)) {
         for hold in &mut self.holds {
             let before = hold.answer.force;
-            hold.multiplier = before;
+            hold.multiplier = hold.kept * before;
             hold.answer = hold.answer_to(&push_of);
             hold.share_out(&hold.answer, hold.answer.force - before, &mut add);
         }
