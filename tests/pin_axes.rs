@@ -646,10 +646,8 @@ fn a_tool_moves_what_is_free_to_move() {
                 let wrench = wrench.as_dvec3();
                 momentum -= wrench.x * f64::from(dt);
                 let error = (0.5 * scene.velocities()[0].x - momentum).abs();
-                // The equation of IMPLICIT is solved to a hundred-thousandth.
-                let allowed = if solver == Solver::Implicit { 1e-5 } else { 1e-6 };
                 assert!(
-                    error < allowed,
+                    error < 1e-6,
                     "{solver:?}, {axes:?}, {aside}, step {step}: {error:.2e} N s"
                 );
                 let held = DVec3::select(BVec3::from(axes), wrench, DVec3::ZERO);

@@ -15,8 +15,8 @@ use super::gauge::{Gauge, Meets};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 
-/// How much stiffer a contact is than its nodes.
-const STIFFER: f32 = 10.0;
+/// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
+const STIFFER: f32 = 3.0;
 
 /// A contact as the equation sees it.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +39,8 @@ struct Hold {
     holds_on: bool,
     /// What acts on the tissue with the nodes where they were last.
     answer: Answer,
+    /// Whether it pushed when it was last asked.
+    pushed: bool,
 }
 
 /// What a contact does.
@@ -181,6 +183,7 @@ impl Holds {
                 kept: f64::from(1.0 - constraint.give),
                 holds_on: false,
                 answer: Answer::default(),
+                pushed: false,
             };
             let mut softness = 0.0;
             for (corner, &node) in constraint.feature.nodes().iter().enumerate() {
@@ -264,6 +267,17 @@ impl Holds {
         let off: f64 = pressed().map(|hold| hold.weighted(&residual_of).abs()).sum();
         let all: f64 = pressed().map(|hold| hold.answer.force).sum();
         if all > 0.0 { off / all } else { 0.0 }
+    }
+
+    /// Whether others push than when this was last asked: then the equation is another one.
+    pub fn have_changed(&mut self) -> bool {
+        let mut changed = false;
+        for hold in &mut self.holds {
+            let pushes = hold.answer.force != 0.0;
+            changed |= pushes != hold.pushed;
+            hold.pushed = pushes;
+        }
+        changed
     }
 
     /// Whether a contact pushes.
