@@ -41,7 +41,9 @@ pub(super) struct Constraint {
     /// The least that it moves along any direction.
     free_mass: f32,
     /// How far the contact gives way, 0 to 1: 0 but near pinned nodes, where it would fling away the free ones.
-    give: f32,
+    pub give: f32,
+    /// What part of the impulse that would stop the contact it gives at a time: 1 where it does not give way.
+    pub firmness: f32,
     /// What it has given so far, N s, at least 0.
     impulse: f32,
     /// What friction has given so far, N s.
@@ -94,6 +96,7 @@ impl Constraint {
             effective_mass: fading / inverse_mass,
             free_mass: 1.0 / leverage.max(free),
             give: 1.0 - rigid / inverse_mass,
+            firmness: fading * rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
             rounded: None,

@@ -423,7 +423,7 @@ impl Contacts {
                 }
             }
             Solid::Rounded { .. } => {
-                let segment = motion.segment(slice.duration, meeting.drifts);
+                let segment = motion.segment(meeting.drifts);
                 if feature.nodes().len() == 3 && !segment.is_point() {
                     for end in 0..2 {
                         let found = meet_rounded(meeting, slice, motion, feature, &segment.end(end));
