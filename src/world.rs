@@ -15,7 +15,7 @@ use crate::solver::{
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
 use attachments::Attachment;
-pub use attachments::{AttachmentId, SurfacePoint};
+pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
@@ -178,8 +178,7 @@ impl World {
         if !body.meets_tissue() {
             return Ok(());
         }
-        self.walks.try_reserve((place + 1).saturating_sub(self.walks.len()))?;
-        self.walks.resize((place + 1).max(self.walks.len()), None);
+        make_walks(&mut self.walks, place)?;
         self.tissue.get_or_insert_default().join(place, body)
     }
 
@@ -189,10 +188,10 @@ impl World {
     /// [`Error::StaleId`].
     pub fn destroy_body(&mut self, body: BodyId) -> Result<()> {
         let place = self.bodies.place(body.0)?;
-        if let Some(tissue) = &mut self.tissue {
-            tissue.leave(place);
-        }
         self.bodies.remove(body.0)?;
+        if let Some(tissue) = &mut self.tissue {
+            tissue.leave(&mut self.bodies, place);
+        }
         self.forget_attachments_of(body);
         Ok(())
     }
@@ -222,8 +221,9 @@ impl World {
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of its range, or a part is pulled by a net force
-    /// along an axis along which no pin holds it. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// along an axis along which no pin holds it, or the body is attached to a body. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
+        self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
         rest_state(self.bodies.get_mut(body.0)?, gravity, definition)
     }
@@ -428,6 +428,9 @@ impl World {
             commit_bodies(bodies, outcomes, paths, team)
         });
         self.commit_tools(dt);
+        if let Some(tissue) = &mut self.tissue {
+            tissue.bonds.commit(&self.outcomes, dt);
+        }
         self.end_slipped();
         report
     }
@@ -502,6 +505,9 @@ impl World {
             hasher.write_u64(place as u64);
             tool.hash_state(&mut hasher);
         }
+        if let Some(tissue) = &self.tissue {
+            tissue.bonds.hash(&mut hasher);
+        }
         hasher.finish()
     }
 
@@ -526,6 +532,13 @@ impl World {
             }
         }
     }
+}
+
+/// Makes room for the body at this place to take its substeps together with others.
+fn make_walks(walks: &mut Vec<Option<Walk>>, place: usize) -> Result<()> {
+    walks.try_reserve((place + 1).saturating_sub(walks.len()))?;
+    walks.resize((place + 1).max(walks.len()), None);
+    Ok(())
 }
 
 /// What the step would come to where a body cannot take it.

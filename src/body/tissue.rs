@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 
-use super::Body;
+use super::{Body, Vectors};
 use crate::contact::Moment;
 use crate::error::Result;
+use crate::solver::close;
 
 impl Body {
     /// Whether it meets other bodies, or itself, and has something to meet with.
@@ -37,6 +38,69 @@ impl Body {
             let led = state.next_positions.get(node);
             let moved = state.positions.get(node) + velocity * moment.duration;
             state.next_positions.set(node, Vec3::select(held, led, moved));
+        }
+    }
+
+    /// Makes room for forces on nodes that are attached, and begins what these do anew.
+    pub(crate) fn begin_bonds(&mut self) -> Result<()> {
+        if self.applied.is_none() {
+            self.applied = Some(Vectors::zeros(self.node_count())?);
+        }
+        close(self);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+        }
+        Ok(())
+    }
+
+    /// Its own number of a node.
+    pub(crate) fn own_node(&self, node: u32) -> u32 {
+        self.order.own(node)
+    }
+
+    /// How much faster a node becomes for an impulse, along each axis, 1/kg.
+    pub(crate) fn answer_of(&self, node: u32) -> Vec3 {
+        let held = self.pins.axes_of(node);
+        Vec3::select(held, Vec3::ZERO, Vec3::splat(self.inverse_masses[node as usize]))
+    }
+
+    /// How fast a node goes on its way in a substep, m/s.
+    pub(crate) fn mean_velocity(&mut self, node: usize) -> Vec3 {
+        match &self.implicit {
+            None => self.state.substep().velocities.get(node),
+            Some(implicit) => implicit.mean(node),
+        }
+    }
+
+    /// Has this force act on a node, N, instead of what was applied to it.
+    pub(crate) fn load(&mut self, node: usize, force: Vec3) {
+        if let Some(applied) = &mut self.applied {
+            applied.set(node, force);
+            self.forces_applied = true;
+        }
+    }
+
+    /// Gives a node that is attached this mean velocity, m/s, in a substep: it has received `impulse` in all, N s, which a pinned node hands on.
+    pub(crate) fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+        let held = self.pins.axes_of(node as u32);
+        if let Some(pin) = self.pins.get_mut(node as u32) {
+            pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
+        }
+        if self.inverse_masses[node] == 0.0 {
+            return;
+        }
+        let given = Vec3::select(held, Vec3::ZERO, velocity - self.mean_velocity(node));
+        if given == Vec3::ZERO {
+            return;
+        }
+        if let Some(implicit) = &mut self.implicit {
+            implicit.draw(node, given, moment.duration);
+        }
+        let state = self.state.substep();
+        state.velocities.set(node, state.velocities.get(node) + given);
+        if moment.drifts {
+            let way = given * moment.duration;
+            state.next_positions.set(node, state.next_positions.get(node) + way);
         }
     }
 

@@ -47,6 +47,7 @@ pub(crate) fn attempt_together(
     if substeps == 0 {
         return;
     }
+    tissue.bonds.attempt(bodies);
     let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
     let mut stable_substep = f32::INFINITY;
     let mut is_taken = false;
@@ -67,6 +68,7 @@ pub(crate) fn attempt_together(
             }
         }
     }
+    tissue.bonds.unload(bodies);
     for (place, (walk, outcome)) in walks.iter().zip(outcomes).enumerate() {
         let (Some(walk), Some(body)) = (walk, bodies.at(place)) else {
             continue;
@@ -119,6 +121,7 @@ fn go(
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
     let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
     let gravity = request.gravity.as_dvec3();
+    tissue.bonds.begin();
     each(bodies, walks, |_, body, walk| {
         walk.carry = walk.start;
         if body.implicit.is_some() {
@@ -140,6 +143,7 @@ fn go(
         drifts: true,
     };
     for index in 0..substeps {
+        tissue.bonds.load(bodies, false);
         each(bodies, walks, |_, body, walk| {
             if body.implicit.is_some() {
                 let is_fine = next_part(body, request, [index, substeps], is_last, team);
@@ -175,6 +179,7 @@ fn go(
         })?;
     }
     moment.drifts = false;
+    tissue.bonds.load(bodies, true);
     each(bodies, walks, |_, body, walk| {
         if body.implicit.is_some() {
             return Ok(());
@@ -185,7 +190,10 @@ fn go(
         check_beside_springs(body, substep)
     })?;
     tissue.meet_together(bodies, &moment);
-    Ok(())
+    each(bodies, walks, |_, body, _| {
+        body.feel_what_grasps_handed_on(request.tools);
+        Ok(())
+    })
 }
 
 /// Does something with each body that is on its way.

@@ -5,10 +5,12 @@
 //! (sequential impulses, Catto 2005, on the pairs of Bridson, Fedkiw, Anderson 2002: nodes with faces, edges with edges). Both sides get the same
 //! impulse, with opposite signs, in the same place: no momentum is made.
 
+mod bonds;
 mod link;
 mod search;
 mod skin;
 
+pub(crate) use self::bonds::{Bonds, Corner};
 use self::link::Link;
 use self::search::{Party, Search};
 use self::skin::Skin;
@@ -64,6 +66,8 @@ pub(crate) struct Tissue {
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
+    /// What is attached.
+    pub bonds: Bonds,
 }
 
 impl Tissue {
@@ -85,7 +89,8 @@ impl Tissue {
     }
 
     /// A body is gone.
-    pub fn leave(&mut self, place: usize) {
+    pub fn leave(&mut self, bodies: &mut Slots<Body>, place: usize) {
+        self.bonds.leave(bodies, place);
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }
@@ -146,11 +151,12 @@ impl Tissue {
     /// Whether the body at a place takes its substeps together with others.
     pub fn goes_together(&self, place: usize) -> bool {
         let skin = self.skins.get(place).and_then(Option::as_ref);
-        skin.is_some_and(|skin| skin.goes_together)
+        skin.is_some_and(|skin| skin.goes_together) || self.bonds.concern(place)
     }
 
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
     pub fn velocities(&self, place: usize, before: Bounds) -> Bounds {
+        let before = self.bonds.velocities(place, before);
         match self.skins.get(place) {
             Some(Some(skin)) => before.and(&skin.given),
             _ => before,
@@ -168,6 +174,7 @@ impl Tissue {
                 skin.follow(body, moment.duration);
             }
         }
+        self.bonds.follow(bodies, &self.skins, moment);
         self.solve(bodies, moment);
         for link in &self.links {
             for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
@@ -180,8 +187,10 @@ impl Tissue {
                 }
             }
         }
+        self.bonds.give(bodies, &self.skins, moment);
         if moment.drifts {
             self.part(bodies, Body::part_substep);
+            self.bonds.part(bodies, moment.duration);
         }
     }
 
@@ -191,12 +200,12 @@ impl Tissue {
         for search in 0..SEARCHES {
             let known = self.links.len();
             self.find(bodies, moment);
-            if self.links.len() == known {
+            if self.links.len() == known && (search > 0 || self.bonds.is_empty()) {
                 break;
             }
             for sweep in 0..SWEEPS {
                 let changes = self.links.iter_mut().map(|link| link.solve(&mut self.skins));
-                let largest = changes.fold(0.0, f32::max);
+                let largest = changes.fold(0.0, f32::max).max(self.bonds.sweep(&mut self.skins));
                 if search == 0 && sweep == 0 {
                     first = largest;
                 }
@@ -221,7 +230,10 @@ impl Tissue {
     /// Adds the contacts that are not known yet, of those that meet.
     fn find(&mut self, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
-            skins, links, known, ..
+            skins,
+            links,
+            known,
+            bonds,
         } = self;
         let key = |link: &Link| link.sides.map(|side| side.key());
         known.clear();
@@ -254,7 +266,7 @@ impl Tissue {
                     let is_known = known
                         .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
                         .is_ok();
-                    if is_known || links.len() == links.capacity() {
+                    if is_known || links.len() == links.capacity() || bonds.join(&touch.sides) {
                         return;
                     }
                     let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });

@@ -110,6 +110,8 @@ pub(crate) struct Implicit {
     settled: usize,
     /// How the last equation that was solved makes velocities of what forces do.
     taken: Formula,
+    /// How long the substep that was just solved is, s.
+    latest: f32,
     /// s: what forces do within the step, m.
     pushes: Vectors,
     /// Where there are tools: how fast nodes go on their way, m/s.
@@ -200,6 +202,7 @@ impl Implicit {
             ],
             settled: 0,
             taken: Formula::new(1, 0.0, 0.0),
+            latest: 0.0,
             pushes: Vectors::zeros(node_count)?,
             means: None,
             corrections: vectors()?,

@@ -498,6 +498,7 @@ impl Substep<'_> {
     /// Makes velocities and history of what was found; whether all is finite.
     fn finish(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
         implicit.taken = self.formula;
+        implicit.latest = self.step as f32;
         let node_count = body.node_count();
         let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;
