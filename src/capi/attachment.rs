@@ -212,7 +212,10 @@ pub unsafe extern "C" fn sinew_body_attach_nodes_to_points(
             let names = ["other_triangles", "other_weights"];
             let points = anchors_of_points(names, other_triangles, other_weights, count)?;
             let out = memory::output_array("out", out, count)?;
-            write(out, world.attach_to_body(body.id(), &nodes, other.id(), &points, force_limit)?);
+            write(
+                out,
+                world.attach_to_body(body.id(), &nodes, other.id(), &points, force_limit)?,
+            );
             Ok(())
         })
     }
@@ -245,7 +248,10 @@ pub unsafe extern "C" fn sinew_body_attach_points_to_points(
             let names = ["other_triangles", "other_weights"];
             let others = anchors_of_points(names, other_triangles, other_weights, count)?;
             let out = memory::output_array("out", out, count)?;
-            write(out, world.attach_to_body(body.id(), &points, other.id(), &others, force_limit)?);
+            write(
+                out,
+                world.attach_to_body(body.id(), &points, other.id(), &others, force_limit)?,
+            );
             Ok(())
         })
     }

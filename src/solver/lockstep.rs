@@ -48,6 +48,7 @@ pub(crate) fn attempt_together(
         return;
     }
     tissue.bonds.attempt(bodies);
+    substeps = substeps.max(tissue.bonds.substeps(bodies, request.dt));
     let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
     let mut stable_substep = f32::INFINITY;
     let mut is_taken = false;
@@ -143,7 +144,7 @@ fn go(
         drifts: true,
     };
     for index in 0..substeps {
-        tissue.bonds.load(bodies, false);
+        tissue.bonds.load(bodies);
         each(bodies, walks, |_, body, walk| {
             if body.implicit.is_some() {
                 let is_fine = next_part(body, request, [index, substeps], is_last, team);
@@ -179,7 +180,7 @@ fn go(
         })?;
     }
     moment.drifts = false;
-    tissue.bonds.load(bodies, true);
+    tissue.bonds.load(bodies);
     each(bodies, walks, |_, body, walk| {
         if body.implicit.is_some() {
             return Ok(());

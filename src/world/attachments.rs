@@ -190,8 +190,8 @@ impl World {
     /// `force_limit`, N: an attachment ends with the step in which its mean force was larger ([`World::slipped`]); 0 or infinite: it holds
     /// whatever comes. [`World::attachment_force`] has the force on `body`. An attachment ends with either body.
     ///
-    /// Sequential impulses (Catto 2005), what they came to in the last substep being a force in the kick or in the equation of the next
-    /// (van Kan 1986).
+    /// Sequential impulses (Catto 2005): between bodies of [`Solver::Verlet`](crate::Solver::Verlet) SHAKE (Ryckaert, Ciccotti, Berendsen
+    /// 1977), with the other solvers a projection (Chorin 1968), for which substeps become shorter under load, down to 0.25 ms.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node or triangle, weights are negative, not finite or not 1 in sum,
@@ -352,7 +352,8 @@ impl World {
 
     /// A body is gone, and with it what is attached of it.
     pub(super) fn forget_attachments_of(&mut self, body: BodyId) {
-        self.attachments.retain(|attachment| attachment.body != body && attachment.holder != Holder::Body(body));
+        self.attachments
+            .retain(|attachment| attachment.body != body && attachment.holder != Holder::Body(body));
     }
 
     /// A tool is gone: lets go of what is attached to it.

@@ -1,9 +1,13 @@
 //! Tissue that is attached to tissue: a point of one body kept at a point of another, or of the same.
 //!
-//! The bodies take their substeps together. In each, impulses make the mean velocities of both points equal (sequential impulses, Catto 2005;
-//! for VERLET, whose ways are straight, that is SHAKE: Ryckaert, Ciccotti, Berendsen 1977). What they came to in the substep before is
-//! foreseen: it acts as a force within the kick of VERLET and within the equation of the other solvers, and the impulses are but what that
-//! lacks, as in the incremental projection of flows (van Kan 1986). So at rest nothing is left to be corrected, however stiff tissue is.
+//! The bodies take their substeps together. In each, impulses make the mean velocities of both points equal (sequential impulses, Catto 2005).
+//!
+//! Between bodies of VERLET that is SHAKE (Ryckaert, Ciccotti, Berendsen 1977), and as stable as they are by themselves. What the impulses
+//! came to in the last substep is foreseen: it acts as a force in the next kick, so that velocities at the time of the positions, which
+//! damping along springs needs, are those of nodes that are held. Where that force entered the equation of an implicit solver its lag would
+//! be fed by stiff tissue, and grow; there the impulses are a projection of what was found (Chorin 1968), which only takes energy. Such an
+//! equation does not know what the point is to carry, and leaves it off by `force time^2 / mass` until the projection: so heavier loads
+//! ask for shorter substeps.
 
 use glam::{DVec3, Vec3};
 
@@ -23,6 +27,10 @@ const LARGEST_PART: f64 = 0.2;
 
 /// Sweeps over what is apart.
 const SWEEPS: u32 = 8;
+
+/// How far an equation may leave a point off, as a part of a body's extent, where substeps need not be shorter than this for it, s.
+const LEFT_OFF: f32 = 1e-3;
+const SHORTEST: f64 = 0.25e-3;
 
 /// Velocities that differ by less than this part of themselves are equal.
 const ROUNDING: f32 = 2e-7;
@@ -55,9 +63,8 @@ struct Bond {
     /// The mean force on it over the last step, N.
     mean: Vec3,
     // The step in progress.
-    /// The force that this substep foresees, and that which the first did, N.
+    /// The force that this substep foresees, N; none where a body is not moved by VERLET.
     load: Vec3,
-    first_load: Vec3,
     /// What was given beside that in this substep, N s, and all in the step.
     impulse: Vec3,
     sum: DVec3,
@@ -67,8 +74,8 @@ struct Bond {
     gap: DVec3,
     /// Whether it acts in this moment.
     acts: bool,
-    /// Whether a body at it is moved by VERLET, and whether one is not.
-    of_solvers: [bool; 2],
+    /// Whether a body at it is not moved by VERLET.
+    is_implicit: bool,
 }
 
 /// A node at which bonds are.
@@ -110,14 +117,14 @@ impl Bond {
         self.used().any(|corner| corner.body == body)
     }
 
-    fn is_mixed(&self) -> bool {
-        self.of_solvers[0] && self.of_solvers[1]
-    }
-
     /// How long forces act in this moment, s.
     fn duration(&self, moment: &Moment, is_opening: bool) -> f32 {
-        let is_half = !self.of_solvers[1] && (is_opening || !moment.drifts);
-        if is_half { 0.5 * moment.duration } else { moment.duration }
+        let is_half = !self.is_implicit && (is_opening || !moment.drifts);
+        if is_half {
+            0.5 * moment.duration
+        } else {
+            moment.duration
+        }
     }
 }
 
@@ -143,13 +150,12 @@ impl Bonds {
             foreseen: Vec3::ZERO,
             mean: Vec3::ZERO,
             load: Vec3::ZERO,
-            first_load: Vec3::ZERO,
             impulse: Vec3::ZERO,
             sum: DVec3::ZERO,
             masses: Vec3::ZERO,
             gap: DVec3::ZERO,
             acts: false,
-            of_solvers: [false; 2],
+            is_implicit: false,
         };
         memory::push(&mut self.bonds, bond)?;
         for corner in bond.used() {
@@ -249,17 +255,15 @@ impl Bonds {
             }
             hasher.write_floats(&[bond.limit]);
             hasher.write_floats(&bond.foreseen.to_array());
+            hasher.write_floats(&bond.mean.to_array());
         }
     }
 
     /// Begins to attempt a step, which may be taken several times, until [`Self::unload`].
     pub fn attempt(&mut self, bodies: &Slots<Body>) {
         for bond in &mut self.bonds {
-            bond.of_solvers = [false; 2];
-            for corner in bond.used() {
-                let is_implicit = bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
-                bond.of_solvers[usize::from(is_implicit)] = true;
-            }
+            let is_implicit = |corner: Corner| bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
+            bond.is_implicit = bond.used().any(is_implicit);
         }
         for end in &mut self.ends {
             if let Some(body) = bodies.at(end.body) {
@@ -277,24 +281,36 @@ impl Bonds {
         self.is_opening = true;
         for bond in &mut self.bonds {
             bond.load = bond.foreseen;
-            bond.first_load = bond.foreseen;
             bond.sum = DVec3::ZERO;
         }
     }
 
-    /// Has the forces that are foreseen act in what follows: the last half kick of a step or another.
-    pub fn load(&mut self, bodies: &mut Slots<Body>, is_closing: bool) {
+    /// How many substeps a step of `dt` seconds takes at least.
+    pub fn substeps(&self, bodies: &Slots<Body>, dt: f32) -> u32 {
+        let mut longest = f64::INFINITY;
+        for bond in self.bonds.iter().filter(|bond| bond.is_implicit) {
+            let (mut answer, mut extent) = (0.0, f32::INFINITY);
+            for corner in bond.used() {
+                if let Some(body) = bodies.at(corner.body) {
+                    answer += body.inverse_masses[corner.node as usize] * corner.weight * corner.weight;
+                    extent = extent.min(body.extent());
+                }
+            }
+            let square = LEFT_OFF * extent / (bond.mean.length() * answer);
+            if square.is_finite() {
+                longest = longest.min(f64::from(square).sqrt().max(SHORTEST));
+            }
+        }
+        (f64::from(dt) / longest).ceil().clamp(1.0, f64::from(u32::MAX / 4)) as u32
+    }
+
+    /// Has the forces that are foreseen act in what follows.
+    pub fn load(&mut self, bodies: &mut Slots<Body>) {
         self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
         let Self { bonds, ends, .. } = self;
-        for bond in bonds {
-            // A body of VERLET gets half of the first in the first half kick: so both get the same over the step.
-            let load = if is_closing && bond.is_mixed() {
-                bond.first_load
-            } else {
-                bond.load
-            };
+        for bond in bonds.iter().filter(|bond| !bond.is_implicit) {
             for corner in bond.used() {
-                ends[corner.end].given += load * corner.weight;
+                ends[corner.end].given += bond.load * corner.weight;
             }
         }
         for end in ends {
@@ -324,10 +340,10 @@ impl Bonds {
             end.is_on_skin = moment.concerns(body)
                 && skin.is_some_and(|skin| skin.goes_together && skin.nodes.binary_search(&end.node).is_ok());
             end.velocity = body.mean_velocity(end.node as usize);
-            end.answer = body.answer_of(end.node);
+            end.answer = body.answer_of(end.node) * body.left_by_damping(end.node, moment);
         }
         for bond in &mut self.bonds {
-            bond.acts = moment.drifts || !bond.of_solvers[1];
+            bond.acts = moment.drifts || !bond.is_implicit;
             bond.impulse = Vec3::ZERO;
             let corners = bond.used();
             let whole: Vec3 = corners
@@ -374,11 +390,13 @@ impl Bonds {
         for bond in bonds.iter_mut().filter(|bond| bond.acts) {
             let duration = bond.duration(moment, *is_opening);
             let all = bond.load * duration + bond.impulse;
+            if !bond.is_implicit {
+                bond.load += bond.impulse / duration;
+            }
             for corner in bond.used() {
                 ends[corner.end].given += all * corner.weight;
             }
             bond.sum += all.as_dvec3();
-            bond.load += bond.impulse / duration;
         }
         for end in ends {
             if let Some(body) = bodies.at_mut(end.body)

@@ -195,11 +195,10 @@ impl Implicit {
         history.ways.get(node) / self.latest
     }
 
-    /// What it is attached to has a node go so much faster in a substep of `duration` seconds: a gain as others are.
+    /// What it is attached to has a node go so much faster in a substep of `duration` seconds: no gain that will go on.
     pub fn draw(&mut self, node: usize, given: Vec3, duration: f32) {
         let history = &mut self.histories[1 - self.settled];
         history.ways.set(node, history.ways.get(node) + given * duration);
-        history.gains.set(node, history.gains.get(node) + given);
         history.energy = None;
     }
 
