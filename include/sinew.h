@@ -651,6 +651,40 @@ typedef struct sinew_body_def {
    * enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
    */
   float pressure;
+  /**
+   * m, at least 0: what tools and other tissue keep off the surface; default 0.
+   */
+  float contact_thickness;
+  /**
+   * Coulomb coefficient with other tissue and with itself, at least 0; of two bodies that meet, the larger holds; default 0. With tools
+   * the tool's own holds.
+   */
+  float contact_friction;
+  /**
+   * 1: it meets other bodies that have 1 here; 0, the default: it does not.
+   */
+  uint32_t meets_bodies;
+  /**
+   * 1: it meets itself; 0, the default: it does not.
+   */
+  uint32_t meets_itself;
+  /**
+   * How it finds other bodies: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE; exactly where one of two asks for that.
+   */
+  uint32_t contact_detection;
+  /**
+   * IMAGE_SPACE: m, the side of a pixel; 0, the default: chosen from the body.
+   */
+  float contact_resolution;
+  /**
+   * The categories that it belongs to, a bit for each; default 1. It meets tools and bodies where each has a category that the other's
+   * mask has.
+   */
+  uint32_t collision_category;
+  /**
+   * The categories that it meets, a bit for each; default 0xffffffff.
+   */
+  uint32_t collision_mask;
 } sinew_body_def;
 
 /**
@@ -960,6 +994,24 @@ typedef struct sinew_tool_def {
    * 0.
    */
   uint32_t reserved;
+  /**
+   * How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: chosen from the mesh.
+   */
+  float resolution;
+  /**
+   * N, at least 0: the largest force that moves it; default infinity: it goes wherever it is sent. Where tissue resists with more it stops
+   * short of its pose: see sinew_tool_get_pose.
+   */
+  float force_limit;
+  /**
+   * The categories that it belongs to, a bit for each; default 1. It meets bodies where each has a category that the other's
+   * mask has.
+   */
+  uint32_t collision_category;
+  /**
+   * The categories that it meets, a bit for each; default 0xffffffff.
+   */
+  uint32_t collision_mask;
 } sinew_tool_def;
 
 /**
@@ -977,7 +1029,59 @@ typedef struct sinew_tool_id {
 } sinew_tool_id;
 
 /**
- * What a tool holds of a body: a plain value, all zero is "none".
+ * Where a tool pressed a body when the last step ended.
+ */
+typedef struct sinew_contact {
+  /**
+   * The body.
+   */
+  struct sinew_body_id body;
+  /**
+   * The node, the two of an edge or the three of a face that it pressed; the last is repeated.
+   */
+  uint32_t nodes[3];
+  /**
+   * The point of them, as weights; 0 where a node is repeated.
+   */
+  float weights[3];
+  /**
+   * The point, m.
+   */
+  float point[3];
+  /**
+   * Away from the tool, 1 long.
+   */
+  float normal[3];
+  /**
+   * On the tool, friction with it, N, in the last substep: where a step has several, the wrench is their mean.
+   */
+  float force[3];
+} sinew_contact;
+
+/**
+ * A tool and a body that began or ceased to touch in the last step.
+ */
+typedef struct sinew_contact_change {
+  /**
+   * The tool.
+   */
+  struct sinew_tool_id tool;
+  /**
+   * The body.
+   */
+  struct sinew_body_id body;
+  /**
+   * 1: they touch now; 0: they do no longer.
+   */
+  uint32_t begun;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_contact_change;
+
+/**
+ * What a tool holds of a body, or a body of another: a plain value, all zero is "none".
  */
 typedef struct sinew_attachment_id {
   /**
@@ -1114,9 +1218,9 @@ typedef struct sinew_picture_def {
    */
   float field_of_view;
   /**
-   * 0.
+   * 1: with the points where tools press bodies and the forces on the tools there; 0, the default: without.
    */
-  uint32_t reserved;
+  uint32_t show_contacts;
 } sinew_picture_def;
 
 /**
@@ -1152,6 +1256,44 @@ typedef struct sinew_body_values {
    */
   uint32_t reserved;
 } sinew_body_values;
+
+/**
+ * A point of a body's surface.
+ */
+typedef struct sinew_surface_point {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * The body it belongs to; all zero: nothing was found, and the rest is 0.
+   */
+  struct sinew_body_id body;
+  /**
+   * The triangle, in the order of the body's surface.
+   */
+  uint32_t triangle;
+  /**
+   * Of the triangle's corners, 1 in sum.
+   */
+  float weights[3];
+  /**
+   * m
+   */
+  float position[3];
+  /**
+   * The triangle's, outward, of unit length; 0 where it has no area.
+   */
+  float normal[3];
+  /**
+   * m: from where it was asked for.
+   */
+  float distance;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_surface_point;
 
 /**
  * Done.
@@ -1771,7 +1913,7 @@ sinew_status sinew_tool_def_init(struct sinew_tool_def *def, size_t struct_size)
 /**
  * Creates a tool; copies what `def` points to.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (SINEW_SHAPE_MESH, detection other than EXACT),
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh),
  * SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
@@ -1807,6 +1949,20 @@ sinew_status sinew_tool_set_pose(struct sinew_world *world,
                                  const float *orientation);
 
 /**
+ * Writes where a tool is: its position, 3 floats, m, and its orientation, 4 floats, x y z w; either may be NULL. Where its force is
+ * limited it may have stopped short of where it was sent.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
+ */
+sinew_status sinew_tool_get_pose(const struct sinew_world *world,
+                                 struct sinew_tool_id tool,
+                                 float *position,
+                                 float *orientation);
+
+/**
  * Writes the force, 3 floats, N, and the torque about its position, 3 floats, N m, on a tool: world axes, mean over the
  * last step.
  *
@@ -1819,6 +1975,35 @@ sinew_status sinew_tool_get_wrench(const struct sinew_world *world,
                                    struct sinew_tool_id tool,
                                    float *force,
                                    float *torque);
+
+/**
+ * Writes where the tool pressed bodies when the last step ended, `capacity` of them at most, to `contacts`, which may be NULL where
+ * that is 0, and how many there are to `count`.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `contacts` is NULL or writable for `capacity` of them; `count` is NULL or writable.
+ */
+sinew_status sinew_tool_get_contacts(const struct sinew_world *world,
+                                     struct sinew_tool_id tool,
+                                     struct sinew_contact *contacts,
+                                     size_t capacity,
+                                     size_t *count);
+
+/**
+ * Writes which tools and bodies began or ceased to touch in the last step, `capacity` of them at most, to `changes`, which may be NULL
+ * where that is 0, and how many there are to `count`. With a tool or body that was destroyed nothing ceases.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `changes` is NULL or writable for `capacity` of them; `count` is NULL or writable.
+ */
+sinew_status sinew_world_get_contact_changes(const struct sinew_world *world,
+                                             struct sinew_contact_change *changes,
+                                             size_t capacity,
+                                             size_t *count);
 
 /**
  * Attaches a node of a body to a tool, as sinew_body_attach_nodes does.
@@ -1887,9 +2072,76 @@ sinew_status sinew_body_attach_points(struct sinew_world *world,
                                       struct sinew_attachment_id *out);
 
 /**
+ * Attaches `count` nodes of a body to as many nodes of another, or of the same, each pair by an attachment of its own, whose ids
+ * are written to `out`. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes
+ * together within some hundredths of a second. Each body may turn about the point as it likes: what shall not turn takes three.
+ *
+ * The bodies take their substeps together, those of IMPLICIT and NEWTON of 1 ms at most. No momentum is made; nor is any angular
+ * momentum, once the points have come together. Where both points are held by pins or tools along an axis nothing is done
+ * along it. Nodes, edges and faces that share such a pair of points do not touch each other.
+ *
+ * `force_limit`, N: an attachment ends with the step in which its mean force was larger (sinew_world_get_slipped); 0 or infinity:
+ * it holds whatever comes. sinew_attachment_get_force has the force on `body`; sinew_attachment_release lets go. An attachment
+ * ends with either body.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the two are one node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY;
+ * then nothing is attached.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_nodes_to_nodes(struct sinew_world *world,
+                                              struct sinew_body_id body,
+                                              const uint32_t *nodes,
+                                              size_t count,
+                                              struct sinew_body_id other,
+                                              const uint32_t *other_nodes,
+                                              float force_limit,
+                                              struct sinew_attachment_id *out);
+
+/**
+ * Attaches `count` nodes of a body to as many points of the surface of another, or of the same, as sinew_body_attach_nodes_to_nodes
+ * does. Points are given as to sinew_body_attach_points, and no patch is bonded: the surface may turn about the point.
+ *
+ * Errors: as there; SINEW_STATUS_INVALID_ARGUMENT also where there is no such triangle or weights are not at least 0 and 1 in sum.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_nodes_to_points(struct sinew_world *world,
+                                               struct sinew_body_id body,
+                                               const uint32_t *nodes,
+                                               size_t count,
+                                               struct sinew_body_id other,
+                                               const uint32_t *other_triangles,
+                                               const float *other_weights,
+                                               float force_limit,
+                                               struct sinew_attachment_id *out);
+
+/**
+ * Attaches `count` points of the surface of a body to as many points of that of another, or of the same, as
+ * sinew_body_attach_nodes_to_points does.
+ *
+ * Errors: as there.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_points_to_points(struct sinew_world *world,
+                                                struct sinew_body_id body,
+                                                const uint32_t *triangles,
+                                                const float *weights,
+                                                size_t count,
+                                                struct sinew_body_id other,
+                                                const uint32_t *other_triangles,
+                                                const float *other_weights,
+                                                float force_limit,
+                                                struct sinew_attachment_id *out);
+
+/**
  * Lets go of what is attached: it goes on as it was led in the last step.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or its body or tool is gone).
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or a body or the tool is gone).
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
@@ -1898,8 +2150,8 @@ sinew_status sinew_attachment_release(struct sinew_world *world,
                                       struct sinew_attachment_id attachment);
 
 /**
- * Writes the force by which a tool holds what is attached, on the tissue, 3 floats, N: world axes, mean over the last step; 0
- * before the first. After sinew_body_rest_state it is that which holds the body at rest.
+ * Writes the force by which what it is attached to, a tool or a body, holds a body, on the tissue, 3 floats, N: world axes, mean
+ * over the last step; 0 before the first. After sinew_body_rest_state it is that by which a tool holds the body at rest.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
  *
@@ -2069,6 +2321,37 @@ sinew_status sinew_world_save_picture_of_values(const struct sinew_world *world,
                                                 const struct sinew_body_values *coloured,
                                                 size_t count,
                                                 const char *path);
+
+/**
+ * Writes the first point that a ray from `origin`, 3 floats, m, along `direction`, 3 floats of any length, meets on the surface of a
+ * body within `max_distance`, m, at least 0, at the nodes' current places. `out->struct_size` is set by the caller; where nothing is
+ * met out->body is all zero.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the direction is zero).
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `origin` and `direction` are NULL or 3 floats; `out` is NULL or writable for
+ * `out->struct_size` bytes.
+ */
+sinew_status sinew_world_cast_ray(const struct sinew_world *world,
+                                  const float *origin,
+                                  const float *direction,
+                                  float max_distance,
+                                  struct sinew_surface_point *out);
+
+/**
+ * Writes the point of the bodies' surfaces that is nearest to `point`, 3 floats, m, at the nodes' current places, no further than
+ * `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `point` is NULL or 3 floats; `out` is NULL or writable for `out->struct_size` bytes.
+ */
+sinew_status sinew_world_find_nearest(const struct sinew_world *world,
+                                      const float *point,
+                                      float max_distance,
+                                      struct sinew_surface_point *out);
 
 #ifdef __cplusplus
 }  // extern "C"

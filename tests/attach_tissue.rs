@@ -160,18 +160,18 @@ impl Hanging {
 
 #[test]
 fn a_block_hangs_from_another() {
-    let [verlet, implicit, exact] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-    let mut cases = Vec::new();
+    let [verlet, implicit] = [Solver::Verlet, Solver::Implicit];
+    let mut cases = vec![
+        ([0.01, 1.0], [implicit; 2], 1.0 / 60.0, 1),
+        ([1.0, 0.01], [implicit; 2], 1e-3, 25),
+        ([0.01, 1.0], [verlet, implicit], 1.0 / 60.0, 4),
+        ([1.0, 0.01], [implicit, verlet], 1e-3, 4),
+    ];
     for masses in [[0.01, 1.0], [1.0, 0.01]] {
         for dt in [1e-3, 1.0 / 60.0] {
             cases.extend([1, 4, 25].map(|count| (masses, [verlet; 2], dt, count)));
-            cases.push((masses, [implicit; 2], dt, 1));
         }
-        cases.push((masses, [implicit; 2], 1.0 / 60.0, 25));
-        cases.push((masses, [verlet, implicit], 1.0 / 60.0, 4));
-        cases.push((masses, [implicit, verlet], 1e-3, 4));
     }
-    cases.push(([0.1, 0.1], [exact, implicit], 1.0 / 60.0, 4));
     for (masses, solvers, dt, count) in cases {
         let start = std::time::Instant::now();
         let [above, below] = [0, 1].map(|index| Block {
@@ -181,7 +181,7 @@ fn a_block_hangs_from_another() {
         });
         let mut hanging = Hanging::new(above, below, count, DOWN);
         let mut most = 0.0_f32;
-        for _ in 0..(0.8 / dt) as u32 {
+        for _ in 0..(0.7 / dt) as u32 {
             hanging.world.step(dt).expect("a step");
             most = most.max(hanging.drift());
         }
@@ -273,7 +273,7 @@ fn momentum_is_kept() {
             let sum = |world: &World| parts(world)[0] + parts(world)[1];
             let first = sum(&hanging.world);
             let mut off = 0.0_f64;
-            for _ in 0..(0.3 / dt) as u32 {
+            for _ in 0..(0.1 / dt) as u32 {
                 hanging.world.step(dt).expect("a step");
                 off = off.max((sum(&hanging.world) - first).length());
             }
@@ -446,7 +446,8 @@ fn pins_and_tools_take_what_hangs_on_them() {
         [Solver::Implicit; 2],
         [Solver::Implicit, Solver::Verlet],
     ] {
-        for dt in [0.5e-3, 5e-3] {
+        let shortest = if solvers == [Solver::Verlet; 2] { 0.5e-3 } else { 2e-3 };
+        for dt in [shortest, 5e-3] {
             for is_pinned in [true, false] {
                 let [above, below] = solvers.map(|solver| Block { solver, ..Block::CALM });
                 let mut hanging = Hanging::new(above, below, 4, DOWN);
@@ -602,6 +603,7 @@ fn a_step_allocates_nothing() {
         let [above, below] = solvers.map(|solver| Block { solver, ..Block::CALM });
         let mut hanging = Hanging::new(above, below, 4, DOWN);
         let [up, down] = hanging.pairs[0];
+        hanging.world.release(hanging.ids[0]).expect("released");
         let weak = hanging.world.attach_to_body(
             hanging.below,
             &[Anchor::Node(down)],

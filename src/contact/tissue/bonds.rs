@@ -5,7 +5,7 @@
 //! Between bodies of VERLET that is SHAKE (Ryckaert, Ciccotti, Berendsen 1977), and as stable as they are by themselves. What the impulses
 //! came to in the last substep is foreseen: it acts as a force in the next kick, so that velocities at the time of the positions, which
 //! damping along springs needs, are those of nodes that are held. Where that force entered the equation of an implicit solver its lag would
-//! be fed by stiff tissue, and grow; there the impulses are a projection of what was found (Chorin 1968), which only takes energy. Such an
+//! be fed by stiff tissue, and grow; there substeps are of order 1, and the impulses a projection of what was found (Chorin 1968). Such an
 //! equation does not know what the point is to carry, and leaves it off by `force time^2 / mass` until the projection: so heavier loads
 //! ask for shorter substeps.
 
@@ -260,7 +260,12 @@ impl Bonds {
     }
 
     /// Begins to attempt a step, which may be taken several times, until [`Self::unload`].
-    pub fn attempt(&mut self, bodies: &Slots<Body>) {
+    pub fn attempt(&mut self, bodies: &mut Slots<Body>) {
+        for (place, body) in bodies.iter_mut() {
+            if let Some(implicit) = &mut body.implicit {
+                implicit.is_attached = self.concern(place);
+            }
+        }
         for bond in &mut self.bonds {
             let is_implicit = |corner: Corner| bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
             bond.is_implicit = bond.used().any(is_implicit);

@@ -110,6 +110,8 @@ pub(crate) struct Implicit {
     settled: usize,
     /// How the last equation that was solved makes velocities of what forces do.
     taken: Formula,
+    /// Whether it is attached to a body in the step in progress: what that does is not carried on, and substeps are of order 1.
+    pub is_attached: bool,
     /// How long the substep that was just solved is, s.
     latest: f32,
     /// s: what forces do within the step, m.
@@ -202,6 +204,7 @@ impl Implicit {
             ],
             settled: 0,
             taken: Formula::new(1, 0.0, 0.0),
+            is_attached: false,
             latest: 0.0,
             pushes: Vectors::zeros(node_count)?,
             means: None,

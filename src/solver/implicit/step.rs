@@ -150,6 +150,7 @@ fn take_part(
     team: &Team,
 ) -> End {
     let step = f64::from(request.dt) / f64::from(substeps);
+    let order = if implicit.is_attached { 1 } else { implicit.order };
     let substep = Substep {
         request,
         step,
@@ -157,7 +158,7 @@ fn take_part(
         end: f64::from(index + 1) / f64::from(substeps),
         is_first: index == 0,
         equations: substeps - index,
-        formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
+        formula: Formula::new(order, step, f64::from(implicit.last(index == 0).step)),
         team,
     };
     body.lead_grasps(request.tools, [substep.start, substep.end]);
