@@ -149,7 +149,7 @@ pub unsafe extern "C" fn sinew_body_attach_points(
 /// are written to `out`. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes
 /// together within some hundredths of a second. Each body may turn about the point as it likes: what shall not turn takes three.
 ///
-/// The bodies take their substeps together, those of IMPLICIT and NEWTON of 1 ms at most. No momentum is made; nor is any angular
+/// The bodies take their substeps together, those of IMPLICIT and NEWTON of 0.25 ms at most. No momentum is made; nor is any angular
 /// momentum, once the points have come together. Where both points are held by pins or tools along an axis nothing is done
 /// along it. Nodes, edges and faces that share such a pair of points do not touch each other.
 ///

@@ -48,7 +48,7 @@ pub(crate) fn attempt_together(
         return;
     }
     tissue.bonds.attempt(bodies);
-    substeps = substeps.max(tissue.bonds.substeps(bodies, request.dt));
+    substeps = substeps.max(tissue.bonds.substeps(request.dt));
     let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
     let mut stable_substep = f32::INFINITY;
     let mut is_taken = false;

@@ -183,7 +183,7 @@ impl World {
     /// some hundredths of a second. Each may turn about it as it likes: what shall not turn takes three.
     ///
     /// The bodies take their substeps together, those of [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) of 1 ms at most. No momentum is made; nor is any angular momentum, once the points have
+    /// [`Solver::Newton`](crate::Solver::Newton) of 0.25 ms at most and of order 1. No momentum is made; nor is any angular momentum, once the points have
     /// come together. Where both points are held by pins or tools along an axis nothing is done along it. Features that share such a pair
     /// of points do not touch each other.
     ///
@@ -191,7 +191,7 @@ impl World {
     /// whatever comes. [`World::attachment_force`] has the force on `body`. An attachment ends with either body.
     ///
     /// Sequential impulses (Catto 2005): between bodies of [`Solver::Verlet`](crate::Solver::Verlet) SHAKE (Ryckaert, Ciccotti, Berendsen
-    /// 1977), with the other solvers a projection (Chorin 1968), for which substeps become shorter under load, down to 0.25 ms.
+    /// 1977), with the other solvers a projection (Chorin 1968).
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node or triangle, weights are negative, not finite or not 1 in sum,

@@ -6,8 +6,8 @@
 //! came to in the last substep is foreseen: it acts as a force in the next kick, so that velocities at the time of the positions, which
 //! damping along springs needs, are those of nodes that are held. Where that force entered the equation of an implicit solver its lag would
 //! be fed by stiff tissue, and grow; there substeps are of order 1, and the impulses a projection of what was found (Chorin 1968). Such an
-//! equation does not know what the point is to carry, and leaves it off by `force time^2 / mass` until the projection: so heavier loads
-//! ask for shorter substeps.
+//! equation does not know what the point is to carry, and leaves it off by `force time^2 / mass` until the projection: so substeps
+//! are short.
 
 use glam::{DVec3, Vec3};
 
@@ -28,9 +28,9 @@ const LARGEST_PART: f64 = 0.2;
 /// Sweeps over what is apart.
 const SWEEPS: u32 = 8;
 
-/// How far an equation may leave a point off, as a part of a body's extent, where substeps need not be shorter than this for it, s.
-const LEFT_OFF: f32 = 1e-3;
-const SHORTEST: f64 = 0.25e-3;
+/// The longest substep where an implicit solver moves a body, s. One length whatever the load: how far its equation leaves a point off
+/// goes with the square of it, and a change would be a jolt.
+const LONGEST: f64 = 0.25e-3;
 
 /// Velocities that differ by less than this part of themselves are equal.
 const ROUNDING: f32 = 2e-7;
@@ -255,7 +255,6 @@ impl Bonds {
             }
             hasher.write_floats(&[bond.limit]);
             hasher.write_floats(&bond.foreseen.to_array());
-            hasher.write_floats(&bond.mean.to_array());
         }
     }
 
@@ -291,22 +290,12 @@ impl Bonds {
     }
 
     /// How many substeps a step of `dt` seconds takes at least.
-    pub fn substeps(&self, bodies: &Slots<Body>, dt: f32) -> u32 {
-        let mut longest = f64::INFINITY;
-        for bond in self.bonds.iter().filter(|bond| bond.is_implicit) {
-            let (mut answer, mut extent) = (0.0, f32::INFINITY);
-            for corner in bond.used() {
-                if let Some(body) = bodies.at(corner.body) {
-                    answer += body.inverse_masses[corner.node as usize] * corner.weight * corner.weight;
-                    extent = extent.min(body.extent());
-                }
-            }
-            let square = LEFT_OFF * extent / (bond.mean.length() * answer);
-            if square.is_finite() {
-                longest = longest.min(f64::from(square).sqrt().max(SHORTEST));
-            }
+    pub fn substeps(&self, dt: f32) -> u32 {
+        if self.bonds.iter().any(|bond| bond.is_implicit) {
+            (f64::from(dt) / LONGEST).ceil().clamp(1.0, f64::from(u32::MAX / 4)) as u32
+        } else {
+            1
         }
-        (f64::from(dt) / longest).ceil().clamp(1.0, f64::from(u32::MAX / 4)) as u32
     }
 
     /// Has the forces that are foreseen act in what follows.
@@ -520,6 +509,7 @@ fn forget(bodies: &mut Slots<Body>, place: usize) {
         ..
     }) = bodies.at_mut(place)
     {
+        implicit.is_attached = false;
         implicit.forget_history();
     }
 }
