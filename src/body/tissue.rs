@@ -64,11 +64,13 @@ impl Body {
         Vec3::select(held, Vec3::ZERO, Vec3::splat(self.inverse_masses[node as usize]))
     }
 
-    /// What damping leaves of the speed that an impulse gives to a node in an equation, so that the impulse is what the force behind it
+    /// What damping leaves of the speed that an impulse gives to a node, so that the impulse is what the force behind it
     /// would have given undamped.
     pub(crate) fn left_by_damping(&self, node: u32, moment: &Moment) -> f32 {
         match (&self.implicit, &self.damping) {
             (Some(_), Some(damping)) => 1.0 / (1.0 + damping.rates()[node as usize] * moment.duration),
+            // A kick of VERLET gives (1 - exp(-x)) / x of what its forces would undamped: 1 - x / 2 but for terms of order 2.
+            (None, Some(damping)) => 1.0 / (1.0 + 0.5 * damping.rates()[node as usize] * moment.duration),
             _ => 1.0,
         }
     }
