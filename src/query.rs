@@ -42,7 +42,7 @@ impl World {
         let start = origin.as_dvec3();
         let mut found: Option<SurfaceHit> = None;
         for (id, body) in self.bodies_by_id() {
-            let bounds = body.bounds();
+            let bounds = body.published_bounds();
             let limit = f64::from(found.map_or(max_distance, |found| found.distance));
             let furthest = start
                 .abs()
@@ -77,7 +77,7 @@ impl World {
         let mut limit = f64::from(max_distance);
         let mut found = None;
         for (id, body) in self.bodies_by_id() {
-            let bounds = body.bounds();
+            let bounds = body.published_bounds();
             let (low, high) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
             if (low - place).max(place - high).max(DVec3::ZERO).length() > limit {
                 continue;
@@ -112,7 +112,7 @@ impl SurfaceHit {
 
 impl Body {
     /// The box about its nodes as they are published, and a little more.
-    fn bounds(&self) -> Bounds {
+    fn published_bounds(&self) -> Bounds {
         let bounds = self.local_bounds();
         let [min, max] = [bounds.min, bounds.max].map(|corner| (corner.as_dvec3() + self.origin()).as_vec3());
         // By what rounding takes.

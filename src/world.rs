@@ -9,9 +9,7 @@ use crate::contact::{Contact, ContactChange, Pose, TRIES, Tissue, Tool, ToolDefi
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
-use crate::solver::{
-    Outcome, RestStateDefinition, RestStateReport, StepRequest, Walk, attempt, attempt_together, rest_state,
-};
+use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, Together, Walk, attempt, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{Items, RunTasks, Team, Threads};
 use attachments::Attachment;
@@ -71,6 +69,9 @@ pub struct StepReport {
     /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
     /// anything to compare.
     pub error_estimate: f32,
+    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
+    /// apart. Those of one that is closed come out again by themselves.
+    pub crossings: u32,
 }
 
 /// A body of a world.
@@ -93,6 +94,8 @@ pub struct World {
     paths: Vec<ToolPath>,
     /// Contacts of tissue with tissue, where bodies ask for them.
     tissue: Option<Box<Tissue>>,
+    /// How many edges pass through tissue as the step in progress ends.
+    crossings: u32,
     /// The bodies that take their substeps together, by their places; none where none can.
     walks: Vec<Option<Walk>>,
     /// How the step in progress ended for each body, at its place.
@@ -126,6 +129,7 @@ impl World {
             tools: Slots::new("tool"),
             paths: Vec::new(),
             tissue: None,
+            crossings: 0,
             walks: Vec::new(),
             outcomes: Vec::new(),
             attachments: Slots::new("attachment"),
@@ -376,6 +380,7 @@ impl World {
             paths,
             outcomes,
             tissue,
+            crossings,
             walks,
             ..
         } = self;
@@ -400,13 +405,24 @@ impl World {
         };
         tissue.plan(bodies, dt);
         lead(threads, bodies, |bodies, team| {
-            attempt_bodies(bodies, outcomes, &request, |place| !tissue.goes_together(place), team);
-            attempt_together(bodies, tissue, walks, outcomes, &request, team);
-            if tissue.plan_again(bodies) {
-                attempt_together(bodies, tissue, walks, outcomes, &request, team);
+            attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);
+            loop {
+                tissue.find_crossings(bodies, false);
+                let mut together = Together {
+                    tissue,
+                    walks,
+                    request: &request,
+                    team,
+                };
+                together.attempt(bodies, outcomes);
+                if !tissue.plan_again(bodies) {
+                    break;
+                }
             }
         });
-        reported(bodies, outcomes)
+        reported(bodies, outcomes)?;
+        *crossings = tissue.find_crossings(bodies, true);
+        Ok(())
     }
 
     /// Takes back what bodies have tried.
@@ -423,7 +439,8 @@ impl World {
             outcomes,
             ..
         } = self;
-        let report = report(bodies, outcomes);
+        let mut report = report(bodies, outcomes);
+        report.crossings = self.crossings;
         lead(threads, bodies, |bodies, team| {
             commit_bodies(bodies, outcomes, paths, team)
         });
@@ -612,6 +629,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
         stable_substep: f32::INFINITY,
         bodies_restored: 0,
         error_estimate: 0.0,
+        crossings: 0,
     };
     for (place, body) in bodies.iter() {
         let stable_substep = match outcomes[place] {

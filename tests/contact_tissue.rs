@@ -3,9 +3,9 @@
 #[path = "support/tissue.rs"]
 mod tissue;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyContact, BodyDefinition, BodyId, Solver, Values, World};
+use sinew::{BodyContact, BodyDefinition, BodyId, CollisionFilter, Solver, StepReport, Values, World, WorldDefinition};
 use tissue::*;
 
 /// What each surface keeps off, m.
@@ -13,79 +13,158 @@ const THICKNESS: f32 = 0.5e-3;
 
 const CONTACT: BodyContact = BodyContact {
     thickness: THICKNESS,
-    friction: 0.0,
     with_bodies: true,
     ..BodyContact::NOTHING
 };
 
-/// A block that is damped along its springs alone.
-fn block(world: &mut World, at: Vec3, size: f32, cells: u32, solver: Solver, contact: BodyContact) -> BodyId {
-    let mesh = moved(Mesh::block([size; 3], [cells; 3]).expect("a block"), at);
-    put(world, &mesh, 0.05, 60.0, 0.05, solver, contact)
+const ROUGH: BodyContact = BodyContact {
+    friction: 0.5,
+    ..CONTACT
+};
+
+const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
+
+/// What a body is made of.
+#[derive(Clone, Copy)]
+struct Matter {
+    /// Of the whole body, kg.
+    mass: f32,
+    /// Of each spring, N/m.
+    stiffness: f32,
+    /// Along springs, N s/m.
+    damping: f32,
+    /// Against the world, 1/s.
+    drag: f32,
 }
 
-fn put(
-    world: &mut World,
-    mesh: &Mesh,
-    mass: f32,
-    stiffness: f32,
-    damping: f32,
-    solver: Solver,
-    contact: BodyContact,
-) -> BodyId {
-    world
-        .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            masses: Values::Uniform(mass / mesh.positions.len() as f32),
-            stiffnesses: Values::Uniform(stiffness),
-            spring_dampings: Values::Uniform(damping),
-            triangles: &mesh.triangles,
-            tetrahedra: &mesh.tetrahedra,
-            solver,
-            contact,
-            ..Default::default()
+const BLOCK: Matter = Matter {
+    mass: 0.05,
+    stiffness: 60.0,
+    damping: 0.05,
+    drag: 0.0,
+};
+
+const CALM: Matter = Matter { drag: 15.0, ..BLOCK };
+
+const SHEET: Matter = Matter {
+    mass: 0.01,
+    stiffness: 20.0,
+    damping: 0.005,
+    drag: 10.0,
+};
+
+fn put(world: &mut World, mesh: &Mesh, matter: Matter, solver: Solver, contact: BodyContact) -> BodyId {
+    let mass = matter.mass / mesh.positions.len() as f32;
+    let definition = BodyDefinition {
+        positions: &mesh.positions,
+        masses: Values::Uniform(mass),
+        node_dampings: Values::Uniform(matter.drag * mass),
+        stiffnesses: Values::Uniform(matter.stiffness),
+        spring_dampings: Values::Uniform(matter.damping),
+        triangles: &mesh.triangles,
+        tetrahedra: &mesh.tetrahedra,
+        solver,
+        contact,
+        ..Default::default()
+    };
+    world.create_body(&definition).expect("a body")
+}
+
+fn block(size: f32, cells: u32, at: Vec3) -> Mesh {
+    moved(Mesh::block([size; 3], [cells; 3]).expect("a block"), at)
+}
+
+fn throw(world: &mut World, id: BodyId, velocity: Vec3) {
+    let velocities = vec![velocity; body(world, id).node_count()];
+    let body = world.body_mut(id).expect("a body");
+    body.set_velocities(&velocities).expect("velocities");
+}
+
+fn step(world: &mut World, dt: f32) -> StepReport {
+    let report = world.step(dt).expect("a step");
+    assert_eq!(report.bodies_restored, 0);
+    report
+}
+
+/// How many nodes of one body lie in tetrahedra of another.
+fn inside(world: &World, of: BodyId, mesh: &Mesh, other: BodyId) -> usize {
+    let places = body(world, other).positions();
+    let corners = mesh
+        .tetrahedra
+        .iter()
+        .map(|nodes| nodes.map(|node| places[node as usize].as_dvec3()));
+    let tetrahedra: Vec<_> = corners
+        .map(|[a, b, c, d]| (a, DMat3::from_cols(b - a, c - a, d - a).inverse()))
+        .collect();
+    let is_in = |point: DVec3| {
+        tetrahedra.iter().any(|&(a, inverse)| {
+            let weights = inverse * (point - a);
+            weights.min_element() > 0.0 && weights.element_sum() < 1.0
         })
-        .expect("a body")
+    };
+    let nodes = body(world, of).positions().iter();
+    nodes.filter(|node| is_in(node.as_dvec3())).count()
 }
 
 #[test]
-fn two_blocks_that_meet_keep_their_momentum_and_bounce() {
-    for solver in [Solver::Verlet, Solver::Implicit] {
+fn two_blocks_that_meet_keep_their_momentum_and_part_again() {
+    for (left_solver, right_solver) in [
+        (Solver::Verlet, Solver::Verlet),
+        (Solver::Implicit, Solver::Implicit),
+        (Solver::Verlet, Solver::Implicit),
+    ] {
         let mut world = world(Vec3::ZERO);
-        let size = 0.04;
-        let left = block(&mut world, Vec3::new(-0.03, 0.0, 0.0), size, 4, solver, CONTACT);
-        let right = block(&mut world, Vec3::new(0.03, 0.003, 0.002), size, 4, solver, CONTACT);
-        let count = body(&world, left).node_count();
-        for (id, speed) in [(left, 0.5), (right, -0.5)] {
-            let velocities = vec![Vec3::new(speed, 0.0, 0.0); count];
-            world
-                .body_mut(id)
-                .expect("a body")
-                .set_velocities(&velocities)
-                .expect("velocities");
+        let meshes = [
+            block(0.04, 4, Vec3::new(-0.03, 0.0, 0.0)),
+            block(0.04, 3, Vec3::new(0.03, 0.005, 0.003)),
+        ];
+        let ids = [(0, left_solver), (1, right_solver)]
+            .map(|(side, solver)| put(&mut world, &meshes[side], BLOCK, solver, CONTACT));
+        let masses = meshes.each_ref().map(|mesh| BLOCK.mass / mesh.positions.len() as f32);
+        for (id, speed) in ids.into_iter().zip([0.5, -0.5]) {
+            throw(&mut world, id, Vec3::new(speed, 0.0, 0.0));
         }
-        let node_mass = 0.05 / count as f32;
-        let total = |world: &World| momentum(body(world, left), node_mass) + momentum(body(world, right), node_mass);
-        let mut closest = f64::INFINITY;
-        for _ in 0..400 {
-            world.step(1e-3).expect("a step");
-            let gap = body(&world, right)
-                .positions()
-                .iter()
-                .map(|p| f64::from(p.x))
-                .fold(f64::INFINITY, f64::min)
-                - body(&world, left)
-                    .positions()
-                    .iter()
-                    .map(|p| f64::from(p.x))
-                    .fold(f64::NEG_INFINITY, f64::max);
-            closest = closest.min(gap);
+        let total = |world: &World| -> [DVec3; 2] {
+            let each = [0, 1].map(|side| {
+                let body = body(world, ids[side]);
+                [
+                    momentum(body, masses[side]),
+                    angular_momentum(body, masses[side], DVec3::ZERO),
+                ]
+            });
+            [each[0][0] + each[1][0], each[0][1] + each[1][1]]
+        };
+        let energy = |world: &World| ids.iter().map(|&id| total_energy(world, id)).sum::<f64>();
+        let (before, energy_before) = (total(&world), energy(&world));
+        let what = format!("{left_solver:?}, {right_solver:?}");
+        let mut met = false;
+        for index in 0..300 {
+            let report = step(&mut world, 1e-3);
+            assert_eq!(report.crossings, 0, "{what}, step {index}");
+            let deep = inside(&world, ids[0], &meshes[1], ids[1]) + inside(&world, ids[1], &meshes[0], ids[0]);
+            assert_eq!(deep, 0, "{what}, step {index}: nodes within the other");
+            assert!(
+                energy(&world) < energy_before * 1.001,
+                "{what}, step {index}: energy {} of {energy_before}",
+                energy(&world)
+            );
+            met |= (momentum(body(&world, ids[0]), masses[0]).x - 0.025).abs() > 0.01;
         }
-        let [l, r] = [left, right].map(|id| momentum(body(&world, id), node_mass));
-        println!(
-            "{solver:?}: momentum {:?}, left {l}, right {r}, closest {closest}",
-            total(&world)
+        assert!(met, "{what}: they never met");
+        let after = total(&world);
+        // An impulse acts where both sides are within a substep, not where they are as it begins: a little angular momentum is made.
+        // An equation that is solved to a hundredth leaves some momentum.
+        let allowed = if what.contains("Implicit") { 1e-2 } else { 1e-6 };
+        assert!(
+            (after[0] - before[0]).length() < allowed * 0.05,
+            "{what}: {after:?} after {before:?}"
         );
+        assert!(
+            (after[1] - before[1]).length() < (100.0 * allowed).min(1e-2) * 0.05 * 0.03,
+            "{what}: {after:?} after {before:?}"
+        );
+        let [left, right] = [0, 1].map(|side| momentum(body(&world, ids[side]), masses[side]).x);
+        assert!(left < 0.0 && right > 0.0, "{what}: {left} and {right} kg m/s");
     }
 }
 
@@ -93,52 +172,229 @@ fn two_blocks_that_meet_keep_their_momentum_and_bounce() {
 fn a_block_rests_on_another() {
     for solver in [Solver::Verlet, Solver::Implicit] {
         for dt in [1e-3_f32, 1.0 / 60.0] {
-            let mut world = world(Vec3::new(0.0, -9.81, 0.0));
-            let size = 0.04;
-            let below = block(&mut world, Vec3::ZERO, 0.06, 4, solver, CONTACT);
-            let pinned: Vec<u32> = (0..)
-                .zip(body(&world, below).positions())
+            let mut world = world(DOWN);
+            let below = block(0.06, 3, Vec3::ZERO);
+            let above = block(0.04, 3, Vec3::new(0.004, 0.0515, 0.003));
+            let low = put(&mut world, &below, CALM, solver, ROUGH);
+            let floor: Vec<u32> = (0..)
+                .zip(&below.positions)
                 .filter(|(_, p)| p.y < -0.029)
                 .map(|(node, _)| node)
                 .collect();
-            pin_all(&mut world, below, &pinned);
-            let above = block(
-                &mut world,
-                Vec3::new(0.004, 0.0525, 0.003),
-                size,
-                4,
-                solver,
-                BodyContact {
-                    friction: 0.5,
-                    ..CONTACT
-                },
-            );
-            let start = std::time::Instant::now();
-            let steps = (1.5 / dt) as u32;
-            let mut noise: f64 = 0.0;
-            for step in 0..steps {
-                world.step(dt).expect("a step");
-                if step > steps - 20 {
-                    let held = pin_forces(&world, below, &pinned).y;
-                    noise = noise.max((held - 0.981).abs());
-                }
+            pin_all(&mut world, low, &floor);
+            let high = put(&mut world, &above, CALM, solver, ROUGH);
+            for _ in 0..(1.2 / dt) as u32 {
+                step(&mut world, dt);
             }
-            let held: DVec3 = pin_forces(&world, below, &pinned);
-            let fastest = [below, above].map(|id| {
-                body(&world, id)
-                    .velocities()
-                    .iter()
-                    .fold(0.0_f32, |a, v| a.max(v.length()))
-            });
-            let lowest = body(&world, above)
+            let what = format!("{solver:?}, {dt} s");
+            let weight = 2.0 * 0.05 * 9.81;
+            for _ in 0..3 {
+                let report = step(&mut world, dt);
+                assert_eq!(report.crossings, 0, "{what}");
+                let held = pin_forces(&world, low, &floor);
+                assert!(
+                    (held.y - weight).abs() < 0.01 * weight,
+                    "{what}: pins hold {held} of {weight}"
+                );
+            }
+            let fastest = body(&world, high)
+                .velocities()
+                .iter()
+                .fold(0.0_f32, |fastest, v| fastest.max(v.length()));
+            assert!(fastest < 5e-3, "{what}: still {fastest} m/s");
+            assert_eq!(inside(&world, high, &below, low), 0, "{what}");
+            // It lies on what keeps off both, within a tenth of it.
+            let top = body(&world, low)
+                .positions()
+                .iter()
+                .map(|p| p.y)
+                .fold(f32::NEG_INFINITY, f32::max);
+            let bottom = body(&world, high)
                 .positions()
                 .iter()
                 .map(|p| p.y)
                 .fold(f32::INFINITY, f32::min);
-            println!(
-                "{solver:?} {dt}: pins hold {held} of 0.981, noise {noise:.2e}, speeds {fastest:?}, lowest {lowest}, {:.2} s",
-                start.elapsed().as_secs_f64()
-            );
+            assert!(bottom < top + 2.2 * THICKNESS, "{what}: from {bottom} to {top}");
         }
     }
+}
+
+/// Two sheets, the lower held at its rim, in one body or in two.
+fn sheets(world: &mut World, solver: Solver, as_one: bool) -> Vec<BodyId> {
+    let lower = square(0.08, 8);
+    let upper = moved(square(0.05, 7), Vec3::new(0.002, 0.006, 0.003));
+    let rim = rim(8);
+    if as_one {
+        let mut both = lower.clone();
+        let first = both.positions.len() as u32;
+        both.positions.extend(&upper.positions);
+        both.triangles
+            .extend(upper.triangles.iter().map(|triangle| triangle.map(|node| node + first)));
+        let contact = BodyContact {
+            with_itself: true,
+            with_bodies: false,
+            ..ROUGH
+        };
+        let id = put(world, &both, SHEET, solver, contact);
+        pin_all(world, id, &rim);
+        vec![id]
+    } else {
+        let low = put(world, &lower, SHEET, solver, ROUGH);
+        pin_all(world, low, &rim);
+        vec![low, put(world, &upper, SHEET, solver, ROUGH)]
+    }
+}
+
+#[test]
+fn a_sheet_falls_on_another_and_on_one_of_its_own_body() {
+    for (solver, as_one) in [
+        (Solver::Verlet, false),
+        (Solver::Verlet, true),
+        (Solver::Implicit, true),
+    ] {
+        let what = format!("{solver:?}, one body: {as_one}");
+        let mut world = world(DOWN);
+        let ids = sheets(&mut world, solver, as_one);
+        for _ in 0..600 {
+            assert_eq!(step(&mut world, 1e-3).crossings, 0, "{what}");
+        }
+        let upper = body(&world, ids[ids.len() - 1]).positions();
+        let upper = &upper[upper.len() - 64..];
+        let lowest = upper.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
+        assert!(lowest > -0.04, "{what}: the upper sheet is at {lowest}");
+        // As wide apart as both keep off, where it lies: the upper's nodes above the lower's triangles.
+        let lower = body(&world, ids[0]);
+        let triangles: Vec<_> = lower.surface()[..128]
+            .iter()
+            .map(|&triangle| corners(lower, triangle))
+            .collect();
+        let gap = |node: &Vec3| {
+            triangles
+                .iter()
+                .map(|&triangle| point_to_triangle(node.as_dvec3(), triangle))
+                .fold(f64::INFINITY, f64::min)
+        };
+        let gaps: Vec<f64> = upper.iter().map(gap).collect();
+        let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+        let resting = gaps.iter().filter(|gap| **gap < 1.2e-3).count();
+        assert!(least > 0.9e-3, "{what}: {least} m apart");
+        assert!(resting > 12, "{what}: {resting} nodes lie on it");
+    }
+}
+
+#[test]
+fn what_is_thrown_does_not_pass() {
+    for (speed, dt) in [(5.0, 1e-3), (20.0, 1e-3), (5.0, 1.0 / 60.0)] {
+        let mut world = world(Vec3::ZERO);
+        let net = square(0.1, 10);
+        let low = put(
+            &mut world,
+            &net,
+            Matter { mass: 0.05, ..SHEET },
+            Solver::Verlet,
+            CONTACT,
+        );
+        let small = block(0.02, 2, Vec3::new(0.003, 0.03, 0.004));
+        let stone = put(
+            &mut world,
+            &small,
+            Matter { mass: 0.005, ..BLOCK },
+            Solver::Verlet,
+            CONTACT,
+        );
+        throw(&mut world, stone, Vec3::new(0.0, -speed, 0.0));
+        for index in 0..40 {
+            let report = step(&mut world, dt);
+            // What is as fast as that crushes itself flat, and then some of it passes: that is told.
+            assert!(report.crossings == 0 || speed > 10.0, "{speed} m/s, step {index}");
+        }
+        // The net, which is free, goes ahead of what hit it.
+        let [stone, below] = [
+            centre(body(&world, stone)).y,
+            f64::from(body(&world, low).positions()[60].y),
+        ];
+        assert!(
+            stone > below && below < -0.01,
+            "{speed} m/s: the stone is at {stone}, the net at {below}"
+        );
+    }
+}
+
+#[test]
+fn what_began_within_another_comes_out() {
+    let mut world = world(Vec3::ZERO);
+    let meshes = [
+        block(0.04, 4, Vec3::ZERO),
+        block(0.03, 3, Vec3::new(0.033, 0.002, 0.001)),
+    ];
+    let ids = meshes
+        .each_ref()
+        .map(|mesh| put(&mut world, mesh, CALM, Solver::Verlet, CONTACT));
+    let first = step(&mut world, 1e-3).crossings;
+    assert!(first > 0, "they were to begin within each other");
+    for _ in 0..400 {
+        step(&mut world, 1e-3);
+    }
+    assert_eq!(step(&mut world, 1e-3).crossings, 0);
+    assert_eq!(inside(&world, ids[0], &meshes[1], ids[1]), 0);
+    let fastest = body(&world, ids[0])
+        .velocities()
+        .iter()
+        .fold(0.0_f32, |fastest, v| fastest.max(v.length()));
+    assert!(fastest < 0.5, "{fastest} m/s");
+}
+
+#[test]
+fn only_what_is_to_meet_meets() {
+    let pass = |left: BodyContact, right: BodyContact| {
+        let mut world = world(Vec3::ZERO);
+        let ids = [(-0.025, left), (0.025, right)].map(|(x, contact)| {
+            put(
+                &mut world,
+                &block(0.04, 2, Vec3::new(x, 0.001, 0.002)),
+                BLOCK,
+                Solver::Verlet,
+                contact,
+            )
+        });
+        throw(&mut world, ids[0], Vec3::new(1.0, 0.0, 0.0));
+        for _ in 0..30 {
+            step(&mut world, 1e-3);
+        }
+        momentum(body(&world, ids[1]), 1.0).length() < 1e-4
+    };
+    assert!(!pass(CONTACT, CONTACT));
+    assert!(pass(CONTACT, BodyContact::NOTHING));
+    let filter = |category, mask| BodyContact {
+        filter: CollisionFilter { category, mask },
+        ..CONTACT
+    };
+    assert!(pass(filter(1, 2), filter(1, 1)));
+    assert!(pass(filter(1, 1), filter(2, 1)));
+    assert!(!pass(filter(1, 2), filter(2, 1)));
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let hashes = [1, 2, 3].map(|thread_count| {
+        let mut world = World::new(WorldDefinition {
+            thread_count,
+            ..Default::default()
+        })
+        .expect("a world");
+        let _ = sheets(&mut world, Solver::Verlet, false);
+        let _ = put(
+            &mut world,
+            &block(0.03, 3, Vec3::new(0.0, 0.03, 0.0)),
+            BLOCK,
+            Solver::Implicit,
+            ROUGH,
+        );
+        for _ in 0..60 {
+            step(&mut world, 2e-3);
+        }
+        world.state_hash()
+    });
+    assert_eq!(hashes[0], hashes[1]);
+    assert_eq!(hashes[0], hashes[2]);
 }

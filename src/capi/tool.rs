@@ -195,7 +195,7 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
 
 /// Creates a tool; copies what `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh),
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh, IMAGE_SPACE of a plane),
 /// SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety

@@ -87,6 +87,11 @@ pub struct sinew_step_report {
     /// m: how far a position of this step may be off; 0 where tolerance is off, infinity where the step is refused before there is
     /// anything to compare.
     pub error_estimate: f32,
+    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
+    /// apart. Those in a body that is closed come out again by themselves.
+    pub crossings: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
@@ -97,7 +102,7 @@ unsafe impl Versioned for sinew_world_def {
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_step_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const SIZES: &'static [usize] = &[offset_of!(Self, crossings), size_of::<Self>()];
     const NAME: &'static str = "sinew_step_report";
 }
 
@@ -153,6 +158,8 @@ impl From<StepReport> for sinew_step_report {
             stable_substep: report.stable_substep,
             bodies_restored: report.bodies_restored,
             error_estimate: report.error_estimate,
+            crossings: report.crossings,
+            reserved: 0,
         }
     }
 }

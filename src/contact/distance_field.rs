@@ -33,7 +33,7 @@ const BORDER: f32 = 1e-4;
 
 /// Signed distances at the corners of cubes.
 #[derive(Debug)]
-pub(crate) struct DistanceField {
+pub struct DistanceField {
     low: Vec3,
     cell: f32,
     counts: UVec3,
@@ -48,7 +48,7 @@ impl DistanceField {
     /// # Errors
     /// [`Error::InvalidArgument`] where the cell is negative, not finite, or so small that there would be more than 16.8 million samples;
     /// [`Error::OutOfMemory`].
-    pub fn new(solid: &ExactSolid, cell: f32) -> Result<Self> {
+    pub(crate) fn of(solid: &ExactSolid, cell: f32) -> Result<Self> {
         if !(cell >= 0.0 && cell.is_finite()) {
             return Err(Error::invalid(format!(
                 "cell is {cell} m: must be finite and at least 0"
@@ -86,8 +86,22 @@ impl DistanceField {
         }
         Ok(field)
     }
+
+    /// Of a solid; see `of`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn new(surface: &crate::mesh::ClosedSurface, cell: f32) -> Result<Self> {
+        Self::of(&ExactSolid::new(surface)?, cell)
+    }
+
+    /// The size of a cell, m.
+    pub fn cell(&self) -> f32 {
+        self.cell
+    }
+
     /// The closest that a node, edge or face (1, 2 or 3 corners) comes; `None` where it is outside and further than `within`.
-    pub fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
+    pub(crate) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         let count = corners.len();
         let part = 1.0 / count as f32;
         let middle = corners.iter().sum::<Vec3>() * part;
@@ -227,7 +241,7 @@ mod tests {
     /// The largest error against EXACT of points outside of a sphere of 0.05 m, at most 5 mm away.
     fn error(cell: f32) -> f64 {
         let solid = ExactSolid::new(&sphere(96)).expect("a solid");
-        let field = DistanceField::new(&solid, cell).expect("a field");
+        let field = DistanceField::of(&solid, cell).expect("a field");
         let mut random = Random(3);
         let mut largest = 0.0_f64;
         for _ in 0..2000 {
@@ -242,7 +256,7 @@ mod tests {
 
     #[test]
     fn the_error_is_of_second_order() {
-        let errors = [0.008, 0.004, 0.002].map(|cell| error(cell));
+        let errors = [0.008, 0.004, 0.002].map(error);
         // Two second derivatives are 1 / 0.05 m; the mesh turns by 2 pi / 96 from face to face.
         for (error, cell) in errors.iter().zip([0.008_f64, 0.004, 0.002]) {
             assert!(
@@ -256,8 +270,8 @@ mod tests {
     #[test]
     fn features_are_found_as_by_exact() {
         let solid = ExactSolid::new(&cube()).expect("a solid");
-        let field = DistanceField::new(&solid, 0.0).expect("a field");
-        let cell = field.cell;
+        let field = DistanceField::of(&solid, 0.0).expect("a field");
+        let cell = field.cell();
         let mut random = Random(9);
         let mut found = 0;
         for turn in 0..2000 {
@@ -303,7 +317,7 @@ mod tests {
             (-1.0, "cell is -1 m"),
             (f32::NAN, "cell is NaN m"),
         ] {
-            let error = DistanceField::new(&solid, cell).expect_err("refused").to_string();
+            let error = DistanceField::of(&solid, cell).expect_err("refused").to_string();
             assert!(error.contains(says), "{error}");
         }
     }

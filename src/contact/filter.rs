@@ -74,10 +74,11 @@ impl BodyContact {
         not_negative("contact_thickness", self.thickness)?;
         not_negative("contact_friction", self.friction)?;
         not_negative("contact_resolution", self.resolution)?;
-        if self.detection == Detection::DistanceField {
-            return Err(Error::Unsupported(
-                "contact_detection is DistanceField: that is for meshes of tools alone".into(),
-            ));
+        if self.detection != Detection::Exact {
+            return Err(Error::Unsupported(format!(
+                "contact_detection is {:?}: this version finds other tissue exactly",
+                self.detection
+            )));
         }
         Ok(())
     }

@@ -22,6 +22,8 @@ pub(crate) struct MeshSolid {
     bounds: Bounds,
     reach: f32,
     hash: u64,
+    /// The side of a pixel or a cell, m; 0: it is known exactly.
+    grain: f32,
 }
 
 /// How what it encloses is found.
@@ -29,12 +31,21 @@ pub(crate) struct MeshSolid {
 enum Found {
     Exact(Box<ExactSolid>),
     Field(Box<DistanceField>),
-    Image(LayeredImage),
+    Image(Box<LayeredImage>),
 }
 
 /// The longest extent is this many pixels or cells, where it is not said how fine an image or a field is.
 const PIXELS: f32 = 256.0;
 const CELLS: f32 = 96.0;
+
+/// How far beside a feature's deepest point is looked at least, as a part of half the least extent.
+const BESIDE: f32 = 1e-3;
+
+/// The least that a normal looks across a face which it leads out, as a cosine.
+const ACROSS: f32 = 0.2;
+
+/// What rounding may take from a distance to the box, as a part of the largest coordinate.
+const ROUNDING: f32 = 1e-6;
 
 impl MeshSolid {
     /// What this surface encloses, to be found in this way; `resolution` as in a tool's definition.
@@ -46,21 +57,24 @@ impl MeshSolid {
     ) -> Result<Arc<Self>> {
         let surface = ClosedSurface::new(positions, triangles)?;
         let bounds = Bounds::of(surface.positions().iter().copied());
-        let fine = |count: f32| {
-            if resolution > 0.0 {
-                resolution
+        let grain = if resolution > 0.0 {
+            resolution
+        } else {
+            let count = if detection == Detection::ImageSpace {
+                PIXELS
             } else {
-                (bounds.max - bounds.min).max_element() / count
-            }
+                CELLS
+            };
+            (bounds.max - bounds.min).max_element() / count
         };
         let found = match detection {
             Detection::Exact => Found::Exact(Box::new(ExactSolid::new(&surface)?)),
             Detection::ImageSpace => {
-                let image = LayeredImage::new(surface.positions(), surface.triangles(), fine(PIXELS))?;
-                Found::Image(image)
+                let image = LayeredImage::new(surface.positions(), surface.triangles(), grain)?;
+                Found::Image(Box::new(image))
             }
             Detection::DistanceField => {
-                let field = DistanceField::new(&ExactSolid::new(&surface)?, fine(CELLS))?;
+                let field = DistanceField::of(&ExactSolid::new(&surface)?, grain)?;
                 Found::Field(Box::new(field))
             }
         };
@@ -80,6 +94,7 @@ impl MeshSolid {
                 .positions()
                 .iter()
                 .fold(0.0, |reach, corner| corner.length().max(reach)),
+            grain: if detection == Detection::Exact { 0.0 } else { grain },
             surface,
             hash: hasher.finish(),
         };
@@ -119,10 +134,99 @@ impl MeshSolid {
 
     /// The closest that a node, edge or face with these corners comes; `None`: no closer than `within`.
     pub(super) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
+        if is_apart(&self.bounds, corners, within) {
+            return None;
+        }
+        let closest = self.deepest(corners, within)?;
+        if closest.inside && closest.distance < 0.0 && corners.len() > 1 {
+            return Some(self.led_out(corners, closest));
+        }
+        Some(closest)
+    }
+
+    fn deepest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         match &self.found {
             Found::Exact(solid) => solid.closest(corners, within),
             Found::Field(field) => field.closest(corners, within),
             Found::Image(image) => image.closest(corners, within),
         }
     }
+
+    /// The same for an edge or face that an edge or corner of the solid has passed into. At its deepest point several sides of the solid are
+    /// as close, and none of them is where it came in: the way out is a mean of theirs, across the feature.
+    fn led_out(&self, corners: &[Vec3], closest: Closest) -> Closest {
+        let weighted = corners.iter().zip(closest.weights);
+        let point: Vec3 = weighted.map(|(corner, weight)| *corner * weight).sum();
+        let aside = (-0.5 * closest.distance).max(self.grain).max(BESIDE * self.thickness());
+        let normal_beside = |way: Vec3| {
+            let beside = self.deepest(&[point + way * aside], 2.0 * aside);
+            beside.map_or(closest.normal, |beside| beside.normal)
+        };
+        let normal = if let &[a, b] = corners {
+            let along = (b - a).normalize_or_zero();
+            let [ahead, behind] = [along, -along].map(normal_beside);
+            let [rise, fall] = [ahead, behind].map(|normal| normal.dot(along));
+            if rise > 0.0 && fall < 0.0 {
+                ahead * -fall + behind * rise
+            } else {
+                closest.normal - along * closest.normal.dot(along)
+            }
+        } else {
+            let across = (corners[1] - corners[0])
+                .cross(corners[2] - corners[0])
+                .normalize_or_zero();
+            // What looks across the face the most tells its side; where nothing does, that is not where it came in.
+            let u = (corners[1] - corners[0]).normalize_or_zero();
+            let v = across.cross(u);
+            let ways = [u, u + v, v, v - u, -u, -u - v, -v, u - v];
+            let looks = ways.map(|way| normal_beside(way.normalize_or_zero()).dot(across));
+            let further = |most: f32, look: f32| if look.abs() > most.abs() { look } else { most };
+            let most = looks.into_iter().fold(closest.normal.dot(across), further);
+            if most.abs() < ACROSS {
+                return closest;
+            }
+            across * most
+        };
+        Closest {
+            normal: normal.try_normalize().unwrap_or(closest.normal),
+            ..closest
+        }
+    }
+}
+
+/// Whether a plane that is parallel to a side of the box, to an edge of each, or to the face, tells that a node, edge or face keeps further
+/// than `within` from the box (Gottschalk, Lin, Manocha 1996). A long feature beside the box is found out so without a look at the solid.
+fn is_apart(bounds: &Bounds, corners: &[Vec3], within: f32) -> bool {
+    let centre = 0.5 * (bounds.min + bounds.max);
+    let half = 0.5 * (bounds.max - bounds.min) + within;
+    let mut from = [Vec3::ZERO; 3];
+    let mut size = half.max_element();
+    for (from, &corner) in from.iter_mut().zip(corners) {
+        *from = corner - centre;
+        size = size.max(from.abs().max_element());
+    }
+    let from = &from[..corners.len()];
+    let half = half + ROUNDING * size;
+    let low = from.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+    let high = from.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+    if low.cmpgt(half).any() || high.cmplt(-half).any() {
+        return true;
+    }
+    let parted = |across: Vec3| {
+        let reach = half.dot(across.abs());
+        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+        for corner in from {
+            let height = corner.dot(across);
+            least = least.min(height);
+            most = most.max(height);
+        }
+        least > reach || most < -reach
+    };
+    let sides = [(0, 1), (1, 2), (2, 0)];
+    // An edge has one side, a node none.
+    let sides = &sides[..[0, 0, 1, 3][from.len().min(3)]];
+    sides.iter().any(|&(a, b)| {
+        let side = from[b] - from[a];
+        Vec3::AXES.iter().any(|axis| parted(axis.cross(side)))
+    }) || from.len() == 3 && parted((from[1] - from[0]).cross(from[2] - from[0]))
 }

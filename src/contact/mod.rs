@@ -19,6 +19,7 @@ pub(crate) mod nearest;
 mod path;
 pub(crate) mod predicates;
 mod report;
+mod rounded;
 mod sweep;
 mod tissue;
 mod tool;

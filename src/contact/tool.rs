@@ -7,6 +7,7 @@ use glam::{Quat, Vec3};
 use super::filter::CollisionFilter;
 use super::limit::Reach;
 use super::mesh_solid::MeshSolid;
+use super::rounded;
 use crate::body::{finite_vector, not_negative};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
@@ -186,29 +187,36 @@ impl Tool {
             )));
         }
         let pose = definition.pose.checked()?;
-        let is_mesh = matches!(definition.shape, Shape::Mesh { .. });
-        if definition.detection != Detection::Exact && !is_mesh {
+        let (detection, resolution) = (definition.detection, definition.resolution);
+        let is_refused = match definition.shape {
+            Shape::Mesh { .. } => false,
+            Shape::Plane => detection != Detection::Exact,
+            Shape::Sphere { .. } | Shape::Capsule { .. } => detection == Detection::DistanceField,
+        };
+        if is_refused {
             return Err(Error::Unsupported(format!(
-                "detection is {:?}: spheres, capsules and planes are met exactly",
-                definition.detection
+                "detection is {detection:?}: distance fields are for meshes, and images for what has an end"
             )));
         }
+        let rounded = |radius, half_length| match detection {
+            Detection::ImageSpace => {
+                let (positions, triangles) = rounded::surface(radius, half_length)?;
+                MeshSolid::shared(&positions, &triangles, detection, resolution).map(Form::Mesh)
+            }
+            _ => Ok(Form::Rounded { radius, half_length }),
+        };
         let form = match definition.shape {
             Shape::Sphere { radius } => {
                 positive("radius", radius)?;
-                Form::Rounded {
-                    radius,
-                    half_length: 0.0,
-                }
+                rounded(radius, 0.0)?
             }
             Shape::Capsule { radius, half_length } => {
                 positive("radius", radius)?;
                 not_negative("half_length", half_length)?;
-                Form::Rounded { radius, half_length }
+                rounded(radius, half_length)?
             }
             Shape::Plane => Form::HalfSpace,
             Shape::Mesh { positions, triangles } => {
-                let (detection, resolution) = (definition.detection, definition.resolution);
                 Form::Mesh(MeshSolid::shared(positions, triangles, detection, resolution)?)
             }
         };

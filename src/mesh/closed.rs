@@ -75,8 +75,9 @@ impl ClosedSurface {
         let parts = surface.parts()?;
         surface.part_flat_triangles()?;
         surface.check_volume()?;
-        surface.check_parts(parts)?;
+        // Of parts that cross, neither lies within the other.
         surface.check_crossings()?;
+        surface.check_parts(parts)?;
         Ok(surface)
     }
 

@@ -15,6 +15,9 @@ use crate::threads::Team;
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 6;
 
+/// The energy that a solved equation has gained is taken off where there are so many, rather than that the step is taken in more.
+const PARTS: u32 = 256;
+
 /// A body on its way through a step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Walk {
@@ -24,68 +27,181 @@ pub(crate) struct Walk {
     part: Part,
 }
 
-/// Takes the step of the bodies that go together, as `tissue` tells, without making it current. `walks` has a place for each.
-pub(crate) fn attempt_together(
-    bodies: &mut Slots<Body>,
-    tissue: &mut Tissue,
-    walks: &mut [Option<Walk>],
-    outcomes: &mut [Option<Outcome>],
-    request: &StepRequest,
-    team: &Team,
-) {
-    let mut substeps = 0;
-    for (place, walk) in walks.iter_mut().enumerate() {
-        *walk = None;
-        if let Some(body) = bodies.at_mut(place)
-            && tissue.goes_together(place)
-        {
-            let (begun, wanted) = Walk::of(body, request, team);
-            substeps = substeps.max(wanted);
-            *walk = Some(begun);
+/// The bodies that go together, in groups, as `tissue` tells; `walks` has a place for each body.
+pub(crate) struct Together<'a> {
+    pub tissue: &'a mut Tissue,
+    pub walks: &'a mut [Option<Walk>],
+    pub request: &'a StepRequest<'a>,
+    pub team: &'a Team<'a>,
+}
+
+impl Together<'_> {
+    /// Takes the step of all groups without making it current.
+    pub fn attempt(&mut self, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+        for group in 0..self.tissue.groups() {
+            self.attempt_group(group, bodies, outcomes);
         }
     }
-    if substeps == 0 {
-        return;
-    }
-    tissue.bonds.attempt(bodies);
-    substeps = substeps.max(tissue.bonds.substeps(request.dt));
-    let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
-    let mut stable_substep = f32::INFINITY;
-    let mut is_taken = false;
-    for attempt in 0..=allowed {
-        let is_last = attempt == allowed;
-        match go(bodies, tissue, walks, request, substeps, is_last, team) {
-            Ok(()) => {
-                is_taken = true;
-                break;
-            }
-            Err(found) => {
-                stable_substep = stable_substep.min(found.stable_substep);
-                let wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
-                substeps = wanted.max(substeps.saturating_add(substeps / 4 + 1));
-                if request.substeps == 0 && substeps > request.max_substeps {
+
+    fn attempt_group(&mut self, group: usize, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+        let request = self.request;
+        let mut substeps = self.set_out(group, bodies);
+        if substeps == 0 {
+            return;
+        }
+        let Together { tissue, walks, .. } = self;
+        tissue
+            .bonds
+            .attempt(bodies, |place| walks.get(place).is_some_and(Option::is_some));
+        substeps = substeps.max(tissue.bonds.substeps(request.dt));
+        let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
+        let mut stable_substep = f32::INFINITY;
+        let mut is_taken = false;
+        for attempt in 0..=allowed {
+            match self.go(group, bodies, substeps, attempt == allowed) {
+                Ok(()) => {
+                    is_taken = true;
                     break;
+                }
+                Err(found) => {
+                    stable_substep = stable_substep.min(found.stable_substep);
+                    let wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
+                    substeps = wanted.max(substeps.saturating_add(substeps / 4 + 1));
+                    if request.substeps == 0 && substeps > request.max_substeps {
+                        break;
+                    }
                 }
             }
         }
-    }
-    tissue.bonds.unload(bodies);
-    for (place, (walk, outcome)) in walks.iter().zip(outcomes).enumerate() {
-        let (Some(walk), Some(body)) = (walk, bodies.at(place)) else {
-            continue;
-        };
-        *outcome = Some(if is_taken {
-            let taken = Taken {
-                carry: walk.carry,
-                finite: body.state.newest_is_finite(),
+        self.tissue.bonds.unload(bodies);
+        for (place, (walk, outcome)) in self.walks.iter().zip(outcomes).enumerate() {
+            let (Some(walk), Some(body)) = (walk, bodies.at(place)) else {
+                continue;
             };
-            finish(body, substeps, taken, 0.0)
-        } else {
-            Outcome::Unstable {
-                stable_substep,
-                error: 0.0,
+            *outcome = Some(if is_taken {
+                let taken = Taken {
+                    carry: walk.carry,
+                    finite: body.state.newest_is_finite(),
+                };
+                finish(body, substeps, taken, 0.0)
+            } else {
+                Outcome::Unstable {
+                    stable_substep,
+                    error: 0.0,
+                }
+            });
+        }
+    }
+
+    /// Makes a way for each body of a group: in how many substeps; 0: it has none.
+    fn set_out(&mut self, group: usize, bodies: &mut Slots<Body>) -> u32 {
+        let mut substeps = 0;
+        for (place, walk) in self.walks.iter_mut().enumerate() {
+            *walk = None;
+            if let Some(body) = bodies.at_mut(place)
+                && self.tissue.group(place) == Some(group)
+            {
+                let (begun, wanted) = Walk::of(body, self.request, self.team);
+                substeps = substeps.max(wanted);
+                *walk = Some(begun);
             }
-        });
+        }
+        if substeps > 0 && self.request.substeps == 0 {
+            // A wish, where stability is a need.
+            let wished = self.tissue.substeps_wished(group, bodies, self.request.dt);
+            substeps = substeps.max(wished.min(self.request.max_substeps));
+        }
+        substeps
+    }
+
+    /// Takes it in so many substeps, the last time that it is tried or not.
+    fn go(&mut self, group: usize, bodies: &mut Slots<Body>, substeps: u32, is_last: bool) -> Result<(), TooLong> {
+        let Self {
+            tissue,
+            walks,
+            request,
+            team,
+        } = self;
+        let (request, team) = (*request, *team);
+        let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
+        let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
+        let gravity = request.gravity.as_dvec3();
+        tissue.bonds.begin();
+        each(bodies, walks, |_, body, walk| {
+            walk.carry = walk.start;
+            if body.implicit.is_some() {
+                begin_parts(body, request, substeps);
+                return Ok(());
+            }
+            if walk.masses_for == 0.0 {
+                check(&walk.start.stability, substep)?;
+            }
+            begin(body, request);
+            walk.part = step(walk).opening(body, &mut walk.carry);
+            if let Some(damping) = &mut body.damping {
+                damping.prepare(substep);
+            }
+            Ok(())
+        })?;
+        let mut moment = Moment {
+            duration: substep,
+            drifts: true,
+        };
+        for index in 0..substeps {
+            tissue.bonds.load(bodies);
+            each(bodies, walks, |_, body, walk| {
+                if body.implicit.is_some() {
+                    // There may be no more parts to try it in.
+                    let is_last = is_last || substeps >= PARTS;
+                    let is_fine = next_part(body, request, [index, substeps], is_last, team);
+                    let shorter = TooLong {
+                        stable_substep: 0.25 * substep,
+                    };
+                    return if is_fine { Ok(()) } else { Err(shorter) };
+                }
+                if index > 0 {
+                    walk.part.go_on(walk.carry.gravity.next(gravity * f64::from(substep)));
+                }
+                walk.part.start = f64::from(index) / f64::from(substeps);
+                walk.part.end = f64::from(index + 1) / f64::from(substeps);
+                pass(body, request, &walk.part, &mut walk.carry, team);
+                Ok(())
+            })?;
+            tissue.meet(group, bodies, &moment);
+            each(bodies, walks, |place, body, walk| {
+                if let Some(implicit) = &mut body.implicit {
+                    implicit.settle_deflection();
+                    body.state.advance();
+                    return Ok(());
+                }
+                body.age(f64::from(substep), team);
+                body.state.advance();
+                let velocities = tissue.velocities(place, walk.carry.gravity.velocities);
+                walk.carry.gravity.velocities = velocities;
+                if !step(walk).is_stable_after(&mut walk.carry.stability, &velocities) {
+                    let known = walk.carry.stability.for_short(substep);
+                    walk.carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
+                    check(&walk.carry.stability, substep)?;
+                }
+                check_beside_springs(body, substep)
+            })?;
+        }
+        moment.drifts = false;
+        tissue.bonds.load(bodies);
+        each(bodies, walks, |_, body, walk| {
+            if body.implicit.is_some() {
+                return Ok(());
+            }
+            let fall = gravity * f64::from(0.5 * substep);
+            walk.part.close(walk.carry.gravity.next(fall));
+            pass(body, request, &walk.part, &mut walk.carry, team);
+            check_beside_springs(body, substep)
+        })?;
+        tissue.meet(group, bodies, &moment);
+        each(bodies, walks, |_, body, _| {
+            body.feel_what_grasps_handed_on(request.tools);
+            Ok(())
+        })
     }
 }
 
@@ -107,94 +223,6 @@ impl Walk {
         };
         (walk, substeps)
     }
-}
-
-/// Takes it in so many substeps, the last time that it is tried or not.
-fn go(
-    bodies: &mut Slots<Body>,
-    tissue: &mut Tissue,
-    walks: &mut [Option<Walk>],
-    request: &StepRequest,
-    substeps: u32,
-    is_last: bool,
-    team: &Team,
-) -> Result<(), TooLong> {
-    let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-    let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
-    let gravity = request.gravity.as_dvec3();
-    tissue.bonds.begin();
-    each(bodies, walks, |_, body, walk| {
-        walk.carry = walk.start;
-        if body.implicit.is_some() {
-            begin_parts(body, request, substeps);
-            return Ok(());
-        }
-        if walk.masses_for == 0.0 {
-            check(&walk.start.stability, substep)?;
-        }
-        begin(body, request);
-        walk.part = step(walk).opening(body, &mut walk.carry);
-        if let Some(damping) = &mut body.damping {
-            damping.prepare(substep);
-        }
-        Ok(())
-    })?;
-    let mut moment = Moment {
-        duration: substep,
-        drifts: true,
-    };
-    for index in 0..substeps {
-        tissue.bonds.load(bodies);
-        each(bodies, walks, |_, body, walk| {
-            if body.implicit.is_some() {
-                let is_fine = next_part(body, request, [index, substeps], is_last, team);
-                let shorter = TooLong {
-                    stable_substep: 0.25 * substep,
-                };
-                return if is_fine { Ok(()) } else { Err(shorter) };
-            }
-            if index > 0 {
-                walk.part.go_on(walk.carry.gravity.next(gravity * f64::from(substep)));
-            }
-            walk.part.start = f64::from(index) / f64::from(substeps);
-            walk.part.end = f64::from(index + 1) / f64::from(substeps);
-            pass(body, request, &walk.part, &mut walk.carry, team);
-            Ok(())
-        })?;
-        tissue.meet_together(bodies, &moment);
-        each(bodies, walks, |place, body, walk| {
-            if body.implicit.is_some() {
-                body.state.advance();
-                return Ok(());
-            }
-            body.age(f64::from(substep), team);
-            body.state.advance();
-            let velocities = tissue.velocities(place, walk.carry.gravity.velocities);
-            walk.carry.gravity.velocities = velocities;
-            if !step(walk).is_stable_after(&mut walk.carry.stability, &velocities) {
-                let known = walk.carry.stability.for_short(substep);
-                walk.carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
-                check(&walk.carry.stability, substep)?;
-            }
-            check_beside_springs(body, substep)
-        })?;
-    }
-    moment.drifts = false;
-    tissue.bonds.load(bodies);
-    each(bodies, walks, |_, body, walk| {
-        if body.implicit.is_some() {
-            return Ok(());
-        }
-        let fall = gravity * f64::from(0.5 * substep);
-        walk.part.close(walk.carry.gravity.next(fall));
-        pass(body, request, &walk.part, &mut walk.carry, team);
-        check_beside_springs(body, substep)
-    })?;
-    tissue.meet_together(bodies, &moment);
-    each(bodies, walks, |_, body, _| {
-        body.feel_what_grasps_handed_on(request.tools);
-        Ok(())
-    })
 }
 
 /// Does something with each body that is on its way.

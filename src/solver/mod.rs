@@ -21,7 +21,7 @@ pub(crate) use closing::{close, make_up_for, mean_force, show_closed};
 pub(crate) use gravity::GravityKicks;
 pub(crate) use implicit::Implicit;
 pub(crate) use kick::Survey;
-pub(crate) use lockstep::{Walk, attempt_together};
+pub(crate) use lockstep::{Together, Walk};
 pub(crate) use mass_scaling::{Heavier, MassScaling, Sliver};
 pub(crate) use newton::rest_state;
 pub use newton::{RestStateDefinition, RestStateReport};

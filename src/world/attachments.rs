@@ -230,7 +230,7 @@ impl World {
         for place in places {
             make_walks(&mut self.walks, place)?;
         }
-        self.tissue.get_or_insert_default().bonds.reserve(all.len())?;
+        self.tissue.get_or_insert_default().reserve_bonds(places, all.len())?;
         for id in [body, other] {
             self.bodies.get_mut(id.0)?.begin_bonds()?;
         }

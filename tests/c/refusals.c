@@ -467,13 +467,13 @@ static sinew_tool_def good_tool(uint32_t shape)
 
 static void tool_definitions_unspoiled(void)
 {
-    static const uint32_t shapes[] = {SINEW_SHAPE_SPHERE, SINEW_SHAPE_CAPSULE, SINEW_SHAPE_PLANE};
+    static const uint32_t shapes[] = {SINEW_SHAPE_SPHERE, SINEW_SHAPE_CAPSULE, SINEW_SHAPE_PLANE, SINEW_SHAPE_MESH};
     const sinew_world_def world_def = good_world();
     sinew_world *world = NULL;
     sinew_tool_id tool;
     int i;
     MUST(sinew_world_create(&world_def, &world));
-    for (i = 0; i < 3; i++) {
+    for (i = 0; i < 4; i++) {
         const sinew_tool_def def = good_tool(shapes[i]);
         MUST(sinew_tool_create(world, &def, &tool));
     }
@@ -498,9 +498,8 @@ static void tool_definitions(void)
     TOOL(SPHERE, INVALID, "shape", def.shape = UINT32_MAX);
     TOOL(SPHERE, INVALID, "detection", def.detection = 3);
     TOOL(SPHERE, INVALID, "detection", def.detection = UINT32_MAX);
-    TOOL(SPHERE, UNSUPPORTED, "detection", def.detection = SINEW_DETECTION_IMAGE_SPACE);
+    TOOL(PLANE, UNSUPPORTED, "detection", def.detection = SINEW_DETECTION_IMAGE_SPACE);
     TOOL(SPHERE, UNSUPPORTED, "detection", def.detection = SINEW_DETECTION_DISTANCE_FIELD);
-    TOOL(MESH, UNSUPPORTED, "shape", (void)0);
     for (i = 0; i < OR_ZERO; i++) {
         TOOL(SPHERE, INVALID, "radius", def.radius = bad[i]);
         TOOL(CAPSULE, INVALID, "radius", def.radius = bad[i]);

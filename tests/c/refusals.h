@@ -53,6 +53,9 @@ static struct outputs {
     float numbers[2][9];
     sinew_strain strain;
     sinew_attachment_id attachments[2];
+    sinew_contact contacts[2];
+    sinew_contact_change changes[2];
+    float position[3], orientation[4];
     size_t count;
 } out, untouched;
 

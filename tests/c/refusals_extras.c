@@ -99,7 +99,8 @@ static void pictures(void)
     REFUSES_SIZES(sinew_picture_def, sizeof(sinew_picture_def),
                   sinew_picture_def def = good_picture(); def.struct_size = size,
                   sinew_world_save_picture(the.world, &def, "must_not_be_written.png"));
-    PICTURE("reserved", def.reserved = 1);
+    PICTURE("show_contacts", def.show_contacts = 2);
+    PICTURE("show_contacts", def.show_contacts = UINT32_MAX);
     PICTURE("width", def.width = 0);
     PICTURE("width", def.width = 16385);
     PICTURE("height", def.height = 0);
@@ -132,6 +133,8 @@ static void queries(void)
     REFUSED(INVALID, "point", sinew_world_find_nearest(the.world, NULL, 1.0f, point));
     REFUSED(INVALID, "out", sinew_world_find_nearest(the.world, place, 1.0f, NULL));
     REFUSED(INVALID, "max_distance", sinew_world_find_nearest(the.world, place, -1.0f, point));
+    REFUSED(INVALID, "max_distance", sinew_world_cast_ray(the.world, place, place, NAN, point));
+    REFUSED(INVALID, "max_distance", sinew_world_find_nearest(the.world, place, NAN, point));
     for (i = 0; i < NOT_FINITE; i++)
         for (axis = 0; axis < 3; axis++) {
             REFUSED(INVALID, "origin", sinew_world_cast_ray(the.world, spoiled(place, 3, axis, bad[i]), place, 1.0f, point));

@@ -14,11 +14,11 @@ const CELLS: std::ops::RangeInclusive<usize> = 1 << 12..=1 << 16;
 const ROUNDING: f32 = 1e-6;
 
 /// The signed distance at a cell's centre, and the place of the triangle that is closest there.
-pub(super) type Sample = (f32, u32);
+pub(in crate::contact) type Sample = (f32, u32);
 
 /// What is known of a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Between {
+pub(in crate::contact) struct Between {
     /// Its signed distance is no less, and no more.
     pub least: f32,
     pub most: f32,
@@ -28,7 +28,7 @@ pub(super) struct Between {
 
 /// Signed distances at the centres of cubes.
 #[derive(Debug)]
-pub(super) struct Coarse {
+pub(in crate::contact) struct Coarse {
     low: Vec3,
     cell: f32,
     counts: UVec3,

@@ -212,13 +212,15 @@ impl Facets {
         self.doubtful
     }
 
-    /// The ends of the edges that the triangle at a place is the first to have.
-    pub fn edges(&self, place: usize) -> impl Iterator<Item = [Vec3; 2]> {
+    /// The ends of the edges that the triangle at a place is the first to have, and the sum of the normals of the other faces there.
+    pub fn edges(&self, place: usize) -> impl Iterator<Item = ([Vec3; 2], DVec3)> {
         let triangle = &self.triangles[place];
         let own = move |side: &usize| triangle.own >> side & 1 == 1;
-        (0..3).filter(own).map(|side| {
+        (0..3).filter(own).map(move |side| {
             let [a, b] = TRIANGLE_EDGES[side].map(|end| triangle.nodes[end] as usize);
-            [self.positions[a], self.positions[b]]
+            let face = self.normal(place, Part::Face).normalize_or_zero();
+            let others = self.edges[triangle.edges[side] as usize].normal - face;
+            ([self.positions[a], self.positions[b]], others)
         })
     }
 

@@ -3,7 +3,7 @@
 //! A tree finds the triangles that are near. The side is that of the pseudonormal of the face, edge or corner that is closest (Baerentzen,
 //! Aanaes 2005). An edge outside is closest to a convex edge or corner of the solid, a face to a corner, or else at their borders.
 
-mod coarse;
+pub(super) mod coarse;
 mod deepest;
 mod facets;
 pub(crate) mod overlap;
@@ -25,6 +25,9 @@ use crate::mesh::ClosedSurface;
 
 /// Crossings of one edge that are looked at, at most.
 const CROSSINGS: usize = 16;
+
+/// Crossings of one face that a search within the solid starts from, at most.
+const STARTS: usize = 4;
 
 /// What is closer than this part of the solid's size looks the way that its surface does.
 const TOUCHING: f64 = 1e-9;
@@ -380,15 +383,17 @@ impl ExactSolid {
         }
         let face = corners.map(|corner| corner.as_dvec3());
         let mut pairs = Pairs::within(within);
-        let mut crossed = None;
+        let mut crossed = [None; STARTS];
+        let mut count = 0;
         let bounds = Bounds::of(corners.into_iter());
         let plane = Placed::new(corners);
         self.tree.near(&bounds, pairs.limit as f32, |place| {
             if plane.is_beside(&self.tree.placed(place).corners, within) {
                 return pairs.limit as f32;
             }
-            if crossed.is_none() {
-                crossed = self.crossed(face, place);
+            if count < STARTS {
+                crossed[count] = self.crossed(face, place);
+                count += usize::from(crossed[count].is_some());
             }
             for node in self.facets.salient_nodes(place) {
                 let position = self.facets.position(node);
@@ -403,24 +408,39 @@ impl ExactSolid {
             }
             pairs.limit as f32
         });
-        if let Some((weights, normal)) = crossed {
-            let start = self.start_within(face, weights, normal);
-            return self.deepest_of(&corners, start, &pairs);
+        if count == 0 {
+            return self.apart_or_within(&corners, middle, known, &pairs);
         }
-        self.apart_or_within(&corners, middle, known, &pairs)
+        let mut best: Option<Closest> = None;
+        let starts = crossed.into_iter().flatten();
+        let starts = starts.map(|(weights, normals)| self.start_within(face, weights, normals));
+        // What passes through a sharp or folded edge may start outside: then from elsewhere, and from corners.
+        for start in starts.chain([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]) {
+            let found = self.deepest_of(&corners, start, &pairs);
+            if let Some(found) = found
+                && best.is_none_or(|best| found.distance < best.distance)
+            {
+                best = Some(found);
+            }
+            if best.is_some_and(|best| best.distance < 0.0) {
+                break;
+            }
+        }
+        best
     }
 
-    /// A point, as weights, where a face and the border of the triangle at a place pass through each other, and the way that this looks.
-    fn crossed(&self, face: [DVec3; 3], place: usize) -> Option<([f64; 3], DVec3)> {
+    /// A point, as weights, where a face and the border of the triangle at a place pass through each other, and the
+    /// normals of what meets there.
+    fn crossed(&self, face: [DVec3; 3], place: usize) -> Option<([f64; 3], [DVec3; 2])> {
         let triangle = self.tree.placed(place).exact();
         if lies_beside(triangle, face) || lies_beside(face, triangle) {
             return None;
         }
         let normal = self.facets.normal(place, Part::Face);
-        for [p, q] in self.facets.edges(place) {
+        for ([p, q], others) in self.facets.edges(place) {
             let (p, q) = (p.as_dvec3(), q.as_dvec3());
             if let Some((fraction, _)) = pierce(p, q, face, [0, 1, 2]) {
-                return Some((nearest_on_triangle(p.lerp(q, fraction), face).0, normal));
+                return Some((nearest_on_triangle(p.lerp(q, fraction), face).0, [normal, others]));
             }
         }
         for side in 0..3 {
@@ -429,16 +449,18 @@ impl ExactSolid {
                 let mut weights = [0.0; 3];
                 weights[side] = 1.0 - fraction;
                 weights[next] = fraction;
-                return Some((weights, normal));
+                return Some((weights, [normal, DVec3::ZERO]));
             }
         }
         None
     }
 
-    /// A point of a face within the solid, found from one of its points on the surface on, where that looks along `normal`.
-    fn start_within(&self, face: [DVec3; 3], weights: [f64; 3], normal: DVec3) -> [f64; 3] {
+    /// A point of a face within the solid, found from one of its points on the surface on, where that has these normals: midway between them, so
+    /// that it stays within a sharp edge.
+    fn start_within(&self, face: [DVec3; 3], weights: [f64; 3], normals: [DVec3; 2]) -> [f64; 3] {
         let across = (face[1] - face[0]).cross(face[2] - face[0]);
-        let inward = -normal.reject_from(across);
+        let [one, other] = normals.map(|normal| normal.reject_from(across).normalize_or_zero());
+        let inward = -(one + other);
         // How fast each weight grows on the way, and where the first is used up.
         let rate = |from: usize, to: usize| across.dot((face[to] - face[from]).cross(inward)) / across.length_squared();
         let rates = [rate(1, 2), rate(2, 0), rate(0, 1)];
@@ -492,6 +514,14 @@ impl ExactSolid {
     fn answer(&self, corners: &[Vec3], pairs: &Pairs) -> Option<Closest> {
         let pair = pairs.inner.or(pairs.border)?;
         let distance = pair.squared.sqrt();
+        if self.facets.are_doubtful() && pairs.inner.is_some() {
+            // Where triangles are folded, what looks closest may be behind another.
+            let closer = (distance - TOUCHING * self.size) as f32 * (1.0 - ROUNDING);
+            let nearest = self.nearest(point_of(corners, pair.weights), closer.max(0.0));
+            if nearest.is_some() && closer > 0.0 {
+                return self.deepest_from(corners, pair.weights);
+            }
+        }
         let normal = if distance > TOUCHING * self.size {
             pair.offset / distance
         } else {
@@ -507,6 +537,11 @@ impl ExactSolid {
     }
 
     fn deepest_of(&self, corners: &[Vec3], start: [f64; 3], pairs: &Pairs) -> Option<Closest> {
+        self.deepest_from(corners, start)
+            .or_else(|| self.answer(corners, pairs))
+    }
+
+    fn deepest_from(&self, corners: &[Vec3], start: [f64; 3]) -> Option<Closest> {
         // What was closest to the last point may be to the next.
         let mut hint = None;
         let measure = |point: Vec3| {
@@ -515,9 +550,7 @@ impl ExactSolid {
             hint = Some(nearest.place as u32);
             Some(self.signed(&nearest))
         };
-        let Some(Deepest { weights, signed }) = deepest(corners, start, measure) else {
-            return self.answer(corners, pairs);
-        };
+        let Deepest { weights, signed } = deepest(corners, start, measure)?;
         Some(Closest {
             weights: weights.map(|weight| weight as f32),
             distance: signed.distance as f32,

@@ -6,7 +6,11 @@ use super::covered::nearest_covered;
 use super::layers::{Crossing, Layers};
 use super::projection::{Frame, Projection};
 use super::surface;
+use crate::body::Bounds;
 use crate::contact::distance::closest_on_triangle;
+use crate::contact::exact::coarse::{Coarse, Sample};
+use crate::contact::nearest::nearest_on_triangle;
+use crate::contact::tree::Tree;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh;
@@ -29,6 +33,8 @@ const EQUAL: f32 = 1e-4;
 pub struct LayeredImage {
     triangles: Vec<Triangle>,
     images: [Image; 3],
+    /// What is far away is known from here.
+    coarse: Coarse,
     low: Vec3,
     high: Vec3,
     /// Metres.
@@ -159,8 +165,16 @@ impl LayeredImage {
             }
         }));
         let image = |axis: usize| Image::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
+        let images = [image(0)?, image(1)?, image(2)?];
+        let tree = Tree::new(triangles.len(), |triangle| drawn[triangle as usize].corners)?;
+        let coarse = Coarse::new(Bounds { min: low, max: high }, triangles.len(), |point, hint| {
+            let (distance, place) = nearest_of(&tree, point, hint);
+            let side = if shows_inside(&images, point) { -1.0 } else { 1.0 };
+            (side * distance, place)
+        })?;
         Ok(Self {
-            images: [image(0)?, image(1)?, image(2)?],
+            images,
+            coarse,
             triangles: drawn,
             low,
             high,
@@ -172,7 +186,7 @@ impl LayeredImage {
     /// unit length; `None` where the point is outside and further away than `within`.
     pub fn distance(&self, point: Vec3, within: f32) -> Option<(f32, Vec3)> {
         let beyond = point - point.clamp(self.low, self.high);
-        if !(beyond.length() <= within) {
+        if !(beyond.length() <= within) || self.is_beyond(point, within) {
             return None;
         }
         let (distance, normal) = self.signed_distance(point)?;
@@ -182,6 +196,12 @@ impl LayeredImage {
     /// Metres.
     pub(super) fn pixel(&self) -> f32 {
         self.pixel
+    }
+
+    /// Whether a point is known to be outside and further away than `within`.
+    #[inline]
+    pub(super) fn is_beyond(&self, point: Vec3, within: f32) -> bool {
+        self.coarse.between(point).is_some_and(|known| known.least > within)
     }
 
     /// The corners of the box around the solid.
@@ -216,7 +236,10 @@ impl LayeredImage {
         let length = face.beside.length();
         let beside = length - self.pixel;
         if beside <= 0.0 {
-            return Some((face.height, face.normal));
+            // So far away the images know the side, also of a face that is folded over.
+            let folded = face.height.abs() > self.pixel && self.is_inside(point) != (face.height < 0.0);
+            let side = if folded { -1.0 } else { 1.0 };
+            return Some((side * face.height, side * face.normal));
         }
         let offset = face.normal * face.height + face.beside * (beside / length);
         let side = if self.is_inside(point) { -1.0 } else { 1.0 };
@@ -258,10 +281,39 @@ impl LayeredImage {
         }
     }
 
-    /// What most of the three images say.
+    /// Where it is not known, what most of the three images say.
     fn is_inside(&self, point: Vec3) -> bool {
-        self.images.iter().filter(|image| image.shows_inside(point)).count() >= 2
+        match self.coarse.between(point) {
+            Some(known) if known.least > 0.0 => false,
+            Some(known) if known.most < 0.0 => true,
+            _ => shows_inside(&self.images, point),
+        }
     }
+}
+
+/// What most of the images say.
+fn shows_inside(images: &[Image; 3], point: Vec3) -> bool {
+    images.iter().filter(|image| image.shows_inside(point)).count() >= 2
+}
+
+/// How far the closest triangle is, and its place, given one that may be.
+fn nearest_of(tree: &Tree, point: Vec3, hint: u32) -> Sample {
+    let exact = point.as_dvec3();
+    let squared = |place: usize| {
+        let corners = tree.placed(place).exact();
+        let (weights, _) = nearest_on_triangle(exact, corners);
+        exact.distance_squared(corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2])
+    };
+    let mut best = (squared(hint as usize), hint);
+    let bounds = Bounds { min: point, max: point };
+    tree.near(&bounds, best.0 as f32, |place| {
+        let here = squared(place);
+        if here < best.0 {
+            best = (here, place as u32);
+        }
+        best.0 as f32
+    });
+    (best.0.sqrt() as f32, best.1)
 }
 
 impl Image {

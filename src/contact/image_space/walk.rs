@@ -14,10 +14,22 @@ const GAIN: f32 = 1e-3;
 /// Halvings of a pixel in which a search ends.
 const HALVINGS: u32 = 6;
 
-/// Parts of a face whose corners are no further than this from their middle, in pixels, are not cut again: about a pixel each.
+/// A part is cut down to so many pixels, unless it is known to be no deeper.
 const FINEST: f32 = 1.5;
 
-/// Room for the parts of a face that a search has still to see: three for each time that it is halved.
+/// And to so many at least where it may be deeper between the looks.
+const COARSEST: f32 = 4.0;
+
+/// What a part must promise to be cut, in pixels.
+const PROMISE: f32 = 0.25;
+
+/// How far a surface is taken to fall from its slope, as a part of how much the slopes that are seen differ.
+const BEND: f32 = 0.25;
+
+/// A search follows the slope while it promises this, in pixels.
+const FOLLOWED: f32 = 0.1;
+
+/// Room for the parts that a search has still to see: three for each time that a face is halved.
 const PARTS: usize = 64;
 
 /// A feature is looked at so often at most.
@@ -29,6 +41,28 @@ struct Sample {
     weights: [f32; 3],
     distance: f32,
     normal: Vec3,
+}
+
+impl Sample {
+    /// This, or the other where it is clearly deeper.
+    fn deeper(self, other: Self, pixel: f32) -> Self {
+        if other.distance < self.distance - GAIN * pixel {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+/// A part of a face, seen in its middle.
+#[derive(Clone, Copy)]
+struct Part {
+    corners: [[f32; 3]; 3],
+    middle: Sample,
+    /// From its middle to the furthest corner, at most.
+    reach: f32,
+    /// How far the normals differ over what it is a part of.
+    bend: f32,
 }
 
 impl LayeredImage {
@@ -56,27 +90,70 @@ impl LayeredImage {
         })
     }
 
-    /// Goes along an edge in steps of a pixel, longer ones where it is far away.
+    /// Halves an edge, and what could hold a deeper point again, down to a pixel.
     fn deepest_of_edge(&self, a: Vec3, b: Vec3, within: f32) -> Option<Sample> {
         let along = b - a;
         let length = along.length();
-        let [start, end] = self.clipped(a, along, within)?;
-        let mut best: Option<Sample> = None;
-        let mut share = start;
-        let shortest = self.pixel().max((end - start) * length / LOOKS as f32);
-        loop {
-            let sample = self.sample([a, b, b], [1.0 - share, share, 0.0])?;
-            if best.is_none_or(|best| sample.distance < best.distance - GAIN * self.pixel()) {
-                best = Some(sample);
-            }
-            if !(share < end) {
-                break;
-            }
-            let known = best.map_or(within, |best| best.distance.min(within));
-            let step = shortest.max((sample.distance - known) * CAUTION);
-            share = (share + step / length).min(end);
+        let middle = 0.5 * (a + b);
+        if self.is_beyond(middle, within + 0.5 * length) {
+            return None;
         }
-        let best = best.filter(|best| best.distance <= within + self.pixel())?;
+        let [start, end] = self.clipped(a, along, within)?;
+        let look = |share: f32| self.sample([a, b, b], [1.0 - share, share, 0.0]);
+        let centre = look(0.5 * (start + end))?;
+        if (centre.distance - within) * CAUTION >= 0.5 * (end - start) * length {
+            return None;
+        }
+        let ends = [look(start)?, look(end)?];
+        let mut best = ends[0].deeper(ends[1], self.pixel()).deeper(centre, self.pixel());
+        let mut parts = [ends; PARTS];
+        let mut count = 0;
+        let halves = |parts: &mut [[Sample; 2]; PARTS], count: &mut usize, [from, to]: [Sample; 2], middle: Sample| {
+            // The deeper half is seen first.
+            let deeper_first = from.distance < to.distance;
+            let (last, first) = if deeper_first {
+                ([middle, to], [from, middle])
+            } else {
+                ([from, middle], [middle, to])
+            };
+            parts[*count] = last;
+            parts[*count + 1] = first;
+            *count += 2;
+        };
+        halves(&mut parts, &mut count, ends, centre);
+        let mut looks = 3;
+        while count > 0 && looks < LOOKS {
+            count -= 1;
+            let [from, to] = parts[count];
+            let stretch = (to.weights[1] - from.weights[1]) * length;
+            if stretch <= self.pixel() || count + 2 > PARTS {
+                continue;
+            }
+            let known = best.distance.min(within) - PROMISE * self.pixel();
+            // It is no deeper than the way there, nor, but for how much it bends, than the slopes at its ends lead.
+            let reached = 0.5 * (from.distance + to.distance - stretch / CAUTION);
+            let [ahead, back] = [from.normal.dot(along) / length, -to.normal.dot(along) / length];
+            let bend = ahead + back;
+            let low = from.distance.min(to.distance);
+            let led = if ahead < 0.0 && back < 0.0 {
+                // Where both slopes meet.
+                let way = ((to.distance - from.distance - back * stretch) / bend).clamp(0.0, stretch);
+                from.distance + ahead * way
+            } else {
+                low - 0.5 * BEND * bend.abs() * stretch
+            };
+            let fine = stretch <= COARSEST * self.pixel();
+            if reached >= known || fine && led.min(low) >= known {
+                continue;
+            }
+            looks += 1;
+            let middle = look(0.5 * (from.weights[1] + to.weights[1]))?;
+            best = best.deeper(middle, self.pixel());
+            halves(&mut parts, &mut count, [from, to], middle);
+        }
+        if best.distance > within + self.pixel() {
+            return None;
+        }
         Some(self.refined([a, b, b], best, |best| {
             let slope = best.normal.dot(along);
             [slope, -slope, 0.0].map(|change| change / (slope.abs() * length))
@@ -85,46 +162,90 @@ impl LayeredImage {
 
     /// Halves a face, and what could hold a deeper point again, down to a pixel.
     fn deepest_of_face(&self, corners: [Vec3; 3], within: f32) -> Option<Sample> {
+        let third = [1.0 / 3.0; 3];
+        let centre = mixed(corners, third);
+        let radius = corners.map(|corner| corner.distance(centre));
+        let radius = radius[0].max(radius[1]).max(radius[2]);
+        if self.is_beyond(centre, within + radius) {
+            return None;
+        }
+        let middle = self.sample(corners, third)?;
+        if (middle.distance - within) * CAUTION >= radius {
+            return None;
+        }
+        // The border is the edges' and nodes' concern: what lies within must be deeper.
         let whole = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let mut parts = [whole; PARTS];
+        let mut best = middle;
+        for (weights, corner) in whole.into_iter().zip(corners) {
+            if !self.is_beyond(corner, best.distance.min(within)) {
+                let corner = self.sample(corners, weights)?;
+                best = if corner.distance <= best.distance { corner } else { best };
+            }
+        }
+        let part = Part {
+            corners: whole,
+            middle,
+            reach: radius,
+            bend: f32::INFINITY,
+        };
+        let mut parts = [part; PARTS];
         let mut count = 1;
-        let mut best: Option<Sample> = None;
         let mut looks = 0;
         while count > 0 && looks < LOOKS {
             count -= 1;
             looks += 1;
             let part = parts[count];
-            let middle = [0, 1, 2].map(|i| (part[0][i] + part[1][i] + part[2][i]) / 3.0);
-            let sample = self.sample(corners, middle)?;
-            let centre = mixed(corners, middle);
-            let reach = part.map(|weights| mixed(corners, weights).distance(centre));
-            let reach = reach[0].max(reach[1]).max(reach[2]);
-            let known = best.map_or(within, |best| best.distance.min(within));
-            if (sample.distance - known) * CAUTION >= reach {
+            if part.reach <= FINEST * self.pixel() || count + 4 > PARTS {
                 continue;
             }
-            if looks == 1 {
-                // The border is the edges' and nodes' concern: what lies within must be deeper.
-                for weights in whole {
-                    let corner = self.sample(corners, weights)?;
-                    if best.is_none_or(|best| corner.distance < best.distance) {
-                        best = Some(corner);
-                    }
+            let known = best.distance.min(within) - PROMISE * self.pixel();
+            if part.middle.distance - part.reach / CAUTION >= known {
+                continue;
+            }
+            let here = mixed(corners, part.middle.weights);
+            let falls = part
+                .corners
+                .map(|weights| part.middle.normal.dot(mixed(corners, weights) - here));
+            let fall = falls[0].min(falls[1]).min(falls[2]);
+            let fine = part.reach <= COARSEST * self.pixel();
+            if fine && part.middle.distance + fall - BEND * part.bend * part.reach >= known {
+                continue;
+            }
+            let [ab, bc, ca] = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| halfway(part.corners[i], part.corners[j]));
+            let [a, b, c] = part.corners;
+            let mut bend = 0.0_f32;
+            let first = count;
+            for smaller in [[a, ab, ca], [ab, b, bc], [ca, bc, c]] {
+                let weights = [0, 1, 2].map(|i| (smaller[0][i] + smaller[1][i] + smaller[2][i]) / 3.0);
+                if self.is_beyond(mixed(corners, weights), known + 0.5 * part.reach) {
+                    continue;
                 }
-            }
-            if best.is_none_or(|best| sample.distance < best.distance - GAIN * self.pixel()) {
-                best = Some(sample);
-            }
-            if reach <= FINEST * self.pixel() || count + 4 > PARTS {
-                continue;
-            }
-            let [ab, bc, ca] = [(0, 1), (1, 2), (2, 0)].map(|(from, to)| halfway(part[from], part[to]));
-            for smaller in [[part[0], ab, ca], [ab, part[1], bc], [ca, bc, part[2]], [ab, bc, ca]] {
-                parts[count] = smaller;
+                let middle = self.sample(corners, weights)?;
+                best = best.deeper(middle, self.pixel());
+                bend = bend.max(middle.normal.distance(part.middle.normal));
+                parts[count] = Part {
+                    corners: smaller,
+                    middle,
+                    ..part
+                };
                 count += 1;
             }
+            parts[count] = Part {
+                corners: [ab, bc, ca],
+                ..part
+            };
+            count += 1;
+            for smaller in &mut parts[first..count] {
+                smaller.reach = 0.5 * part.reach;
+                smaller.bend = bend;
+            }
         }
-        let best = best.filter(|best| best.distance <= within + self.pixel())?;
+        if best.distance > within + self.pixel() {
+            return None;
+        }
+        if best.weights.contains(&1.0) {
+            return Some(best);
+        }
         let [a, b, c] = corners;
         let across = (b - a).cross(c - a);
         // Barycentric weights grow along these, perpendicular to the opposite sides.
@@ -143,6 +264,10 @@ impl LayeredImage {
         let mut step = self.pixel();
         for _ in 0..HALVINGS {
             let change = downhill(&best);
+            let way = corners[0] * change[0] + corners[1] * change[1] + corners[2] * change[2];
+            if !(best.normal.dot(way).abs() * step > FOLLOWED * self.pixel()) {
+                break;
+            }
             if change.iter().all(|change| change.is_finite()) {
                 let moved = [0, 1, 2].map(|i| (best.weights[i] + step * change[i]).max(0.0));
                 let sum = moved[0] + moved[1] + moved[2];

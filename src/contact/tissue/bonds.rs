@@ -63,6 +63,8 @@ struct Bond {
     /// The mean force on it over the last step, N.
     mean: Vec3,
     // The step in progress.
+    /// Whether it is the turn of the group of its bodies.
+    is_in_turn: bool,
     /// The force that this substep foresees, N; none where a body is not moved by VERLET.
     load: Vec3,
     /// What was given beside that in this substep, N s, and all in the step.
@@ -85,6 +87,8 @@ struct End {
     node: u32,
     /// Whether its velocity is that of a skin.
     is_on_skin: bool,
+    /// Whether it is the turn of the group of its body.
+    is_in_turn: bool,
     velocity: Vec3,
     /// 1/kg; 0 along axes along which it is held.
     answer: Vec3,
@@ -129,8 +133,18 @@ impl Bond {
 }
 
 impl Bonds {
-    pub fn is_empty(&self) -> bool {
-        self.bonds.is_empty()
+    /// Whether any acts in this moment.
+    pub(super) fn act(&self) -> bool {
+        self.bonds.iter().any(|bond| bond.acts)
+    }
+
+    /// The two bodies of each, by their places, or one twice.
+    pub(super) fn bodies(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.bonds.iter().filter_map(|bond| {
+            let mut bodies = bond.used().map(|corner| corner.body);
+            let first = bodies.next()?;
+            Some([first, bodies.last().unwrap_or(first)])
+        })
     }
 
     /// Makes room for so many bonds more.
@@ -149,6 +163,7 @@ impl Bonds {
             limit: if limit > 0.0 { limit } else { f32::INFINITY },
             foreseen: Vec3::ZERO,
             mean: Vec3::ZERO,
+            is_in_turn: false,
             load: Vec3::ZERO,
             impulse: Vec3::ZERO,
             sum: DVec3::ZERO,
@@ -258,19 +273,14 @@ impl Bonds {
         }
     }
 
-    /// Begins to attempt a step, which may be taken several times, until [`Self::unload`].
-    pub fn attempt(&mut self, bodies: &mut Slots<Body>) {
-        for (place, body) in bodies.iter_mut() {
-            if let Some(implicit) = &mut body.implicit {
-                implicit.is_attached = self.concern(place);
-            }
-        }
-        for bond in &mut self.bonds {
-            let is_implicit = |corner: Corner| bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
-            bond.is_implicit = bond.used().any(is_implicit);
-        }
+    /// Begins to attempt the step of a group, of which these bodies are, which may be taken several times, until [`Self::unload`].
+    pub fn attempt(&mut self, bodies: &mut Slots<Body>, is_of_group: impl Fn(usize) -> bool) {
         for end in &mut self.ends {
-            if let Some(body) = bodies.at(end.body) {
+            end.is_in_turn = is_of_group(end.body);
+            if let Some(body) = bodies.at_mut(end.body).filter(|_| end.is_in_turn) {
+                if let Some(implicit) = &mut body.implicit {
+                    implicit.is_attached = true;
+                }
                 end.is_pending = body.forces_applied;
                 end.pending = match &body.applied {
                     Some(applied) if body.forces_applied => applied.get(end.node as usize),
@@ -278,12 +288,17 @@ impl Bonds {
                 };
             }
         }
+        for bond in &mut self.bonds {
+            let is_implicit = |corner: Corner| bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
+            bond.is_implicit = bond.used().any(is_implicit);
+            bond.is_in_turn = bond.used().all(|corner| is_of_group(corner.body));
+        }
     }
 
     /// Begins the step over, from what is current.
     pub fn begin(&mut self) {
         self.is_opening = true;
-        for bond in &mut self.bonds {
+        for bond in self.bonds.iter_mut().filter(|bond| bond.is_in_turn) {
             bond.load = bond.foreseen;
             bond.sum = DVec3::ZERO;
         }
@@ -291,7 +306,7 @@ impl Bonds {
 
     /// How many substeps a step of `dt` seconds takes at least.
     pub fn substeps(&self, dt: f32) -> u32 {
-        if self.bonds.iter().any(|bond| bond.is_implicit) {
+        if self.bonds.iter().any(|bond| bond.is_in_turn && bond.is_implicit) {
             (f64::from(dt) / LONGEST).ceil().clamp(1.0, f64::from(u32::MAX / 4)) as u32
         } else {
             1
@@ -302,12 +317,12 @@ impl Bonds {
     pub fn load(&mut self, bodies: &mut Slots<Body>) {
         self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
         let Self { bonds, ends, .. } = self;
-        for bond in bonds.iter().filter(|bond| !bond.is_implicit) {
+        for bond in bonds.iter().filter(|bond| bond.is_in_turn && !bond.is_implicit) {
             for corner in bond.used() {
                 ends[corner.end].given += bond.load * corner.weight;
             }
         }
-        for end in ends {
+        for end in ends.iter().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at_mut(end.body) {
                 let free = Vec3::select(body.answer_of(end.node).cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO);
                 let force = (end.pending + end.given * free).clamp(Vec3::MIN, Vec3::MAX);
@@ -318,7 +333,7 @@ impl Bonds {
 
     /// Takes the forces off again that were foreseen: only what the caller applied is left.
     pub fn unload(&self, bodies: &mut Slots<Body>) {
-        for end in &self.ends {
+        for end in self.ends.iter().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at_mut(end.body) {
                 body.load(end.node as usize, end.pending);
                 body.forces_applied = end.is_pending;
@@ -328,16 +343,19 @@ impl Bonds {
 
     /// Takes a substep as it is to be, after the skins.
     pub(super) fn follow(&mut self, bodies: &mut Slots<Body>, skins: &[Option<Skin>], moment: &Moment) {
-        for end in &mut self.ends {
+        for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
             let Some(body) = bodies.at_mut(end.body) else { continue };
             let skin = skins.get(end.body).and_then(Option::as_ref);
-            end.is_on_skin = moment.concerns(body)
-                && skin.is_some_and(|skin| skin.goes_together && skin.nodes.binary_search(&end.node).is_ok());
+            end.is_on_skin =
+                moment.concerns(body) && skin.is_some_and(|skin| skin.nodes.binary_search(&end.node).is_ok());
             end.velocity = body.mean_velocity(end.node as usize);
             end.answer = body.answer_of(end.node) * body.left_by_damping(end.node, moment);
         }
         for bond in &mut self.bonds {
-            bond.acts = moment.drifts || !bond.is_implicit;
+            bond.acts = bond.is_in_turn && (moment.drifts || !bond.is_implicit);
+            if !bond.acts {
+                continue;
+            }
             bond.impulse = Vec3::ZERO;
             let corners = bond.used();
             let whole: Vec3 = corners
@@ -392,7 +410,7 @@ impl Bonds {
             }
             bond.sum += all.as_dvec3();
         }
-        for end in ends {
+        for end in ends.iter_mut().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at_mut(end.body)
                 && moment.concerns(body)
             {
@@ -406,7 +424,7 @@ impl Bonds {
     /// Moves what is apart at the end of a substep of `duration` seconds together, without giving it speed.
     pub(super) fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
         let Self { bonds, ends, .. } = self;
-        for end in ends.iter_mut() {
+        for end in ends.iter_mut().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at(end.body) {
                 let place = body.state.next_positions().get(end.node as usize);
                 end.place = place.as_dvec3() + body.origin;
@@ -416,7 +434,7 @@ impl Bonds {
         let left = 1.0 - (f64::from(duration) / CLOSING_TIME).min(LARGEST_PART);
         for sweep in 0..SWEEPS {
             let mut is_done = true;
-            for bond in &mut *bonds {
+            for bond in bonds.iter_mut().filter(|bond| bond.is_in_turn) {
                 let place = |corner: Corner| ends[corner.end].place + ends[corner.end].shift;
                 let apart: DVec3 = bond.used().map(|corner| place(corner) * f64::from(corner.weight)).sum();
                 if sweep == 0 {
@@ -434,8 +452,9 @@ impl Bonds {
             }
         }
         for end in ends {
-            if let Some(body) = bodies.at_mut(end.body)
+            if end.is_in_turn
                 && end.shift != DVec3::ZERO
+                && let Some(body) = bodies.at_mut(end.body)
             {
                 body.part_substep(end.node as usize, end.shift.as_vec3());
             }
@@ -476,6 +495,7 @@ impl End {
             body: corner.body,
             node: corner.node,
             is_on_skin: false,
+            is_in_turn: false,
             velocity: Vec3::ZERO,
             answer: Vec3::ZERO,
             given: Vec3::ZERO,

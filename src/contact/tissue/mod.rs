@@ -6,11 +6,14 @@
 //! impulse, with opposite signs, in the same place: no momentum is made.
 
 mod bonds;
+mod crossing;
+mod groups;
 mod link;
 mod search;
 mod skin;
 
 pub(crate) use self::bonds::{Bonds, Corner};
+use self::groups::Groups;
 use self::link::Link;
 use self::search::{Party, Search};
 use self::skin::Skin;
@@ -28,13 +31,19 @@ const SWEEPS: u32 = 128;
 const CONVERGED: f32 = 1e-5;
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
-const SEARCHES: u32 = 4;
+const SEARCHES: u32 = 16;
 
 /// The part of what is too close that comes apart in a step.
 const PARTED: f32 = 0.2;
 
 /// What keeps off a surface without thickness, as a part of its shortest edge: in `f32` something must.
 const LEAST_THICKNESS: f32 = 1e-3;
+
+/// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
+const FASTER: f32 = 2.0;
+
+/// How far bodies come against each other in a substep, as a part of the shortest edge.
+const TRAVEL: f32 = 0.5;
 
 /// With itself a surface keeps off no further than this part of its shortest edge, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
@@ -61,6 +70,7 @@ impl Moment {
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
 pub(crate) struct Tissue {
+    groups: Groups,
     /// By a body's place in the world.
     skins: Vec<Option<Skin>>,
     links: Vec<Link>,
@@ -77,6 +87,7 @@ impl Tissue {
             return Ok(());
         }
         let skin = Skin::new(body)?;
+        self.groups.make_place(place)?;
         let more = ROOM * (skin.nodes.len() + skin.edges.len() + skin.triangles.len());
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
@@ -86,6 +97,14 @@ impl Tissue {
         }
         self.skins[place] = Some(skin);
         Ok(())
+    }
+
+    /// Makes room for so many attachments between the bodies at these places.
+    pub fn reserve_bonds(&mut self, places: [usize; 2], count: usize) -> Result<()> {
+        for place in places {
+            self.groups.make_place(place)?;
+        }
+        self.bonds.reserve(count)
     }
 
     /// A body is gone.
@@ -101,57 +120,103 @@ impl Tissue {
         self.skins.iter().flatten().map(of).sum()
     }
 
-    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, and those that meet
-    /// themselves.
+    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
+    /// and by themselves those that meet themselves.
     pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
-        for place in 0..self.skins.len() {
-            let is_near = self.skins[place].as_ref().is_some_and(|_| {
-                let Some(body) = bodies.at(place) else {
-                    return false;
-                };
-                body.contact.with_itself
-                    || self.others(place).any(|other| {
-                        let Some(other) = bodies.at(other) else { return false };
-                        meet_each_other(body, other) && reach(body, dt, 2.0).overlaps(&reach(other, dt, 2.0))
-                    })
-            });
-            if let Some(skin) = &mut self.skins[place] {
-                skin.goes_together = is_near;
-            }
+        self.groups.part(|place| {
+            let meets_itself = |body: &Body| body.meets_tissue() && body.contact.with_itself;
+            bodies.at(place).is_some_and(meets_itself)
+        });
+        for [first, second] in self.bonds.bodies() {
+            self.groups.join(first, second);
         }
+        self.join_those(bodies, |first, second| reach(first, dt).overlaps(&reach(second, dt)));
     }
 
-    /// Has bodies go together that went alone in a step that was tried, and came near each other: whether there are such.
+    /// Has bodies go together that came near each other in a step that was tried, and did not go together: whether there are such.
     pub fn plan_again(&mut self, bodies: &Slots<Body>) -> bool {
-        let mut found = false;
-        for place in 0..self.skins.len() {
-            let Some(body) = bodies.at(place) else { continue };
-            let met = self.skins[place].as_ref().is_some_and(|skin| {
-                !skin.goes_together
-                    && self.others(place).any(|other| {
-                        let Some(other) = bodies.at(other) else { return false };
-                        meet_each_other(body, other) && swept(body).overlaps(&swept(other))
-                    })
-            });
-            if let Some(skin) = self.skins[place].as_mut().filter(|_| met) {
-                skin.goes_together = true;
-                found = true;
+        self.join_those(bodies, |first, second| swept(first).overlaps(&swept(second)))
+    }
+
+    /// Joins the groups of bodies that meet each other and are near, as this tells: whether that changed any.
+    fn join_those(&mut self, bodies: &Slots<Body>, are_near: impl Fn(&Body, &Body) -> bool) -> bool {
+        let mut changed = false;
+        for a in 0..self.skins.len() {
+            for b in 0..a {
+                let has_skin = |place: usize| self.skins[place].is_some();
+                if !(has_skin(a) && has_skin(b)) || self.groups.are_one(a, b) {
+                    continue;
+                }
+                if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
+                    && meet_each_other(first, second)
+                    && are_near(first, second)
+                {
+                    self.groups.join(a, b);
+                    changed = true;
+                }
             }
         }
-
-        found
+        changed
     }
 
-    /// The other bodies that meet tissue.
-    fn others(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
-        let places = self.skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
-        places.map(|(other, _)| other).filter(move |&other| other != place)
+    /// How many groups there may be: their numbers are below.
+    pub fn groups(&self) -> usize {
+        self.groups.count()
     }
 
-    /// Whether the body at a place takes its substeps together with others.
-    pub fn goes_together(&self, place: usize) -> bool {
-        let skin = self.skins.get(place).and_then(Option::as_ref);
-        skin.is_some_and(|skin| skin.goes_together) || self.bonds.concern(place)
+    /// The group of bodies that the one at a place takes its substeps together with.
+    pub fn group(&self, place: usize) -> Option<usize> {
+        self.groups.of(place)
+    }
+
+    /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
+    /// there are.
+    pub fn find_crossings(&mut self, bodies: &Slots<Body>, at_end: bool) -> u32 {
+        let mut count = 0_u32;
+        for (place, skin) in self.skins.iter_mut().enumerate() {
+            if let (Some(skin), Some(body)) = (skin, bodies.at(place))
+                && self.groups.of(place).is_some()
+            {
+                skin.stand(body, at_end);
+            }
+        }
+        for a in 0..self.skins.len() {
+            // It is written to while others are read.
+            let Some(mut first) = self.skins[a].take() else {
+                continue;
+            };
+            let mut pierces = std::mem::take(&mut first.pierces);
+            pierces.fill(false);
+            if let (Some(body), true) = (bodies.at(a), self.groups.of(a).is_some()) {
+                if body.contact.with_itself {
+                    count = count.saturating_add(crossing::mark(&first, &first, true, &mut pierces));
+                }
+                for (b, second) in self.skins.iter().enumerate() {
+                    if let (Some(second), Some(other)) = (second, bodies.at(b))
+                        && self.groups.are_one(a, b)
+                        && meet_each_other(body, other)
+                    {
+                        count = count.saturating_add(crossing::mark(&first, second, false, &mut pierces));
+                    }
+                }
+            }
+            first.pierces = pierces;
+            self.skins[a] = Some(first);
+        }
+        count
+    }
+
+    /// In how many substeps bodies of a group come no further against each other in one than what they are made of is small.
+    pub fn substeps_wished(&self, group: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
+        let members = self.skins.iter().enumerate().filter_map(|(place, skin)| {
+            let skin = skin.as_ref().filter(|_| self.groups.of(place) == Some(group))?;
+            Some((skin.shortest, speed(bodies.at(place)?)))
+        });
+        let (shortest, speeds) = members.fold((f32::INFINITY, 0.0), |(least, sum), (shortest, speed)| {
+            (shortest.min(least), sum + speed)
+        });
+        let wished = (dt * speeds / (TRAVEL * shortest)).ceil();
+        wished.clamp(1.0, 1e6) as u32
     }
 
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
@@ -163,19 +228,19 @@ impl Tissue {
         }
     }
 
-    /// Stops what meets in a substep of bodies that go together.
-    pub fn meet_together(&mut self, bodies: &mut Slots<Body>, moment: &Moment) {
+    /// Stops what meets in a substep of the bodies of a group.
+    pub fn meet(&mut self, group: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         self.links.clear();
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
-                && skin.goes_together
+                && self.groups.of(place) == Some(group)
                 && moment.concerns(body)
             {
                 skin.follow(body, moment.duration);
             }
         }
         self.bonds.follow(bodies, &self.skins, moment);
-        self.solve(bodies, moment);
+        self.solve(group, bodies, moment);
         for link in &self.links {
             for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
@@ -195,12 +260,12 @@ impl Tissue {
     }
 
     /// Finds contacts and gives their impulses, until they lead to no others.
-    fn solve(&mut self, bodies: &Slots<Body>, moment: &Moment) {
+    fn solve(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
         let mut first = 0.0_f32;
         for search in 0..SEARCHES {
             let known = self.links.len();
-            self.find(bodies, moment);
-            if self.links.len() == known && (search > 0 || self.bonds.is_empty()) {
+            self.find(group, bodies, moment);
+            if self.links.len() == known && (search > 0 || !self.bonds.act()) {
                 break;
             }
             for sweep in 0..SWEEPS {
@@ -228,12 +293,13 @@ impl Tissue {
     }
 
     /// Adds the contacts that are not known yet, of those that meet.
-    fn find(&mut self, bodies: &Slots<Body>, moment: &Moment) {
+    fn find(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
             skins,
             links,
             known,
             bonds,
+            groups,
         } = self;
         let key = |link: &Link| link.sides.map(|side| side.key());
         known.clear();
@@ -251,7 +317,7 @@ impl Tissue {
                 let second = Party { place: b, skin };
                 let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
                 let Some(radius) = radius(&first, &second, [body_a, body_b])
-                    .filter(|_| is_looked_at && first.skin.goes_together && skin.goes_together)
+                    .filter(|_| is_looked_at && [groups.of(a), groups.of(b)] == [Some(group); 2])
                 else {
                     continue;
                 };
@@ -297,15 +363,9 @@ fn meet_each_other(first: &Body, second: &Body) -> bool {
     a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
 }
 
-/// A box about what a body may touch in a step of `dt` seconds if it becomes no more than so many times as fast, in the caller's coordinates.
-fn reach(body: &Body, dt: f32, faster: f32) -> Bounds {
-    let velocities = body.carry.gravity.velocities;
-    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
-    let way = if fastest.is_finite() {
-        faster * fastest * dt
-    } else {
-        0.0
-    };
+/// A box about what a body may touch in a step of `dt` seconds, in the caller's coordinates.
+fn reach(body: &Body, dt: f32) -> Bounds {
+    let way = FASTER * speed(body) * dt;
     let bounds = body.local_bounds();
     let origin = body.origin.as_vec3();
     Bounds {
@@ -313,6 +373,13 @@ fn reach(body: &Body, dt: f32, faster: f32) -> Bounds {
         max: bounds.max + origin,
     }
     .extended(way + 2.0 * body.contact.thickness + 0.01 * body.extent())
+}
+
+/// No node of a body is faster, m/s, as far as that is kept.
+fn speed(body: &Body) -> f32 {
+    let velocities = body.carry.gravity.velocities;
+    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
+    if fastest.is_finite() { fastest } else { 0.0 }
 }
 
 /// A box about a body as a step that was tried begins and as it ends, and what keeps off it, in the caller's coordinates.

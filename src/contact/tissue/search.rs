@@ -8,6 +8,13 @@ use super::skin::Skin;
 use crate::body::Bounds;
 use crate::contact::sweep::{Corners, Segment, Separation};
 
+/// A node that lies within another body is led out through a face that is no further than this part of the shortest edge.
+const LED_OUT: f32 = 0.5;
+
+/// Distances that are the same but for this part are those of faces that share the closest point: which side it is on says the one that is
+/// seen most squarely.
+const SAME: f32 = 1e-4;
+
 /// A body in a search, by its place in the world.
 #[derive(Clone, Copy)]
 pub(super) struct Party<'a> {
@@ -56,24 +63,47 @@ impl Search<'_> {
                 steps: [step; 2],
                 radius: self.radius,
             };
-            let mut closest: Option<(f32, usize, Separation)> = None;
+            let mut touched: Option<(f32, usize, Separation)> = None;
+            // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
+            let mut nearest = (f32::INFINITY, 0.0_f32);
+            let mut behind: Option<(usize, Separation)> = None;
             let around = Bounds::of([place, place + step].into_iter());
-            of_faces
-                .skin
-                .near(&around, self.radius + of_faces.skin.spread, |triangle| {
-                    let nodes = of_faces.skin.triangles[triangle];
-                    if self.is_of_one() && nodes.contains(&node) {
-                        return;
-                    }
-                    let corners = self.corners(of_faces, &nodes);
-                    if let Some(found) = corners.approach(&segment, 0.0) {
-                        let start = corners.separation(&segment, 0.0).offset.length_squared();
-                        if closest.is_none_or(|(least, ..)| start < least) {
-                            closest = Some((start, triangle, found));
-                        }
-                    }
-                });
-            if let Some((_, triangle, found)) = closest {
+            let is_solid = of_faces.skin.is_closed && !self.is_of_one();
+            let depth = if is_solid {
+                LED_OUT * of_faces.skin.shortest
+            } else {
+                0.0
+            };
+            let reach = self.radius.max(depth) + of_faces.skin.spread;
+            of_faces.skin.near(&around, reach, |triangle| {
+                let nodes = of_faces.skin.triangles[triangle];
+                if self.is_of_one() && nodes.contains(&node) {
+                    return;
+                }
+                let corners = self.corners(of_faces, &nodes);
+                let start = corners.separation(&segment, 0.0);
+                let distance = start.offset.length();
+                let height = if is_solid { height(&corners, &start) } else { 0.0 };
+                let is_nearer = distance < nearest.0 * (1.0 - SAME)
+                    || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
+                if is_solid && is_nearer {
+                    nearest = (distance, height.abs());
+                    behind = (height < 0.0).then_some((triangle, start));
+                }
+                if height >= 0.0
+                    && touched.is_none_or(|(least, ..)| distance < least)
+                    && let Some(found) = corners.approach(&segment, 0.0)
+                {
+                    touched = Some((distance, triangle, found));
+                }
+            });
+            // On the wrong side it is led out, or let out where it is deep.
+            let is_behind = behind.is_some();
+            let closest = match behind {
+                Some((triangle, start)) => (nearest.0 < self.radius.max(depth)).then_some((triangle, start)),
+                None => touched.map(|(_, triangle, found)| (triangle, found)),
+            };
+            if let Some((triangle, found)) = closest {
                 let nodes = of_faces.skin.triangles[triangle];
                 let sides = [
                     Side {
@@ -87,7 +117,7 @@ impl Search<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, -found.offset, shift, see);
+                self.show(sides, if is_behind { found.offset } else { -found.offset }, shift, see);
             }
         }
     }
@@ -95,6 +125,9 @@ impl Search<'_> {
     fn edges_with_edges(&self, first: Party, second: Party, see: &mut impl FnMut(Touch)) {
         let shift = shift(first.skin, second.skin);
         for (index, &edge) in first.skin.edges.iter().enumerate() {
+            if first.skin.pierces[index] {
+                continue;
+            }
             let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
             let segment = Segment {
                 ends: ways.map(|(place, _)| place),
@@ -184,6 +217,12 @@ impl Search<'_> {
         }
         corners
     }
+}
+
+/// How far above a face what is compared with it begins, m; below 0 on its inner side.
+fn height(face: &Corners, start: &Separation) -> f32 {
+    let [a, b, c] = face.points;
+    -start.offset.dot((b - a).cross(c - a).normalize_or_zero())
 }
 
 /// From the coordinates of one body to those of another.

@@ -18,8 +18,10 @@ pub(super) struct Skin {
     /// The edges that are looked at with a triangle: each with one.
     owned: Vec<[u32; 3]>,
     tree: Tree,
-    /// Whether the body takes its substeps together with others, or looks after itself in each.
-    pub goes_together: bool,
+    /// Whether it encloses something.
+    pub is_closed: bool,
+    /// The edges that pass through other tissue, or the body's own, as the step begins.
+    pub pierces: Vec<bool>,
     /// Where the body's coordinates begin.
     pub origin: DVec3,
     /// Where nodes are as a step or substep begins, in the body's coordinates, and how fast they go through it, m/s.
@@ -54,6 +56,7 @@ impl Skin {
                 }
             }
         }
+        let pierces = memory::filled(false, edges.len())?;
         let mut nodes = memory::copied(triangles.as_flattened())?;
         nodes.sort_unstable();
         nodes.dedup();
@@ -67,7 +70,8 @@ impl Skin {
             edges,
             owned,
             tree,
-            goes_together: false,
+            is_closed: mesh::is_closed(&triangles)?,
+            pierces,
             origin: body.origin,
             starts: Vectors::zeros(body.node_count())?,
             velocities: Vectors::zeros(body.node_count())?,
@@ -87,6 +91,16 @@ impl Skin {
             None => self.take(origin, duration, |node| (starts.get(node), velocities.get(node))),
             Some(implicit) => self.take(origin, duration, |node| (starts.get(node), implicit.mean(node))),
         }
+    }
+
+    /// Takes the body as it stands when a step that was tried begins, or as it ends.
+    pub fn stand(&mut self, body: &Body, at_end: bool) {
+        let positions = if at_end {
+            body.state.newest().0
+        } else {
+            body.state.positions()
+        };
+        self.take(body.origin, 0.0, |node| (positions.get(node), Vec3::ZERO));
     }
 
     fn take(&mut self, origin: DVec3, duration: f32, motion_of: impl Fn(usize) -> (Vec3, Vec3)) {
@@ -114,9 +128,10 @@ impl Skin {
         });
     }
 
-    /// The edges that are looked at with a triangle.
+    /// The edges that are looked at with a triangle, but for those that pass through tissue: there is no telling which side they belong to.
     pub fn owned(&self, triangle: usize) -> impl Iterator<Item = [u32; 2]> + '_ {
         let edges = self.owned[triangle].into_iter().filter(|&edge| edge != NONE);
-        edges.map(|edge| self.edges[edge as usize])
+        let edges = edges.map(|edge| edge as usize).filter(|&edge| !self.pierces[edge]);
+        edges.map(|edge| self.edges[edge])
     }
 }

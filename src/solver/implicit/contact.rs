@@ -211,8 +211,16 @@ impl Implicit {
             // What it gives is no gain that will go on.
             history.gains.set(node, Vec3::ZERO);
             history.energy = None;
+            self.is_deflected = true;
         }
         given
+    }
+
+    /// After a part that ended otherwise than its equation did the next is one of order 1.
+    pub fn settle_deflection(&mut self) {
+        if std::mem::take(&mut self.is_deflected) {
+            self.histories[1 - self.settled].step = 0.0;
+        }
     }
 
     /// Makes the preconditioner what it is without contacts.

@@ -106,6 +106,8 @@ pub(crate) struct Implicit {
     /// The part of a step's correction that may be missing.
     accuracy: f32,
     histories: [History; 2],
+    /// Whether other tissue changed what the last equation led to.
+    is_deflected: bool,
     /// Which of them belongs to the current state.
     settled: usize,
     /// How the last equation that was solved makes velocities of what forces do.
@@ -198,6 +200,7 @@ impl Implicit {
             budget,
             left: 0,
             accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
+            is_deflected: false,
             histories: [
                 History::new(node_count, solved_count)?,
                 History::new(node_count, solved_count)?,
