@@ -1,162 +1,17 @@
-//! Tissue attached to tissue.
-#![allow(unsafe_code)]
+//! Tissue attached to tissue: what holds, what is handed on and when it ends.
 
-#[path = "support/counting.rs"]
-mod counting;
+#[path = "support/hanging.rs"]
+mod hanging;
 #[path = "support/tissue.rs"]
 mod tissue;
 
-use std::cell::Cell;
-
-use counting::Counting;
 use glam::{DVec3, Quat, Vec3};
+use hanging::*;
 use sinew::mesh::Mesh;
 use sinew::{
-    Anchor, AttachmentId, BodyContact, BodyDefinition, BodyId, Error, RestStateDefinition, Solver, SurfacePoint,
-    Values, World, WorldDefinition,
+    Anchor, AttachmentId, BodyContact, BodyDefinition, BodyId, Error, Solver, SurfacePoint, Values, World,
 };
 use tissue::*;
-
-thread_local! {
-    static ASKED: Cell<u64> = const { Cell::new(0) };
-}
-
-/// What this thread asks for.
-fn count() {
-    // Nothing where the thread is at its end.
-    let _ = ASKED.try_with(|asked| asked.set(asked.get() + 1));
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting(count);
-
-const SIZE: f32 = 0.04;
-const HEIGHT: f32 = 0.02;
-const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
-
-/// What a block is like.
-#[derive(Clone, Copy)]
-struct Block {
-    at: Vec3,
-    mass: f32,
-    stiffness: f32,
-    drag: f32,
-    solver: Solver,
-    contact: BodyContact,
-}
-
-impl Block {
-    /// Without damping.
-    const FREE: Self = Self {
-        drag: 0.0,
-        ..Self::CALM
-    };
-    const CALM: Self = Self {
-        at: Vec3::ZERO,
-        mass: 0.1,
-        stiffness: 1000.0,
-        drag: 30.0,
-        solver: Solver::Verlet,
-        contact: BodyContact::NOTHING,
-    };
-
-    fn mesh(&self) -> Mesh {
-        moved(Mesh::block([SIZE, HEIGHT, SIZE], [4, 2, 4]).expect("a block"), self.at)
-    }
-
-    fn put(&self, world: &mut World) -> BodyId {
-        let mesh = self.mesh();
-        let node_mass = self.mass / mesh.positions.len() as f32;
-        world
-            .create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                masses: Values::Uniform(node_mass),
-                node_dampings: Values::Uniform(self.drag * node_mass),
-                stiffnesses: Values::Uniform(self.stiffness),
-                triangles: &mesh.triangles,
-                tetrahedra: &mesh.tetrahedra,
-                solver: self.solver,
-                contact: self.contact,
-                ..Default::default()
-            })
-            .expect("a body")
-    }
-}
-
-/// The nodes that are somewhere when a mesh is at rest.
-fn nodes_at(mesh: &Mesh, is_one: impl Fn(Vec3) -> bool) -> Vec<u32> {
-    let nodes = (0..).zip(&mesh.positions).filter(|(_, position)| is_one(**position));
-    nodes.map(|(node, _)| node).collect()
-}
-
-fn anchors(nodes: &[u32]) -> Vec<Anchor> {
-    nodes.iter().copied().map(Anchor::Node).collect()
-}
-
-/// A block that hangs by some nodes of its top from the bottom of another, whose top is pinned.
-struct Hanging {
-    world: World,
-    above: BodyId,
-    below: BodyId,
-    pinned: Vec<u32>,
-    pairs: Vec<[u32; 2]>,
-    ids: Vec<AttachmentId>,
-}
-
-impl Hanging {
-    fn new(above: Block, below: Block, count: usize, gravity: Vec3) -> Self {
-        Self::in_world(world(gravity), above, below, count)
-    }
-
-    fn in_world(mut world: World, above: Block, below: Block, count: usize) -> Self {
-        let half = SIZE / 2.0;
-        let above = Block {
-            at: Vec3::Y * (HEIGHT / 2.0),
-            ..above
-        };
-        let below = Block {
-            at: Vec3::NEG_Y * (HEIGHT / 2.0),
-            ..below
-        };
-        let meshes = [above.mesh(), below.mesh()];
-        let bodies = [above.put(&mut world), below.put(&mut world)];
-        let pinned = nodes_at(&meshes[0], |place| place.y > HEIGHT - 1e-4);
-        pin_all(&mut world, bodies[0], &pinned);
-        let corner = |place: Vec3| place.x.abs() > half - 1e-4 && place.z.abs() > half - 1e-4;
-        let chosen = |place: Vec3| {
-            place.y.abs() < 1e-4
-                && match count {
-                    1 => place.x.abs() < 1e-4 && place.z.abs() < 1e-4,
-                    4 => corner(place),
-                    _ => true,
-                }
-        };
-        let [first, second] = [0, 1].map(|index| nodes_at(&meshes[index], chosen));
-        assert_eq!([first.len(), second.len()], [count; 2]);
-        let ids = world
-            .attach_to_body(bodies[1], &anchors(&second), bodies[0], &anchors(&first), 0.0)
-            .expect("attachments");
-        Self {
-            world,
-            above: bodies[0],
-            below: bodies[1],
-            pinned,
-            pairs: first.into_iter().zip(second).map(|(a, b)| [a, b]).collect(),
-            ids,
-        }
-    }
-
-    fn drift(&self) -> f32 {
-        let [above, below] = [self.above, self.below].map(|id| body(&self.world, id).positions());
-        let apart = |&[a, b]: &[u32; 2]| above[a as usize].distance(below[b as usize]);
-        self.pairs.iter().map(apart).fold(0.0, f32::max)
-    }
-
-    fn force(&self) -> DVec3 {
-        let force = |&id: &AttachmentId| self.world.attachment_force(id).expect("a force").as_dvec3();
-        self.ids.iter().map(force).sum()
-    }
-}
 
 #[test]
 fn a_block_hangs_from_another() {
@@ -552,75 +407,6 @@ fn what_is_attached_does_not_touch_there() {
             // Without it what lies within the thickness comes apart.
             assert!(hanging.drift() > 0.4e-3, "{}", hanging.drift());
         }
-    }
-}
-
-#[test]
-fn a_state_of_rest_is_refused() {
-    let mut hanging = Hanging::new(Block::CALM, Block::CALM, 4, DOWN);
-    let before = hanging.world.state_hash();
-    for id in [hanging.above, hanging.below] {
-        let refused = hanging.world.rest_state(id, &RestStateDefinition::default());
-        assert!(matches!(refused, Err(Error::InvalidArgument(_))), "{refused:?}");
-    }
-    assert_eq!(hanging.world.state_hash(), before);
-    for &id in &hanging.ids {
-        hanging.world.release(id).expect("released");
-    }
-    hanging
-        .world
-        .rest_state(hanging.above, &RestStateDefinition::default())
-        .expect("a state of rest");
-}
-
-#[test]
-fn the_hash_knows_of_it_and_threads_change_nothing() {
-    let hashes = [1, 3].map(|thread_count| {
-        let mut hashes = Vec::new();
-        for solvers in [[Solver::Verlet; 2], [Solver::Verlet, Solver::Implicit]] {
-            let world = World::new(WorldDefinition {
-                thread_count,
-                ..Default::default()
-            });
-            let [above, below] = solvers.map(|solver| Block { solver, ..Block::FREE });
-            let mut hanging = Hanging::in_world(world.expect("a world"), above, below, 4);
-            for _ in 0..20 {
-                hanging.world.step(2e-3).expect("a step");
-                hashes.push(hanging.world.state_hash());
-            }
-            hanging.world.release(hanging.ids[0]).expect("released");
-            hashes.push(hanging.world.state_hash());
-        }
-        hashes
-    });
-    assert_eq!(hashes[0], hashes[1]);
-    let [.., last, released] = hashes[0][..] else { panic!() };
-    assert_ne!(last, released);
-}
-
-#[test]
-fn a_step_allocates_nothing() {
-    for solvers in [[Solver::Verlet; 2], [Solver::Implicit, Solver::Newton]] {
-        let [above, below] = solvers.map(|solver| Block { solver, ..Block::CALM });
-        let mut hanging = Hanging::new(above, below, 4, DOWN);
-        let [up, down] = hanging.pairs[0];
-        hanging.world.release(hanging.ids[0]).expect("released");
-        let weak = hanging.world.attach_to_body(
-            hanging.below,
-            &[Anchor::Node(down)],
-            hanging.above,
-            &[Anchor::Node(up)],
-            1e-6,
-        );
-        weak.expect("an attachment");
-        let mut lost = 0;
-        for step in 0..10 {
-            let before = ASKED.get();
-            drop(hanging.world.step(4e-3));
-            assert_eq!(ASKED.get(), before, "{solvers:?}, step {step}");
-            lost += hanging.world.slipped().len();
-        }
-        assert_eq!(lost, 1, "{solvers:?}");
     }
 }
 

@@ -41,16 +41,20 @@ impl Body {
         }
     }
 
-    /// Makes room for forces on nodes that are attached, and begins what these do anew.
-    pub(crate) fn begin_bonds(&mut self) -> Result<()> {
+    /// Makes room for forces on nodes that are attached.
+    pub(crate) fn reserve_bonds(&mut self) -> Result<()> {
         if self.applied.is_none() {
             self.applied = Some(Vectors::zeros(self.node_count())?);
         }
+        Ok(())
+    }
+
+    /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
+    pub(crate) fn begin_bonds(&mut self) {
         close(self);
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();
         }
-        Ok(())
     }
 
     /// Its own number of a node.

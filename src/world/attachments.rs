@@ -226,21 +226,28 @@ impl World {
             all.push(corners);
         }
         let mut ids = memory::reserved(all.len())?;
+        if all.is_empty() {
+            return Ok(ids);
+        }
         self.slipped.try_reserve(self.attachments.iter().count() + all.len())?;
         for place in places {
             make_walks(&mut self.walks, place)?;
         }
         self.tissue.get_or_insert_default().reserve_bonds(places, all.len())?;
         for id in [body, other] {
-            self.bodies.get_mut(id.0)?.begin_bonds()?;
+            self.bodies.get_mut(id.0)?.reserve_bonds()?;
         }
         let holder = Holder::Body(other);
         self.name(Attachment { body, holder }, all.len(), &mut ids)?;
+        for id in [body, other] {
+            self.bodies.get_mut(id.0)?.begin_bonds();
+        }
         for (&AttachmentId(id), corners) in ids.iter().zip(&all) {
             if let Some(bonds) = self.bonds_mut() {
                 bonds.add(id, corners, force_limit)?;
             }
         }
+        self.bonds_mut().into_iter().for_each(Bonds::name_ends);
         Ok(ids)
     }
 

@@ -21,9 +21,14 @@ use crate::memory;
 use crate::slots::{SlotId, Slots};
 use crate::solver::Outcome;
 
-/// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
+/// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep, and no faster than this,
+/// m/s, so that bodies that are far apart follow their points.
 const CLOSING_TIME: f64 = 0.02;
 const LARGEST_PART: f64 = 0.2;
+const CLOSING_SPEED: f64 = 0.25;
+
+/// The part of the way by which points may miss where they are to be, after `SWEEPS`.
+const MISSED: f64 = 0.2;
 
 /// Sweeps over what is apart.
 const SWEEPS: u32 = 8;
@@ -72,8 +77,9 @@ struct Bond {
     sum: DVec3,
     /// How much impulse makes the points faster against each other, along each axis, kg; 0 where neither moves.
     masses: Vec3,
-    /// How far the points are apart at the end of the substep, m.
+    /// How far the points are to be apart at the end of the substep, and how far they may miss that, m.
     gap: DVec3,
+    miss: f64,
     /// Whether it acts in this moment.
     acts: bool,
     /// Whether a body at it is not moved by VERLET.
@@ -85,6 +91,8 @@ struct Bond {
 struct End {
     body: usize,
     node: u32,
+    /// Whether a bond is there still.
+    is_used: bool,
     /// Whether its velocity is that of a skin.
     is_on_skin: bool,
     /// Whether it is the turn of the group of its body.
@@ -115,6 +123,15 @@ pub(crate) struct Bonds {
 impl Bond {
     fn used(&self) -> impl Iterator<Item = Corner> + use<> {
         self.corners.into_iter().filter(|corner| corner.weight != 0.0)
+    }
+
+    /// How far its points are apart as ends are placed, m.
+    fn apart(&self, ends: &[End]) -> DVec3 {
+        let place = |end: &End| end.place + end.shift;
+        let parts = self
+            .used()
+            .map(|corner| place(&ends[corner.end]) * f64::from(corner.weight));
+        parts.sum()
     }
 
     fn concerns(&self, body: usize) -> bool {
@@ -153,7 +170,7 @@ impl Bonds {
         Ok(self.ends.try_reserve(count.saturating_mul(CORNERS))?)
     }
 
-    /// Keeps the two points of these corners together, for which there is room.
+    /// Keeps the two points of these corners together, for which there is room, once [`Self::name_ends`] has seen to all that were added.
     pub fn add(&mut self, id: SlotId, corners: &[Corner], limit: f32) -> Result<()> {
         let mut all = [Corner::default(); CORNERS];
         all[..corners.len()].copy_from_slice(corners);
@@ -169,6 +186,7 @@ impl Bonds {
             sum: DVec3::ZERO,
             masses: Vec3::ZERO,
             gap: DVec3::ZERO,
+            miss: 0.0,
             acts: false,
             is_implicit: false,
         };
@@ -179,7 +197,6 @@ impl Bonds {
                 self.ends.insert(place, End::new(&corner));
             }
         }
-        self.name_ends();
         Ok(())
     }
 
@@ -198,10 +215,11 @@ impl Bonds {
             return;
         }
         let Self { bonds, ends, .. } = self;
-        ends.retain(|end| {
-            let mut corners = bonds.iter().flat_map(Bond::used);
-            corners.any(|corner| (corner.body, corner.node) == (end.body, end.node))
-        });
+        ends.iter_mut().for_each(|end| end.is_used = false);
+        for corner in bonds.iter().flat_map(Bond::used) {
+            ends[corner.end].is_used = true;
+        }
+        ends.retain(|end| end.is_used);
         self.name_ends();
     }
 
@@ -240,6 +258,13 @@ impl Bonds {
 
     /// Whether a bond joins these two.
     pub(super) fn join(&self, sides: &[Side; 2]) -> bool {
+        let is_at_end = |side: &Side| {
+            side.used()
+                .any(|(node, _)| self.find(side.body, node as u32).is_ok())
+        };
+        if self.bonds.is_empty() || !sides.iter().all(is_at_end) {
+            return false;
+        }
         let has = |side: &Side, corner: Corner| {
             side.body == corner.body && side.used().any(|(node, _)| node == corner.node as usize)
         };
@@ -431,17 +456,20 @@ impl Bonds {
                 end.shift = DVec3::ZERO;
             }
         }
-        let left = 1.0 - (f64::from(duration) / CLOSING_TIME).min(LARGEST_PART);
-        for sweep in 0..SWEEPS {
+        let duration = f64::from(duration);
+        let closed = (duration / CLOSING_TIME).min(LARGEST_PART);
+        for bond in bonds.iter_mut().filter(|bond| bond.is_in_turn) {
+            let apart = bond.apart(ends);
+            let way = (apart * closed).clamp_length_max(CLOSING_SPEED * duration);
+            bond.gap = apart - way;
+            bond.miss = MISSED * way.abs().max_element();
+        }
+        for _ in 0..SWEEPS {
             let mut is_done = true;
-            for bond in bonds.iter_mut().filter(|bond| bond.is_in_turn) {
-                let place = |corner: Corner| ends[corner.end].place + ends[corner.end].shift;
-                let apart: DVec3 = bond.used().map(|corner| place(corner) * f64::from(corner.weight)).sum();
-                if sweep == 0 {
-                    bond.gap = apart;
-                }
-                let off = (apart - bond.gap * left) * bond.masses.as_dvec3();
-                is_done &= (apart - bond.gap * left).abs().max_element() <= 0.01 * bond.gap.abs().max_element();
+            for bond in bonds.iter().filter(|bond| bond.is_in_turn) {
+                let off = bond.apart(ends) - bond.gap;
+                is_done &= off.abs().max_element() <= bond.miss;
+                let off = off * bond.masses.as_dvec3();
                 for corner in bond.used() {
                     let end = &mut ends[corner.end];
                     end.shift -= off * (end.answer.as_dvec3() * f64::from(corner.weight));
@@ -480,7 +508,7 @@ impl Bonds {
     }
 
     /// Tells corners where their ends are now.
-    fn name_ends(&mut self) {
+    pub fn name_ends(&mut self) {
         let Self { bonds, ends, .. } = self;
         for corner in bonds.iter_mut().flat_map(|bond| &mut bond.corners) {
             let found = ends.binary_search_by_key(&(corner.body, corner.node), |end| (end.body, end.node));
@@ -494,6 +522,7 @@ impl End {
         Self {
             body: corner.body,
             node: corner.node,
+            is_used: true,
             is_on_skin: false,
             is_in_turn: false,
             velocity: Vec3::ZERO,
