@@ -124,5 +124,8 @@ impl Body {
         let next_positions = self.state.substep().next_positions;
         let place = next_positions.get(node) + way;
         next_positions.set(node, place);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.part();
+        }
     }
 }

@@ -21,6 +21,7 @@ pub struct Block {
     pub drag: f32,
     pub solver: Solver,
     pub contact: BodyContact,
+    pub cells: [u32; 3],
 }
 
 impl Block {
@@ -36,10 +37,11 @@ impl Block {
         drag: 30.0,
         solver: Solver::Verlet,
         contact: BodyContact::NOTHING,
+        cells: [4, 2, 4],
     };
 
     pub fn mesh(&self) -> Mesh {
-        moved(Mesh::block([SIZE, HEIGHT, SIZE], [4, 2, 4]).expect("a block"), self.at)
+        moved(Mesh::block([SIZE, HEIGHT, SIZE], self.cells).expect("a block"), self.at)
     }
 
     pub fn put(&self, world: &mut World) -> BodyId {

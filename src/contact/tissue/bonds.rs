@@ -12,7 +12,6 @@
 use glam::{DVec3, Vec3};
 
 use super::Moment;
-use super::link::Side;
 use super::skin::Skin;
 use crate::body::{Body, Bounds};
 use crate::diagnostics::StateHasher;
@@ -256,28 +255,18 @@ impl Bonds {
         self.ends.get(first).is_some_and(|end| end.body == body)
     }
 
-    /// Whether a bond joins these two.
-    pub(super) fn join(&self, sides: &[Side; 2]) -> bool {
-        let is_at_end = |side: &Side| {
-            side.used()
-                .any(|(node, _)| self.find(side.body, node as u32).is_ok())
-        };
-        if self.bonds.is_empty() || !sides.iter().all(is_at_end) {
+    /// Whether a bond joins a node of one body with a node of the other, of these.
+    pub(super) fn join(&self, bodies: [usize; 2], nodes: [&[u32]; 2]) -> bool {
+        let is_at_end = |side: usize| nodes[side].iter().any(|&node| self.find(bodies[side], node).is_ok());
+        if self.bonds.is_empty() || !(is_at_end(0) && is_at_end(1)) {
             return false;
         }
-        let has = |side: &Side, corner: Corner| {
-            side.body == corner.body && side.used().any(|(node, _)| node == corner.node as usize)
+        let has = |bond: &Bond, side: usize, sign: f32| {
+            let mut corners = bond.used().filter(|corner| corner.weight * sign > 0.0);
+            corners.any(|corner| corner.body == bodies[side] && nodes[side].contains(&corner.node))
         };
-        self.bonds.iter().any(|bond| {
-            let between = |first: usize, second: usize| {
-                bond.used()
-                    .any(|corner| corner.weight > 0.0 && has(&sides[first], corner))
-                    && bond
-                        .used()
-                        .any(|corner| corner.weight < 0.0 && has(&sides[second], corner))
-            };
-            between(0, 1) || between(1, 0)
-        })
+        let joins = |bond: &Bond| has(bond, 0, 1.0) && has(bond, 1, -1.0) || has(bond, 0, -1.0) && has(bond, 1, 1.0);
+        self.bonds.iter().any(joins)
     }
 
     /// The box of all velocities of a body, given that of those before.

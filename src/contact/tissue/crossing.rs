@@ -6,21 +6,26 @@ use super::search::shift;
 use super::skin::Skin;
 use crate::body::Bounds;
 
-/// Marks the edges of `first` that pass through triangles of `second`, as their trees have them; with itself those triangles that an edge has
-/// no node of. How many there are.
-pub(super) fn mark(first: &Skin, second: &Skin, is_one: bool, pierces: &mut [bool]) -> u32 {
+/// Marks the edges of `first` that pass through triangles of `second`, as their trees have them, but for those that are joined with the
+/// edge: how many there are.
+pub(super) fn mark(
+    first: &Skin,
+    second: &Skin,
+    are_joined: impl Fn(&[u32], &[u32]) -> bool,
+    pierces: &mut [bool],
+) -> u32 {
     let mut count = 0;
     let shift = shift(first, second);
     for (edge, pierces) in first.edges.iter().zip(pierces) {
         let ends = edge.map(|node| first.starts.get(node as usize) + shift);
         let mut passes = false;
         second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {
-            let nodes = second.triangles[triangle];
-            if passes || is_one && nodes.iter().any(|node| edge.contains(node)) {
+            if passes {
                 return;
             }
+            let nodes = second.triangles[triangle];
             let corners = nodes.map(|node| second.starts.get(node as usize).as_dvec3());
-            passes = passes_through(ends.map(|end| end.as_dvec3()), corners);
+            passes = passes_through(ends.map(|end| end.as_dvec3()), corners) && !are_joined(edge, &nodes);
         });
         if passes {
             *pierces = true;

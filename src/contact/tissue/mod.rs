@@ -188,15 +188,20 @@ impl Tissue {
             let mut pierces = std::mem::take(&mut first.pierces);
             pierces.fill(false);
             if let (Some(body), true) = (bodies.at(a), self.groups.of(a).is_some()) {
+                let join = |b: usize, edge: &[u32], triangle: &[u32]| self.bonds.join([a, b], [edge, triangle]);
                 if body.contact.with_itself {
-                    count = count.saturating_add(crossing::mark(&first, &first, true, &mut pierces));
+                    let are_joined = |edge: &[u32], triangle: &[u32]| {
+                        edge.iter().any(|node| triangle.contains(node)) || join(a, edge, triangle)
+                    };
+                    count = count.saturating_add(crossing::mark(&first, &first, are_joined, &mut pierces));
                 }
                 for (b, second) in self.skins.iter().enumerate() {
                     if let (Some(second), Some(other)) = (second, bodies.at(b))
                         && self.groups.are_one(a, b)
                         && meet_each_other(body, other)
                     {
-                        count = count.saturating_add(crossing::mark(&first, second, false, &mut pierces));
+                        let are_joined = |edge: &[u32], triangle: &[u32]| join(b, edge, triangle);
+                        count = count.saturating_add(crossing::mark(&first, second, are_joined, &mut pierces));
                     }
                 }
             }
@@ -332,7 +337,9 @@ impl Tissue {
                     let is_known = known
                         .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
                         .is_ok();
-                    if is_known || links.len() == links.capacity() || bonds.join(&touch.sides) {
+                    let [of_a, of_b] = &touch.sides;
+                    let are_joined = || bonds.join([of_a.body, of_b.body], [&of_a.nodes, &of_b.nodes]);
+                    if is_known || links.len() == links.capacity() || are_joined() {
                         return;
                     }
                     let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });

@@ -202,6 +202,11 @@ impl Implicit {
         history.energy = None;
     }
 
+    /// Nodes were moved after the substep that was just solved: its energy is no longer known.
+    pub fn part(&mut self) {
+        self.histories[1 - self.settled].energy = None;
+    }
+
     /// Other tissue has a node go with this mean velocity instead, m/s: by how much it becomes faster.
     pub fn deflect(&mut self, node: usize, mean: Vec3) -> Vec3 {
         let given = mean - self.mean(node);
