@@ -36,6 +36,9 @@ const SWEEPS: u32 = 8;
 /// goes with the square of it, and a change would be a jolt.
 const LONGEST: f64 = 0.25e-3;
 
+/// Steps of 1 ms are a little longer than that in `f32`.
+const ROUNDED: f64 = 1e-3;
+
 /// Velocities that differ by less than this part of themselves are equal.
 const ROUNDING: f32 = 2e-7;
 
@@ -321,7 +324,9 @@ impl Bonds {
     /// How many substeps a step of `dt` seconds takes at least.
     pub fn substeps(&self, dt: f32) -> u32 {
         if self.bonds.iter().any(|bond| bond.is_in_turn && bond.is_implicit) {
-            (f64::from(dt) / LONGEST).ceil().clamp(1.0, f64::from(u32::MAX / 4)) as u32
+            (f64::from(dt) / LONGEST - ROUNDED)
+                .ceil()
+                .clamp(1.0, f64::from(u32::MAX / 4)) as u32
         } else {
             1
         }
