@@ -147,7 +147,8 @@ pub unsafe extern "C" fn sinew_body_attach_points(
 
 /// Attaches `count` nodes of a body to as many nodes of another, or of the same, each pair by an attachment of its own, whose ids
 /// are written to `out`. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes
-/// together within some hundredths of a second. Each body may turn about the point as it likes: what shall not turn takes three.
+/// together within some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each body may turn about the
+/// point as it likes: what shall not turn takes three.
 ///
 /// The bodies take their substeps together, those of IMPLICIT and NEWTON of 0.25 ms at most. No momentum is made; nor is any angular
 /// momentum, once the points have come together. Where both points are held by pins or tools along an axis nothing is done

@@ -180,7 +180,8 @@ impl World {
 
     /// Attaches points of a body to as many points of another, or of the same, each pair by an attachment of its own: nodes, or points of
     /// the surface. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes together within
-    /// some hundredths of a second. Each may turn about it as it likes: what shall not turn takes three.
+    /// some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each may turn about it as it likes: what shall not
+    /// turn takes three.
     ///
     /// The bodies take their substeps together, those of [`Solver::Implicit`](crate::Solver::Implicit) and
     /// [`Solver::Newton`](crate::Solver::Newton) of 0.25 ms at most and of order 1. No momentum is made; nor is any angular momentum, once the points have
