@@ -96,10 +96,6 @@ fn what_is_far_apart_is_pulled_together_gently() {
                 }
             }
             let off = sum_of(&world, &parts).length();
-            println!(
-                "{solvers:?}, {distance} m: {first} m apart, then {:.1e}; nodes {most:.3} m from the middle, {fastest:.2} m/s, momentum {off:.1e}",
-                gap(&world)
-            );
             assert!(most < 0.9 * SIZE, "{solvers:?}, {distance} m: {most} m");
             assert!(fastest < 0.5, "{solvers:?}, {distance} m: {fastest} m/s");
             assert!(off < 1e-6, "{solvers:?}, {distance} m: momentum {off}");
@@ -187,10 +183,6 @@ fn what_meets_one_goes_with_all_that_are_attached_to_it() {
             }
         }
         let each = parts.map(|part| sum_of(&world, &[part]).x / first.x);
-        println!(
-            "{solvers:?}: {each:.3?} of the momentum, off by {:.1e}, drift {drift:.1e}",
-            off / first.x
-        );
         // Most of it is what sweeps over contacts round off.
         assert!(off < 1e-5 * first.x, "{solvers:?}: off by {off} of {first}");
         assert!(drift < 1e-5, "{solvers:?}: {drift} m");
@@ -226,7 +218,6 @@ fn a_step_that_is_begun_again_hands_on_as_much() {
         let expected = force.as_dvec3() * f64::from(dt) * forces.len() as f64;
         let off = (sum_of(&world, &parts) - expected).length() / expected.x;
         let met = sum_of(&world, &parts[2..]).x / expected.x;
-        println!("{solvers:?}: off by {off:.1e}, {met:.3} in what waited");
         assert!(off < 2e-6, "{solvers:?}: off by {off}");
         assert!(met > 0.01, "{solvers:?}: {met}");
         // What was applied was applied once.

@@ -8,7 +8,7 @@ mod tissue;
 use glam::{DVec3, Quat, Vec3};
 use hanging::*;
 use sinew::mesh::Mesh;
-use sinew::{Anchor, AttachmentId, BodyContact, BodyDefinition, BodyId, Error, Solver, SurfacePoint, Values, World};
+use sinew::{Anchor, BodyContact, BodyDefinition, BodyId, Error, Solver, SurfacePoint, Values, World};
 use tissue::*;
 
 #[test]
@@ -26,7 +26,6 @@ fn a_block_hangs_from_another() {
         }
     }
     for (masses, solvers, dt, count) in cases {
-        let start = std::time::Instant::now();
         let [above, below] = [0, 1].map(|index| Block {
             mass: masses[index],
             solver: solvers[index],
@@ -41,12 +40,6 @@ fn a_block_hangs_from_another() {
         let case = format!("{masses:?} kg, {solvers:?}, {dt} s, {count}");
         let weight = 9.81 * f64::from(masses[1]);
         let off = (hanging.force() + DVec3::Y * -weight).length() / weight;
-        println!(
-            "{case}: force off by {off:.1e}, drift {:.1e}, at most {:.1e}, {:.1} s",
-            hanging.drift() / SIZE,
-            most / SIZE,
-            start.elapsed().as_secs_f64()
-        );
         assert!(off < 1e-3, "{case}: the force is off by {off:e}");
         assert!(hanging.drift() < 1e-4 * SIZE, "{case}: drift of {}", hanging.drift());
         assert!(most < 1e-3 * SIZE, "{case}: drift of {most} on the way");
@@ -84,7 +77,6 @@ fn what_swings_gains_no_energy() {
             hanging.world.step(1e-3).expect("a step");
             most = most.max(energy(&hanging) - first);
         }
-        println!("{solvers:?}: at most {:.1e} of what was put in gained", most / thrown);
         assert!(most < 0.03 * thrown, "{solvers:?}: {most} J gained of {thrown}");
         assert!(hanging.drift() < 1e-4 * SIZE, "{solvers:?}: {}", hanging.drift());
         // It did move.
@@ -133,11 +125,6 @@ fn momentum_is_kept() {
                 handed += hanging.force().length() * f64::from(dt);
             }
             let [upper, _] = parts(&hanging.world);
-            println!(
-                "{solvers:?}, {dt}: off by {:.1e} of {handed:.3}, {upper} of {first} above, drift {:.1e}",
-                off / handed,
-                hanging.drift()
-            );
             assert!(
                 off < 1e-6 * handed,
                 "{solvers:?}, {dt}: off by {off} of {handed} handed on"
@@ -234,7 +221,6 @@ fn points_come_together_and_hold() {
             }
         }
         let held: Vec3 = ids.iter().map(|&id| world.attachment_force(id).expect("a force")).sum();
-        println!("{solver:?}: {first} m apart, then {last}; {held} of {} N", 0.981);
         assert!(last < 1e-4 * SIZE, "{solver:?}: {last} m apart");
         assert!((held - Vec3::Y * 0.981).length() < 1e-3 * 0.981, "{solver:?}: {held}");
     }
@@ -324,7 +310,6 @@ fn pins_and_tools_take_what_hangs_on_them() {
                     let (force, _) = hanging.world.wrench(tool).expect("a wrench");
                     all -= f64::from(force.y);
                 }
-                println!("{solvers:?}, {dt}, pinned {is_pinned}: {all} of {expected} N");
                 assert!(
                     (all - expected).abs() < 2e-3 * expected,
                     "{solvers:?}, {dt}, {is_pinned}: {all} N"
@@ -366,7 +351,6 @@ fn it_slips_beyond_its_limit_alone() {
                     lost = lost.or(Some(step));
                 }
             }
-            println!("{solvers:?}, {limit} N: {lost:?}");
             assert_eq!(lost.is_some(), slips, "{solvers:?}, {limit} N");
             assert_eq!(world.attachment_force(held).is_err(), slips, "{solvers:?}");
         }
@@ -397,7 +381,6 @@ fn it_ends_with_either_body() {
             }
             let fallen = |id: BodyId| centre(body(&hanging.world, id)).y;
             let free = -0.5 * 9.81 * 0.05_f64.powi(2);
-            println!("{solver:?}: {} of {free} m", fallen(other));
             // It is damped.
             assert!(fallen(other) < 0.5 * free, "{solver:?}: {} m", fallen(other));
             assert!(all_finite(body(&hanging.world, left)));
@@ -431,7 +414,6 @@ fn what_is_attached_does_not_touch_there() {
                 force = force.max(hanging.force().length());
             }
         }
-        println!("attached {is_attached}: drift {}, force {force}", hanging.drift());
         if is_attached {
             assert!(hanging.drift() < 1e-4 * SIZE, "{}", hanging.drift());
             assert!(force < 1e-4, "{force} N");
