@@ -72,17 +72,17 @@ fn what_swings_gains_no_energy() {
         };
         let first = energy(&hanging);
         let thrown = 0.5 * 0.1 * 0.2;
-        let mut most = f64::NEG_INFINITY;
-        for _ in 0..800 {
+        let (mut most, mut aside) = (f64::NEG_INFINITY, 0.0_f32);
+        for _ in 0..500 {
             hanging.world.step(1e-3).expect("a step");
             most = most.max(energy(&hanging) - first);
+            let places = body(&hanging.world, hanging.below).positions();
+            aside = places.iter().map(|place| place.x.abs()).fold(aside, f32::max);
         }
         assert!(most < 0.03 * thrown, "{solvers:?}: {most} J gained of {thrown}");
         assert!(hanging.drift() < 1e-4 * SIZE, "{solvers:?}: {}", hanging.drift());
         // It did move.
-        let places = body(&hanging.world, hanging.below).positions();
-        let aside = places.iter().map(|place| place.x.abs()).fold(0.0, f32::max);
-        assert!(aside > 0.6 * SIZE, "{solvers:?}: {aside}");
+        assert!(aside > 0.8 * SIZE, "{solvers:?}: {aside}");
     }
 }
 
