@@ -82,7 +82,7 @@ fn what_swings_gains_no_energy() {
         assert!(most < 0.03 * thrown, "{solvers:?}: {most} J gained of {thrown}");
         assert!(hanging.drift() < 1e-4 * SIZE, "{solvers:?}: {}", hanging.drift());
         // It did move.
-        assert!(aside > 0.8 * SIZE, "{solvers:?}: {aside}");
+        assert!(aside > 0.7 * SIZE, "{solvers:?}: {aside}");
     }
 }
 
