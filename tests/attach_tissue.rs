@@ -424,6 +424,64 @@ fn what_is_attached_does_not_touch_there() {
     }
 }
 
+/// The point of the lowest triangles of a block that is straight above or below a place.
+fn point_at(surface: &[[u32; 3]], positions: &[Vec3], place: Vec3) -> SurfacePoint {
+    let lowest = positions
+        .iter()
+        .map(|position| position.y)
+        .fold(f32::INFINITY, f32::min);
+    let candidates = (0..).zip(surface).filter_map(|(triangle, corners)| {
+        let [a, b, c] = corners.map(|node| positions[node as usize]);
+        let is_low = a.y.max(b.y).max(c.y) < lowest + 1e-4;
+        let area = |p: Vec3, q: Vec3, r: Vec3| (q - p).cross(r - p).y;
+        let weights = [area(place, b, c), area(a, place, c), area(a, b, place)].map(|part| part / area(a, b, c));
+        (is_low && weights.iter().all(|&weight| weight >= 0.0)).then_some(SurfacePoint { triangle, weights })
+    });
+    candidates.last().expect("a triangle")
+}
+
+#[test]
+fn what_is_attached_crosses_nothing_there() {
+    let contact = BodyContact {
+        thickness: 0.1e-3,
+        with_bodies: true,
+        ..BodyContact::NOTHING
+    };
+    for solvers in [[Solver::Verlet; 2], [Solver::Implicit, Solver::Verlet]] {
+        let mut world = world(DOWN);
+        let [above, below] = [0, 1].map(|index| Block {
+            solver: solvers[index],
+            at: [
+                Vec3::Y * (HEIGHT / 2.0),
+                Vec3::new(0.0013, -HEIGHT / 2.0 - 0.3e-3, 0.0007),
+            ][index],
+            contact,
+            ..Block::CALM
+        });
+        let [upper, lower] = [above, below].map(|block| block.put(&mut world));
+        let [rest, nodes] = [above, below].map(|block| block.mesh().positions);
+        let top = nodes_at(&above.mesh(), |place| place.y > HEIGHT - 1e-4);
+        pin_all(&mut world, upper, &top);
+        let inner = nodes_at(&below.mesh(), |place| {
+            place.y > -1e-3 && place.x.abs().max(place.z.abs()) < 0.015
+        });
+        assert_eq!(inner.len(), 9);
+        let surface = body(&world, upper).surface().to_vec();
+        let points = inner
+            .iter()
+            .map(|&node| point_at(&surface, &rest, nodes[node as usize]));
+        let points: Vec<Anchor> = points.map(Anchor::Point).collect();
+        let made = world.attach_to_body(lower, &anchors(&inner), upper, &points, 0.0);
+        let ids = made.expect("attachments");
+        for step in 0..200 {
+            let report = world.step(1e-3).expect("a step");
+            assert_eq!(report.crossings, 0, "{solvers:?}, step {step}");
+        }
+        let held: Vec3 = ids.iter().map(|&id| world.attachment_force(id).expect("a force")).sum();
+        assert!(held.y > 0.9, "{solvers:?}: {held}");
+    }
+}
+
 #[test]
 fn a_tool_carries_what_hangs_on_what_it_holds() {
     let mut hanging = Hanging::new(Block::CALM, Block::CALM, 4, Vec3::ZERO);
