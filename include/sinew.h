@@ -321,7 +321,8 @@ typedef struct sinew_world_def {
   uint32_t thread_count;
   /**
    * 0, the default: as many as stability needs; n: exactly n per step, but for bodies of IMPLICIT and NEWTON near a tool,
-   * whose substeps are of 1 ms at most there, and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
+   * whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms, and where a substep of theirs gains energy: then
+   * they are cut again, to 4096 in all.
    */
   uint32_t substeps;
   /**

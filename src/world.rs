@@ -25,8 +25,8 @@ pub struct WorldDefinition {
     /// 1: the caller's thread alone; 0: one per core; at most 256. What comes of a step is the same for any number.
     pub thread_count: u32,
     /// 0: as many as stability needs; n: exactly n per step, but for bodies of [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, and where a substep of theirs
-    /// gains energy: then they are cut again, to 4096 in all.
+    /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms,
+    /// and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
     pub substeps: u32,
     /// A step that needs more is [`Error::Unstable`]; at least 1. What is cut as above is no such need.
     pub max_substeps: u32,
