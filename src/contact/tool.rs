@@ -246,7 +246,8 @@ impl Tool {
 
     /// Begins a step: all of its way, until it is known what resists.
     pub fn set_out(&mut self) {
-        let is_limited = self.force_limit < f32::INFINITY && self.target.is_some();
+        let goes = self.target.is_some_and(|target| target != self.pose);
+        let is_limited = self.force_limit < f32::INFINITY && goes;
         self.reach = is_limited.then(|| Reach::new(self.force.length(), self.force_limit));
     }
 
