@@ -142,6 +142,7 @@ impl World {
             tools,
             paths,
             outcomes,
+            tissue,
             ..
         } = self;
         for (index, (_, tool)) in tools.iter_mut().enumerate() {
@@ -152,6 +153,9 @@ impl World {
             tool.pose = paths[index].end();
             tool.target = None;
             tool.reach = None;
+        }
+        if let Some(tissue) = tissue {
+            tissue.bonds.commit(outcomes, dt);
         }
         self.end_slipped();
     }
