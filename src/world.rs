@@ -1,25 +1,21 @@
 //! A world: bodies and tools that are stepped together.
 
 mod attachments;
+mod step;
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
-use crate::contact::{Contact, ContactChange, Pose, TRIES, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
-use crate::solver::{Outcome, RestStateDefinition, RestStateReport, StepRequest, Together, Walk, attempt, rest_state};
+use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
-use crate::threads::{Items, RunTasks, Team, Threads};
+use crate::threads::{RunTasks, Threads};
 use attachments::Attachment;
 pub use attachments::{AttachmentId, SurfacePoint};
-
-/// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
-const SHARED_FROM: usize = 8192;
-
-/// Small bodies of fewer nodes in all are not worth waking anybody.
-const WORTH_SHARING: usize = 1024;
+pub use step::StepReport;
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,23 +53,6 @@ impl Default for WorldDefinition {
     }
 }
 
-/// What a step did.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepReport {
-    /// The most substeps that any body took.
-    pub substeps: u32,
-    /// The longest explicit substep that is stable now, over all bodies, s; infinity: no limit.
-    pub stable_substep: f32,
-    /// Bodies that would have become non-finite: put back as they were, the others stepped.
-    pub bodies_restored: u32,
-    /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
-    /// anything to compare.
-    pub error_estimate: f32,
-    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those of one that is closed come out again by themselves.
-    pub crossings: u32,
-}
-
 /// A body of a world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BodyId(pub(crate) SlotId);
@@ -94,8 +73,6 @@ pub struct World {
     paths: Vec<ToolPath>,
     /// Contacts of tissue with tissue, where bodies ask for them.
     tissue: Option<Box<Tissue>>,
-    /// How many edges pass through tissue as the step in progress ends.
-    crossings: u32,
     /// The bodies that take their substeps together, by their places; none where none can.
     walks: Vec<Option<Walk>>,
     /// How the step in progress ended for each body, at its place.
@@ -129,7 +106,6 @@ impl World {
             tools: Slots::new("tool"),
             paths: Vec::new(),
             tissue: None,
-            crossings: 0,
             walks: Vec::new(),
             outcomes: Vec::new(),
             attachments: Slots::new("attachment"),
@@ -339,144 +315,6 @@ impl World {
         self.tools.iter().map(|(_, tool)| tool)
     }
 
-    /// Steps everything by `dt` seconds, above 0.
-    ///
-    /// # Errors
-    /// [`Error::InvalidArgument`]: `dt` is out of its range. [`Error::Unstable`]: some body needs more substeps than are
-    /// allowed. Nothing has moved then, pending forces and poses stay pending.
-    pub fn step(&mut self, dt: f32) -> Result<StepReport> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
-        }
-        for (_, tool) in self.tools.iter_mut() {
-            tool.set_out();
-        }
-        for left in (0..=TRIES).rev() {
-            self.plan_tools();
-            if let Err(report) = self.attempt(dt) {
-                self.put_back();
-                return Err(Error::Unstable {
-                    report,
-                    allowed: match self.definition.substeps {
-                        0 => self.definition.max_substeps,
-                        fixed => fixed,
-                    },
-                });
-            }
-            if left == 0 || self.are_within_limits(dt, left == 1) {
-                break;
-            }
-            self.put_back();
-        }
-        Ok(self.commit(dt))
-    }
-
-    /// Lets every body try the step; what it would come to where one cannot take it.
-    fn attempt(&mut self, dt: f32) -> std::result::Result<(), StepReport> {
-        let Self {
-            definition,
-            threads,
-            bodies,
-            paths,
-            outcomes,
-            tissue,
-            crossings,
-            walks,
-            ..
-        } = self;
-        let request = StepRequest {
-            dt,
-            gravity: definition.gravity,
-            substeps: definition.substeps,
-            max_substeps: definition.max_substeps,
-            // Fixed substeps are taken as they are.
-            tolerance: if definition.substeps == 0 {
-                definition.tolerance
-            } else {
-                0.0
-            },
-            tools: paths,
-        };
-        let Some(tissue) = tissue else {
-            lead(threads, bodies, |bodies, team| {
-                attempt_bodies(bodies, outcomes, &request, |_| true, team);
-            });
-            return reported(bodies, outcomes);
-        };
-        tissue.plan(bodies, dt);
-        lead(threads, bodies, |bodies, team| {
-            attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);
-            loop {
-                tissue.find_crossings(bodies, false);
-                let mut together = Together {
-                    tissue,
-                    walks,
-                    request: &request,
-                    team,
-                };
-                together.attempt(bodies, outcomes);
-                if !tissue.plan_again(bodies) {
-                    break;
-                }
-            }
-        });
-        reported(bodies, outcomes)?;
-        *crossings = tissue.find_crossings(bodies, true);
-        Ok(())
-    }
-
-    /// Takes back what bodies have tried.
-    fn put_back(&mut self) {
-        self.bodies.iter_mut().for_each(|(_, body)| body.put_back());
-    }
-
-    /// Makes the step that was tried the current state.
-    fn commit(&mut self, dt: f32) -> StepReport {
-        let Self {
-            threads,
-            bodies,
-            paths,
-            outcomes,
-            ..
-        } = self;
-        let mut report = report(bodies, outcomes);
-        report.crossings = self.crossings;
-        lead(threads, bodies, |bodies, team| {
-            commit_bodies(bodies, outcomes, paths, team)
-        });
-        self.commit_tools(dt);
-        self.end_slipped();
-        report
-    }
-
-    /// Whether no tool presses harder than it can; else those that do go less far in the next try, which may be the `last`.
-    fn are_within_limits(&mut self, dt: f32, last: bool) -> bool {
-        let mut are_within = true;
-        for index in 0..self.paths.len() {
-            let [force, _] = self.wrench_of(index, dt);
-            if let Some((_, tool)) = self.tools.iter_mut().nth(index)
-                && let Some(reach) = &mut tool.reach
-            {
-                are_within &= reach.is_allowed(force.length() as f32, tool.force_limit, last);
-            }
-        }
-        are_within
-    }
-
-    /// The mean force and torque on a tool, at this place among the ways, in the step that was tried, N and N m.
-    fn wrench_of(&self, index: usize, dt: f32) -> [DVec3; 2] {
-        let mut wrench = [DVec3::ZERO; 2];
-        for (place, body) in self.bodies.iter() {
-            if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&self.outcomes[place], &body.contacts) {
-                let load = contacts.loads()[index];
-                let [force, torque] = body.pull_of(self.paths[index].slot, *substeps);
-                wrench[0] += load.impulse / f64::from(dt) - force;
-                wrench[1] += load.angular_impulse / f64::from(dt) - torque;
-            }
-        }
-        wrench
-    }
-
     /// Where a tool pressed bodies when the last step ended.
     ///
     /// # Errors
@@ -520,137 +358,5 @@ impl World {
             tool.hash_state(&mut hasher);
         }
         hasher.finish()
-    }
-
-    fn plan_tools(&mut self) {
-        self.paths.clear();
-        for (place, tool) in self.tools.iter() {
-            self.paths.push(ToolPath::new(place, tool));
-        }
-    }
-
-    fn commit_tools(&mut self, dt: f32) {
-        for index in 0..self.paths.len() {
-            let [force, torque] = self.wrench_of(index, dt);
-            let end = self.paths[index].end();
-            if let Some((_, tool)) = self.tools.iter_mut().nth(index) {
-                // Finite, whatever the step's length.
-                tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
-                tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
-                tool.pose = end;
-                tool.target = None;
-                tool.reach = None;
-            }
-        }
-    }
-}
-
-/// What the step would come to where a body cannot take it.
-fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::Result<(), StepReport> {
-    let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
-    if outcomes.iter().flatten().any(unstable) {
-        return Err(report(bodies, outcomes));
-    }
-    Ok(())
-}
-
-/// Has the threads do something with bodies that are worth it, or the caller's own alone.
-fn lead(threads: &mut Threads, bodies: &mut Slots<Body>, act: impl FnOnce(&mut Slots<Body>, &Team) + Send) {
-    if is_worth_sharing(bodies) {
-        threads.lead(|team| act(bodies, team));
-    } else {
-        act(bodies, &Team::alone());
-    }
-}
-
-/// Whether there is work for more than one thread.
-fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
-    let sizes = || bodies.iter().map(|(_, body)| body.node_count());
-    sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
-}
-
-/// Attempts the step of every body: the small ones are shared among the threads, the large ones each by all threads.
-fn attempt_bodies(
-    bodies: &mut Slots<Body>,
-    outcomes: &mut Vec<Option<Outcome>>,
-    request: &StepRequest,
-    goes_alone: impl Fn(usize) -> bool + Sync,
-    team: &Team,
-) {
-    outcomes.clear();
-    outcomes.resize(bodies.places(), None);
-    let small = bodies
-        .iter()
-        .filter(|(_, body)| body.node_count() < SHARED_FROM)
-        .count();
-    if small > 1 {
-        let contents = Items::new(bodies.slots_mut());
-        team.pass(
-            outcomes.len(),
-            (contents, Items::new(outcomes)),
-            |place, (slot, outcome)| {
-                if let Some(body) = slot.content_mut()
-                    && body.node_count() < SHARED_FROM
-                    && goes_alone(place)
-                {
-                    *outcome = Some(attempt(body, request, &Team::alone()));
-                }
-            },
-        );
-    }
-    for (place, body) in bodies.iter_mut() {
-        if outcomes[place].is_none() && goes_alone(place) {
-            let alone = body.node_count() < SHARED_FROM;
-            outcomes[place] = Some(if alone {
-                attempt(body, request, &Team::alone())
-            } else {
-                attempt(body, request, team)
-            });
-        }
-    }
-}
-
-fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> StepReport {
-    let mut report = StepReport {
-        substeps: 0,
-        stable_substep: f32::INFINITY,
-        bodies_restored: 0,
-        error_estimate: 0.0,
-        crossings: 0,
-    };
-    for (place, body) in bodies.iter() {
-        let stable_substep = match outcomes[place] {
-            Some(Outcome::Done { substeps, carry, error }) => {
-                report.substeps = report.substeps.max(substeps);
-                report.error_estimate = report.error_estimate.max(error);
-                carry.limit().map(|limit| limit.min(body.newest_limit_beside_springs()))
-            }
-            Some(Outcome::Unstable { stable_substep, error }) => {
-                report.error_estimate = report.error_estimate.max(error);
-                Some(stable_substep)
-            }
-            Some(Outcome::NotFinite) | None => {
-                report.bodies_restored += 1;
-                body.carry.limit()
-            }
-        };
-        report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
-    }
-    report
-}
-
-fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: &[ToolPath], team: &Team) {
-    for (place, body) in bodies.iter_mut() {
-        match outcomes[place] {
-            Some(Outcome::Done { substeps, carry, .. }) => {
-                let alone = Team::alone();
-                let team = if body.node_count() < SHARED_FROM { &alone } else { team };
-                body.commit(substeps, carry, tools, team);
-            }
-            _ => {
-                body.put_back();
-                body.clear_pending();
-            }
-        }
     }
 }

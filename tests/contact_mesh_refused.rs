@@ -7,7 +7,7 @@ mod tissue;
 
 use glam::{Quat, Vec3};
 use sinew::{Detection, Error, Pose, Shape, ToolDefinition};
-use solid::ball;
+use solid::{ball, cuboid};
 use tissue::*;
 
 const WAYS: [Detection; 3] = [Detection::Exact, Detection::DistanceField, Detection::ImageSpace];
@@ -15,19 +15,7 @@ const WAYS: [Detection; 3] = [Detection::Exact, Detection::DistanceField, Detect
 type Parts = (Vec<Vec3>, Vec<[u32; 3]>);
 
 fn cube() -> Parts {
-    let positions = (0..8)
-        .map(|corner| Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32) * 0.02 - 0.01)
-        .collect();
-    let sides = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    (positions, triangles)
+    cuboid(Vec3::splat(-0.01), Vec3::splat(0.01))
 }
 
 fn with(change: impl FnOnce(&mut Vec<Vec3>, &mut Vec<[u32; 3]>)) -> Parts {

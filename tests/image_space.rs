@@ -1,5 +1,10 @@
 //! Contact in image space, against brute force in `f64`.
 
+#[path = "support/solid.rs"]
+mod solid;
+#[path = "support/tissue.rs"]
+mod tissue;
+
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -96,19 +101,8 @@ impl Shape {
     }
 
     fn cuboid(low: Vec3, high: Vec3) -> Self {
-        let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low);
-        let sides = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        Self {
-            positions: (0..8).map(corner).collect(),
-            triangles: sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        }
+        let (positions, triangles) = solid::cuboid(low, high);
+        Self { positions, triangles }
     }
 
     /// A grid of 2 x 2 m in the plane z = 0.

@@ -4,11 +4,8 @@ use glam::{BVec3, DVec3, Vec3};
 
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
+use super::impulses::LEVERAGE;
 use crate::body::{Mobility, Vectors};
-
-/// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
-/// need more, and cannot be had: where nothing gives way, the tool goes in.
-const LEVERAGE: f32 = 4.0;
 
 /// A contact over one slice of a substep.
 ///

@@ -11,6 +11,7 @@ use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::filter::{BodyContact, CollisionFilter};
 use super::holds::Holds;
+use super::impulses::{PUSHED_OUT, SWEEPS, relax};
 use super::meet::{meet_mesh, meet_plane, meet_rounded};
 use super::path::{Motion, Solid, ToolPath};
 use super::report::Touch;
@@ -29,16 +30,8 @@ const SLICES: u32 = 512;
 /// How far a tool and the body may move against each other in a slice, as a part of the tool's radius.
 const SLICE_TRAVEL: f32 = 0.5;
 
-/// Sweeps over the contacts of a substep at most: where nothing is fast, so that tissue comes to rest; and in each of
-/// several slices, where what is left is found again in the next.
-const SWEEPS: u32 = 128;
+/// Sweeps over the contacts of each of several slices at most: what is left is found again in the next.
 const SWEEPS_OF_A_SLICE: u32 = 16;
-
-/// The sweeps end when the last changed velocities by less than this part of what the first did.
-const CONVERGED: f32 = 1e-5;
-
-/// The part of a depth that is taken back in one slice, where something began inside a tool.
-const PUSHED_OUT: f32 = 0.2;
 
 /// What a tool received from a body in the step in progress, N s and N m s.
 #[derive(Clone, Copy, Debug, Default)]
@@ -452,19 +445,13 @@ impl Contacts {
     }
 
     fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
-        let mut first = 0.0_f32;
-        for sweep in 0..slice.sweeps {
-            let mut largest = 0.0_f32;
-            for constraint in &mut self.constraints {
-                largest = largest.max(constraint.solve(meeting.velocities));
-            }
-            if sweep == 0 {
-                first = largest;
-            }
-            if !(largest > CONVERGED * first) {
-                break;
-            }
-        }
+        let constraints = &mut self.constraints;
+        let first = relax(slice.sweeps, None, || {
+            let changes = constraints
+                .iter_mut()
+                .map(|constraint| constraint.solve(meeting.velocities));
+            changes.fold(0.0, f32::max)
+        });
         // Where nothing was given beside what an equation found the nodes are where that has put them.
         let moves = first > 0.0 || self.holds.is_empty();
         for index in 0..self.constraints.len() {

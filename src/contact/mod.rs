@@ -12,6 +12,7 @@ mod filter;
 mod gauge;
 mod holds;
 pub(crate) mod image_space;
+mod impulses;
 mod limit;
 mod meet;
 mod mesh_solid;

@@ -118,3 +118,23 @@ pub(crate) fn solid_angle(point: DVec3, triangle: [DVec3; 3]) -> f64 {
     let cosine = length_a * length_b * length_c + a.dot(b) * length_c + b.dot(c) * length_a + c.dot(a) * length_b;
     2.0 * a.dot(b.cross(c)).atan2(cosine)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_crosses_the_inside_of_a_triangle_alone() {
+        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let through = |x: f32, y: f32, from: f32, to: f32, depth: f64| {
+            crosses(Vec3::new(x, y, from), Vec3::new(x, y, to), triangle, depth)
+        };
+        for depth in [0.0, 0.1] {
+            assert!(through(0.2, 0.3, -1.0, 0.5, depth) && through(0.2, 0.3, 0.5, -1.0, depth));
+            assert!(!through(0.2, 0.3, 0.1, 0.5, depth), "it lies on one side");
+            assert!(!through(0.7, 0.7, -1.0, 1.0, depth) && !through(-0.1, 0.3, -1.0, 1.0, depth));
+            assert_eq!(through(0.05, 0.3, -1.0, 1.0, depth), depth == 0.0);
+            assert_eq!(through(0.2, 0.3, -1.0, 0.05, depth), depth == 0.0);
+        }
+    }
+}

@@ -5,7 +5,7 @@
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
-use glam::{DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 use sinew::Pose;
 use sinew::mesh::{Mesh, MeshFormat};
 
@@ -62,6 +62,21 @@ pub fn real(name: &str, scale: f32) -> Option<Mesh> {
         return None;
     }
     Some(sinew::mesh::load(path, MeshFormat::Stl, scale).expect("a mesh").mesh)
+}
+
+/// A box between two corners.
+pub fn cuboid(low: Vec3, high: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let corner = |i: u32| Vec3::select(BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low);
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    ((0..8).map(corner).collect(), triangles.collect())
 }
 
 /// A ball of this radius: an icosahedron whose triangles were quartered so often.

@@ -1,10 +1,9 @@
 //! Edges of one surface that pass through triangles of another: what contact is to prevent, and what it left.
 
-use glam::DVec3;
-
 use super::search::shift;
 use super::skin::Skin;
 use crate::body::Bounds;
+use crate::contact::predicates::crosses;
 
 /// Marks the edges of `first` that pass through triangles of `second`, as their trees have them; with itself those triangles that an edge has
 /// no node of. How many there are.
@@ -19,8 +18,8 @@ pub(super) fn mark(first: &Skin, second: &Skin, is_one: bool, pierces: &mut [boo
             if passes || is_one && nodes.iter().any(|node| edge.contains(node)) {
                 return;
             }
-            let corners = nodes.map(|node| second.starts.get(node as usize).as_dvec3());
-            passes = passes_through(ends.map(|end| end.as_dvec3()), corners);
+            let corners = nodes.map(|node| second.starts.get(node as usize));
+            passes = crosses(ends[0], ends[1], corners, 0.0);
         });
         if passes {
             *pierces = true;
@@ -28,33 +27,4 @@ pub(super) fn mark(first: &Skin, second: &Skin, is_one: bool, pierces: &mut [boo
         }
     }
     count
-}
-
-/// Whether a segment passes through a triangle, its border left out.
-fn passes_through([from, to]: [DVec3; 2], corners: [DVec3; 3]) -> bool {
-    let volume = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| (b - a).cross(c - a).dot(d - a);
-    let [a, b, c] = corners;
-    let [start, end] = [from, to].map(|point| volume(a, b, c, point));
-    if start * end >= 0.0 {
-        return false;
-    }
-    let around = [[a, b], [b, c], [c, a]].map(|[p, q]| volume(from, to, p, q));
-    around.iter().all(|&volume| volume > 0.0) || around.iter().all(|&volume| volume < 0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_segment_passes_through_the_inside_of_a_triangle_alone() {
-        let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        let through = |x: f64, y: f64, from: f64, to: f64| {
-            passes_through([DVec3::new(x, y, from), DVec3::new(x, y, to)], triangle)
-        };
-        assert!(through(0.2, 0.3, -1.0, 0.5) && through(0.2, 0.3, 0.5, -1.0));
-        assert!(!through(0.2, 0.3, 0.1, 0.5));
-        assert!(!through(0.7, 0.7, -1.0, 1.0));
-        assert!(!through(-0.1, 0.3, -1.0, 1.0));
-    }
 }

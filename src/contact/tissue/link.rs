@@ -4,9 +4,7 @@ use glam::{BVec3, Vec3};
 
 use super::skin::Skin;
 use crate::body::Body;
-
-/// How much faster than the contact any of its nodes moves for it, at most.
-const LEVERAGE: f32 = 4.0;
+use crate::contact::impulses::LEVERAGE;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

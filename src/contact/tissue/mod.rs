@@ -17,21 +17,13 @@ use self::skin::Skin;
 use glam::Vec3;
 
 use crate::body::{Body, Bounds};
+use crate::contact::impulses::{PUSHED_OUT, SWEEPS, relax};
 use crate::error::Result;
 use crate::memory;
 use crate::slots::Slots;
 
-/// Sweeps over the contacts at most, after each search.
-const SWEEPS: u32 = 128;
-
-/// The sweeps end when the last changed velocities by less than this part of what the first did.
-const CONVERGED: f32 = 1e-5;
-
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
-
-/// The part of what is too close that comes apart in a step.
-const PARTED: f32 = 0.2;
 
 /// What keeps off a surface without thickness, as a part of its shortest edge: in `f32` something must.
 const LEAST_THICKNESS: f32 = 1e-3;
@@ -299,30 +291,25 @@ impl Tissue {
 
     /// Finds contacts and gives their impulses, until they lead to no others.
     fn solve(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
-        let mut first = 0.0_f32;
-        for search in 0..SEARCHES {
+        let mut first = None;
+        for _ in 0..SEARCHES {
             let known = self.links.len();
             self.find(group, bodies, moment);
             if self.links.len() == known {
                 break;
             }
-            for sweep in 0..SWEEPS {
-                let changes = self.links.iter_mut().map(|link| link.solve(&mut self.skins));
-                let largest = changes.fold(0.0, f32::max);
-                if search == 0 && sweep == 0 {
-                    first = largest;
-                }
-                if !(largest > CONVERGED * first) {
-                    break;
-                }
-            }
+            let Self { links, skins, .. } = self;
+            first = Some(relax(SWEEPS, first, || {
+                let changes = links.iter_mut().map(|link| link.solve(skins));
+                changes.fold(0.0, f32::max)
+            }));
         }
     }
 
     /// Moves what began too close apart.
     fn part(&self, bodies: &mut Slots<Body>, part: impl Fn(&mut Body, usize, Vec3)) {
         for link in self.links.iter().filter(|link| link.depth > 0.0) {
-            for (place, node, way) in link.parting(PARTED) {
+            for (place, node, way) in link.parting(PUSHED_OUT) {
                 if let Some(body) = bodies.at_mut(place) {
                     part(body, node, way);
                 }

@@ -1,0 +1,304 @@
+//! A step of a world: plan the tools' ways, attempt every body, then commit all or nothing.
+
+use glam::{DVec3, Vec3};
+
+use super::World;
+use crate::body::Body;
+use crate::contact::{TRIES, ToolPath};
+use crate::error::{Error, Result};
+use crate::slots::Slots;
+use crate::solver::{Outcome, StepRequest, Together, attempt};
+use crate::threads::{Items, Team};
+
+/// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
+const SHARED_FROM: usize = 8192;
+
+/// Small bodies of fewer nodes in all are not worth waking anybody.
+const WORTH_SHARING: usize = 1024;
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// The most substeps that any body took.
+    pub substeps: u32,
+    /// The longest explicit substep that is stable now, over all bodies, s; infinity: no limit.
+    pub stable_substep: f32,
+    /// Bodies that would have become non-finite: put back as they were, the others stepped.
+    pub bodies_restored: u32,
+    /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
+    /// anything to compare.
+    pub error_estimate: f32,
+    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
+    /// apart. Those of one that is closed come out again by themselves.
+    pub crossings: u32,
+}
+
+impl World {
+    /// Steps everything by `dt` seconds, above 0.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: `dt` is out of its range. [`Error::Unstable`]: some body needs more substeps than are
+    /// allowed. Nothing has moved then, pending forces and poses stay pending.
+    pub fn step(&mut self, dt: f32) -> Result<StepReport> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
+        }
+        if !is_worth_sharing(&self.bodies) {
+            return self.step_with(dt, &Team::alone());
+        }
+        let mut threads = std::mem::take(&mut self.threads);
+        let result = threads.lead(|team| self.step_with(dt, team));
+        self.threads = threads;
+        result
+    }
+
+    /// The step, with the threads that help.
+    fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
+        for (_, tool) in self.tools.iter_mut() {
+            tool.set_out();
+        }
+        let mut left = TRIES;
+        let crossings = loop {
+            self.plan_tools();
+            match self.attempt(dt, team) {
+                Ok(crossings) if left == 0 || self.are_within_limits(dt, left == 1) => break crossings,
+                Ok(_) => self.put_back(),
+                Err(report) => {
+                    self.put_back();
+                    return Err(Error::Unstable {
+                        report,
+                        allowed: match self.definition.substeps {
+                            0 => self.definition.max_substeps,
+                            fixed => fixed,
+                        },
+                    });
+                }
+            }
+            left -= 1;
+        };
+        let report = report(&self.bodies, &self.outcomes, crossings);
+        self.commit(dt, team);
+        Ok(report)
+    }
+
+    /// Lets every body try the step: how many edges pass through tissue then, or what the step would come to where a body cannot
+    /// take it.
+    fn attempt(&mut self, dt: f32, team: &Team) -> std::result::Result<u32, StepReport> {
+        let Self {
+            definition,
+            bodies,
+            paths,
+            outcomes,
+            tissue,
+            walks,
+            ..
+        } = self;
+        let request = StepRequest {
+            dt,
+            gravity: definition.gravity,
+            substeps: definition.substeps,
+            max_substeps: definition.max_substeps,
+            // Fixed substeps are taken as they are.
+            tolerance: if definition.substeps == 0 {
+                definition.tolerance
+            } else {
+                0.0
+            },
+            tools: paths,
+        };
+        let Some(tissue) = tissue else {
+            attempt_bodies(bodies, outcomes, &request, |_| true, team);
+            return reported(bodies, outcomes).map(|()| 0);
+        };
+        tissue.plan(bodies, dt);
+        attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);
+        loop {
+            tissue.find_crossings(bodies, false);
+            let mut together = Together {
+                tissue,
+                walks,
+                request: &request,
+                team,
+            };
+            together.attempt(bodies, outcomes);
+            if !tissue.plan_again(bodies) {
+                break;
+            }
+        }
+        reported(bodies, outcomes)?;
+        Ok(tissue.find_crossings(bodies, true))
+    }
+
+    /// Takes back what bodies have tried.
+    fn put_back(&mut self) {
+        self.bodies.iter_mut().for_each(|(_, body)| body.put_back());
+    }
+
+    /// Makes the step that was tried the current state.
+    fn commit(&mut self, dt: f32, team: &Team) {
+        commit_bodies(&mut self.bodies, &self.outcomes, &self.paths, team);
+        let Self {
+            bodies,
+            tools,
+            paths,
+            outcomes,
+            ..
+        } = self;
+        for (index, (_, tool)) in tools.iter_mut().enumerate() {
+            let [force, torque] = wrench(bodies, outcomes, (index, &paths[index]), dt);
+            // Finite, whatever the step's length.
+            tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+            tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+            tool.pose = paths[index].end();
+            tool.target = None;
+            tool.reach = None;
+        }
+        self.end_slipped();
+    }
+
+    /// Whether no tool presses harder than it can; else those that do go less far in the next try, which may be the `last`.
+    fn are_within_limits(&mut self, dt: f32, last: bool) -> bool {
+        let Self {
+            bodies,
+            tools,
+            paths,
+            outcomes,
+            ..
+        } = self;
+        let mut are_within = true;
+        for (index, (_, tool)) in tools.iter_mut().enumerate() {
+            if let Some(reach) = &mut tool.reach {
+                let [force, _] = wrench(bodies, outcomes, (index, &paths[index]), dt);
+                are_within &= reach.is_allowed(force.length() as f32, tool.force_limit, last);
+            }
+        }
+        are_within
+    }
+
+    fn plan_tools(&mut self) {
+        self.paths.clear();
+        for (place, tool) in self.tools.iter() {
+            self.paths.push(ToolPath::new(place, tool));
+        }
+    }
+}
+
+/// The mean force and torque on a tool, by its place among the ways, in the step that was tried, N and N m.
+fn wrench(
+    bodies: &Slots<Body>,
+    outcomes: &[Option<Outcome>],
+    (index, path): (usize, &ToolPath),
+    dt: f32,
+) -> [DVec3; 2] {
+    let mut wrench = [DVec3::ZERO; 2];
+    for (place, body) in bodies.iter() {
+        if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.contacts) {
+            let load = contacts.loads()[index];
+            let [force, torque] = body.pull_of(path.slot, *substeps);
+            wrench[0] += load.impulse / f64::from(dt) - force;
+            wrench[1] += load.angular_impulse / f64::from(dt) - torque;
+        }
+    }
+    wrench
+}
+
+/// What the step would come to where a body cannot take it.
+fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::Result<(), StepReport> {
+    let unstable = |outcome: &Outcome| matches!(outcome, Outcome::Unstable { .. });
+    if outcomes.iter().flatten().any(unstable) {
+        return Err(report(bodies, outcomes, 0));
+    }
+    Ok(())
+}
+
+/// Whether there is work for more than one thread.
+fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
+    let sizes = || bodies.iter().map(|(_, body)| body.node_count());
+    sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
+}
+
+/// Attempts the step of every body: the small ones are shared among the threads, the large ones each by all threads.
+fn attempt_bodies(
+    bodies: &mut Slots<Body>,
+    outcomes: &mut Vec<Option<Outcome>>,
+    request: &StepRequest,
+    goes_alone: impl Fn(usize) -> bool + Sync,
+    team: &Team,
+) {
+    outcomes.clear();
+    outcomes.resize(bodies.places(), None);
+    let small = bodies
+        .iter()
+        .filter(|(_, body)| body.node_count() < SHARED_FROM)
+        .count();
+    if small > 1 {
+        let contents = Items::new(bodies.slots_mut());
+        team.pass(
+            outcomes.len(),
+            (contents, Items::new(outcomes)),
+            |place, (slot, outcome)| {
+                if let Some(body) = slot.content_mut()
+                    && body.node_count() < SHARED_FROM
+                    && goes_alone(place)
+                {
+                    *outcome = Some(attempt(body, request, &Team::alone()));
+                }
+            },
+        );
+    }
+    for (place, body) in bodies.iter_mut() {
+        if outcomes[place].is_none() && goes_alone(place) {
+            let alone = body.node_count() < SHARED_FROM;
+            outcomes[place] = Some(if alone {
+                attempt(body, request, &Team::alone())
+            } else {
+                attempt(body, request, team)
+            });
+        }
+    }
+}
+
+fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) -> StepReport {
+    let mut report = StepReport {
+        substeps: 0,
+        stable_substep: f32::INFINITY,
+        bodies_restored: 0,
+        error_estimate: 0.0,
+        crossings,
+    };
+    for (place, body) in bodies.iter() {
+        let stable_substep = match outcomes[place] {
+            Some(Outcome::Done { substeps, carry, error }) => {
+                report.substeps = report.substeps.max(substeps);
+                report.error_estimate = report.error_estimate.max(error);
+                carry.limit().map(|limit| limit.min(body.newest_limit_beside_springs()))
+            }
+            Some(Outcome::Unstable { stable_substep, error }) => {
+                report.error_estimate = report.error_estimate.max(error);
+                Some(stable_substep)
+            }
+            Some(Outcome::NotFinite) | None => {
+                report.bodies_restored += 1;
+                body.carry.limit()
+            }
+        };
+        report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
+    }
+    report
+}
+
+fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: &[ToolPath], team: &Team) {
+    for (place, body) in bodies.iter_mut() {
+        match outcomes[place] {
+            Some(Outcome::Done { substeps, carry, .. }) => {
+                let alone = Team::alone();
+                let team = if body.node_count() < SHARED_FROM { &alone } else { team };
+                body.commit(substeps, carry, tools, team);
+            }
+            _ => {
+                body.put_back();
+                body.clear_pending();
+            }
+        }
+    }
+}
