@@ -168,6 +168,6 @@ fn seen(projection: &Projection, axis: usize, corners: [Vec3; 3]) -> Option<[Vec
     if f64::from(across[axis]) > SMALL * projection.pixel * projection.pixel {
         return Some(corners);
     }
-    let aside = projection.to_middle((a + b + c) / 3.0);
+    let aside = projection.way_to_middle((a + b + c) / 3.0);
     Some(corners.map(|corner| corner + aside))
 }

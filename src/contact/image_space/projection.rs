@@ -127,7 +127,7 @@ impl Projection {
     }
 
     /// From a point to the ray in the middle of its pixel, m.
-    pub fn to_middle(&self, point: Vec3) -> Vec3 {
+    pub fn way_to_middle(&self, point: Vec3) -> Vec3 {
         let vertex = self.project(point);
         let [right, down] = [vertex.x, vertex.y].map(|at| (at.floor() + 0.5 - at) * self.pixel);
         (self.frame.right * right + self.frame.down * down).as_vec3()
