@@ -679,11 +679,14 @@ typedef struct sinew_body_def {
    */
   uint32_t meets_itself;
   /**
-   * How it finds other bodies: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE; exactly where one of two asks for that.
+   * How it and other bodies find each other: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE, which one of two has to ask
+   * for: then both are drawn in each substep along three axes where their boxes overlap, and what is seen near each other is compared
+   * exactly. Itself it always meets exactly. SINEW_DETECTION_DISTANCE_FIELD is for rigid tools: SINEW_STATUS_UNSUPPORTED.
    */
   uint32_t contact_detection;
   /**
-   * IMAGE_SPACE: m, the side of a pixel; 0, the default: chosen from the body.
+   * IMAGE_SPACE: m, the side of a pixel; 0, the default: half of the surface's mean edge. An image of a body of more than 2^24 pixels is
+   * refused.
    */
   float contact_resolution;
   /**
@@ -1530,6 +1533,19 @@ sinew_status sinew_body_get_positions(const struct sinew_world *world,
 sinew_status sinew_body_get_velocities(const struct sinew_world *world,
                                        struct sinew_body_id body,
                                        struct sinew_vec3_view *out);
+
+/**
+ * Writes 1 where a body's surface encloses something, so that others can be found within it and are led out, else 0: where it is not closed,
+ * and from then on that sinew_body_remove_spring has taken away an edge of it.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_body_is_closed(const struct sinew_world *world,
+                                  struct sinew_body_id body,
+                                  uint32_t *out);
 
 /**
  * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is

@@ -10,8 +10,8 @@ use counting::Counting;
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, Error, Material, Model, Pose, Shape, Solver, Storage, ToolDefinition, Values, Viscosity, World,
-    WorldDefinition, Yielding,
+    BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage, ToolDefinition,
+    Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 thread_local! {
@@ -47,6 +47,47 @@ fn a_step_allocates_nothing() {
         for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
             steps_allocate_nothing(storage, solver, &[0.0]);
         }
+    }
+}
+
+#[test]
+fn tissue_against_tissue_allocates_nothing() {
+    let [upper, lower] = [0.0025, 0.0].map(|height| {
+        let mut mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
+        mesh.positions
+            .iter_mut()
+            .for_each(|place| *place += Vec3::new(0.3 * height, height, height));
+        mesh
+    });
+    for detection in [Detection::Exact, Detection::ImageSpace] {
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let mut first = None;
+        for (mesh, pinned) in [(&upper, 0..0), (&lower, 0..100)] {
+            let cloth = BodyDefinition {
+                positions: &mesh.positions,
+                triangles: &mesh.triangles,
+                masses: Values::Uniform(2e-4),
+                stiffnesses: Values::Uniform(50.0),
+                contact: BodyContact {
+                    thickness: 1e-3,
+                    with_bodies: true,
+                    detection,
+                    ..BodyContact::NOTHING
+                },
+                ..BodyDefinition::default()
+            };
+            let cloth = world.create_body(&cloth).expect("a body");
+            first.get_or_insert(cloth);
+            for node in pinned {
+                world.body_mut(cloth).and_then(|body| body.pin(node)).expect("a node");
+            }
+        }
+        for step in 0..40 {
+            assert_eq!(asked(|| drop(world.step(0.002))), 0, "{detection:?}, step {step}");
+        }
+        // They met: it would have fallen three centimetres.
+        let places = world.body(first.expect("a body")).expect("a body").positions();
+        assert!(places.iter().all(|place| place.y > 0.001), "{detection:?}");
     }
 }
 

@@ -6,12 +6,15 @@ mod solid;
 mod tissue;
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::Error;
+use sinew::detection::exact::Exact;
 use sinew::detection::image_space::{
     Form, ImageSpace, ImageSpaceDefinition, LayeredImage, Overlap, Placed, Surface, Views,
 };
+use sinew::mesh::{ClosedSurface, MeshFormat, load};
 
 /// Half the diagonal of a pixel: how far a point can be from the ray in the middle of its pixel.
 const HALF_DIAGONAL: f64 = 0.7072;
@@ -596,6 +599,97 @@ fn distances_from_a_layered_image_are_those_of_the_faces_but_for_a_pixel() {
             "1/{parts}: {worst} pixels at worst, {} in the mean",
             sum / f64::from(count)
         );
+    }
+}
+
+/// A block with a groove in its upper side, `width` at the top and `depth` deep.
+fn grooved(width: f32, depth: f32) -> Shape {
+    let profile = [
+        [0.1, 0.5 - depth],
+        [0.1 - width / 2.0, 0.5],
+        [-1.0, 0.5],
+        [-1.0, -0.5],
+        [1.0, -0.5],
+        [1.0, 0.5],
+        [0.1 + width / 2.0, 0.5],
+    ];
+    let count = profile.len() as u32;
+    let at = |z: f32| profile.map(|[x, y]| Vec3::new(x, y, z));
+    let mut triangles = Vec::new();
+    for corner in 0..count {
+        let next = (corner + 1) % count;
+        triangles.extend([[corner, next, next + count], [corner, next + count, corner + count]]);
+        // The bottom of the groove sees all of the ends.
+        if corner > 0 && next > 0 {
+            triangles.extend([[0, next, corner], [count, corner + count, next + count]]);
+        }
+    }
+    let shape = Shape {
+        positions: [at(-0.6), at(0.6)].concat(),
+        triangles,
+    };
+    assert!((shape.volume() - f64::from(1.2 * (2.0 - width * depth / 2.0))).abs() < 1e-5);
+    shape
+}
+
+#[test]
+fn what_is_below_a_groove_narrower_than_a_pixel_is_not_deep_inside() {
+    let pixel = 0.02;
+    let mut random = Random(77);
+    for (width, depth) in [(0.6, 8.0), (0.3, 15.0), (1.5, 5.0)] {
+        for _ in 0..12 {
+            let turn = Quat::from_axis_angle(random.direction(), 3.0 * random.unit());
+            let shape = grooved(width * pixel, depth * pixel).moved(|p| turn * p);
+            let image = LayeredImage::new(&shape.positions, &shape.triangles, pixel).expect("a closed surface");
+            for _ in 0..60 {
+                let along = shape.positions[0].lerp(shape.positions[7], 0.1 + 0.8 * random.unit());
+                let point = along + random.vector() * pixel * 1.5;
+                let exact = shape.distance(point.as_dvec3());
+                let (distance, _) = image.distance(point, 1.0).expect("near");
+                assert!(
+                    (f64::from(distance) - exact).abs() < f64::from(pixel),
+                    "{width} x {depth} at {point}: {distance} for {exact}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn organs_are_seen_as_they_are_but_for_a_pixel() {
+    let Some(folder) = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .map(|above| above.join("shared/meshes"))
+        .find(|folder| folder.is_dir())
+    else {
+        use std::io::Write;
+        let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes is missing");
+        return;
+    };
+    for name in ["stomach.stl", "liver_collision.stl"] {
+        let mesh = load(folder.join(name), MeshFormat::Auto, 1e-3).expect("a mesh").mesh;
+        let surface = ClosedSurface::new(&mesh.positions, &mesh.triangles).expect(name);
+        let exact = Exact::new(&surface).expect("a solid");
+        let [low, high] =
+            [Vec3::min, Vec3::max].map(|most| mesh.positions.iter().copied().reduce(most).expect("nodes"));
+        let pixel = (high - low).max_element() / 256.0;
+        let image = LayeredImage::new(surface.positions(), surface.triangles(), pixel).expect("a closed surface");
+        let mut random = Random(77);
+        let (mut wrong, count) = (0, 40_000);
+        for _ in 0..count {
+            let triangle =
+                mesh.triangles[(random.unit() * mesh.triangles.len() as f32) as usize % mesh.triangles.len()];
+            let [a, b, c] = triangle.map(|node| mesh.positions[node as usize]);
+            let (u, v) = (random.unit(), random.unit());
+            let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            let point = a + (b - a) * u + (c - a) * v + random.vector() * pixel;
+            let (distance, _) = image.distance(point, 1.0).expect("near");
+            let (true_distance, _) = exact.distance(point, 1.0).expect("near");
+            let error = (distance - true_distance).abs();
+            assert!(error < pixel, "{name} at {point}: {distance} for {true_distance}");
+            wrong += u32::from(error > 0.05 * pixel && (distance < 0.0) != (true_distance < 0.0));
+        }
+        assert!(wrong * 2000 < count, "{name}: {wrong} of {count} on the wrong side");
     }
 }
 

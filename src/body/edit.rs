@@ -242,7 +242,8 @@ impl Body {
 
     /// Removes the spring between two nodes, and with it the tetrahedra of [`Model::Tetrahedra`](crate::Model::Tetrahedra) that
     /// have this edge, with their fibres, and the bending of triangles that have it, whether or not there is a spring along it. A cavity
-    /// whose surface has it is open from then on, and neither keeps its volume nor its pressure.
+    /// whose surface has it is open from then on, and neither keeps its volume nor its pressure; for other tissue too nothing is within it
+    /// ([`is_closed`](Self::is_closed)).
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or nothing of all that between them.
@@ -270,6 +271,10 @@ impl Body {
         }
         if link.is_none() && removed == 0 {
             return Err(not_joined(a, b));
+        }
+        if self.contact.with_bodies && !self.is_cut_open {
+            let has = |triangle: &[u32; 3]| triangle.contains(&a) && triangle.contains(&b);
+            self.is_cut_open = self.surface.iter().any(has);
         }
         Ok(())
     }

@@ -99,6 +99,8 @@ pub struct Body {
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
     pub(crate) contact: BodyContact,
+    /// Whether an edge of its surface was taken away.
+    pub(crate) is_cut_open: bool,
     /// What tools hold of it.
     pub(crate) grasps: Option<Box<Grasps>>,
     pub(crate) carry: Carry,
@@ -222,6 +224,7 @@ impl Body {
             applied: None,
             contacts: None,
             contact: definition.contact,
+            is_cut_open: false,
             grasps: None,
             carry: Carry {
                 stability: Stability::UNKNOWN,
@@ -283,6 +286,14 @@ impl Body {
     /// or cells.
     pub fn surface(&self) -> &[[u32; 3]] {
         &self.surface
+    }
+
+    /// Whether the surface encloses something: whether others can be found within it, and are led out. It does not where it is not closed, and no
+    /// more once [`remove_spring`](Self::remove_spring) has taken away an edge of it; then what comes near it from either side meets it, and
+    /// nothing is within it.
+    pub fn is_closed(&self) -> bool {
+        // Out of memory: nothing is known to be within.
+        !self.is_cut_open && crate::mesh::is_closed(&self.surface).unwrap_or(false)
     }
 
     /// The two nodes of each spring, each once, the lower first.

@@ -226,6 +226,28 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
     }
 }
 
+/// Writes 1 where a body's surface encloses something, so that others can be found within it and are led out, else 0: where it is not closed,
+/// and from then on that sinew_body_remove_spring has taken away an edge of it.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_is_closed(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = u32::from(body.is_closed());
+            Ok(())
+        })
+    }
+}
+
 /// Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is
 /// swept. What tools hold they hold there.
 ///

@@ -210,9 +210,12 @@ pub struct sinew_body_def {
     pub meets_bodies: u32,
     /// 1: it meets itself; 0, the default: it does not.
     pub meets_itself: u32,
-    /// How it finds other bodies: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE; exactly where one of two asks for that.
+    /// How it and other bodies find each other: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE, which one of two has to ask
+    /// for: then both are drawn in each substep along three axes where their boxes overlap, and what is seen near each other is compared
+    /// exactly. Itself it always meets exactly. SINEW_DETECTION_DISTANCE_FIELD is for rigid tools: SINEW_STATUS_UNSUPPORTED.
     pub contact_detection: u32,
-    /// IMAGE_SPACE: m, the side of a pixel; 0, the default: chosen from the body.
+    /// IMAGE_SPACE: m, the side of a pixel; 0, the default: half of the surface's mean edge. An image of a body of more than 2^24 pixels is
+    /// refused.
     pub contact_resolution: f32,
     /// The categories that it belongs to, a bit for each; default 1. It meets tools and bodies where each has a category that the other's
     /// mask has.

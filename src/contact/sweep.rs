@@ -55,6 +55,12 @@ impl Segment {
         }
     }
 
+    /// Where a point of it is, first and last.
+    pub fn at(&self, share: f32) -> [Vec3; 2] {
+        let place = self.ends[0].lerp(self.ends[1], share);
+        [place, place + self.steps[0].lerp(self.steps[1], share)]
+    }
+
     pub fn is_point(&self) -> bool {
         self.ends[0] == self.ends[1] && self.steps[0] == self.steps[1]
     }

@@ -149,7 +149,8 @@ static void a_cube_carries_a_cloth(size_t size, uint32_t detection)
 }
 
 /* A block of 40 mm about the point, thrown along x; how its definition is as of an older header. */
-static sinew_body_id a_block(sinew_world *world, size_t size, float x, float speed, uint32_t meets_bodies)
+static sinew_body_id a_block(sinew_world *world, size_t size, float x, float speed, uint32_t meets_bodies,
+                             uint32_t detection)
 {
     static const float extent[3] = {0.04f, 0.04f, 0.04f};
     static const uint32_t cells[3] = {3, 3, 3};
@@ -181,7 +182,9 @@ static sinew_body_id a_block(sinew_world *world, size_t size, float x, float spe
     def.tetrahedron_count = shape.tetrahedron_count;
     if (size == sizeof def) {
         CHECK(def.meets_bodies == 0 && def.contact_thickness == 0.0f && def.contact_friction == 0.0f);
+        CHECK(def.contact_detection == SINEW_DETECTION_EXACT && def.contact_resolution == 0.0f);
         def.meets_bodies = meets_bodies;
+        def.contact_detection = detection;
         def.contact_thickness = meets_bodies ? 0.0005f : 0.0f;
     }
     MUST(sinew_body_create(world, &def, &body));
@@ -206,7 +209,7 @@ static void a_weak_tool_stops_short(uint32_t shape)
     const float limit = 0.25f, size = shape == SINEW_SHAPE_SPHERE ? 0.02f : half;
     const float way = shape == SINEW_SHAPE_SPHERE ? 5e-5f : 3e-5f; /* m a frame */
     sinew_world *world = a_world(0.0f);
-    const sinew_body_id block = a_block(world, sizeof(sinew_body_def), 0.0f, 0.0f, 0);
+    const sinew_body_id block = a_block(world, sizeof(sinew_body_def), 0.0f, 0.0f, 0, SINEW_DETECTION_EXACT);
     sinew_tool_def def = cube_def(sizeof def, SINEW_DETECTION_DISTANCE_FIELD, 0.0201f + size);
     sinew_tool_id tool;
     float force[3], torque[3], pose[3];
@@ -267,12 +270,16 @@ static void masks(uint32_t category, uint32_t mask, int meets)
     sinew_world_destroy(world);
 }
 
-static void two_blocks(size_t size, uint32_t meet)
+static void two_blocks(size_t size, uint32_t meet, uint32_t detection)
 {
     sinew_world *world = a_world(0.0f);
-    const sinew_body_id left = a_block(world, size, -0.03f, 0.5f, 1), right = a_block(world, size, 0.03f, -0.5f, meet);
+    const sinew_body_id left = a_block(world, size, -0.03f, 0.5f, 1, SINEW_DETECTION_EXACT);
+    const sinew_body_id right = a_block(world, size, 0.03f, -0.5f, meet, detection);
     double closest = INFINITY;
+    uint32_t is_closed = 2;
     int frame;
+    MUST(sinew_body_is_closed(world, right, &is_closed));
+    CHECK(is_closed == 1);
     for (frame = 0; frame < 100; frame++) {
         steps(world, 0.002f, 1);
         closest = fmin(closest, end_of(world, right, -1) - end_of(world, left, 1));
@@ -299,8 +306,9 @@ int main(void)
     masks(4, 1, 0); /* the tool does not meet the body's kind, */
     masks(1, 2, 0); /* nor the body the tool's */
     masks(0, 0, 0);
-    two_blocks(sizeof(sinew_body_def), 1);
-    two_blocks(sizeof(sinew_body_def), 0);
-    two_blocks(OLD_BODY, 0);
+    two_blocks(sizeof(sinew_body_def), 1, SINEW_DETECTION_EXACT);
+    two_blocks(sizeof(sinew_body_def), 1, SINEW_DETECTION_IMAGE_SPACE); /* one of two asks for it */
+    two_blocks(sizeof(sinew_body_def), 0, SINEW_DETECTION_EXACT);
+    two_blocks(OLD_BODY, 0, SINEW_DETECTION_EXACT);
     return checked("tools and bodies meet as they are asked to");
 }

@@ -56,6 +56,7 @@ static struct outputs {
     sinew_contact contacts[2];
     sinew_contact_change changes[2];
     float position[3], orientation[4];
+    uint32_t closed;
     size_t count;
 } out, untouched;
 

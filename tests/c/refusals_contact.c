@@ -135,6 +135,8 @@ static void results(void)
     REFUSED(INVALID, "changes", sinew_world_get_contact_changes(the.world, out.changes, SIZE_MAX, &out.count));
     REFUSED(INVALID, "count", sinew_world_get_contact_changes(the.world, out.changes, 2, NULL));
     REFUSES_NO_TOOL(sinew_tool_get_pose(world, tool, out.position, out.orientation));
+    REFUSES_NO_BODY(sinew_body_is_closed(world, body, &out.closed));
+    REFUSED(INVALID, "out", sinew_body_is_closed(the.world, the.body, NULL));
 }
 
 int main(void)

@@ -72,6 +72,11 @@ impl Coarse {
         Ok(grid)
     }
 
+    /// Names the closest triangles otherwise than by their places.
+    pub fn name_hints(&mut self, name: impl Fn(u32) -> u32) {
+        self.distances.iter_mut().for_each(|(_, hint)| *hint = name(*hint));
+    }
+
     fn centre(&self, place: UVec3) -> Vec3 {
         self.low + (place.as_vec3() + 0.5) * self.cell
     }

@@ -70,8 +70,9 @@ impl Counted {
             });
         }
         let thickness = body.thickness + occluder.thickness;
-        let triangles = occluder.surface.triangles();
-        draw_triangles(projection, occluder.positions, triangles, |_, pixel, fragment| {
+        let corners = |triangle: usize| Some(occluder.corners(triangle));
+        let triangle_count = occluder.surface.triangles().len();
+        draw_triangles(projection, triangle_count, &corners, |_, pixel, fragment| {
             let pixel = &mut self.pixels[pixel];
             if pixel.edge == NO_EDGE {
                 return;

@@ -220,7 +220,8 @@ impl ImageSpace {
             }
             Drawing::Intervals(layers) => {
                 for (layers, body) in layers.iter_mut().zip(bodies) {
-                    if body.surface.is_closed() && !layers.draw(projection, body.positions, body.surface.triangles()) {
+                    let corners = |triangle: usize| Some(body.corners(triangle));
+                    if body.surface.is_closed() && !layers.draw(projection, body.surface.triangles().len(), &corners) {
                         return false;
                     }
                 }

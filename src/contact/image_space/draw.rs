@@ -8,16 +8,20 @@ use crate::raster::{Fragment, rasterise_triangle};
 /// More than what the rasteriser's rounding moves a vertex, in pixels.
 const ROUNDING: f64 = 1.0 / 2048.0;
 
-/// Calls `sink` with the triangle, the pixel and the fragment for each pixel whose middle a triangle covers.
+/// Calls `sink` with the triangle, the pixel and the fragment for each pixel whose middle one of `count` triangles covers, those without corners left
+/// out.
 pub(super) fn draw_triangles(
     projection: &Projection,
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
+    count: usize,
+    corners: &impl Fn(usize) -> Option<[Vec3; 3]>,
     mut sink: impl FnMut(usize, usize, Fragment),
 ) {
     let window = projection.window();
-    for (index, triangle) in triangles.iter().enumerate() {
-        let vertices = triangle.map(|node| projection.project(positions[node as usize]));
+    for index in 0..count {
+        let Some(corners) = corners(index) else {
+            continue;
+        };
+        let vertices = corners.map(|corner| projection.project(corner));
         // Most triangles of a fine mesh cover no middle, or lie beside the image.
         let columns = vertices.each_ref().map(|vertex| vertex.x);
         let rows = vertices.each_ref().map(|vertex| vertex.y);

@@ -18,17 +18,24 @@ use crate::mesh;
 /// How often a search goes on from the foot of the perpendicular on the face that it has found.
 const STEPS: usize = 4;
 
-/// A search meets at most so many faces: two in each image, and at each step.
-const MET: usize = 6 + 2 * STEPS;
+/// A search keeps so many of the faces that it meets, the closest.
+const MET: usize = 24;
+
+/// How far a point can be from the ray in the middle of its pixel, in pixels.
+const HALF_DIAGONAL: f32 = 0.7072;
+
+/// Marks a pixel of whose neighbours some are passed by more faces or fewer: there a face that is closer may be seen beside it alone, as
+/// those of a groove narrower than a pixel.
+const BROKEN: u32 = 1 << 31;
 
 /// Faces whose distance differs by less than this part of it are equally close: they meet where they are closest.
 const EQUAL: f32 = 1e-4;
 
 /// A closed solid drawn along its three axes, once: for each pixel all faces that the ray through its middle passes.
 ///
-/// Distances come from the faces seen at a point's pixels. They are exact where the closest face is seen there, else
-/// wrong by no more than about a pixel near the surface; what no ray passes, a part thinner than a pixel along two axes,
-/// is not seen at all.
+/// Distances come from the faces seen at a point's pixels, and at those around them where more or fewer are seen. They are exact where the
+/// closest face is seen there, else wrong by no more than about a pixel near the surface; what no ray passes, a part thinner than a pixel
+/// along two axes, is not seen at all.
 #[derive(Debug)]
 pub struct LayeredImage {
     triangles: Vec<Triangle>,
@@ -54,7 +61,7 @@ struct Triangle {
 struct Image {
     projection: Projection,
     layers: Layers,
-    /// For each pixel the nearest that shows the solid.
+    /// For each pixel the nearest that shows the solid, marked where that is broken.
     covered: Vec<u32>,
 }
 
@@ -91,18 +98,31 @@ struct Faces {
 
 impl Faces {
     fn add(&mut self, face: Face) {
-        if self.count == MET {
+        let Some(place) = self.place_for(&face) else {
             return;
-        }
-        self.met[self.count] = face;
+        };
         let known = &self.met[self.closest];
         let (least, most) = (1.0 - EQUAL, 1.0 + EQUAL);
         let closer = face.squared_distance < known.squared_distance * least;
         let as_close = face.squared_distance <= known.squared_distance * most;
-        if self.count == 0 || closer || as_close && face.height.abs() > known.height.abs() {
-            self.closest = self.count;
+        let is_closest = self.count == 0 || closer || as_close && face.height.abs() > known.height.abs();
+        self.met[place] = face;
+        self.count = self.count.max(place + 1);
+        if is_closest {
+            self.closest = place;
         }
-        self.count += 1;
+    }
+
+    /// A free place, or that of the face furthest away where this one is closer.
+    fn place_for(&self, face: &Face) -> Option<usize> {
+        if self.count < MET {
+            return Some(self.count);
+        }
+        let distance = |place: &usize| self.met[*place].squared_distance;
+        let furthest = (0..MET)
+            .filter(|place| *place != self.closest)
+            .max_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        (face.squared_distance < distance(&furthest)).then_some(furthest)
     }
 
     fn met(&self) -> &[Face] {
@@ -167,11 +187,12 @@ impl LayeredImage {
         let image = |axis: usize| Image::new(Frame::AXES[axis], positions, triangles, [low, high], pixel);
         let images = [image(0)?, image(1)?, image(2)?];
         let tree = Tree::new(triangles.len(), |triangle| drawn[triangle as usize].corners)?;
-        let coarse = Coarse::new(Bounds { min: low, max: high }, triangles.len(), |point, hint| {
+        let mut coarse = Coarse::new(Bounds { min: low, max: high }, triangles.len(), |point, hint| {
             let (distance, place) = nearest_of(&tree, point, hint);
             let side = if shows_inside(&images, point) { -1.0 } else { 1.0 };
             (side * distance, place)
         })?;
+        coarse.name_hints(|place| tree.triangle(place as usize));
         Ok(Self {
             images,
             coarse,
@@ -217,16 +238,17 @@ impl LayeredImage {
             closest: 0,
         };
         for image in &self.images {
-            self.meet(image.near(point), point, &mut faces);
+            image.near(point, |crossings| self.meet(crossings, point, &mut faces));
+        }
+        // Deep inside the closest face may be seen along no axis.
+        if let Some(hint) = self.coarse.between(point).and_then(|known| known.hint) {
+            self.meet_face(hint, point, &mut faces);
         }
         for _ in 0..STEPS {
             let last = *faces.closest()?;
             let axis = last.normal.abs().max_position();
-            self.meet(
-                self.images[axis].near(point - last.normal * last.height),
-                point,
-                &mut faces,
-            );
+            let foot = point - last.normal * last.height;
+            self.images[axis].near(foot, |crossings| self.meet(crossings, point, &mut faces));
             if faces.closest()?.triangle == last.triangle {
                 break;
             }
@@ -236,10 +258,14 @@ impl LayeredImage {
         let length = face.beside.length();
         let beside = length - self.pixel;
         if beside <= 0.0 {
-            // So far away the images know the side, also of a face that is folded over.
-            let folded = face.height.abs() > self.pixel && self.is_inside(point) != (face.height < 0.0);
-            let side = if folded { -1.0 } else { 1.0 };
-            return Some((side * face.height, side * face.normal));
+            // So far away the rays beside the point know the side, also of a face that is folded over or whose neighbour is not seen.
+            let closest = faces.closest()?;
+            let distance = closest.squared_distance.sqrt();
+            if distance > HALF_DIAGONAL * self.pixel && self.is_inside(point) != (face.height < 0.0) {
+                let side = face.height.signum();
+                return Some((-side * distance, closest.closest * (side / distance)));
+            }
+            return Some((face.height, face.normal));
         }
         let offset = face.normal * face.height + face.beside * (beside / length);
         let side = if self.is_inside(point) { -1.0 } else { 1.0 };
@@ -250,35 +276,38 @@ impl LayeredImage {
     /// Adds the faces that a ray passes to those met.
     fn meet(&self, crossings: &[Crossing], point: Vec3, faces: &mut Faces) {
         for crossing in crossings {
-            let triangle = crossing.triangle();
-            let Triangle { corners, normal } = self.triangles[triangle as usize];
-            // As seen from the point, so that no digits are lost.
-            let [a, b, c] = corners.map(|corner| corner - point);
-            let height = -a.dot(normal);
-            let too_far = faces.closest().is_some_and(|closest| {
-                let reach = height.abs() - self.pixel;
-                reach > 0.0 && reach * reach > closest.squared_distance
-            });
-            if too_far || normal == Vec3::ZERO || faces.met().iter().any(|face| face.triangle == triangle) {
-                continue;
-            }
-            let weights = closest_on_triangle(Vec3::ZERO, a, b, c);
-            let closest = a * weights[0] + b * weights[1] + c * weights[2];
-            let within = weights.iter().all(|&weight| weight > 0.0);
-            faces.add(Face {
-                triangle,
-                squared_distance: closest.length_squared(),
-                height,
-                normal,
-                closest,
-                beside: if within {
-                    Vec3::ZERO
-                } else {
-                    -(closest + normal * height)
-                },
-                centre: (a + b + c) / 3.0,
-            });
+            self.meet_face(crossing.triangle(), point, faces);
         }
+    }
+
+    fn meet_face(&self, triangle: u32, point: Vec3, faces: &mut Faces) {
+        let Triangle { corners, normal } = self.triangles[triangle as usize];
+        // As seen from the point, so that no digits are lost.
+        let [a, b, c] = corners.map(|corner| corner - point);
+        let height = -a.dot(normal);
+        let too_far = faces.closest().is_some_and(|closest| {
+            let reach = height.abs() - self.pixel;
+            reach > 0.0 && reach * reach > closest.squared_distance
+        });
+        if too_far || normal == Vec3::ZERO || faces.met().iter().any(|face| face.triangle == triangle) {
+            return;
+        }
+        let weights = closest_on_triangle(Vec3::ZERO, a, b, c);
+        let closest = a * weights[0] + b * weights[1] + c * weights[2];
+        let within = weights.iter().all(|&weight| weight > 0.0);
+        faces.add(Face {
+            triangle,
+            squared_distance: closest.length_squared(),
+            height,
+            normal,
+            closest,
+            beside: if within {
+                Vec3::ZERO
+            } else {
+                -(closest + normal * height)
+            },
+            centre: (a + b + c) / 3.0,
+        });
     }
 
     /// Where it is not known, what most of the three images say.
@@ -316,14 +345,38 @@ fn nearest_of(tree: &Tree, point: Vec3, hint: u32) -> Sample {
     (best.0.sqrt() as f32, best.1)
 }
 
+/// Shows the neighbours of a pixel.
+fn around(projection: &Projection, pixel: usize, mut see: impl FnMut(usize)) {
+    let (width, height) = (projection.width as usize, projection.height as usize);
+    let (column, row) = (pixel % width, pixel / width);
+    for y in row.saturating_sub(1)..(row + 2).min(height) {
+        for x in column.saturating_sub(1)..(column + 2).min(width) {
+            if (x, y) != (column, row) {
+                see(y * width + x);
+            }
+        }
+    }
+}
+
 impl Image {
     fn new(frame: Frame, positions: &[Vec3], triangles: &[[u32; 3]], bounds: [Vec3; 2], pixel: f32) -> Result<Self> {
         let [low, high]: [DVec3; 2] = bounds.map(|corner| frame.coordinates(corner));
         let projection = Projection::new(frame, low, high, pixel.into())?;
         let layers = Layers::new(&projection, positions, triangles)?;
-        let covered = nearest_covered(projection.width, projection.height, |pixel| {
+        let mut covered = nearest_covered(projection.width, projection.height, |pixel| {
             !layers.at(pixel).is_empty()
         })?;
+        let is_broken = |pixel: usize| {
+            let count = layers.at(pixel).len();
+            let mut differ = false;
+            around(&projection, pixel, |beside| differ |= layers.at(beside).len() != count);
+            differ
+        };
+        for found in &mut covered {
+            if *found != u32::MAX && is_broken(*found as usize) {
+                *found |= BROKEN;
+            }
+        }
         Ok(Self {
             projection,
             layers,
@@ -331,16 +384,24 @@ impl Image {
         })
     }
 
-    /// Of what the ray next to a point passes, the last before it and the first behind it.
-    fn near(&self, point: Vec3) -> &[Crossing] {
+    /// Shows of what the ray next to a point passes the last before it and the first behind it, and what the rays around that one pass there
+    /// where that differs.
+    fn near(&self, point: Vec3, mut see: impl FnMut(&[Crossing])) {
         let vertex = self.projection.project(point);
-        let pixel = self.covered[self.projection.pixel_at(&vertex)];
-        if pixel as usize >= self.covered.len() {
-            return &[];
+        let marked = self.covered[self.projection.pixel_at(&vertex)];
+        if marked == u32::MAX {
+            return;
         }
-        let crossings = self.layers.at(pixel as usize);
-        let behind = crossings.partition_point(|crossing| f64::from(crossing.depth) < vertex.depth);
-        &crossings[behind.saturating_sub(1)..(behind + 1).min(crossings.len())]
+        let mut look = |pixel: usize| {
+            let crossings = self.layers.at(pixel);
+            let behind = crossings.partition_point(|crossing| f64::from(crossing.depth) < vertex.depth);
+            see(&crossings[behind.saturating_sub(1)..(behind + 1).min(crossings.len())]);
+        };
+        let pixel = (marked & !BROKEN) as usize;
+        look(pixel);
+        if marked & BROKEN != 0 {
+            around(&self.projection, pixel, look);
+        }
     }
 
     fn shows_inside(&self, point: Vec3) -> bool {

@@ -54,30 +54,36 @@ impl Layers {
     /// Of a surface, in memory of its own.
     pub fn new(projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         let mut layers = Self::reserved(projection.pixel_count(), 0)?;
-        let count = layers.count(projection, positions, triangles);
-        layers.crossings = memory::reserved(count)?;
-        layers.fill(count, projection, positions, triangles);
+        let corners = |triangle: usize| Some(triangles[triangle].map(|node| positions[node as usize]));
+        let crossings = layers.count(projection, triangles.len(), &corners);
+        layers.crossings = memory::reserved(crossings)?;
+        layers.fill(crossings, projection, triangles.len(), &corners);
         Ok(layers)
     }
 
-    /// Draws a surface into the memory reserved; answers whether it was enough.
-    pub fn draw(&mut self, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+    /// Draws so many triangles, those without corners left out, into the memory reserved; answers whether it was enough.
+    pub fn draw(
+        &mut self,
+        projection: &Projection,
+        count: usize,
+        corners: &impl Fn(usize) -> Option<[Vec3; 3]>,
+    ) -> bool {
         if projection.pixel_count() > self.ends.capacity() {
             return false;
         }
-        let count = self.count(projection, positions, triangles);
-        let fits = count <= self.crossings.capacity().min(u32::MAX as usize);
+        let crossings = self.count(projection, count, corners);
+        let fits = crossings <= self.crossings.capacity().min(u32::MAX as usize);
         if fits {
-            self.fill(count, projection, positions, triangles);
+            self.fill(crossings, projection, count, corners);
         }
         fits
     }
 
     /// Leaves in `ends` where each pixel's crossings are to begin; answers how many there are in all.
-    fn count(&mut self, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) -> usize {
+    fn count(&mut self, projection: &Projection, count: usize, corners: &impl Fn(usize) -> Option<[Vec3; 3]>) -> usize {
         self.ends.clear();
         self.ends.resize(projection.pixel_count(), 0);
-        draw_triangles(projection, positions, triangles, |_, pixel, _| {
+        draw_triangles(projection, count, corners, |_, pixel, _| {
             self.ends[pixel] = self.ends[pixel].saturating_add(1);
         });
         let mut total = 0;
@@ -90,9 +96,15 @@ impl Layers {
     }
 
     /// A counting sort by pixel, then a small sort in each.
-    fn fill(&mut self, count: usize, projection: &Projection, positions: &[Vec3], triangles: &[[u32; 3]]) {
-        self.crossings.resize(count, Crossing::default());
-        draw_triangles(projection, positions, triangles, |triangle, pixel, fragment| {
+    fn fill(
+        &mut self,
+        crossings: usize,
+        projection: &Projection,
+        count: usize,
+        corners: &impl Fn(usize) -> Option<[Vec3; 3]>,
+    ) {
+        self.crossings.resize(crossings, Crossing::default());
+        draw_triangles(projection, count, corners, |triangle, pixel, fragment| {
             let place = &mut self.ends[pixel];
             self.crossings[*place as usize] = Crossing::new(fragment.depth, triangle, fragment.front);
             *place += 1;
@@ -105,6 +117,11 @@ impl Layers {
             }
             begin = end;
         }
+    }
+
+    /// Whether nothing is seen.
+    pub fn is_empty(&self) -> bool {
+        self.crossings.is_empty()
     }
 
     /// What the ray of a pixel passes.

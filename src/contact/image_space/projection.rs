@@ -1,5 +1,7 @@
 //! From space to the pixels of a parallel view, and how large such an image may be.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::error::{Error, Result};
@@ -100,6 +102,19 @@ impl Projection {
         Window::new(self.width, self.height)
     }
 
+    /// The columns and rows of the pixels that a rectangle touches, given by its corners in the coordinates of the frame.
+    pub fn touched(&self, low: DVec3, high: DVec3) -> [Range<u32>; 2] {
+        let side = |low: f64, high: f64, count: u32| {
+            let end = ((high * self.per_metre).floor() + 1.0).clamp(0.0, f64::from(count));
+            (low * self.per_metre).floor().clamp(0.0, end) as u32..end as u32
+        };
+        let [left, top] = self.low;
+        [
+            side(low.x - left, high.x - left, self.width),
+            side(low.y - top, high.y - top, self.height),
+        ]
+    }
+
     /// Where a point falls.
     pub fn project(&self, point: Vec3) -> PixelVertex {
         let at = self.frame.coordinates(point);
@@ -109,6 +124,13 @@ impl Projection {
             depth: at.z,
             reciprocal: 1.0,
         }
+    }
+
+    /// From a point to the ray in the middle of its pixel, m.
+    pub fn way_to_middle(&self, point: Vec3) -> Vec3 {
+        let vertex = self.project(point);
+        let [right, down] = [vertex.x, vertex.y].map(|at| (at.floor() + 0.5 - at) * self.pixel);
+        (self.frame.right * right + self.frame.down * down).as_vec3()
     }
 
     /// The middle of a pixel, in pixels.

@@ -83,6 +83,11 @@ impl Surface {
 }
 
 impl Placed<'_> {
+    /// The corners of a triangle.
+    pub(super) fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.surface.triangles[triangle].map(|node| self.positions[node as usize])
+    }
+
     /// Refuses what does not belong together or is not finite.
     pub(super) fn check(&self) -> Result<()> {
         let node_count = self.surface.node_count;

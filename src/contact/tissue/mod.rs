@@ -8,6 +8,7 @@
 mod bonds;
 mod crossing;
 mod groups;
+mod images;
 mod link;
 mod search;
 mod skin;
@@ -78,7 +79,8 @@ impl Tissue {
         if !body.meets_tissue() {
             return Ok(());
         }
-        let skin = Skin::new(body)?;
+        let mut skin = Skin::new(body)?;
+        self.add_images(&mut skin)?;
         self.groups.make_place(place)?;
         let more = ROOM * (skin.nodes.len() + skin.edges.len() + skin.triangles.len());
         let room = self.room() + more;
@@ -97,6 +99,22 @@ impl Tissue {
             self.groups.make_place(place)?;
         }
         self.bonds.reserve(count)
+    }
+
+    /// Has a new surface, and those that it may meet, be found in images where one of two asks for that.
+    fn add_images(&mut self, skin: &mut Skin) -> Result<()> {
+        for other in self.skins.iter_mut().flatten() {
+            if skin.meets_bodies && other.meets_bodies && (skin.asks_for_images || other.asks_for_images) {
+                other.add_images()?;
+                skin.add_images()?;
+            }
+        }
+        // The first of its world too is refused what it asks for.
+        if skin.asks_for_images {
+            skin.add_images()
+        } else {
+            Ok(())
+        }
     }
 
     /// A body is gone.
@@ -237,6 +255,7 @@ impl Tissue {
             }
         }
         self.bonds.follow(bodies, &self.skins, moment);
+        self.draw(group, bodies, moment);
         self.solve(group, bodies, moment);
         for link in &self.links {
             for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
@@ -253,6 +272,37 @@ impl Tissue {
         if moment.drifts {
             self.part(bodies, Body::part_substep);
             self.bonds.part(bodies, moment.duration);
+        }
+    }
+
+    /// Draws what of each surface is near others that it is found by in images, as the substep begins.
+    fn draw(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
+        for a in 0..self.skins.len() {
+            // It is written to while others are read.
+            let Some(mut first) = self.skins[a].take() else {
+                continue;
+            };
+            if let Some(body) = bodies.at(a)
+                && first.images.is_some()
+                && self.groups.of(a) == Some(group)
+                && moment.concerns(body)
+            {
+                let mut part = Bounds::EMPTY;
+                for (b, other) in self.skins.iter().enumerate() {
+                    if let (Some(other), Some(other_body)) = (other, bodies.at(b))
+                        && self.groups.of(b) == Some(group)
+                        && moment.concerns(other_body)
+                        && meet_in_images(&first, other)
+                    {
+                        let parties = [(a, &first), (b, other)].map(|(place, skin)| Party { place, skin });
+                        if let Some(radius) = radius(&parties[0], &parties[1], [body, other_body]) {
+                            part = part.and(&near(&first, other, radius));
+                        }
+                    }
+                }
+                first.draw(&part);
+            }
+            self.skins[a] = Some(first);
         }
     }
 
@@ -320,6 +370,7 @@ impl Tissue {
                     parties: [first, second],
                     dt: moment.duration,
                     radius,
+                    in_images: a != b && meet_in_images(first.skin, skin),
                 };
                 search.run(|touch| {
                     let sides = touch.sides.map(|side| side.key());
@@ -352,6 +403,22 @@ fn radius(first: &Party, second: &Party, bodies: [&Body; 2]) -> Option<f32> {
         return a.with_itself.then_some(apart.min(WITH_ITSELF * shortest));
     }
     meet_each_other(bodies[0], bodies[1]).then_some(apart)
+}
+
+/// Whether two bodies that meet are found in images.
+fn meet_in_images(first: &Skin, second: &Skin) -> bool {
+    first.asks_for_images || second.asks_for_images
+}
+
+/// A box about what of a surface another may meet that it keeps `radius` away from.
+fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
+    let margin = radius + skin.shortest + FASTER * (skin.travel + other.travel);
+    let shift = search::shift(other, skin);
+    let (own, others) = (skin.tree.bounds(), other.tree.bounds());
+    Bounds {
+        min: (others.min + shift - margin).max(own.min),
+        max: (others.max + shift + margin).min(own.max),
+    }
 }
 
 fn meet_each_other(first: &Body, second: &Body) -> bool {

@@ -37,6 +37,8 @@ pub(super) struct Search<'a> {
     pub parties: [Party<'a>; 2],
     pub dt: f32,
     pub radius: f32,
+    /// Whether they find each other in images.
+    pub in_images: bool,
 }
 
 impl Search<'_> {
@@ -52,6 +54,14 @@ impl Search<'_> {
 
     fn is_of_one(&self) -> bool {
         self.parties[0].place == self.parties[1].place
+    }
+
+    /// Shows the triangles that a box comes within `reach` of, those that are seen there where they are to be found in images.
+    fn near(&self, skin: &Skin, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
+        match &skin.images {
+            Some(images) if self.in_images => images.near(skin, bounds, reach, see),
+            _ => skin.near(bounds, reach, see),
+        }
     }
 
     fn nodes_with_faces(&self, of_nodes: Party, of_faces: Party, see: &mut impl FnMut(Touch)) {
@@ -75,7 +85,7 @@ impl Search<'_> {
                 0.0
             };
             let reach = self.radius.max(depth) + of_faces.skin.spread;
-            of_faces.skin.near(&around, reach, |triangle| {
+            self.near(of_faces.skin, &around, reach, |triangle| {
                 let nodes = of_faces.skin.triangles[triangle];
                 if self.is_of_one() && nodes.contains(&node) {
                     return;
@@ -135,9 +145,8 @@ impl Search<'_> {
                 radius: self.radius,
             };
             let mut closest: Option<(f32, [u32; 2], Separation)> = None;
-            let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
-            second.skin.near(&around, self.radius + second.skin.spread, |triangle| {
-                for other in second.skin.owned(triangle) {
+            let mut see_edges = |edges: [u32; 3]| {
+                for other in second.skin.sound(edges) {
                     if self.is_of_one()
                         && (other <= first.skin.edges[index] || other.iter().any(|node| edge.contains(node)))
                     {
@@ -155,7 +164,28 @@ impl Search<'_> {
                         }
                     }
                 }
-            });
+            };
+            let reach = self.radius + second.skin.spread;
+            match &second.skin.images {
+                Some(images) if self.in_images => {
+                    // The box about all of a long edge is mostly beside it.
+                    let [from, to] = segment.ends;
+                    let pieces = images.pieces(to - from);
+                    for piece in 0..pieces {
+                        let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
+                        let places = shares.map(|share| segment.at(share)).into_iter().flatten();
+                        let (skin, around) = (second.skin, Bounds::of(places));
+                        images.near(skin, &around, reach, |triangle| {
+                            see_edges(images.edges_near(skin, triangle, &around, reach));
+                        });
+                    }
+                }
+                _ => {
+                    let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
+                    let skin = second.skin;
+                    skin.near(&around, reach, |triangle| see_edges(skin.owned(triangle)));
+                }
+            }
             if let Some((_, other, found)) = closest {
                 let sides = [
                     Side {

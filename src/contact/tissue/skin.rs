@@ -2,7 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
+use super::images::Images;
 use crate::body::{Body, Bounds, Vectors};
+use crate::contact::tool::Detection;
 use crate::contact::tree::Tree;
 use crate::error::Result;
 use crate::memory;
@@ -17,7 +19,7 @@ pub(super) struct Skin {
     pub triangles: Vec<[u32; 3]>,
     /// The edges that are looked at with a triangle: each with one.
     owned: Vec<[u32; 3]>,
-    tree: Tree,
+    pub tree: Tree,
     /// Whether it encloses something.
     pub is_closed: bool,
     /// The edges that pass through other tissue, or the body's own, as the step begins.
@@ -34,10 +36,23 @@ pub(super) struct Skin {
     pub given: Bounds,
     /// How long its shortest edge was at first, m.
     pub shortest: f32,
+    /// How far any node goes, m.
+    pub travel: f32,
+    /// Whether it meets other bodies, and asks to find them in images.
+    pub meets_bodies: bool,
+    pub asks_for_images: bool,
+    /// The side of a pixel of its images, m.
+    pub resolution: f32,
+    /// Where others find it, or it others, in images.
+    pub images: Option<Images>,
 }
 
 /// No edge.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
+
+/// How many pixels a mean edge is long, where it is not said how fine images are; and the longest extent at most.
+const PIXELS_OF_EDGE: f32 = 2.0;
+const PIXELS: f32 = 1024.0;
 
 impl Skin {
     /// That of a body, which has triangles.
@@ -63,9 +78,25 @@ impl Skin {
         let positions = body.state.positions();
         let at = |node: u32| positions.get(node as usize);
         let tree = Tree::new(triangles.len(), |triangle| triangles[triangle as usize].map(at))?;
-        let lengths = edges.iter().map(|&[a, b]| at(a).distance(at(b)));
+        let lengths = || edges.iter().map(|&[a, b]| at(a).distance(at(b)));
+        let contact = &body.contact;
+        let asks_for_images = contact.with_bodies && contact.detection == Detection::ImageSpace;
+        let resolution = if asks_for_images && contact.resolution > 0.0 {
+            contact.resolution
+        } else {
+            let bounds = tree.bounds();
+            let chosen = lengths().sum::<f32>() / (edges.len() as f32 * PIXELS_OF_EDGE);
+            chosen
+                .max((bounds.max - bounds.min).max_element() / PIXELS)
+                .max(f32::MIN_POSITIVE)
+        };
         Ok(Self {
-            shortest: lengths.fold(f32::INFINITY, f32::min),
+            shortest: lengths().fold(f32::INFINITY, f32::min),
+            travel: 0.0,
+            meets_bodies: contact.with_bodies,
+            asks_for_images,
+            resolution,
+            images: None,
             nodes,
             edges,
             owned,
@@ -85,6 +116,7 @@ impl Skin {
     /// Takes a substep of `duration` seconds as it is to be.
     pub fn follow(&mut self, body: &mut Body, duration: f32) {
         let origin = body.origin;
+        self.is_closed &= !body.is_cut_open;
         let state = body.state.substep();
         let (starts, velocities) = (state.positions, &*state.velocities);
         match &body.implicit {
@@ -114,10 +146,27 @@ impl Skin {
             all = all.with(velocity);
         }
         self.drift = 0.5 * (all.min + all.max);
+        self.travel = duration * all.min.abs().max(all.max.abs()).length();
         self.spread = 0.5 * duration * (all.max - all.min).length();
         let (triangles, starts) = (&self.triangles, &self.starts);
         self.tree
             .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
+    }
+
+    /// Has images of the surface, if it has none.
+    pub fn add_images(&mut self) -> Result<()> {
+        if self.images.is_none() {
+            self.images = Some(Images::new(self)?);
+        }
+        Ok(())
+    }
+
+    /// Draws what of the surface lies within `part`.
+    pub fn draw(&mut self, part: &Bounds) {
+        if let Some(mut images) = self.images.take() {
+            images.draw(self, part);
+            self.images = Some(images);
+        }
     }
 
     /// Shows the triangles that a box comes within `reach` of.
@@ -128,9 +177,14 @@ impl Skin {
         });
     }
 
-    /// The edges that are looked at with a triangle, but for those that pass through tissue: there is no telling which side they belong to.
-    pub fn owned(&self, triangle: usize) -> impl Iterator<Item = [u32; 2]> + '_ {
-        let edges = self.owned[triangle].into_iter().filter(|&edge| edge != NONE);
+    /// The edges that are looked at with a triangle, as numbers.
+    pub fn owned(&self, triangle: usize) -> [u32; 3] {
+        self.owned[triangle]
+    }
+
+    /// Those of these edges that do not pass through tissue: of the others there is no telling which side they belong to.
+    pub fn sound(&self, edges: [u32; 3]) -> impl Iterator<Item = [u32; 2]> + '_ {
+        let edges = edges.into_iter().filter(|&edge| edge != NONE);
         let edges = edges.map(|edge| edge as usize).filter(|&edge| !self.pierces[edge]);
         edges.map(|edge| self.edges[edge])
     }

@@ -1,0 +1,81 @@
+//! Surfaces in images, for bodies that are to be found there by each other.
+
+use glam::Vec3;
+
+use super::skin::{NONE, Skin};
+use crate::body::Bounds;
+use crate::contact::image_space::Drawn;
+use crate::error::Result;
+use crate::memory;
+
+/// A longer part of an edge, in pixels, is looked along piece by piece.
+const PIECE: f32 = 8.0;
+
+/// Images of a surface.
+#[derive(Debug)]
+pub(super) struct Images {
+    drawn: Drawn,
+    /// The edges of each triangle: the one that an edge is looked at with by its tree may not be seen.
+    edges: Vec<[u32; 3]>,
+    /// Metres.
+    pixel: f32,
+}
+
+impl Images {
+    /// Room for those of a surface.
+    pub fn new(skin: &Skin) -> Result<Self> {
+        let triangles = (0..skin.triangles.len()).map(|place| skin.tree.placed(place).corners);
+        let drawn = Drawn::reserved(skin.resolution, &skin.tree.bounds(), triangles)?;
+        let mut edges = memory::reserved(skin.triangles.len())?;
+        let number = |a: u32, b: u32| {
+            skin.edges
+                .binary_search(&[a.min(b), a.max(b)])
+                .map_or(NONE, |edge| edge as u32)
+        };
+        edges.extend(
+            skin.triangles
+                .iter()
+                .map(|&[a, b, c]| [number(a, b), number(b, c), number(c, a)]),
+        );
+        Ok(Self {
+            drawn,
+            edges,
+            pixel: skin.resolution,
+        })
+    }
+
+    /// Draws what of the surface lies within `part`, where it is as a substep begins.
+    pub fn draw(&mut self, skin: &Skin, part: &Bounds) {
+        let corners = |triangle: usize| skin.triangles[triangle].map(|node| skin.starts.get(node as usize));
+        self.drawn
+            .draw(&skin.tree.bounds(), part, skin.triangles.len(), corners);
+    }
+
+    /// Shows the triangles that are seen within `reach` of a box, and come so near.
+    pub fn near(&self, skin: &Skin, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
+        let around = bounds.extended(reach);
+        self.drawn.near(bounds, reach, |triangle| {
+            let corners = skin.triangles[triangle].map(|node| skin.starts.get(node as usize));
+            if Bounds::of(corners.into_iter()).overlaps(&around) {
+                see(triangle);
+            }
+        });
+    }
+
+    /// Those edges of a triangle, or none, that come within `reach` of a box.
+    pub fn edges_near(&self, skin: &Skin, triangle: usize, bounds: &Bounds, reach: f32) -> [u32; 3] {
+        let around = bounds.extended(reach);
+        self.edges[triangle].map(|edge| {
+            let is_near = skin.edges.get(edge as usize).is_some_and(|ends| {
+                let ends = ends.map(|node| skin.starts.get(node as usize));
+                Bounds::of(ends.into_iter()).overlaps(&around)
+            });
+            if is_near { edge } else { NONE }
+        })
+    }
+
+    /// In how many pieces something so long is looked along.
+    pub fn pieces(&self, along: Vec3) -> u32 {
+        (along.length() / (PIECE * self.pixel)).clamp(1.0, 1e3) as u32
+    }
+}
