@@ -254,9 +254,18 @@ fn a_block_rests_on_another() {
 
 /// Two sheets, the lower held at its rim, in one body or in two.
 fn sheets(world: &mut World, solver: Solver, as_one: bool, contact: BodyContact) -> Vec<BodyId> {
-    let lower = square(0.08, 8);
+    lay(world, solver, as_one, contact, (square(0.08, 8), &rim(8)))
+}
+
+/// The upper of two sheets above this one, which is held at these nodes.
+fn lay(
+    world: &mut World,
+    solver: Solver,
+    as_one: bool,
+    contact: BodyContact,
+    (lower, rim): (Mesh, &[u32]),
+) -> Vec<BodyId> {
     let upper = moved(square(0.05, 7), Vec3::new(0.002, 0.006, 0.003));
-    let rim = rim(8);
     if as_one {
         let mut both = lower.clone();
         let first = both.positions.len() as u32;
@@ -269,11 +278,11 @@ fn sheets(world: &mut World, solver: Solver, as_one: bool, contact: BodyContact)
             ..contact
         };
         let id = put(world, &both, SHEET, solver, contact);
-        pin_all(world, id, &rim);
+        pin_all(world, id, rim);
         vec![id]
     } else {
         let low = put(world, &lower, SHEET, solver, contact);
-        pin_all(world, low, &rim);
+        pin_all(world, low, rim);
         vec![low, put(world, &upper, SHEET, solver, contact)]
     }
 }
@@ -319,6 +328,44 @@ fn a_sheet_falls_on_another_and_on_one_of_its_own_body() {
         let resting = gaps.iter().filter(|gap| **gap < 1.2e-3).count();
         assert!(least > 0.9e-3, "{what}: {least} m apart");
         assert!(resting > 12, "{what}: {resting} nodes lie on it");
+    }
+}
+
+#[test]
+fn a_seam_takes_nothing_from_contact() {
+    // Meshes of files have corners twice in one place: here an edge without length, in a triangle without area.
+    for as_one in [true, false] {
+        let [plain, seamed] = [false, true].map(|has_seam| {
+            let (mut lower, mut held) = (square(0.08, 8), rim(8));
+            if has_seam {
+                let doubled = lower.positions.len() as u32;
+                lower.positions.push(lower.positions[0]);
+                lower.triangles.push([0, doubled, 1]);
+                held.push(doubled);
+            }
+            let mut world = world(DOWN);
+            let ids = lay(&mut world, Solver::Verlet, as_one, ROUGH, (lower, &held));
+            let mut substeps = 0;
+            for _ in 0..60 {
+                let report = step(&mut world, 5e-3);
+                assert_eq!(report.crossings, 0, "one body: {as_one}, a seam: {has_seam}");
+                substeps += report.substeps;
+            }
+            let upper = body(&world, ids[ids.len() - 1]).positions();
+            let lowest = upper[upper.len() - 64..].iter().map(|p| p.y);
+            (substeps, lowest.fold(f32::INFINITY, f32::min))
+        });
+        assert!(
+            seamed.0 < plain.0 * 5 / 4,
+            "{} substeps instead of {}",
+            seamed.0,
+            plain.0
+        );
+        assert!(
+            seamed.1 > -0.04,
+            "one body: {as_one}: the upper sheet is at {}",
+            seamed.1
+        );
     }
 }
 

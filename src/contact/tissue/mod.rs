@@ -29,16 +29,16 @@ use crate::slots::Slots;
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
 
-/// What keeps off a surface without thickness, as a part of its shortest edge: in `f32` something must.
+/// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
 const LEAST_THICKNESS: f32 = 1e-3;
 
 /// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
 const FASTER: f32 = 2.0;
 
-/// How far bodies come against each other in a substep, as a part of the shortest edge.
+/// How far bodies come against each other in a substep, as a part of the short edges.
 const TRAVEL: f32 = 0.5;
 
-/// With itself a surface keeps off no further than this part of its shortest edge, or neighbours would meet.
+/// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
 
 /// Contacts that there is room for, for each node, edge and face of the surfaces.
@@ -225,7 +225,7 @@ impl Tissue {
     pub fn substeps_wished(&self, group: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
         let members = self.skins.iter().enumerate().filter_map(|(place, skin)| {
             let skin = skin.as_ref().filter(|_| self.groups.of(place) == Some(group))?;
-            Some((skin.shortest, speed(bodies.at(place)?)))
+            Some((skin.short, speed(bodies.at(place)?)))
         });
         let (shortest, speeds) = members.fold((f32::INFINITY, 0.0), |(least, sum), (shortest, speed)| {
             (shortest.min(least), sum + speed)
@@ -397,7 +397,7 @@ impl Tissue {
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
 fn radius(first: &Party, second: &Party, bodies: [&Body; 2]) -> Option<f32> {
     let [a, b] = bodies.map(|body| &body.contact);
-    let shortest = first.skin.shortest.min(second.skin.shortest);
+    let shortest = first.skin.short.min(second.skin.short);
     let apart = (a.thickness + b.thickness).max(LEAST_THICKNESS * shortest);
     if first.place == second.place {
         return a.with_itself.then_some(apart.min(WITH_ITSELF * shortest));
@@ -412,7 +412,7 @@ fn meet_in_images(first: &Skin, second: &Skin) -> bool {
 
 /// A box about what of a surface another may meet that it keeps `radius` away from.
 fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
-    let margin = radius + skin.shortest + FASTER * (skin.travel + other.travel);
+    let margin = radius + skin.short + FASTER * (skin.travel + other.travel);
     let shift = search::shift(other, skin);
     let (own, others) = (skin.tree.bounds(), other.tree.bounds());
     Bounds {

@@ -8,7 +8,7 @@ use super::skin::Skin;
 use crate::body::Bounds;
 use crate::contact::sweep::{Corners, Segment, Separation};
 
-/// A node that lies within another body is led out through a face that is no further than this part of the shortest edge.
+/// A node that lies within another body is led out through a face that is no further than this part of a short edge.
 const LED_OUT: f32 = 0.5;
 
 /// Distances that are the same but for this part are those of faces that share the closest point: which side it is on says the one that is
@@ -79,11 +79,7 @@ impl Search<'_> {
             let mut behind: Option<(usize, Separation)> = None;
             let around = Bounds::of([place, place + step].into_iter());
             let is_solid = of_faces.skin.is_closed && !self.is_of_one();
-            let depth = if is_solid {
-                LED_OUT * of_faces.skin.shortest
-            } else {
-                0.0
-            };
+            let depth = if is_solid { LED_OUT * of_faces.skin.short } else { 0.0 };
             let reach = self.radius.max(depth) + of_faces.skin.spread;
             self.near(of_faces.skin, &around, reach, |triangle| {
                 let nodes = of_faces.skin.triangles[triangle];
@@ -103,6 +99,7 @@ impl Search<'_> {
                 if height >= 0.0
                     && touched.is_none_or(|(least, ..)| distance < least)
                     && let Some(found) = corners.approach(&segment, 0.0)
+                    && !(self.is_of_one() && of_faces.skin.were_near([node; 2], &nodes, self.radius))
                 {
                     touched = Some((distance, triangle, found));
                 }
@@ -157,7 +154,11 @@ impl Search<'_> {
                         continue;
                     };
                     // At an end of either it is a node that meets.
-                    if found.inside && found.along > 0.0 && found.along < 1.0 {
+                    if found.inside
+                        && found.along > 0.0
+                        && found.along < 1.0
+                        && !(self.is_of_one() && second.skin.were_near(edge, &other, self.radius))
+                    {
                         let start = corners.separation(&segment, 0.0).offset.length_squared();
                         if closest.is_none_or(|(least, ..)| start < least) {
                             closest = Some((start, other, found));

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::images::Images;
 use crate::body::{Body, Bounds, Vectors};
+use crate::contact::sweep::{Corners, Segment};
 use crate::contact::tool::Detection;
 use crate::contact::tree::Tree;
 use crate::error::Result;
@@ -34,8 +35,10 @@ pub(super) struct Skin {
     pub spread: f32,
     /// The box of all velocities that were given.
     pub given: Bounds,
-    /// How long its shortest edge was at first, m.
-    pub shortest: f32,
+    /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
+    pub short: f32,
+    /// Where nodes were at first, in the body's coordinates, where it meets itself.
+    firsts: Option<Vectors>,
     /// How far any node goes, m.
     pub travel: f32,
     /// Whether it meets other bodies, and asks to find them in images.
@@ -80,6 +83,11 @@ impl Skin {
         let tree = Tree::new(triangles.len(), |triangle| triangles[triangle as usize].map(at))?;
         let lengths = || edges.iter().map(|&[a, b]| at(a).distance(at(b)));
         let contact = &body.contact;
+        let mut firsts = None;
+        if contact.with_itself {
+            let firsts = firsts.insert(Vectors::zeros(body.node_count())?);
+            nodes.iter().for_each(|&node| firsts.set(node as usize, at(node)));
+        }
         let asks_for_images = contact.with_bodies && contact.detection == Detection::ImageSpace;
         let resolution = if asks_for_images && contact.resolution > 0.0 {
             contact.resolution
@@ -91,7 +99,8 @@ impl Skin {
                 .max(f32::MIN_POSITIVE)
         };
         Ok(Self {
-            shortest: lengths().fold(f32::INFINITY, f32::min),
+            short: short_of(lengths(), edges.len())?,
+            firsts,
             travel: 0.0,
             meets_bodies: contact.with_bodies,
             asks_for_images,
@@ -110,6 +119,27 @@ impl Skin {
             spread: 0.0,
             given: Bounds::EMPTY,
             triangles,
+        })
+    }
+
+    /// Whether a node or an edge, and an edge or a face of the same body, were no further from each other at first than `radius`, m.
+    pub fn were_near(&self, nodes: [u32; 2], others: &[u32], radius: f32) -> bool {
+        self.firsts.as_ref().is_some_and(|firsts| {
+            let at = |node: &u32| firsts.get(*node as usize);
+            let segment = Segment {
+                ends: nodes.map(|node| at(&node)),
+                steps: [Vec3::ZERO; 2],
+                radius,
+            };
+            let mut corners = Corners {
+                points: [Vec3::ZERO; 3],
+                steps: [Vec3::ZERO; 3],
+                count: others.len(),
+            };
+            for (point, other) in corners.points.iter_mut().zip(others) {
+                *point = at(other);
+            }
+            corners.separation(&segment, 0.0).offset.length_squared() <= radius * radius
         })
     }
 
@@ -188,4 +218,15 @@ impl Skin {
         let edges = edges.map(|edge| edge as usize).filter(|&edge| !self.pierces[edge]);
         edges.map(|edge| self.edges[edge])
     }
+}
+
+/// The length that all but a twentieth are longer than, of those that are above 0.
+fn short_of(lengths: impl Iterator<Item = f32>, count: usize) -> Result<f32> {
+    let mut sorted = memory::reserved(count)?;
+    sorted.extend(lengths.filter(|&length| length > 0.0));
+    if sorted.is_empty() {
+        return Ok(f32::MIN_POSITIVE);
+    }
+    let place = sorted.len() / 20;
+    Ok(*sorted.select_nth_unstable_by(place, f32::total_cmp).1)
 }
