@@ -17,6 +17,7 @@ use super::path::{Motion, Solid, ToolPath};
 use super::report::Touch;
 use crate::body::{Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
+use crate::memory;
 
 /// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
 const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
@@ -219,10 +220,9 @@ impl Contacts {
         Ok(self.held.try_reserve(count)?)
     }
 
-    /// A tool holds this node, and does not touch it any more.
-    pub fn hold(&mut self, node: u32, slot: usize) {
-        let place = self.held.partition_point(|&held| held < (node, slot));
-        self.held.insert(place, (node, slot));
+    /// Tools hold these nodes too, which are in order, and do not touch them any more; there is room for them.
+    pub fn hold(&mut self, held: &[(u32, usize)]) {
+        memory::merge(&mut self.held, held, |&held| held);
     }
 
     /// The tool does so no longer.
@@ -243,6 +243,11 @@ impl Contacts {
     pub fn remember(&mut self, tools: &[ToolPath]) {
         self.holds.remember(&self.constraints, |place| tools[place].slot);
     }
+    /// Nodes that are not to stay are held no longer.
+    pub fn retain_held(&mut self, stays: impl Fn(u32) -> bool) {
+        self.held.retain(|&(node, _)| stays(node));
+    }
+
 
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
     pub fn forget(&mut self) {

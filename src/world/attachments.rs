@@ -147,7 +147,7 @@ impl World {
         }
         let mut ids = memory::reserved(grips.len())?;
         // All may slip in one step.
-        let count = self.attachments.iter().count() + grips.len();
+        let count = self.attachments.count() + grips.len();
         self.slipped.try_reserve(count)?;
         if grips.len() == 0 {
             return Ok(ids);
@@ -164,8 +164,15 @@ impl World {
                 }
             }
         }
-        held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit)?;
-        Ok(ids)
+        match held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit) {
+            Ok(()) => Ok(ids),
+            Err(error) => {
+                for AttachmentId(id) in ids {
+                    self.attachments.remove(id)?;
+                }
+                Err(error)
+            }
+        }
     }
 
     /// Lets go of what is attached: it goes on as it was led in the last step.
