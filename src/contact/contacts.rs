@@ -217,6 +217,9 @@ impl Contacts {
 
     /// Makes room for so many nodes more that tools hold.
     pub fn reserve_held(&mut self, count: usize) -> Result<()> {
+        // Another may come to its place.
+        self.candidates.invalidate();
+        self.holds.forget_tool(slot);
         Ok(self.held.try_reserve(count)?)
     }
 
