@@ -6,7 +6,7 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
-use super::candidates::Candidates;
+use super::candidates::{Candidates, met};
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::filter::{BodyContact, CollisionFilter};
@@ -156,7 +156,7 @@ impl Contacts {
         self.loads.clear();
         self.loads.resize(tools.len(), Load::default());
         // A step that is begun again goes back to where its nodes were.
-        if !self.committed || !self.candidates.covers(tools, origin) {
+        if !self.committed || !self.candidates.covers(tools, self.filter, origin) {
             self.candidates.invalidate();
         }
         self.committed = false;
@@ -228,7 +228,7 @@ impl Contacts {
         memory::merge(&mut self.held, held, |&held| held);
     }
 
-    /// The tool does so no longer.
+    /// The tool holds this node no longer.
     pub fn release(&mut self, node: u32, slot: usize) {
         if let Ok(place) = self.held.binary_search(&(node, slot)) {
             self.held.remove(place);
@@ -243,14 +243,14 @@ impl Contacts {
     }
 
     /// An equation with the contacts that were foreseen has been solved: its holds are what the next begins with.
-    pub fn remember(&mut self, tools: &[ToolPath]) {
-        self.holds.remember(&self.constraints, |place| tools[place].slot);
-    }
     /// Nodes that are not to stay are held no longer.
     pub fn retain_held(&mut self, stays: impl Fn(u32) -> bool) {
         self.held.retain(|&(node, _)| stays(node));
     }
 
+    pub fn remember(&mut self, tools: &[ToolPath]) {
+        self.holds.remember(&self.constraints, |place| tools[place].slot);
+    }
 
     /// Forgets what was near: nodes were moved from outside, or their coordinates begin elsewhere.
     pub fn forget(&mut self) {
@@ -295,7 +295,7 @@ impl Contacts {
             return;
         }
         self.find_candidates(&meeting);
-        if self.candidates.near().is_empty() || slices(&meeting) > 1 {
+        if self.candidates.near().is_empty() || self.slices(&meeting) > 1 {
             return;
         }
         let slice = Slice::ahead(&meeting);
@@ -321,7 +321,7 @@ impl Contacts {
         }
         let is_foreseen = !self.holds.is_empty();
         let slices = if meeting.drifts && !is_foreseen {
-            slices(&meeting)
+            self.slices(&meeting)
         } else {
             1
         };
@@ -385,23 +385,40 @@ impl Contacts {
     }
 
     fn find_candidates(&mut self, meeting: &Meeting) {
-        let tool_speed = meeting
-            .tools
-            .iter()
-            .fold(0.0_f32, |speed, tool| speed.max(tool.speed(meeting.dt)));
+        let tools = met(meeting.tools, self.filter);
+        let speeds = tools.clone().map(|tool| tool.speed(meeting.dt));
+        let tool_speed = speeds.fold(0.0, f32::max);
         let travel = meeting.substep * (meeting.fastest + tool_speed);
         if self.candidates.spend(travel) {
             return;
+    /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
+    fn slices(&self, meeting: &Meeting) -> u32 {
+        let mut slices = 1.0_f32;
+        for tool in met(meeting.tools, self.filter) {
+            let Some(sweep) = tool.sweep(meeting.origin) else {
+                continue;
+            };
+            let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
+            let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
+            if wanted > slices {
+                let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
+                if reached.overlaps(&sweep.bounds) {
+                    slices = wanted;
+                }
+            }
+        }
+        (slices as u32).clamp(1, SLICES)
+    }
+
         }
         let bounds = Bounds::of(meeting.positions.iter());
         let slack = (8.0 * travel).max(0.005 * (bounds.max - bounds.min).length());
         self.candidates.gather(
             &self.features,
             meeting.positions,
-            meeting.tools,
+            tools,
             meeting.origin,
-            meeting.substep * tool_speed + meeting.slack + meeting.thickness,
-            slack,
+            [meeting.substep * tool_speed + meeting.slack + meeting.thickness, slack],
         );
         self.candidates.spend(travel);
     }
@@ -501,25 +518,6 @@ impl Contacts {
             }
         }
     }
-}
-
-/// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
-fn slices(meeting: &Meeting) -> u32 {
-    let mut slices = 1.0_f32;
-    for tool in meeting.tools {
-        let Some(sweep) = tool.sweep(meeting.origin) else {
-            continue;
-        };
-        let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
-        let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
-        if wanted > slices {
-            let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
-            if reached.overlaps(&sweep.bounds) {
-                slices = wanted;
-            }
-        }
-    }
-    (slices as u32).clamp(1, SLICES)
 }
 
 impl Slice {
