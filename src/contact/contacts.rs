@@ -197,6 +197,14 @@ impl Contacts {
         }
     }
 
+    /// The step that was begun last is not taken: the body is where it was, and touches what it touched, but nothing pressed it.
+    pub fn stay(&mut self) {
+        self.touches.clear();
+        for pair in &mut self.touched {
+            *pair = [pair[0]; 2];
+        }
+    }
+
     /// What the last step that became current left of contacts with a tool at this place in the world.
     pub fn touches(&self, slot: usize) -> impl Iterator<Item = &Touch> {
         self.touches.iter().filter(move |touch| touch.slot == slot)
@@ -209,6 +217,9 @@ impl Contacts {
 
     /// A tool at this place in the world is gone.
     pub fn forget_tool(&mut self, slot: usize) {
+        // Another may come to its place.
+        self.candidates.invalidate();
+        self.holds.forget_tool(slot);
         self.touches.retain(|touch| touch.slot != slot);
         if let Some(pair) = self.touched.get_mut(slot) {
             *pair = [false; 2];
@@ -217,9 +228,6 @@ impl Contacts {
 
     /// Makes room for so many nodes more that tools hold.
     pub fn reserve_held(&mut self, count: usize) -> Result<()> {
-        // Another may come to its place.
-        self.candidates.invalidate();
-        self.holds.forget_tool(slot);
         Ok(self.held.try_reserve(count)?)
     }
 
@@ -235,6 +243,11 @@ impl Contacts {
         }
     }
 
+    /// Nodes that are not to stay are held no longer.
+    pub fn retain_held(&mut self, stays: impl Fn(u32) -> bool) {
+        self.held.retain(|&(node, _)| stays(node));
+    }
+
     /// Whether the tool in this place holds a node of the feature. What it holds may lie within it, and edges and faces from there
     /// on pass its surface: so it does not touch those either.
     fn is_held(&self, feature: Feature, slot: usize) -> bool {
@@ -243,11 +256,6 @@ impl Contacts {
     }
 
     /// An equation with the contacts that were foreseen has been solved: its holds are what the next begins with.
-    /// Nodes that are not to stay are held no longer.
-    pub fn retain_held(&mut self, stays: impl Fn(u32) -> bool) {
-        self.held.retain(|&(node, _)| stays(node));
-    }
-
     pub fn remember(&mut self, tools: &[ToolPath]) {
         self.holds.remember(&self.constraints, |place| tools[place].slot);
     }
@@ -384,13 +392,6 @@ impl Contacts {
         }
     }
 
-    fn find_candidates(&mut self, meeting: &Meeting) {
-        let tools = met(meeting.tools, self.filter);
-        let speeds = tools.clone().map(|tool| tool.speed(meeting.dt));
-        let tool_speed = speeds.fold(0.0, f32::max);
-        let travel = meeting.substep * (meeting.fastest + tool_speed);
-        if self.candidates.spend(travel) {
-            return;
     /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
     fn slices(&self, meeting: &Meeting) -> u32 {
         let mut slices = 1.0_f32;
@@ -410,6 +411,13 @@ impl Contacts {
         (slices as u32).clamp(1, SLICES)
     }
 
+    fn find_candidates(&mut self, meeting: &Meeting) {
+        let tools = met(meeting.tools, self.filter);
+        let speeds = tools.clone().map(|tool| tool.speed(meeting.dt));
+        let tool_speed = speeds.fold(0.0, f32::max);
+        let travel = meeting.substep * (meeting.fastest + tool_speed);
+        if self.candidates.spend(travel) {
+            return;
         }
         let bounds = Bounds::of(meeting.positions.iter());
         let slack = (8.0 * travel).max(0.005 * (bounds.max - bounds.min).length());

@@ -295,10 +295,7 @@ fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: 
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit(substeps, carry, tools, team);
             }
-            _ => {
-                body.put_back();
-                body.clear_pending();
-            }
+            _ => body.stay(),
         }
     }
 }
