@@ -107,6 +107,11 @@ impl Layers {
         }
     }
 
+    /// Whether no ray passes anything.
+    pub fn is_empty(&self) -> bool {
+        self.crossings.is_empty()
+    }
+
     /// What the ray of a pixel passes.
     pub fn at(&self, pixel: usize) -> &[Crossing] {
         let begin = pixel.checked_sub(1).map_or(0, |previous| self.ends[previous]);
