@@ -321,7 +321,8 @@ typedef struct sinew_world_def {
   uint32_t thread_count;
   /**
    * 0, the default: as many as stability needs; n: exactly n per step, but for bodies of IMPLICIT and NEWTON near a tool,
-   * whose substeps are of 1 ms at most there, and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
+   * whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms, and where a substep of theirs gains energy: then
+   * they are cut again, to 4096 in all.
    */
   uint32_t substeps;
   /**
@@ -1090,7 +1091,7 @@ typedef struct sinew_contact_change {
 } sinew_contact_change;
 
 /**
- * What a tool holds of a body: a plain value, all zero is "none".
+ * What a tool holds of a body, or a body of another: a plain value, all zero is "none".
  */
 typedef struct sinew_attachment_id {
   /**
@@ -2081,9 +2082,77 @@ sinew_status sinew_body_attach_points(struct sinew_world *world,
                                       struct sinew_attachment_id *out);
 
 /**
+ * Attaches `count` nodes of a body to as many nodes of another, or of the same, each pair by an attachment of its own, whose ids
+ * are written to `out`. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes
+ * together within some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each body may turn about the
+ * point as it likes: what shall not turn takes three.
+ *
+ * The bodies take their substeps together, those of IMPLICIT and NEWTON of 0.25 ms at most. No momentum is made; nor is any angular
+ * momentum, once the points have come together. Where both points are held by pins or tools along an axis nothing is done
+ * along it. Nodes, edges and faces that share such a pair of points do not touch each other.
+ *
+ * `force_limit`, N: an attachment ends with the step in which its mean force was larger (sinew_world_get_slipped); 0 or infinity:
+ * it holds whatever comes. sinew_attachment_get_force has the force on `body`; sinew_attachment_release lets go. An attachment
+ * ends with either body.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the two are one node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY;
+ * then nothing is attached.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_nodes_to_nodes(struct sinew_world *world,
+                                              struct sinew_body_id body,
+                                              const uint32_t *nodes,
+                                              size_t count,
+                                              struct sinew_body_id other,
+                                              const uint32_t *other_nodes,
+                                              float force_limit,
+                                              struct sinew_attachment_id *out);
+
+/**
+ * Attaches `count` nodes of a body to as many points of the surface of another, or of the same, as sinew_body_attach_nodes_to_nodes
+ * does. Points are given as to sinew_body_attach_points, and no patch is bonded: the surface may turn about the point.
+ *
+ * Errors: as there; SINEW_STATUS_INVALID_ARGUMENT also where there is no such triangle or weights are not at least 0 and 1 in sum.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_nodes_to_points(struct sinew_world *world,
+                                               struct sinew_body_id body,
+                                               const uint32_t *nodes,
+                                               size_t count,
+                                               struct sinew_body_id other,
+                                               const uint32_t *other_triangles,
+                                               const float *other_weights,
+                                               float force_limit,
+                                               struct sinew_attachment_id *out);
+
+/**
+ * Attaches `count` points of the surface of a body to as many points of that of another, or of the same, as
+ * sinew_body_attach_nodes_to_points does.
+ *
+ * Errors: as there.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_attach_points_to_points(struct sinew_world *world,
+                                                struct sinew_body_id body,
+                                                const uint32_t *triangles,
+                                                const float *weights,
+                                                size_t count,
+                                                struct sinew_body_id other,
+                                                const uint32_t *other_triangles,
+                                                const float *other_weights,
+                                                float force_limit,
+                                                struct sinew_attachment_id *out);
+
+/**
  * Lets go of what is attached: it goes on as it was led in the last step.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or its body or tool is gone).
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or a body or the tool is gone).
  *
  * # Safety
  * `world` is NULL or a world nobody else uses.
@@ -2092,8 +2161,8 @@ sinew_status sinew_attachment_release(struct sinew_world *world,
                                       struct sinew_attachment_id attachment);
 
 /**
- * Writes the force by which a tool holds what is attached, on the tissue, 3 floats, N: world axes, mean over the last step; 0
- * before the first. After sinew_body_rest_state it is that which holds the body at rest.
+ * Writes the force by which what it is attached to, a tool or a body, holds a body, on the tissue, 3 floats, N: world axes, mean
+ * over the last step; 0 before the first. After sinew_body_rest_state it is that by which a tool holds the body at rest.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
  *

@@ -14,7 +14,7 @@ use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_st
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{RunTasks, Threads};
 use attachments::Attachment;
-pub use attachments::{AttachmentId, SurfacePoint};
+pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 pub use step::StepReport;
 
 /// How a world steps.
@@ -25,8 +25,8 @@ pub struct WorldDefinition {
     /// 1: the caller's thread alone; 0: one per core; at most 256. What comes of a step is the same for any number.
     pub thread_count: u32,
     /// 0: as many as stability needs; n: exactly n per step, but for bodies of [`Solver::Implicit`](crate::Solver::Implicit) and
-    /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, and where a substep of theirs
-    /// gains energy: then they are cut again, to 4096 in all.
+    /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms,
+    /// and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
     pub substeps: u32,
     /// A step that needs more is [`Error::Unstable`]; at least 1. What is cut as above is no such need.
     pub max_substeps: u32,
@@ -158,8 +158,7 @@ impl World {
         if !body.meets_tissue() {
             return Ok(());
         }
-        self.walks.try_reserve((place + 1).saturating_sub(self.walks.len()))?;
-        self.walks.resize((place + 1).max(self.walks.len()), None);
+        make_walks(&mut self.walks, place)?;
         self.tissue.get_or_insert_default().join(place, body)
     }
 
@@ -169,10 +168,10 @@ impl World {
     /// [`Error::StaleId`].
     pub fn destroy_body(&mut self, body: BodyId) -> Result<()> {
         let place = self.bodies.place(body.0)?;
-        if let Some(tissue) = &mut self.tissue {
-            tissue.leave(place);
-        }
         self.bodies.remove(body.0)?;
+        if let Some(tissue) = &mut self.tissue {
+            tissue.leave(&mut self.bodies, place);
+        }
         self.forget_attachments_of(body);
         Ok(())
     }
@@ -202,8 +201,9 @@ impl World {
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: the tolerance is out of its range, or a part is pulled by a net force
-    /// along an axis along which no pin holds it. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// along an axis along which no pin holds it, or the body is attached to a body. [`Error::NotConverged`]: not found in the iterations allowed. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
+        self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
         rest_state(self.bodies.get_mut(body.0)?, gravity, definition)
     }
@@ -360,6 +360,16 @@ impl World {
             hasher.write_u64(place as u64);
             tool.hash_state(&mut hasher);
         }
+        if let Some(tissue) = &self.tissue {
+            tissue.bonds.hash(&mut hasher);
+        }
         hasher.finish()
     }
+}
+
+/// Makes room for the body at this place to take its substeps together with others.
+fn make_walks(walks: &mut Vec<Option<Walk>>, place: usize) -> Result<()> {
+    walks.try_reserve((place + 1).saturating_sub(walks.len()))?;
+    walks.resize((place + 1).max(walks.len()), None);
+    Ok(())
 }

@@ -513,6 +513,22 @@ impl Body {
         }
     }
 
+    /// Adds what other tissue did to held nodes in the last substep, after that was felt.
+    pub(crate) fn feel_what_grasps_handed_on(&mut self, tools: &[ToolPath]) {
+        let positions = self.state.newest().0;
+        let mut frames = Frames::new(tools, [1.0], self.origin);
+        for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
+            let (Some([frame]), Some(pin)) = (frames.of(held.tool), self.pins.get(held.node)) else {
+                continue;
+            };
+            let force = pin.force_sum - held.course.pin_sum;
+            let arm = positions.get(held.node as usize).as_dvec3() - frame.centre;
+            held.course.force_sum += force;
+            held.course.torque_sum += arm.cross(force);
+            held.course.pin_sum = pin.force_sum;
+        }
+    }
+
     /// The step in progress, of so many substeps, is the current state.
     pub(super) fn commit_grasps(&mut self, substeps: u32) {
         for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {

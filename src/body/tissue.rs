@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 
-use super::Body;
+use super::{Body, Vectors};
 use crate::contact::Moment;
 use crate::error::Result;
+use crate::solver::close;
 
 impl Body {
     /// Whether it meets other bodies, or itself, and has something to meet with.
@@ -40,10 +41,91 @@ impl Body {
         }
     }
 
+    /// Makes room for forces on nodes that are attached.
+    pub(crate) fn reserve_bonds(&mut self) -> Result<()> {
+        if self.applied.is_none() {
+            self.applied = Some(Vectors::zeros(self.node_count())?);
+        }
+        Ok(())
+    }
+
+    /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
+    pub(crate) fn begin_bonds(&mut self) {
+        close(self);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+        }
+    }
+
+    /// Its own number of a node.
+    pub(crate) fn own_node(&self, node: u32) -> u32 {
+        self.order.own(node)
+    }
+
+    /// How much faster a node becomes for an impulse, along each axis, 1/kg.
+    pub(crate) fn answer_of(&self, node: u32) -> Vec3 {
+        let held = self.pins.axes_of(node);
+        Vec3::select(held, Vec3::ZERO, Vec3::splat(self.inverse_masses[node as usize]))
+    }
+
+    /// What damping leaves of the speed that an impulse gives to a node, so that the impulse is what the force behind it
+    /// would have given undamped.
+    pub(crate) fn left_by_damping(&self, node: u32, moment: &Moment) -> f32 {
+        match (&self.implicit, &self.damping) {
+            (Some(_), Some(damping)) => 1.0 / (1.0 + damping.rates()[node as usize] * moment.duration),
+            // A kick of VERLET gives (1 - exp(-x)) / x of what its forces would undamped: 1 - x / 2 but for terms of order 2.
+            (None, Some(damping)) => 1.0 / (1.0 + 0.5 * damping.rates()[node as usize] * moment.duration),
+            _ => 1.0,
+        }
+    }
+
+    /// How fast a node goes on its way in a substep, m/s.
+    pub(crate) fn mean_velocity(&mut self, node: usize) -> Vec3 {
+        match &self.implicit {
+            None => self.state.substep().velocities.get(node),
+            Some(implicit) => implicit.mean(node),
+        }
+    }
+
+    /// Has this force act on a node, N, instead of what was applied to it.
+    pub(crate) fn load(&mut self, node: usize, force: Vec3) {
+        if let Some(applied) = &mut self.applied {
+            applied.set(node, force);
+            self.forces_applied = true;
+        }
+    }
+
+    /// Gives a node that is attached this mean velocity, m/s, in a substep: it has received `impulse` in all, N s, which a pinned node hands on.
+    pub(crate) fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+        let held = self.pins.axes_of(node as u32);
+        if let Some(pin) = self.pins.get_mut(node as u32) {
+            pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
+        }
+        if self.inverse_masses[node] == 0.0 {
+            return;
+        }
+        let given = Vec3::select(held, Vec3::ZERO, velocity - self.mean_velocity(node));
+        if given == Vec3::ZERO {
+            return;
+        }
+        if let Some(implicit) = &mut self.implicit {
+            implicit.draw(node, given, moment.duration);
+        }
+        let state = self.state.substep();
+        state.velocities.set(node, state.velocities.get(node) + given);
+        if moment.drifts {
+            let way = given * moment.duration;
+            state.next_positions.set(node, state.next_positions.get(node) + way);
+        }
+    }
+
     /// Moves a node at the end of a substep, without giving it speed.
     pub(crate) fn part_substep(&mut self, node: usize, way: Vec3) {
         let next_positions = self.state.substep().next_positions;
         let place = next_positions.get(node) + way;
         next_positions.set(node, place);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.part();
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Attachments: what tools hold of bodies, and the force on several tools together.
+//! Attachments: what tools hold of bodies and bodies of each other, and the force on several tools together.
 
 use glam::Vec3;
 
@@ -9,9 +9,9 @@ use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::error::Result;
 use crate::slots::SlotId;
-use crate::world::{AttachmentId, SurfacePoint};
+use crate::world::{Anchor, AttachmentId, SurfacePoint};
 
-/// What a tool holds of a body: a plain value, all zero is "none".
+/// What a tool holds of a body, or a body of another: a plain value, all zero is "none".
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_attachment_id {
@@ -145,6 +145,148 @@ pub unsafe extern "C" fn sinew_body_attach_points(
     }
 }
 
+/// Attaches `count` nodes of a body to as many nodes of another, or of the same, each pair by an attachment of its own, whose ids
+/// are written to `out`. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes
+/// together within some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each body may turn about the
+/// point as it likes: what shall not turn takes three.
+///
+/// The bodies take their substeps together, those of IMPLICIT and NEWTON of 0.25 ms at most. No momentum is made; nor is any angular
+/// momentum, once the points have come together. Where both points are held by pins or tools along an axis nothing is done
+/// along it. Nodes, edges and faces that share such a pair of points do not touch each other.
+///
+/// `force_limit`, N: an attachment ends with the step in which its mean force was larger (sinew_world_get_slipped); 0 or infinity:
+/// it holds whatever comes. sinew_attachment_get_force has the force on `body`; sinew_attachment_release lets go. An attachment
+/// ends with either body.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the two are one node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY;
+/// then nothing is attached.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_attach_nodes_to_nodes(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    count: usize,
+    other: sinew_body_id,
+    other_nodes: *const u32,
+    force_limit: f32,
+    out: *mut sinew_attachment_id,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let nodes = anchors_of_nodes("nodes", nodes, count)?;
+            let other_nodes = anchors_of_nodes("other_nodes", other_nodes, count)?;
+            let out = memory::output_array("out", out, count)?;
+            let ids = world.attach_to_body(body.id(), &nodes, other.id(), &other_nodes, force_limit)?;
+            write(out, ids);
+            Ok(())
+        })
+    }
+}
+
+/// Attaches `count` nodes of a body to as many points of the surface of another, or of the same, as sinew_body_attach_nodes_to_nodes
+/// does. Points are given as to sinew_body_attach_points, and no patch is bonded: the surface may turn about the point.
+///
+/// Errors: as there; SINEW_STATUS_INVALID_ARGUMENT also where there is no such triangle or weights are not at least 0 and 1 in sum.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_attach_nodes_to_points(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    count: usize,
+    other: sinew_body_id,
+    other_triangles: *const u32,
+    other_weights: *const f32,
+    force_limit: f32,
+    out: *mut sinew_attachment_id,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let nodes = anchors_of_nodes("nodes", nodes, count)?;
+            let names = ["other_triangles", "other_weights"];
+            let points = anchors_of_points(names, other_triangles, other_weights, count)?;
+            let out = memory::output_array("out", out, count)?;
+            write(
+                out,
+                world.attach_to_body(body.id(), &nodes, other.id(), &points, force_limit)?,
+            );
+            Ok(())
+        })
+    }
+}
+
+/// Attaches `count` points of the surface of a body to as many points of that of another, or of the same, as
+/// sinew_body_attach_nodes_to_points does.
+///
+/// Errors: as there.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_attach_points_to_points(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    triangles: *const u32,
+    weights: *const f32,
+    count: usize,
+    other: sinew_body_id,
+    other_triangles: *const u32,
+    other_weights: *const f32,
+    force_limit: f32,
+    out: *mut sinew_attachment_id,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let points = anchors_of_points(["triangles", "weights"], triangles, weights, count)?;
+            let names = ["other_triangles", "other_weights"];
+            let others = anchors_of_points(names, other_triangles, other_weights, count)?;
+            let out = memory::output_array("out", out, count)?;
+            write(
+                out,
+                world.attach_to_body(body.id(), &points, other.id(), &others, force_limit)?,
+            );
+            Ok(())
+        })
+    }
+}
+
+/// # Safety
+/// `nodes` is NULL or as long as stated.
+unsafe fn anchors_of_nodes(name: &str, nodes: *const u32, count: usize) -> Result<Vec<Anchor>> {
+    // SAFETY: the same contract.
+    let nodes = unsafe { memory::array(name, nodes, count)? };
+    let mut anchors = crate::memory::reserved(count)?;
+    anchors.extend(nodes.iter().map(|&node| Anchor::Node(node)));
+    Ok(anchors)
+}
+
+/// # Safety
+/// The arrays are NULL or as long as stated.
+unsafe fn anchors_of_points(
+    [of_triangles, of_weights]: [&str; 2],
+    triangles: *const u32,
+    weights: *const f32,
+    count: usize,
+) -> Result<Vec<Anchor>> {
+    // SAFETY: the same contract.
+    let (triangles, weights) = unsafe {
+        let triangles = memory::array(of_triangles, triangles, count)?;
+        (triangles, memory::array(of_weights, weights.cast::<[f32; 3]>(), count)?)
+    };
+    let mut anchors = crate::memory::reserved(count)?;
+    let points = triangles.iter().zip(weights);
+    anchors.extend(points.map(|(&triangle, &weights)| Anchor::Point(SurfacePoint { triangle, weights })));
+    Ok(anchors)
+}
+
 fn write(out: &mut [sinew_attachment_id], ids: Vec<AttachmentId>) {
     for (out, id) in out.iter_mut().zip(ids) {
         *out = id.into();
@@ -153,7 +295,7 @@ fn write(out: &mut [sinew_attachment_id], ids: Vec<AttachmentId>) {
 
 /// Lets go of what is attached: it goes on as it was led in the last step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or its body or tool is gone).
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or a body or the tool is gone).
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -166,8 +308,8 @@ pub unsafe extern "C" fn sinew_attachment_release(
     unsafe { with_world_mut(world, |world| world.release(attachment.id())) }
 }
 
-/// Writes the force by which a tool holds what is attached, on the tissue, 3 floats, N: world axes, mean over the last step; 0
-/// before the first. After sinew_body_rest_state it is that which holds the body at rest.
+/// Writes the force by which what it is attached to, a tool or a body, holds a body, on the tissue, 3 floats, N: world axes, mean
+/// over the last step; 0 before the first. After sinew_body_rest_state it is that by which a tool holds the body at rest.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
 ///

@@ -51,7 +51,8 @@ pub struct sinew_world_def {
     /// world's threads end with it, and sleep while it is not stepped or too small to share.
     pub thread_count: u32,
     /// 0, the default: as many as stability needs; n: exactly n per step, but for bodies of IMPLICIT and NEWTON near a tool,
-    /// whose substeps are of 1 ms at most there, and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
+    /// whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms, and where a substep of theirs gains energy: then
+    /// they are cut again, to 4096 in all.
     pub substeps: u32,
     /// Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, is no
     /// such need: near a tool a long step of theirs takes as many parts, and as much longer.
@@ -88,7 +89,7 @@ pub struct sinew_step_report {
     /// anything to compare.
     pub error_estimate: f32,
     /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those in a body that is closed come out again by themselves.
+    /// apart. Those of another body in one that is closed come out again by themselves.
     pub crossings: u32,
     /// 0.
     pub reserved: u32,

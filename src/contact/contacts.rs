@@ -34,6 +34,9 @@ const SLICE_TRAVEL: f32 = 0.5;
 /// Sweeps over the contacts of each of several slices at most: what is left is found again in the next.
 const SWEEPS_OF_A_SLICE: u32 = 16;
 
+/// How often what the impulses lead into tools is searched for in a slice.
+const SEARCHES: u32 = 4;
+
 /// What a tool received from a body in the step in progress, N s and N m s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Load {
@@ -103,13 +106,15 @@ pub(crate) struct Meeting<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice {
     /// Seconds from its start to the end of the substep.
-    remains: f32,
+    pub remains: f32,
     /// s
     pub duration: f32,
     first: bool,
     sweeps: u32,
     /// Whether contacts are only looked for.
     foresees: bool,
+    /// So many contacts are known: others count where they are missed.
+    known: usize,
 }
 
 impl Contacts {
@@ -342,6 +347,7 @@ impl Contacts {
                 first: index == 0,
                 sweeps: if slices == 1 { SWEEPS } else { SWEEPS_OF_A_SLICE },
                 foresees: false,
+                known: 0,
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
             if is_foreseen {
@@ -351,7 +357,7 @@ impl Contacts {
             }
             let ends = [fraction(part(index)), fraction(part(index + 1))];
             self.find(&mut meeting, &slice, ends);
-            self.solve(&mut meeting, &slice);
+            self.solve(&mut meeting, &slice, ends);
         }
         if self.given != Bounds::EMPTY {
             let fastest = self.given.min.abs().max(self.given.max.abs()).length();
@@ -450,7 +456,7 @@ impl Contacts {
                 }
             }
             Solid::Rounded { .. } => {
-                let segment = motion.segment(slice.duration, meeting.drifts);
+                let segment = motion.segment(meeting.drifts);
                 if feature.nodes().len() == 3 && !segment.is_point() {
                     for end in 0..2 {
                         let found = meet_rounded(meeting, slice, motion, feature, &segment.end(end));
@@ -468,28 +474,49 @@ impl Contacts {
         let Some(mut constraint) = found else {
             return;
         };
+        if slice.known > 0 && !constraint.is_missed(meeting.velocities) {
+            return;
+        }
         constraint.tool = tool;
         if self.constraints.len() < self.together {
             self.constraints.push(constraint);
         } else if !slice.foresees {
             constraint.solve(meeting.velocities);
-            self.settle(meeting, slice, &constraint, true);
+            constraint.lead(meeting, slice);
+            self.settle(meeting, &constraint);
         }
     }
 
-    fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
-        let constraints = &mut self.constraints;
-        let first = relax(slice.sweeps, None, || {
-            let changes = constraints
-                .iter_mut()
-                .map(|constraint| constraint.solve(meeting.velocities));
-            changes.fold(0.0, f32::max)
-        });
-        // Where nothing was given beside what an equation found the nodes are where that has put them.
-        let moves = first > 0.0 || self.holds.is_empty();
+    /// Gives the impulses of the contacts of a slice between these fractions of the step; where something is fast until they lead to no
+    /// others: what is kept off at one place may turn about it.
+    fn solve(&mut self, meeting: &mut Meeting, slice: &Slice, ends: [f64; 2]) {
+        let searches = if slice.sweeps < SWEEPS { SEARCHES } else { 0 };
+        let mut first = None;
+        for search in 0..=searches {
+            let constraints = &mut self.constraints;
+            first = Some(relax(slice.sweeps, first, || {
+                let changes = constraints
+                    .iter_mut()
+                    .map(|constraint| constraint.solve(meeting.velocities));
+                changes.fold(0.0, f32::max)
+            }));
+            // Where nothing was given beside what an equation found the nodes are where that has put them.
+            if first > Some(0.0) || self.holds.is_empty() {
+                for constraint in &self.constraints {
+                    constraint.lead(meeting, slice);
+                }
+            }
+            let known = self.constraints.len();
+            if search < searches {
+                self.find(meeting, &Slice { known, ..*slice }, ends);
+            }
+            if self.constraints.len() == known {
+                break;
+            }
+        }
         for index in 0..self.constraints.len() {
             let constraint = self.constraints[index];
-            self.settle(meeting, slice, &constraint, moves);
+            self.settle(meeting, &constraint);
         }
         if meeting.drifts {
             for constraint in &self.constraints {
@@ -500,29 +527,16 @@ impl Contacts {
         }
     }
 
-    /// Adds what a contact gave to its tool's load, and moves its nodes.
-    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint, moves: bool) {
+    /// Adds what a contact gave to its tool's load, and to what pins hold.
+    fn settle(&mut self, meeting: &mut Meeting, constraint: &Constraint) {
         let load = &mut self.loads[constraint.tool];
         let received = -constraint.given().as_dvec3();
         load.impulse += received;
         load.angular_impulse += constraint.arm.as_dvec3().cross(received);
-        let corners = constraint.starts.iter().zip(constraint.weights);
-        for (&node, (&start, weight)) in constraint.feature.nodes().iter().zip(corners) {
+        for (&node, weight) in constraint.feature.nodes().iter().zip(constraint.weights) {
+            self.given = self.given.with(meeting.velocities.get(node as usize));
             if let Some(pin) = meeting.pins.get_mut(node) {
                 pin.force_sum += received * f64::from(weight / meeting.substep);
-                if !pin.is_partial() {
-                    continue;
-                }
-            }
-            let velocity = meeting.velocities.get(node as usize);
-            self.given = self.given.with(velocity);
-            if meeting.drifts && moves {
-                let held = meeting.pins.partial_axes_of(node);
-                let led = meeting.next_positions.get(node as usize);
-                let moved = start + velocity * slice.remains;
-                meeting
-                    .next_positions
-                    .set(node as usize, Vec3::select(held, led, moved));
             }
         }
     }
@@ -537,6 +551,7 @@ impl Slice {
             first: true,
             sweeps: SWEEPS,
             foresees: true,
+            known: 0,
         }
     }
 }

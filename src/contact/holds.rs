@@ -15,8 +15,8 @@ use super::gauge::{Gauge, Meets};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 
-/// How much stiffer a contact is than its nodes.
-const STIFFER: f32 = 10.0;
+/// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
+const STIFFER: f32 = 3.0;
 
 /// A contact as the equation sees it.
 #[derive(Clone, Copy, Debug)]
@@ -32,11 +32,15 @@ struct Hold {
     stiffness: f64,
     /// N
     multiplier: f64,
+    /// What part of its force becomes its multiplier: less than 1 where it gives way, as what holds nodes leaves them no way out.
+    kept: f64,
     /// Whether it may pull: where it pushed before, the first solution takes it for one that goes on, though a node that were left
     /// alone might go away from the tool for once.
     holds_on: bool,
     /// What acts on the tissue with the nodes where they were last.
     answer: Answer,
+    /// Whether it pushed when it was last asked.
+    pushed: bool,
 }
 
 /// What a contact does.
@@ -183,8 +187,10 @@ impl Holds {
                 least: -f64::from(constraint.depth.max(0.0)),
                 stiffness: 0.0,
                 multiplier: 0.0,
+                kept: f64::from(1.0 - constraint.give),
                 holds_on: false,
                 answer: Answer::default(),
+                pushed: false,
             };
             let mut softness = 0.0;
             for (corner, &node) in constraint.feature.nodes().iter().enumerate() {
@@ -198,13 +204,13 @@ impl Holds {
                     corner,
                 });
             }
-            let stiffness = STIFFER / softness;
+            let stiffness = STIFFER * constraint.firmness / softness;
             if stiffness.is_finite() {
                 hold.stiffness = f64::from(stiffness);
             }
             let key = (slot_of(constraint.tool), constraint.feature);
             if let Ok(place) = self.last.binary_search_by_key(&key, Push::key) {
-                hold.multiplier = self.last[place].force;
+                hold.multiplier = hold.kept * self.last[place].force;
                 hold.holds_on = true;
             }
             self.holds.push(hold);
@@ -241,7 +247,7 @@ impl Holds {
         let (mut missing, mut all) = (0.0, 0.0);
         for hold in &self.holds {
             let better = Hold {
-                multiplier: hold.answer.force,
+                multiplier: hold.kept * hold.answer.force,
                 ..*hold
             };
             let force = better.answer_to(&push_of).force;
@@ -256,7 +262,7 @@ impl Holds {
     pub fn improve(&mut self, push_of: impl Fn(usize) -> DVec3, mut add: impl FnMut(usize, DVec3)) {
         for hold in &mut self.holds {
             let before = hold.answer.force;
-            hold.multiplier = before;
+            hold.multiplier = hold.kept * before;
             hold.answer = hold.answer_to(&push_of);
             hold.share_out(&hold.answer, hold.answer.force - before, &mut add);
         }
@@ -268,6 +274,17 @@ impl Holds {
         let off: f64 = pressed().map(|hold| hold.weighted(&residual_of).abs()).sum();
         let all: f64 = pressed().map(|hold| hold.answer.force).sum();
         if all > 0.0 { off / all } else { 0.0 }
+    }
+
+    /// Whether others push than when this was last asked: then the equation is another one.
+    pub fn have_changed(&mut self) -> bool {
+        let mut changed = false;
+        for hold in &mut self.holds {
+            let pushes = hold.answer.force != 0.0;
+            changed |= pushes != hold.pushed;
+            hold.pushed = pushes;
+        }
+        changed
     }
 
     /// Whether a contact pushes.

@@ -8,9 +8,12 @@ use super::features::Feature;
 use super::path::{Motion, Placement, Solid};
 use super::sweep::{Corners, Segment};
 
+/// What rounding may leave open between a node and a plane that touch, as a part of the largest coordinate.
+const ROUNDING: f32 = 1e-6;
+
 impl Motion<'_> {
-    /// The segment within a rounded tool over `duration` seconds; with the last half kick of a step as if it went on.
-    pub fn segment(&self, duration: f32, drifts: bool) -> Segment {
+    /// The segment within a rounded tool over a slice; with the last half kick of a step it has come to its end.
+    pub fn segment(&self, drifts: bool) -> Segment {
         let (
             Solid::Rounded { a, b, radius },
             Solid::Rounded {
@@ -27,7 +30,7 @@ impl Motion<'_> {
         let steps = if drifts {
             [last_a - a, last_b - b]
         } else {
-            [a, b].map(|end| self.velocity_at(end) * duration)
+            [Vec3::ZERO; 2]
         };
         Segment {
             ends: [a, b],
@@ -58,9 +61,14 @@ pub(super) fn meet_plane(
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
-    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal) * slice.duration;
-    let margin = surface_velocity.length() * slice.duration + meeting.slack + meeting.thickness;
-    if !(gap <= closing.max(0.0) + margin) {
+    let ahead = if meeting.drifts {
+        let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal).max(0.0);
+        (closing + surface_velocity.length()) * slice.duration + meeting.slack
+    } else {
+        // What rounding leaves open where they touch.
+        ROUNDING * position.abs().max(point.abs()).max_element()
+    };
+    if !(gap <= meeting.thickness + ahead) {
         return None;
     }
     let starts = [position, Vec3::ZERO, Vec3::ZERO];
@@ -92,11 +100,16 @@ pub(super) fn meet_rounded(
     }
     let step = segment.steps[0].lerp(segment.steps[1], separation.along);
     let start = segment.ends[0].lerp(segment.ends[1], separation.along);
+    let axis_velocity = if meeting.drifts {
+        step / slice.duration
+    } else {
+        motion.velocity_at(start)
+    };
     // A feature through the middle of the tool has no side of its own: it is carried ahead of the tool.
     let normal = separation
         .offset
         .try_normalize()
-        .or_else(|| step.try_normalize())
+        .or_else(|| axis_velocity.try_normalize())
         .unwrap_or(Vec3::Y);
     let weights = separation.weights;
     let held = meeting.held_axes(feature);
@@ -104,8 +117,8 @@ pub(super) fn meet_rounded(
     let points = corners.points.iter().zip(weights);
     let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
     let surface = normal * segment.radius;
-    constraint.surface_velocity = step / slice.duration + motion.spin.cross(surface);
-    constraint.arm = start + step * if meeting.drifts { 1.0 } else { 0.0 } + surface - motion.centre;
+    constraint.surface_velocity = axis_velocity + motion.spin.cross(surface);
+    constraint.arm = start + step + surface - motion.centre;
     constraint.friction = motion.friction;
     let gap = (matter - start).dot(normal) - segment.radius;
     constraint.allow_gap(gap - meeting.thickness, slice.duration);
@@ -125,24 +138,16 @@ pub(super) fn meet_mesh(
     let solid = motion.mesh?;
     let corners = Corners::of(meeting, slice, feature);
     let count = corners.count;
-    // In the mesh's own frame, where it stands still; with the last half kick of a step as if it went on.
+    // In the mesh's own frame, where it stands still.
     let mut own = corners;
     let mut travel = 0.0_f32;
     for corner in 0..count {
         let (point, step) = (corners.points[corner], corners.steps[corner]);
-        let start = from.own(point);
-        let way = if meeting.drifts {
-            to.placed(start) - point
-        } else {
-            motion.velocity_at(point) * slice.duration
-        };
-        travel = travel.max(way.length());
-        own.points[corner] = start;
-        own.steps[corner] = if meeting.drifts {
-            to.own(point + step) - start
-        } else {
-            from.orientation.conjugate() * (step - way)
-        };
+        own.points[corner] = from.own(point);
+        if meeting.drifts {
+            travel = travel.max(to.placed(own.points[corner]).distance(point));
+            own.steps[corner] = to.own(point + step) - own.points[corner];
+        }
     }
     let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack)?;
     if !closest.inside {
@@ -177,7 +182,8 @@ pub(super) fn meet_mesh(
 }
 
 impl Corners {
-    /// Those of a feature over the slice, in the body's coordinates.
+    /// Those of a feature over the slice, in the body's coordinates; with the last half kick of a step they have come to their end, and
+    /// what is not touched there is a matter of the next.
     fn of(meeting: &Meeting, slice: &Slice, feature: Feature) -> Self {
         let mut corners = Corners {
             points: [Vec3::ZERO; 3],
@@ -186,7 +192,9 @@ impl Corners {
         };
         for (corner, &node) in feature.nodes().iter().enumerate() {
             corners.points[corner] = meeting.position(slice, node as usize);
-            corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
+            if meeting.drifts {
+                corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
+            }
         }
         corners
     }

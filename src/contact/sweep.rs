@@ -117,9 +117,11 @@ impl Corners {
     }
 
     /// The separation when they first touch, or at the end of the substep where they do not; `None` where they stay
-    /// further apart than the radius and `margin`.
+    /// further apart than the radius and `margin`, as far as they do not touch.
     pub fn approach(&self, segment: &Segment, margin: f32) -> Option<Separation> {
         let closing = self.closing(segment);
+        let touching = TOUCHING * segment.radius;
+        let margin = margin.max(touching);
         let mut separation = self.separation(segment, 0.0);
         let mut gap = separation.offset.length() - segment.radius;
         if !(gap <= closing + margin) {
@@ -127,7 +129,7 @@ impl Corners {
         }
         let mut time = 0.0;
         for _ in 0..ADVANCES {
-            if gap <= TOUCHING * segment.radius {
+            if gap <= touching {
                 return Some(separation);
             }
             time += gap / closing;

@@ -120,7 +120,8 @@ pub struct ToolDefinition<'a> {
     pub shape: Shape<'a>,
     /// How it finds what it touches.
     pub detection: Detection,
-    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0: chosen from the mesh.
+    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0: a 256th or a 96th of the mesh's longest extent, or a
+    /// fourth of the least where that is less. Refused where no ray or sample would lie within the mesh.
     pub resolution: f32,
     /// The Coulomb coefficient of friction, at least 0.
     pub friction: f32,
@@ -273,7 +274,8 @@ impl Tool {
 
     /// Begins a step: all of its way, until it is known what resists.
     pub fn set_out(&mut self) {
-        let is_limited = self.force_limit < f32::INFINITY && self.target.is_some();
+        let goes = self.target.is_some_and(|target| target != self.pose);
+        let is_limited = self.force_limit < f32::INFINITY && goes;
         self.reach = is_limited.then(|| Reach::new(self.force.length(), self.force_limit));
     }
 

@@ -49,6 +49,11 @@ impl Together<'_> {
         if substeps == 0 {
             return;
         }
+        let Together { tissue, walks, .. } = self;
+        tissue
+            .bonds
+            .attempt(bodies, |place| walks.get(place).is_some_and(Option::is_some));
+        substeps = substeps.max(tissue.bonds.substeps(request.dt));
         let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
         let mut stable_substep = f32::INFINITY;
         let mut is_taken = false;
@@ -68,6 +73,7 @@ impl Together<'_> {
                 }
             }
         }
+        self.tissue.bonds.unload(bodies);
         for (place, (walk, outcome)) in self.walks.iter().zip(outcomes).enumerate() {
             let (Some(walk), Some(body)) = (walk, bodies.at(place)) else {
                 continue;
@@ -120,6 +126,7 @@ impl Together<'_> {
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
         let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
         let gravity = request.gravity.as_dvec3();
+        tissue.bonds.begin();
         each(bodies, walks, |_, body, walk| {
             walk.carry = walk.start;
             if body.implicit.is_some() {
@@ -141,6 +148,7 @@ impl Together<'_> {
             drifts: true,
         };
         for index in 0..substeps {
+            tissue.bonds.load(bodies);
             each(bodies, walks, |_, body, walk| {
                 if body.implicit.is_some() {
                     // There may be no more parts to try it in.
@@ -179,6 +187,7 @@ impl Together<'_> {
             })?;
         }
         moment.drifts = false;
+        tissue.bonds.load(bodies);
         each(bodies, walks, |_, body, walk| {
             if body.implicit.is_some() {
                 return Ok(());
@@ -189,7 +198,10 @@ impl Together<'_> {
             check_beside_springs(body, substep)
         })?;
         tissue.meet(group, bodies, &moment);
-        Ok(())
+        each(bodies, walks, |_, body, _| {
+            body.feel_what_grasps_handed_on(request.tools);
+            Ok(())
+        })
     }
 }
 

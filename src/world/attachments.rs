@@ -1,15 +1,16 @@
-//! Attachments: what tools hold of bodies, by their names.
+//! Attachments: what tools hold of bodies, and what bodies hold of each other, by their names.
 
 use glam::{DVec3, Vec3};
 
-use super::{BodyId, ToolId, World};
+use super::{BodyId, ToolId, World, make_walks};
 use crate::body::Grip;
+use crate::contact::{Bonds, Corner};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::slots::SlotId;
 use crate::solver::Outcome;
 
-/// What a tool holds of a body.
+/// What a tool holds of a body, or a body of another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct AttachmentId(pub(crate) SlotId);
 
@@ -17,7 +18,15 @@ pub struct AttachmentId(pub(crate) SlotId);
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attachment {
     body: BodyId,
-    tool: ToolId,
+    holder: Holder,
+}
+
+/// What it is attached to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Holder {
+    Tool(ToolId),
+    /// This one, or another.
+    Body(BodyId),
 }
 
 /// A name that is made where it is needed.
@@ -36,6 +45,15 @@ pub struct SurfacePoint {
     pub triangle: u32,
     /// The parts of its corners in the point: at least 0, and 1 in sum.
     pub weights: [f32; 3],
+}
+
+/// Where a body is attached to a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Anchor {
+    /// A node, of the surface or not.
+    Node(u32),
+    /// A point of the surface.
+    Point(SurfacePoint),
 }
 
 /// How far the sum of a point's weights may be from 1.
@@ -93,20 +111,8 @@ impl World {
     ) -> Result<Vec<AttachmentId>> {
         let surface = self.bodies.get(body.0)?.surface();
         let mut grips = memory::reserved(points.len())?;
-        for (index, &SurfacePoint { triangle, weights }) in points.iter().enumerate() {
-            let Some(&corners) = surface.get(triangle as usize) else {
-                return Err(Error::invalid(format!(
-                    "triangles[{index}] is {triangle}: the surface has {} triangles",
-                    surface.len()
-                )));
-            };
-            let sum: f32 = weights.iter().sum();
-            if !(weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF) {
-                return Err(Error::invalid(format!(
-                    "weights[{index}] are {weights:?}: must be at least 0, and 1 in sum"
-                )));
-            }
-            grips.push(Grip { corners, weights });
+        for (index, point) in points.iter().enumerate() {
+            grips.push(grip_of(surface, "", index, point)?);
         }
         for (index, grip) in grips.iter().enumerate() {
             let held = grip.corners.into_iter().zip(grip.weights);
@@ -140,11 +146,7 @@ impl World {
     ) -> Result<Vec<AttachmentId>> {
         self.tools.get(tool.0)?;
         let held = self.bodies.get_mut(body.0)?;
-        if force_limit.is_nan() || force_limit < 0.0 {
-            return Err(Error::invalid(format!(
-                "force_limit is {force_limit}: must be at least 0"
-            )));
-        }
+        check_limit(force_limit)?;
         let mut ids = memory::reserved(grips.len())?;
         // All may slip in one step.
         let count = self.attachments.count() + grips.len();
@@ -153,17 +155,9 @@ impl World {
             return Ok(ids);
         }
         held.reserve_grasps(grips.len())?;
-        for _ in 0..grips.len() {
-            match self.attachments.insert(Attachment { body, tool }) {
-                Ok(id) => ids.push(AttachmentId(id)),
-                Err(error) => {
-                    for AttachmentId(id) in ids {
-                        self.attachments.remove(id)?;
-                    }
-                    return Err(error);
-                }
-            }
-        }
+        let holder = Holder::Tool(tool);
+        self.name(Attachment { body, holder }, grips.len(), &mut ids)?;
+        let held = self.bodies.get_mut(body.0)?;
         match held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit) {
             Ok(()) => Ok(ids),
             Err(error) => {
@@ -175,23 +169,171 @@ impl World {
         }
     }
 
-    /// Lets go of what is attached: it goes on as it was led in the last step.
-    ///
-    /// # Errors
-    /// [`Error::StaleId`]: it was let go already, or slipped, or its body or its tool is gone.
-    pub fn release(&mut self, attachment: AttachmentId) -> Result<()> {
-        let Attachment { body, .. } = self.attachments.remove(attachment.0)?;
-        self.bodies.get_mut(body.0)?.let_go(attachment.0);
+    /// Makes names for so many attachments, for which `ids` has room.
+    fn name(&mut self, attachment: Attachment, count: usize, ids: &mut Vec<AttachmentId>) -> Result<()> {
+        for _ in 0..count {
+            match self.attachments.insert(attachment) {
+                Ok(id) => ids.push(AttachmentId(id)),
+                Err(error) => {
+                    for AttachmentId(id) in ids {
+                        self.attachments.remove(*id)?;
+                    }
+                    return Err(error);
+                }
+            }
+        }
         Ok(())
     }
 
-    /// The force by which a tool holds what is attached, on the tissue, world axes, mean over the last step, N; 0 before the first.
-    /// Where the state of the body was set to one of rest it is that which holds it there.
+    /// Attaches points of a body to as many points of another, or of the same, each pair by an attachment of its own: nodes, or points of
+    /// the surface. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes together within
+    /// some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each may turn about it as it likes: what shall not
+    /// turn takes three.
+    ///
+    /// The bodies take their substeps together, those of [`Solver::Implicit`](crate::Solver::Implicit) and
+    /// [`Solver::Newton`](crate::Solver::Newton) of 0.25 ms at most and of order 1. No momentum is made; nor is any angular momentum, once the points have
+    /// come together. Where both points are held by pins or tools along an axis nothing is done along it. Features that share such a pair
+    /// of points do not touch each other.
+    ///
+    /// `force_limit`, N: an attachment ends with the step in which its mean force was larger ([`World::slipped`]); 0 or infinite: it holds
+    /// whatever comes. [`World::attachment_force`] has the force on `body`. An attachment ends with either body.
+    ///
+    /// Sequential impulses (Catto 2005): between bodies of [`Solver::Verlet`](crate::Solver::Verlet) SHAKE (Ryckaert, Ciccotti, Berendsen
+    /// 1977), with the other solvers a projection (Chorin 1968).
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there is no such node or triangle, weights are negative, not finite or not 1 in sum,
+    /// the two are one point, there are not as many of the one as of the other, or the limit is negative or not a number.
+    /// [`Error::OutOfMemory`]. Nothing is attached then.
+    pub fn attach_to_body(
+        &mut self,
+        body: BodyId,
+        anchors: &[Anchor],
+        other: BodyId,
+        other_anchors: &[Anchor],
+        force_limit: f32,
+    ) -> Result<Vec<AttachmentId>> {
+        let places = [self.bodies.place(body.0)?, self.bodies.place(other.0)?];
+        crate::body::expect_count("other_anchors", other_anchors.len(), anchors.len())?;
+        check_limit(force_limit)?;
+        let mut all = memory::reserved(anchors.len())?;
+        for (index, (first, second)) in anchors.iter().zip(other_anchors).enumerate() {
+            let mut corners = memory::reserved(6)?;
+            self.add_corners(body, places[0], ("", index, first), 1.0, &mut corners)?;
+            self.add_corners(other, places[1], ("other_", index, second), -1.0, &mut corners)?;
+            corners.retain(|corner| corner.weight != 0.0);
+            if corners.is_empty() {
+                let name = match first {
+                    Anchor::Node(_) => "nodes",
+                    Anchor::Point(_) => "triangles",
+                };
+                return Err(Error::invalid(format!(
+                    "{name}[{index}] and other_{name}[{index}] are one point of one body"
+                )));
+            }
+            all.push(corners);
+        }
+        let mut ids = memory::reserved(all.len())?;
+        if all.is_empty() {
+            return Ok(ids);
+        }
+        self.slipped.try_reserve(self.attachments.count() + all.len())?;
+        for place in places {
+            make_walks(&mut self.walks, place)?;
+        }
+        self.tissue.get_or_insert_default().reserve_bonds(places, all.len())?;
+        for id in [body, other] {
+            self.bodies.get_mut(id.0)?.reserve_bonds()?;
+        }
+        let holder = Holder::Body(other);
+        self.name(Attachment { body, holder }, all.len(), &mut ids)?;
+        for id in [body, other] {
+            self.bodies.get_mut(id.0)?.begin_bonds();
+        }
+        for (&AttachmentId(id), corners) in ids.iter().zip(&all) {
+            if let Some(bonds) = self.bonds_mut() {
+                bonds.add(id, corners, force_limit)?;
+            }
+        }
+        self.bonds_mut().into_iter().for_each(Bonds::name_ends);
+        Ok(ids)
+    }
+
+    /// Adds the corners of an anchor, with its prefix and number in messages, that have a part in it: what is known already counts double.
+    fn add_corners(
+        &self,
+        id: BodyId,
+        place: usize,
+        (prefix, index, anchor): (&str, usize, &Anchor),
+        sign: f32,
+        corners: &mut Vec<Corner>,
+    ) -> Result<()> {
+        let body = self.bodies.get(id.0)?;
+        let grip = match anchor {
+            Anchor::Node(node) => {
+                body.check_node(&format_args!("{prefix}nodes[{index}]"), *node)?;
+                Grip::of_node(*node)
+            }
+            Anchor::Point(point) => grip_of(body.surface(), prefix, index, point)?,
+        };
+        let sum: f32 = grip.weights.iter().sum();
+        for (&node, weight) in grip.corners.iter().zip(grip.weights) {
+            if weight == 0.0 {
+                continue;
+            }
+            let (node, weight) = (body.own_node(node), sign * weight / sum);
+            let is_known = |corner: &&mut Corner| (corner.body, corner.node) == (place, node);
+            match corners.iter_mut().find(is_known) {
+                Some(corner) => corner.weight += weight,
+                None => corners.push(Corner {
+                    body: place,
+                    node,
+                    weight,
+                    ..Corner::default()
+                }),
+            }
+        }
+        Ok(())
+    }
+
+    fn bonds_mut(&mut self) -> Option<&mut Bonds> {
+        self.tissue.as_mut().map(|tissue| &mut tissue.bonds)
+    }
+
+    /// Refuses a body that is attached to a body.
+    pub(super) fn check_not_attached(&self, body: BodyId) -> Result<()> {
+        let place = self.bodies.place(body.0)?;
+        if self.tissue.as_ref().is_some_and(|tissue| tissue.bonds.concern(place)) {
+            return Err(Error::invalid(
+                "body is attached to a body: what holds it there moves with that one",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Lets go of what is attached: it goes on as it was led in the last step.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]: it was let go already, or slipped, or a body or the tool is gone.
+    pub fn release(&mut self, attachment: AttachmentId) -> Result<()> {
+        let Attachment { body, holder } = self.attachments.remove(attachment.0)?;
+        match (holder, &mut self.tissue) {
+            (Holder::Body(_), Some(tissue)) => tissue.bonds.end(&mut self.bodies, attachment.0),
+            _ => self.bodies.get_mut(body.0)?.let_go(attachment.0),
+        }
+        Ok(())
+    }
+
+    /// The force by which what it is attached to holds a body, on the tissue, world axes, mean over the last step, N; 0 before the first.
+    /// Where the state of a body that tools hold was set to one of rest it is that which holds it there.
     ///
     /// # Errors
     /// [`Error::StaleId`].
     pub fn attachment_force(&self, attachment: AttachmentId) -> Result<Vec3> {
-        let Attachment { body, .. } = self.attachments.get(attachment.0)?;
+        let Attachment { body, holder } = self.attachments.get(attachment.0)?;
+        if let (Holder::Body(_), Some(tissue)) = (holder, &self.tissue) {
+            return Ok(tissue.bonds.force_of(attachment.0));
+        }
         let body = self.bodies.get(body.0)?;
         let grasp = body.grasps.as_ref().and_then(|grasps| grasps.get(attachment.0));
         Ok(grasp.map_or(Vec3::ZERO, |grasp| grasp.force))
@@ -225,7 +367,8 @@ impl World {
 
     /// A body is gone, and with it what is attached of it.
     pub(super) fn forget_attachments_of(&mut self, body: BodyId) {
-        self.attachments.retain(|attachment| attachment.body != body);
+        self.attachments
+            .retain(|attachment| attachment.body != body && attachment.holder != Holder::Body(body));
     }
 
     /// A tool is gone: lets go of what is attached to it.
@@ -233,7 +376,7 @@ impl World {
         let Self {
             attachments, bodies, ..
         } = self;
-        attachments.retain(|attachment| attachment.tool != tool);
+        attachments.retain(|attachment| attachment.holder != Holder::Tool(tool));
         for (_, body) in bodies.iter_mut() {
             body.let_go_of(tool.0.index());
         }
@@ -246,6 +389,7 @@ impl World {
             attachments,
             slipped,
             outcomes,
+            tissue,
             ..
         } = self;
         slipped.clear();
@@ -258,5 +402,39 @@ impl World {
                 });
             }
         }
+        if let Some(tissue) = tissue {
+            tissue.bonds.slip(bodies, |id| {
+                if attachments.remove(id).is_ok() {
+                    slipped.push(AttachmentId(id));
+                }
+            });
+        }
     }
+}
+
+fn check_limit(force_limit: f32) -> Result<()> {
+    if force_limit.is_nan() || force_limit < 0.0 {
+        return Err(Error::invalid(format!(
+            "force_limit is {force_limit}: must be at least 0"
+        )));
+    }
+    Ok(())
+}
+
+/// A point of a surface, which messages name by this prefix and number.
+fn grip_of(surface: &[[u32; 3]], prefix: &str, index: usize, point: &SurfacePoint) -> Result<Grip> {
+    let SurfacePoint { triangle, weights } = *point;
+    let Some(&corners) = surface.get(triangle as usize) else {
+        return Err(Error::invalid(format!(
+            "{prefix}triangles[{index}] is {triangle}: the surface has {} triangles",
+            surface.len()
+        )));
+    };
+    let sum: f32 = weights.iter().sum();
+    if !(weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF) {
+        return Err(Error::invalid(format!(
+            "{prefix}weights[{index}] are {weights:?}: must be at least 0, and 1 in sum"
+        )));
+    }
+    Ok(Grip { corners, weights })
 }

@@ -29,7 +29,7 @@ pub struct StepReport {
     /// anything to compare.
     pub error_estimate: f32,
     /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those of one that is closed come out again by themselves.
+    /// apart. Those of another body in one that is closed come out again by themselves.
     pub crossings: u32,
 }
 
@@ -142,6 +142,7 @@ impl World {
             tools,
             paths,
             outcomes,
+            tissue,
             ..
         } = self;
         for (index, (_, tool)) in tools.iter_mut().enumerate() {
@@ -152,6 +153,9 @@ impl World {
             tool.pose = paths[index].end();
             tool.target = None;
             tool.reach = None;
+        }
+        if let Some(tissue) = tissue {
+            tissue.bonds.commit(outcomes, dt);
         }
         self.end_slipped();
     }

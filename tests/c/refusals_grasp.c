@@ -76,6 +76,46 @@ static void points(void)
             sinew_body_attach_points(the.world, body, free_ones, spoiled(good, 6, 0, 0.6f), 2, tool, 0, out.attachments));
 }
 
+/* Of the cloth to itself, or to another one like it. */
+static void to_bodies(void)
+{
+    static const float good[] = {0.5f, 0.25f, 0.25f, 0, 0.5f, 0.5f};
+    const uint32_t some[] = {7, 8}, others[] = {3, 5}, beyond[] = {8, 9}, same[] = {7, 5}, triangles[] = {7, 7}, first[] = {0, 0}, no_triangle[] = {7, 8};
+    const sinew_body_id cloth = the.body;
+    size_t i, corner;
+    REFUSES_NO_BODY(sinew_body_attach_nodes_to_nodes(world, body, some, 2, cloth, others, 0, out.attachments));
+    REFUSES_NO_BODY(sinew_body_attach_nodes_to_nodes(world, cloth, some, 2, body, others, 0, out.attachments));
+    REFUSES_NO_BODY(sinew_body_attach_nodes_to_points(world, body, some, 2, cloth, first, good, 0, out.attachments));
+    REFUSES_NO_BODY(sinew_body_attach_nodes_to_points(world, cloth, some, 2, body, first, good, 0, out.attachments));
+    REFUSES_NO_BODY(sinew_body_attach_points_to_points(world, body, triangles, good, 2, cloth, first, good, 0, out.attachments));
+    REFUSES_NO_BODY(sinew_body_attach_points_to_points(world, cloth, triangles, good, 2, body, first, good, 0, out.attachments));
+    REFUSED(INVALID, "nodes", sinew_body_attach_nodes_to_nodes(the.world, cloth, NULL, 2, cloth, others, 0, out.attachments));
+    REFUSED(INVALID, "other_nodes", sinew_body_attach_nodes_to_nodes(the.world, cloth, some, 2, cloth, NULL, 0, out.attachments));
+    REFUSED(INVALID, "out", sinew_body_attach_nodes_to_nodes(the.world, cloth, some, 2, cloth, others, 0, NULL));
+    REFUSED(INVALID, "nodes[1]", sinew_body_attach_nodes_to_nodes(the.world, cloth, beyond, 2, cloth, others, 0, out.attachments));
+    REFUSED(INVALID, "other_nodes[1]", sinew_body_attach_nodes_to_nodes(the.world, cloth, some, 2, cloth, beyond, 0, out.attachments));
+    REFUSED(INVALID, "other_nodes[0]", sinew_body_attach_nodes_to_nodes(the.world, cloth, some, 2, cloth, same, 0, out.attachments));
+    REFUSED(INVALID, "nodes", sinew_body_attach_nodes_to_points(the.world, cloth, NULL, 2, cloth, first, good, 0, out.attachments));
+    REFUSED(INVALID, "other_triangles", sinew_body_attach_nodes_to_points(the.world, cloth, some, 2, cloth, NULL, good, 0, out.attachments));
+    REFUSED(INVALID, "other_weights", sinew_body_attach_nodes_to_points(the.world, cloth, some, 2, cloth, first, NULL, 0, out.attachments));
+    REFUSED(INVALID, "out", sinew_body_attach_nodes_to_points(the.world, cloth, some, 2, cloth, first, good, 0, NULL));
+    REFUSED(INVALID, "other_triangles[1]", sinew_body_attach_nodes_to_points(the.world, cloth, some, 2, cloth, no_triangle, good, 0, out.attachments));
+    REFUSED(INVALID, "triangles", sinew_body_attach_points_to_points(the.world, cloth, NULL, good, 2, cloth, first, good, 0, out.attachments));
+    REFUSED(INVALID, "weights", sinew_body_attach_points_to_points(the.world, cloth, triangles, NULL, 2, cloth, first, good, 0, out.attachments));
+    REFUSED(INVALID, "other_triangles", sinew_body_attach_points_to_points(the.world, cloth, triangles, good, 2, cloth, NULL, good, 0, out.attachments));
+    REFUSED(INVALID, "other_weights", sinew_body_attach_points_to_points(the.world, cloth, triangles, good, 2, cloth, first, NULL, 0, out.attachments));
+    REFUSED(INVALID, "out", sinew_body_attach_points_to_points(the.world, cloth, triangles, good, 2, cloth, first, good, 0, NULL));
+    REFUSED(INVALID, "triangles[1]", sinew_body_attach_points_to_points(the.world, cloth, no_triangle, good, 2, cloth, first, good, 0, out.attachments));
+    REFUSED(INVALID, "triangles[0]", sinew_body_attach_points_to_points(the.world, cloth, triangles, good, 2, cloth, triangles, good, 0, out.attachments));
+    for (i = 0; i < OR_NEGATIVE; i++) {
+        if (i != 1) /* infinity: no limit */
+            REFUSED(INVALID, "force_limit", sinew_body_attach_nodes_to_nodes(the.world, cloth, some, 2, cloth, others, bad[i], out.attachments));
+        for (corner = 0; corner < 6; corner++)
+            REFUSED(INVALID, corner < 3 ? "other_weights[0]" : "other_weights[1]",
+                    sinew_body_attach_nodes_to_points(the.world, cloth, some, 2, cloth, first, spoiled(good, 6, corner, bad[i]), 0, out.attachments));
+    }
+}
+
 static void attachments(void)
 {
     const float place[3] = {0, 0, 0};
@@ -151,6 +191,16 @@ static void use(void)
     CHECK(count == 1 && memcmp(&slipped[0], &weak, sizeof weak) == 0);
     CHECK(sinew_attachment_release(the.world, weak) == SINEW_STATUS_STALE_ID);
     MUST(sinew_body_pin(the.world, the.body, 8));
+    /* Two nodes of the cloth become one. */
+    {
+        const uint32_t one[] = {6}, two[] = {7};
+        MUST(sinew_body_attach_nodes_to_nodes(the.world, the.body, one, 1, the.body, two, 0, &weak));
+        MUST(sinew_world_step(the.world, 0.01f, NULL));
+        MUST(sinew_attachment_get_force(the.world, weak, force));
+        CHECK(isfinite(force[0]) && force[0] * force[0] + force[1] * force[1] + force[2] * force[2] > 0);
+        CHECK(sinew_body_rest_state(the.world, the.body, NULL, NULL) == SINEW_STATUS_INVALID_ARGUMENT);
+        MUST(sinew_attachment_release(the.world, weak));
+    }
 }
 
 int main(void)
@@ -159,6 +209,7 @@ int main(void)
     set_up_attachments();
     nodes();
     points();
+    to_bodies();
     attachments();
     wrenches();
     use();

@@ -5,9 +5,14 @@ use super::skin::Skin;
 use crate::body::Bounds;
 use crate::contact::predicates::crosses;
 
-/// Marks the edges of `first` that pass through triangles of `second`, as their trees have them; with itself those triangles that an edge has
-/// no node of. How many there are.
-pub(super) fn mark(first: &Skin, second: &Skin, is_one: bool, pierces: &mut [bool]) -> u32 {
+/// Marks the edges of `first` that pass through triangles of `second`, as their trees have them, but for those that are joined with the
+/// edge: how many there are.
+pub(super) fn mark(
+    first: &Skin,
+    second: &Skin,
+    are_joined: impl Fn(&[u32], &[u32]) -> bool,
+    pierces: &mut [bool],
+) -> u32 {
     let mut count = 0;
     let shift = shift(first, second);
     for (edge, pierces) in first.edges.iter().zip(pierces) {
@@ -15,7 +20,7 @@ pub(super) fn mark(first: &Skin, second: &Skin, is_one: bool, pierces: &mut [boo
         let mut passes = false;
         second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {
             let nodes = second.triangles[triangle];
-            if passes || is_one && nodes.iter().any(|node| edge.contains(node)) {
+            if passes || are_joined(edge, &nodes) {
                 return;
             }
             let corners = nodes.map(|node| second.starts.get(node as usize));

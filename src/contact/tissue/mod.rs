@@ -5,11 +5,15 @@
 //! (sequential impulses, Catto 2005, on the pairs of Bridson, Fedkiw, Anderson 2002: nodes with faces, edges with edges). Both sides get the same
 //! impulse, with opposite signs, in the same place: no momentum is made.
 
+mod bonds;
 mod crossing;
+mod groups;
 mod link;
 mod search;
 mod skin;
 
+pub(crate) use self::bonds::{Bonds, Corner};
+use self::groups::Groups;
 use self::link::Link;
 use self::search::{Party, Search};
 use self::skin::Skin;
@@ -58,11 +62,14 @@ impl Moment {
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
 pub(crate) struct Tissue {
+    groups: Groups,
     /// By a body's place in the world.
     skins: Vec<Option<Skin>>,
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
+    /// What is attached.
+    pub bonds: Bonds,
 }
 
 impl Tissue {
@@ -72,6 +79,7 @@ impl Tissue {
             return Ok(());
         }
         let skin = Skin::new(body)?;
+        self.groups.make_place(place)?;
         let more = ROOM * (skin.nodes.len() + skin.edges.len() + skin.triangles.len());
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
@@ -83,8 +91,17 @@ impl Tissue {
         Ok(())
     }
 
+    /// Makes room for so many attachments between the bodies at these places.
+    pub fn reserve_bonds(&mut self, places: [usize; 2], count: usize) -> Result<()> {
+        for place in places {
+            self.groups.make_place(place)?;
+        }
+        self.bonds.reserve(count)
+    }
+
     /// A body is gone.
-    pub fn leave(&mut self, place: usize) {
+    pub fn leave(&mut self, bodies: &mut Slots<Body>, place: usize) {
+        self.bonds.leave(bodies, place);
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }
@@ -95,14 +112,15 @@ impl Tissue {
         self.skins.iter().flatten().map(of).sum()
     }
 
-    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, and by themselves those
-    /// that meet themselves.
+    /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
+    /// and by themselves those that meet themselves.
     pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
-        for (place, skin) in self.skins.iter_mut().enumerate() {
-            if let Some(skin) = skin {
-                let meets_itself = bodies.at(place).is_some_and(|body| body.contact.with_itself);
-                skin.group = meets_itself.then_some(place);
-            }
+        self.groups.part(|place| {
+            let meets_itself = |body: &Body| body.meets_tissue() && body.contact.with_itself;
+            bodies.at(place).is_some_and(meets_itself)
+        });
+        for [first, second] in self.bonds.bodies() {
+            self.groups.join(first, second);
         }
         self.join_those(bodies, |first, second| reach(first, dt).overlaps(&reach(second, dt)));
     }
@@ -117,26 +135,16 @@ impl Tissue {
         let mut changed = false;
         for a in 0..self.skins.len() {
             for b in 0..a {
-                let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) else {
-                    continue;
-                };
-                let groups = [first.group, second.group];
-                let [Some(first), Some(second)] = [a, b].map(|place| bodies.at(place)) else {
-                    continue;
-                };
-                if groups[0].is_some() && groups[0] == groups[1]
-                    || !(meet_each_other(first, second) && are_near(first, second))
-                {
+                let has_skin = |place: usize| self.skins[place].is_some();
+                if !(has_skin(a) && has_skin(b)) || self.groups.are_one(a, b) {
                     continue;
                 }
-                changed = true;
-                let joined = groups[1].unwrap_or(b);
-                for (place, skin) in self.skins.iter_mut().enumerate() {
-                    if let Some(skin) = skin
-                        && (place == a || place == b || groups[0].is_some() && skin.group == groups[0])
-                    {
-                        skin.group = Some(joined);
-                    }
+                if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
+                    && meet_each_other(first, second)
+                    && are_near(first, second)
+                {
+                    self.groups.join(a, b);
+                    changed = true;
                 }
             }
         }
@@ -145,12 +153,12 @@ impl Tissue {
 
     /// How many groups there may be: their numbers are below.
     pub fn groups(&self) -> usize {
-        self.skins.len()
+        self.groups.count()
     }
 
     /// The group of bodies that the one at a place takes its substeps together with.
     pub fn group(&self, place: usize) -> Option<usize> {
-        self.skins.get(place)?.as_ref()?.group
+        self.groups.of(place)
     }
 
     /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
@@ -159,7 +167,7 @@ impl Tissue {
         let mut count = 0_u32;
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at(place))
-                && skin.group.is_some()
+                && self.groups.of(place).is_some()
             {
                 skin.stand(body, at_end);
             }
@@ -171,16 +179,21 @@ impl Tissue {
             };
             let mut pierces = std::mem::take(&mut first.pierces);
             pierces.fill(false);
-            if let (Some(body), true) = (bodies.at(a), first.group.is_some()) {
+            if let (Some(body), true) = (bodies.at(a), self.groups.of(a).is_some()) {
+                let join = |b: usize, edge: &[u32], triangle: &[u32]| self.bonds.join([a, b], [edge, triangle]);
                 if body.contact.with_itself {
-                    count = count.saturating_add(crossing::mark(&first, &first, true, &mut pierces));
+                    let are_joined = |edge: &[u32], triangle: &[u32]| {
+                        edge.iter().any(|node| triangle.contains(node)) || join(a, edge, triangle)
+                    };
+                    count = count.saturating_add(crossing::mark(&first, &first, are_joined, &mut pierces));
                 }
                 for (b, second) in self.skins.iter().enumerate() {
                     if let (Some(second), Some(other)) = (second, bodies.at(b))
-                        && second.group == first.group
+                        && self.groups.are_one(a, b)
                         && meet_each_other(body, other)
                     {
-                        count = count.saturating_add(crossing::mark(&first, second, false, &mut pierces));
+                        let are_joined = |edge: &[u32], triangle: &[u32]| join(b, edge, triangle);
+                        count = count.saturating_add(crossing::mark(&first, second, are_joined, &mut pierces));
                     }
                 }
             }
@@ -193,7 +206,7 @@ impl Tissue {
     /// In how many substeps bodies of a group come no further against each other in one than what they are made of is small.
     pub fn substeps_wished(&self, group: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
         let members = self.skins.iter().enumerate().filter_map(|(place, skin)| {
-            let skin = skin.as_ref().filter(|skin| skin.group == Some(group))?;
+            let skin = skin.as_ref().filter(|_| self.groups.of(place) == Some(group))?;
             Some((skin.shortest, speed(bodies.at(place)?)))
         });
         let (shortest, speeds) = members.fold((f32::INFINITY, 0.0), |(least, sum), (shortest, speed)| {
@@ -205,6 +218,7 @@ impl Tissue {
 
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
     pub fn velocities(&self, place: usize, before: Bounds) -> Bounds {
+        let before = self.bonds.velocities(place, before);
         match self.skins.get(place) {
             Some(Some(skin)) => before.and(&skin.given),
             _ => before,
@@ -216,12 +230,13 @@ impl Tissue {
         self.links.clear();
         for (place, skin) in self.skins.iter_mut().enumerate() {
             if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
-                && skin.group == Some(group)
+                && self.groups.of(place) == Some(group)
                 && moment.concerns(body)
             {
                 skin.follow(body, moment.duration);
             }
         }
+        self.bonds.follow(bodies, &self.skins, moment);
         self.solve(group, bodies, moment);
         for link in &self.links {
             for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
@@ -234,8 +249,10 @@ impl Tissue {
                 }
             }
         }
+        self.bonds.give(bodies, &self.skins, moment);
         if moment.drifts {
             self.part(bodies, Body::part_substep);
+            self.bonds.part(bodies, moment.duration);
         }
     }
 
@@ -245,13 +262,15 @@ impl Tissue {
         for _ in 0..SEARCHES {
             let known = self.links.len();
             self.find(group, bodies, moment);
-            if self.links.len() == known {
+            if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
                 break;
             }
-            let Self { links, skins, .. } = self;
+            let Self {
+                links, skins, bonds, ..
+            } = self;
             first = Some(relax(SWEEPS, first, || {
                 let changes = links.iter_mut().map(|link| link.solve(skins));
-                changes.fold(0.0, f32::max)
+                changes.fold(0.0, f32::max).max(bonds.sweep(skins))
             }));
         }
     }
@@ -270,7 +289,11 @@ impl Tissue {
     /// Adds the contacts that are not known yet, of those that meet.
     fn find(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
-            skins, links, known, ..
+            skins,
+            links,
+            known,
+            bonds,
+            groups,
         } = self;
         let key = |link: &Link| link.sides.map(|side| side.key());
         known.clear();
@@ -288,7 +311,7 @@ impl Tissue {
                 let second = Party { place: b, skin };
                 let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
                 let Some(radius) = radius(&first, &second, [body_a, body_b])
-                    .filter(|_| is_looked_at && [first.skin.group, skin.group] == [Some(group); 2])
+                    .filter(|_| is_looked_at && [groups.of(a), groups.of(b)] == [Some(group); 2])
                 else {
                     continue;
                 };
@@ -303,7 +326,9 @@ impl Tissue {
                     let is_known = known
                         .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
                         .is_ok();
-                    if is_known || links.len() == links.capacity() {
+                    let [of_a, of_b] = &touch.sides;
+                    let are_joined = || bonds.join([of_a.body, of_b.body], [&of_a.nodes, &of_b.nodes]);
+                    if is_known || links.len() == links.capacity() || are_joined() {
                         return;
                     }
                     let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });

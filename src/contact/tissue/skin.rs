@@ -18,8 +18,6 @@ pub(super) struct Skin {
     /// The edges that are looked at with a triangle: each with one.
     owned: Vec<[u32; 3]>,
     tree: Tree,
-    /// Those that the body takes its substeps together with, or itself alone where it meets itself: by one of their places.
-    pub group: Option<usize>,
     /// Whether it encloses something.
     pub is_closed: bool,
     /// The edges that pass through other tissue, or the body's own, as the step begins.
@@ -72,7 +70,6 @@ impl Skin {
             edges,
             owned,
             tree,
-            group: None,
             is_closed: mesh::is_closed(&triangles)?,
             pierces,
             origin: body.origin,

@@ -192,7 +192,19 @@ impl Implicit {
     /// How fast a node goes on its way in the substep that was just solved, m/s.
     pub fn mean(&self, node: usize) -> Vec3 {
         let history = &self.histories[1 - self.settled];
-        history.ways.get(node) / history.step
+        history.ways.get(node) / self.latest
+    }
+
+    /// What it is attached to has a node go so much faster in a substep of `duration` seconds: no gain that will go on.
+    pub fn draw(&mut self, node: usize, given: Vec3, duration: f32) {
+        let history = &mut self.histories[1 - self.settled];
+        history.ways.set(node, history.ways.get(node) + given * duration);
+        history.energy = None;
+    }
+
+    /// Nodes were moved after the substep that was just solved: its energy is no longer known.
+    pub fn part(&mut self) {
+        self.histories[1 - self.settled].energy = None;
     }
 
     /// Other tissue has a node go with this mean velocity instead, m/s: by how much it becomes faster.
@@ -200,7 +212,7 @@ impl Implicit {
         let given = mean - self.mean(node);
         let history = &mut self.histories[1 - self.settled];
         if given != Vec3::ZERO {
-            history.ways.set(node, mean * history.step);
+            history.ways.set(node, mean * self.latest);
             // What it gives is no gain that will go on.
             history.gains.set(node, Vec3::ZERO);
             history.energy = None;

@@ -28,6 +28,8 @@ pub(super) struct Goal {
     pub relative: f64,
     /// The squared norm of inertia of the corrections before, J.
     pub size: f64,
+    /// The error allowed as a fraction of this correction's, where it is not the last.
+    pub own: f64,
 }
 
 /// How it ended.
@@ -79,7 +81,8 @@ impl Implicit {
             solved.work += length * square;
             square = sums.first;
             solved.size = sums.second;
-            let allowed = goal.absolute.max(goal.relative * f64::max(goal.size, solved.size));
+            let allowed =
+                (goal.absolute.max(goal.relative * f64::max(goal.size, solved.size))).max(goal.own * solved.size);
             solved.error = square * self.spectrum.factor();
             if solved.error <= allowed {
                 // What is known of the smallest eigenvalue may be old.

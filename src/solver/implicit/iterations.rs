@@ -15,6 +15,9 @@ use crate::threads::{Items, Team};
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 200;
 
+/// What may be missing of a correction where other contacts push than before it, as a fraction of its size: others will after it.
+const OTHER: f64 = 0.3;
+
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
 
@@ -116,6 +119,10 @@ impl Substep<'_> {
         let mut square = 0.0;
         for iteration in 0..NEWTON {
             self.stiffen(body, implicit);
+            let is_other = body
+                .contacts
+                .as_mut()
+                .is_some_and(|contacts| contacts.holds.have_changed());
             implicit.corrections.clear();
             square = implicit.precondition(body, 0.0, self.team).first;
             // What a solution has left of it is rounding.
@@ -144,6 +151,7 @@ impl Substep<'_> {
                 absolute,
                 relative,
                 size,
+                own: if is_other { OTHER.powi(2) } else { 0.0 },
             };
             let positions = body.state.next_positions();
             let solved = implicit.solve(body, positions, self.tangent(), goal, square, self.team);
@@ -167,11 +175,14 @@ impl Substep<'_> {
             }
             gone = self.go(body, implicit, solved.work);
             size = f64::max(size, gone * gone * solved.size);
+            let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+            // Before that, what contacts do is not what it will be, and would grow with each multiplier made of it.
             if iteration < MULTIPLIERS
+                && gone == 1.0
                 && let Some(contacts) = &mut body.contacts
+                && contacts.holds.missing(push) > f64::from(implicit.accuracy)
             {
                 let (residuals, free) = (&mut implicit.residuals, &body.inverse_masses);
-                let push = |node: usize| implicit.pushes.get(node).as_dvec3();
                 contacts.holds.improve(push, |node, more| {
                     if free[node] > 0.0 {
                         residuals.set(node, residuals.get(node) + more.as_vec3());

@@ -112,6 +112,10 @@ pub(crate) struct Implicit {
     settled: usize,
     /// How the last equation that was solved makes velocities of what forces do.
     taken: Formula,
+    /// Whether it is attached to a body in the step in progress: what that does is not carried on, and substeps are of order 1.
+    pub is_attached: bool,
+    /// How long the substep that was just solved is, s.
+    latest: f32,
     /// s: what forces do within the step, m.
     pushes: Vectors,
     /// Where there are tools: how fast nodes go on their way, m/s.
@@ -203,6 +207,8 @@ impl Implicit {
             ],
             settled: 0,
             taken: Formula::new(1, 0.0, 0.0),
+            is_attached: false,
+            latest: 0.0,
             pushes: Vectors::zeros(node_count)?,
             means: None,
             corrections: vectors()?,

@@ -150,6 +150,7 @@ fn take_part(
     team: &Team,
 ) -> End {
     let step = f64::from(request.dt) / f64::from(substeps);
+    let order = if implicit.is_attached { 1 } else { implicit.order };
     let substep = Substep {
         request,
         step,
@@ -157,7 +158,7 @@ fn take_part(
         end: f64::from(index + 1) / f64::from(substeps),
         is_first: index == 0,
         equations: substeps - index,
-        formula: Formula::new(implicit.order, step, f64::from(implicit.last(index == 0).step)),
+        formula: Formula::new(order, step, f64::from(implicit.last(index == 0).step)),
         team,
     };
     body.lead_grasps(request.tools, [substep.start, substep.end]);
@@ -498,6 +499,7 @@ impl Substep<'_> {
     /// Makes velocities and history of what was found; whether all is finite.
     fn finish(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
         implicit.taken = self.formula;
+        implicit.latest = self.step as f32;
         let node_count = body.node_count();
         let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;

@@ -1,0 +1,274 @@
+//! What bonds do in the substeps of a group of bodies.
+
+use glam::{DVec3, Vec3};
+
+use super::super::Moment;
+use super::super::skin::Skin;
+use super::{Bond, Bonds, Corner, End};
+use crate::body::Body;
+use crate::slots::Slots;
+
+/// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep, and no faster than this,
+/// m/s, so that bodies that are far apart follow their points.
+const CLOSING_TIME: f64 = 0.02;
+const LARGEST_PART: f64 = 0.2;
+const CLOSING_SPEED: f64 = 0.25;
+
+/// The part of the way by which points may miss where they are to be, after `SWEEPS`.
+const MISSED: f64 = 0.2;
+
+/// Sweeps over what is apart.
+const SWEEPS: u32 = 8;
+
+/// The longest substep where an implicit solver moves a body, s. One length whatever the load: how far its equation leaves a point off
+/// goes with the square of it, and a change would be a jolt.
+const LONGEST: f64 = 0.25e-3;
+
+/// Steps of 1 ms are a little longer than that in `f32`.
+const ROUNDED: f64 = 1e-3;
+
+/// Velocities that differ by less than this part of themselves are equal.
+const ROUNDING: f32 = 2e-7;
+
+impl Bonds {
+    /// Begins to attempt the step of a group, of which these bodies are, which may be taken several times, until [`Self::unload`].
+    pub fn attempt(&mut self, bodies: &mut Slots<Body>, is_of_group: impl Fn(usize) -> bool) {
+        for end in &mut self.ends {
+            end.is_in_turn = is_of_group(end.body);
+            if let Some(body) = bodies.at_mut(end.body).filter(|_| end.is_in_turn) {
+                if let Some(implicit) = &mut body.implicit {
+                    implicit.is_attached = true;
+                }
+                end.is_pending = body.forces_applied;
+                end.pending = match &body.applied {
+                    Some(applied) if body.forces_applied => applied.get(end.node as usize),
+                    _ => Vec3::ZERO,
+                };
+            }
+        }
+        for bond in &mut self.bonds {
+            let is_implicit = |corner: Corner| bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
+            bond.is_implicit = bond.used().any(is_implicit);
+            bond.is_in_turn = bond.used().all(|corner| is_of_group(corner.body));
+        }
+    }
+
+    /// Begins the step over, from what is current.
+    pub fn begin(&mut self) {
+        self.is_opening = true;
+        for bond in self.bonds.iter_mut().filter(|bond| bond.is_in_turn) {
+            bond.load = bond.foreseen;
+            bond.sum = DVec3::ZERO;
+        }
+    }
+
+    /// How many substeps a step of `dt` seconds takes at least.
+    pub fn substeps(&self, dt: f32) -> u32 {
+        if self.bonds.iter().any(|bond| bond.is_in_turn && bond.is_implicit) {
+            (f64::from(dt) / LONGEST - ROUNDED)
+                .ceil()
+                .clamp(1.0, f64::from(u32::MAX / 4)) as u32
+        } else {
+            1
+        }
+    }
+
+    /// Has the forces that are foreseen act in what follows.
+    pub fn load(&mut self, bodies: &mut Slots<Body>) {
+        self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
+        let Self { bonds, ends, .. } = self;
+        for bond in bonds.iter().filter(|bond| bond.is_in_turn && !bond.is_implicit) {
+            for corner in bond.used() {
+                ends[corner.end].given += bond.load * corner.weight;
+            }
+        }
+        for end in ends.iter().filter(|end| end.is_in_turn) {
+            if let Some(body) = bodies.at_mut(end.body) {
+                let free = Vec3::select(body.answer_of(end.node).cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO);
+                let force = (end.pending + end.given * free).clamp(Vec3::MIN, Vec3::MAX);
+                body.load(end.node as usize, force);
+            }
+        }
+    }
+
+    /// Takes the forces off again that were foreseen: only what the caller applied is left.
+    pub fn unload(&self, bodies: &mut Slots<Body>) {
+        for end in self.ends.iter().filter(|end| end.is_in_turn) {
+            if let Some(body) = bodies.at_mut(end.body) {
+                body.load(end.node as usize, end.pending);
+                body.forces_applied = end.is_pending;
+            }
+        }
+    }
+
+    /// Takes a substep as it is to be, after the skins.
+    pub(in crate::contact::tissue) fn follow(
+        &mut self,
+        bodies: &mut Slots<Body>,
+        skins: &[Option<Skin>],
+        moment: &Moment,
+    ) {
+        for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
+            let Some(body) = bodies.at_mut(end.body) else { continue };
+            let skin = skins.get(end.body).and_then(Option::as_ref);
+            end.is_on_skin =
+                moment.concerns(body) && skin.is_some_and(|skin| skin.nodes.binary_search(&end.node).is_ok());
+            end.velocity = body.mean_velocity(end.node as usize);
+            end.answer = body.answer_of(end.node) * body.left_by_damping(end.node, moment);
+        }
+        for bond in &mut self.bonds {
+            bond.acts = bond.is_in_turn && (moment.drifts || !bond.is_implicit);
+            if !bond.acts {
+                continue;
+            }
+            bond.impulse = Vec3::ZERO;
+            let corners = bond.used();
+            let whole: Vec3 = corners
+                .map(|corner| self.ends[corner.end].answer * (corner.weight * corner.weight))
+                .sum();
+            bond.masses = Vec3::select(whole.cmpgt(Vec3::ZERO), whole.recip(), Vec3::ZERO);
+        }
+    }
+
+    /// Makes the velocities of the points of each bond equal, one after the other: the largest difference that there was, m/s.
+    pub(in crate::contact::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>]) -> f32 {
+        let Self { bonds, ends, .. } = self;
+        let mut largest = 0.0_f32;
+        for bond in bonds.iter_mut().filter(|bond| bond.acts) {
+            let (mut apart, mut size) = (Vec3::ZERO, Vec3::ZERO);
+            for corner in bond.used() {
+                let velocity = ends[corner.end].velocity(skins) * corner.weight;
+                apart += velocity;
+                size = size.max(velocity.abs());
+            }
+            let counts = apart.abs().cmpgt(size * ROUNDING) & bond.masses.cmpgt(Vec3::ZERO);
+            if !counts.any() {
+                continue;
+            }
+            let apart = Vec3::select(counts, apart, Vec3::ZERO);
+            let given = -apart * bond.masses;
+            bond.impulse += given;
+            for corner in bond.used() {
+                ends[corner.end].quicken(given * corner.weight, skins);
+            }
+            largest = largest.max(apart.length());
+        }
+        largest
+    }
+
+    /// Gives bodies what was found, and foresees the same for the next substep.
+    pub(in crate::contact::tissue) fn give(
+        &mut self,
+        bodies: &mut Slots<Body>,
+        skins: &[Option<Skin>],
+        moment: &Moment,
+    ) {
+        let Self {
+            bonds,
+            ends,
+            is_opening,
+        } = self;
+        ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
+        for bond in bonds.iter_mut().filter(|bond| bond.acts) {
+            let duration = bond.duration(moment, *is_opening);
+            let all = bond.load * duration + bond.impulse;
+            if !bond.is_implicit {
+                bond.load += bond.impulse / duration;
+            }
+            for corner in bond.used() {
+                ends[corner.end].given += all * corner.weight;
+            }
+            bond.sum += all.as_dvec3();
+        }
+        for end in ends.iter_mut().filter(|end| end.is_in_turn) {
+            if let Some(body) = bodies.at_mut(end.body)
+                && moment.concerns(body)
+            {
+                end.velocity = end.velocity(skins);
+                body.draw(end.node as usize, end.velocity, end.given, moment);
+            }
+        }
+        *is_opening = false;
+    }
+
+    /// Moves what is apart at the end of a substep of `duration` seconds together, without giving it speed.
+    pub(in crate::contact::tissue) fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
+        let Self { bonds, ends, .. } = self;
+        for end in ends.iter_mut().filter(|end| end.is_in_turn) {
+            if let Some(body) = bodies.at(end.body) {
+                let place = body.state.next_positions().get(end.node as usize);
+                end.place = place.as_dvec3() + body.origin;
+                end.shift = DVec3::ZERO;
+            }
+        }
+        let duration = f64::from(duration);
+        let closed = (duration / CLOSING_TIME).min(LARGEST_PART);
+        for bond in bonds.iter_mut().filter(|bond| bond.is_in_turn) {
+            let apart = bond.apart(ends);
+            let way = (apart * closed).clamp_length_max(CLOSING_SPEED * duration);
+            bond.gap = apart - way;
+            bond.miss = MISSED * way.abs().max_element();
+        }
+        for _ in 0..SWEEPS {
+            let mut is_done = true;
+            for bond in bonds.iter().filter(|bond| bond.is_in_turn) {
+                let off = bond.apart(ends) - bond.gap;
+                is_done &= off.abs().max_element() <= bond.miss;
+                let off = off * bond.masses.as_dvec3();
+                for corner in bond.used() {
+                    let end = &mut ends[corner.end];
+                    end.shift -= off * (end.answer.as_dvec3() * f64::from(corner.weight));
+                }
+            }
+            if is_done {
+                break;
+            }
+        }
+        for end in ends {
+            if end.is_in_turn
+                && end.shift != DVec3::ZERO
+                && let Some(body) = bodies.at_mut(end.body)
+            {
+                body.part_substep(end.node as usize, end.shift.as_vec3());
+            }
+        }
+    }
+}
+
+impl Bond {
+    /// How far its points are apart as ends are placed, m.
+    fn apart(&self, ends: &[End]) -> DVec3 {
+        let place = |end: &End| end.place + end.shift;
+        let parts = self
+            .used()
+            .map(|corner| place(&ends[corner.end]) * f64::from(corner.weight));
+        parts.sum()
+    }
+
+    /// How long forces act in this moment, s.
+    fn duration(&self, moment: &Moment, is_opening: bool) -> f32 {
+        let is_half = !self.is_implicit && (is_opening || !moment.drifts);
+        if is_half {
+            0.5 * moment.duration
+        } else {
+            moment.duration
+        }
+    }
+}
+
+impl End {
+    fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
+        match skins.get(self.body) {
+            Some(Some(skin)) if self.is_on_skin => skin.velocities.get(self.node as usize),
+            _ => self.velocity,
+        }
+    }
+
+    fn quicken(&mut self, impulse: Vec3, skins: &mut [Option<Skin>]) {
+        let velocity = self.velocity(skins) + impulse * self.answer;
+        match skins.get_mut(self.body) {
+            Some(Some(skin)) if self.is_on_skin => skin.velocities.set(self.node as usize, velocity),
+            _ => self.velocity = velocity,
+        }
+    }
+}
