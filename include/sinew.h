@@ -385,7 +385,7 @@ typedef struct sinew_step_report {
   float error_estimate;
   /**
    * Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-   * apart. Those in a body that is closed come out again by themselves.
+   * apart. Those of another body in one that is closed come out again by themselves.
    */
   uint32_t crossings;
   /**
@@ -662,7 +662,7 @@ typedef struct sinew_body_def {
    */
   float pressure;
   /**
-   * m, at least 0: what tools and other tissue keep off the surface; default 0.
+   * m, 0 to 1e9: what tools and other tissue keep off the surface; default 0.
    */
   float contact_thickness;
   /**
@@ -960,11 +960,12 @@ typedef struct sinew_tool_def {
    */
   uint32_t shape;
   /**
-   * m, above 0: sphere, capsule; no default.
+   * m, above 0, at most 1e9, as is the sum with `half_length`: sphere, capsule; no default.
    */
   float radius;
   /**
-   * m: capsule, between the centre and a cap's centre.
+   * m, at least 0: capsule, between the centre and a cap's centre; with SINEW_DETECTION_IMAGE_SPACE at most 10 000 times `radius`.
+   * What is touched is known to a ten millionth of it.
    */
   float half_length;
   /**
@@ -996,7 +997,7 @@ typedef struct sinew_tool_def {
    */
   float friction;
   /**
-   * Where it is at first, m; default 0 0 0.
+   * Where it is at first, m, each within 1e9 of 0; default 0 0 0.
    */
   float position[3];
   /**
@@ -1008,7 +1009,11 @@ typedef struct sinew_tool_def {
    */
   uint32_t reserved;
   /**
-   * How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: chosen from the mesh.
+   * How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: a 256th or a 96th of the mesh's longest
+   * extent, or a fourth of the least where that is less. Refused where no ray or sample would lie within the mesh, by default where
+   * fewer than two would along its least extent; and where an image would have more than 2^24 pixels or a field as many samples.
+   * Memory: some 24 bytes for each pixel of 3 images, or 4 for each sample. Time: to draw the mesh 3 times, or as many exact distances
+   * as there are samples, which takes minutes for 2^24 of a large mesh.
    */
   float resolution;
   /**
@@ -1962,9 +1967,11 @@ sinew_status sinew_tool_destroy(struct sinew_world *world, struct sinew_tool_id 
 
 /**
  * Moves a tool to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be
- * NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way.
+ * NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way. What of its way a tool of limited force has
+ * not gone in that step is forgotten: it is sent again.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the orientation is zero), SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0 or the orientation is zero),
+ * SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
@@ -2352,7 +2359,8 @@ sinew_status sinew_world_save_picture_of_values(const struct sinew_world *world,
 /**
  * Writes the first point that a ray from `origin`, 3 floats, m, along `direction`, 3 floats of any length, meets on the surface of a
  * body within `max_distance`, m, at least 0, at the nodes' current places. `out->struct_size` is set by the caller; where nothing is
- * met out->body is all zero.
+ * met out->body is all zero. What lies along a triangle does not meet it. All triangles of the bodies whose box the ray meets are looked
+ * at: some 0.3 us each.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the direction is zero).
  *
@@ -2368,7 +2376,8 @@ sinew_status sinew_world_cast_ray(const struct sinew_world *world,
 
 /**
  * Writes the point of the bodies' surfaces that is nearest to `point`, 3 floats, m, at the nodes' current places, no further than
- * `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero.
+ * `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero. All triangles of
+ * the bodies whose box is near enough are looked at: some 0.15 us each.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT.
  *

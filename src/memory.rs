@@ -23,6 +23,20 @@ pub(crate) fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
     Ok(copy)
 }
 
+/// Merges `more` into `values`, which has room for it, both in ascending order of their keys.
+pub(crate) fn merge<T: Copy, K: Ord>(values: &mut Vec<T>, more: &[T], key: impl Fn(&T) -> K) {
+    let mut known = values.len();
+    values.extend_from_slice(more);
+    // From the end: what is moved is not needed any more where it was.
+    for (left, added) in more.iter().enumerate().rev() {
+        while known > 0 && key(&values[known - 1]) > key(added) {
+            known -= 1;
+            values[known + left + 1] = values[known];
+        }
+        values[known + left] = *added;
+    }
+}
+
 /// Appends `value`, growing the vector fallibly.
 pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     values.try_reserve(1)?;

@@ -27,7 +27,8 @@ pub struct SurfaceHit {
 
 impl World {
     /// The first point that a ray from `origin` (m) along `direction` (of any length) meets on the surface of a body within
-    /// `max_distance` (m, may be infinite), at the nodes' current places; `None` where there is none. Fronts and backs of triangles count.
+    /// `max_distance` (m, may be infinite), at the nodes' current places; `None` where there is none. Fronts and backs of triangles count;
+    /// what lies along a triangle does not meet it.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: a number is not finite, the direction is zero, or `max_distance` is negative or not a number.
@@ -43,19 +44,21 @@ impl World {
         let mut found: Option<SurfaceHit> = None;
         for (id, body) in self.bodies_by_id() {
             let bounds = body.published_bounds();
-            let limit = f64::from(found.map_or(max_distance, |found| found.distance));
             let furthest = start
                 .abs()
                 .max(bounds.min.as_dvec3().abs().max(bounds.max.as_dvec3().abs()));
-            let length = (4.0 * furthest.length() + 1.0).min(limit);
-            if !meets(&bounds, start, way * length) {
+            // Past all of the body: what is as far as is asked for is met too.
+            let length = 4.0 * furthest.length() + 1.0;
+            let limit = f64::from(found.map_or(max_distance, |found| found.distance));
+            if !meets(&bounds, start, way * length.min(limit)) {
                 continue;
             }
             for (triangle, &nodes) in (0..).zip(body.surface()) {
                 let corners = nodes.map(|node| body.positions()[node as usize].as_dvec3());
                 if let Some((fraction, _)) = pierce(start, start + way * length, corners, nodes) {
                     let distance = fraction * length;
-                    if found.is_none_or(|found| distance < f64::from(found.distance)) {
+                    let is_within = distance as f32 <= max_distance;
+                    if is_within && found.is_none_or(|found| distance < f64::from(found.distance)) {
                         let (weights, _) = nearest_on_triangle(start + way * distance, corners);
                         found = Some(SurfaceHit::new(id, triangle, corners, weights, distance));
                     }

@@ -6,6 +6,10 @@ use crate::error::{Error, Result};
 #[derive(Debug)]
 pub(crate) struct Slots<T> {
     slots: Vec<Slot<T>>,
+    /// No place before this one is free.
+    first_free: usize,
+    /// How many live.
+    count: usize,
     /// What they are, for messages.
     noun: &'static str,
 }
@@ -25,7 +29,7 @@ impl<T> Slot<T> {
 }
 
 /// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct SlotId {
     pub index1: u32,
     pub generation: u32,
@@ -42,6 +46,8 @@ impl<T> Slots<T> {
     pub fn new(noun: &'static str) -> Self {
         Self {
             slots: Vec::new(),
+            first_free: 0,
+            count: 0,
             noun,
         }
     }
@@ -51,10 +57,15 @@ impl<T> Slots<T> {
         self.slots.len()
     }
 
+    /// How many live.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
     pub fn insert(&mut self, content: T) -> Result<SlotId> {
         let usable = |slot: &Slot<T>| slot.content.is_none() && slot.generation < u32::MAX;
-        let index = match self.slots.iter().position(usable) {
-            Some(index) => index,
+        let index = match self.slots[self.first_free..].iter().position(usable) {
+            Some(beyond) => self.first_free + beyond,
             None => {
                 self.slots.try_reserve(1)?;
                 self.slots.push(Slot {
@@ -67,6 +78,8 @@ impl<T> Slots<T> {
         let slot = &mut self.slots[index];
         slot.generation += 1;
         slot.content = Some(content);
+        self.first_free = index + 1;
+        self.count += 1;
         Ok(SlotId {
             index1: index as u32 + 1,
             generation: slot.generation,
@@ -75,7 +88,10 @@ impl<T> Slots<T> {
 
     pub fn remove(&mut self, id: SlotId) -> Result<T> {
         let index = self.index(id)?;
-        self.slots[index].content.take().ok_or_else(|| stale(self.noun, id))
+        let content = self.slots[index].content.take().ok_or_else(|| stale(self.noun, id))?;
+        self.first_free = self.first_free.min(index);
+        self.count -= 1;
+        Ok(content)
     }
 
     pub fn get(&self, id: SlotId) -> Result<&T> {
@@ -85,7 +101,7 @@ impl<T> Slots<T> {
 
     pub fn get_mut(&mut self, id: SlotId) -> Result<&mut T> {
         let index = self.index(id)?;
-        let Slots { slots, noun } = self;
+        let Slots { slots, noun, .. } = self;
         slots[index].content.as_mut().ok_or_else(|| stale(noun, id))
     }
 
@@ -101,8 +117,12 @@ impl<T> Slots<T> {
 
     /// Removes what is not to stay.
     pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
-        for slot in &mut self.slots {
-            slot.content = slot.content.take().filter(&stays);
+        for (index, slot) in self.slots.iter_mut().enumerate() {
+            if slot.content.as_ref().is_some_and(|content| !stays(content)) {
+                slot.content = None;
+                self.first_free = self.first_free.min(index);
+                self.count -= 1;
+            }
         }
     }
 

@@ -245,6 +245,8 @@ impl World {
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
         let slot = self.tools.place(tool.0)?;
         self.tools.remove(tool.0)?;
+        // They share what a mesh takes.
+        self.paths.clear();
         self.release_all_of(tool);
         if self.tool_places() == 0 {
             self.drop_contacts();
@@ -274,10 +276,11 @@ impl World {
     }
 
     /// Moves a tool to `position`, in metres, over the next step, and turns it to `orientation`, `None`: it stays as it
-    /// is. Tissue gives way.
+    /// is. Tissue gives way. What of its way a tool of limited force has not gone in that step is forgotten: it is sent again.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, or the orientation is zero.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, or the
+    /// orientation is zero.
     pub fn set_pose(&mut self, tool: ToolId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         let tool = self.tools.get_mut(tool.0)?;
         let pose = tool.target.unwrap_or(tool.pose);

@@ -1,10 +1,13 @@
 //! What is near a tool is remembered from substep to substep; results must not tell how.
 
+#[path = "support/solid.rs"]
+mod solid;
 #[path = "support/tissue.rs"]
 mod tissue;
 
 use glam::{Quat, Vec3};
-use sinew::{BodyDefinition, Error, Shape, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Detection, Error, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+use solid::cuboid;
 use tissue::*;
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
@@ -200,4 +203,129 @@ fn a_step_that_could_not_be_taken_leaves_no_trace() {
         seen
     };
     assert!(run(false) == run(true));
+}
+
+/// A cloth in the plane y = 0 whose rim is held.
+fn drum(world: &mut World, solver: Solver) -> sinew::BodyId {
+    let mesh = square(0.2, 10);
+    let node_mass = 0.02 / mesh.positions.len() as f32;
+    let cloth = world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            masses: Values::Uniform(node_mass),
+            node_dampings: Values::Uniform(20.0 * node_mass),
+            stiffnesses: Values::Uniform(30.0),
+            spring_dampings: Values::Uniform(0.01),
+            triangles: &mesh.triangles,
+            solver,
+            ..Default::default()
+        })
+        .expect("a cloth");
+    pin_all(world, cloth, &rim(10));
+    cloth
+}
+
+const SOLVERS: [Solver; 2] = [Solver::Verlet, Solver::Implicit];
+
+#[test]
+fn another_tool_in_the_place_of_one_is_felt() {
+    let cube = |world: &mut World, detection: Detection, half: f32| {
+        let (positions, triangles) = cuboid(Vec3::splat(-half), Vec3::splat(half));
+        let shape = Shape::Mesh {
+            positions: &positions,
+            triangles: &triangles,
+        };
+        world
+            .create_tool(&ToolDefinition {
+                detection,
+                pose: Pose {
+                    position: Vec3::Y * 0.045,
+                    ..Pose::IDENTITY
+                },
+                ..ToolDefinition::new(shape)
+            })
+            .expect("a cube")
+    };
+    for detection in [Detection::Exact, Detection::DistanceField, Detection::ImageSpace] {
+        for solver in SOLVERS {
+            // A cube that reaches into the cloth, in the place of one that does not, or in a place of its own.
+            let run = |exchanged: bool| {
+                let mut world = world(Vec3::ZERO);
+                let cloth = drum(&mut world, solver);
+                let small = exchanged.then(|| cube(&mut world, detection, 0.004));
+                sphere(&mut world, 0.01, Vec3::Y * 5.0);
+                for _ in 0..3 {
+                    world.step(1e-3).expect("a step");
+                }
+                if let Some(small) = small {
+                    world.destroy_tool(small).expect("a tool");
+                }
+                let large = cube(&mut world, detection, 0.05);
+                let mut most = Vec3::ZERO;
+                for _ in 0..30 {
+                    world.step(1e-3).expect("a step");
+                    most = most.max(world.wrench(large).expect("a tool").0);
+                }
+                (most, bits(&world, cloth))
+            };
+            let (exchanged, alone) = (run(true), run(false));
+            assert!(alone.0.y > 1e-3, "{detection:?}, {solver:?}: {} N", alone.0);
+            assert!(
+                exchanged == alone,
+                "{detection:?}, {solver:?}: {} N for {} N",
+                exchanged.0,
+                alone.0
+            );
+        }
+    }
+}
+
+#[test]
+fn a_tool_that_meets_nothing_changes_no_bit() {
+    let (positions, triangles) = cuboid(Vec3::splat(-0.01), Vec3::splat(0.01));
+    let mesh = Shape::Mesh {
+        positions: &positions,
+        triangles: &triangles,
+    };
+    for solver in SOLVERS {
+        for presses in [false, true] {
+            let run = |ghost: Option<Shape>| {
+                let mut world = world(DOWN);
+                let cloth = drum(&mut world, solver);
+                let ball = presses.then(|| sphere(&mut world, 0.01, Vec3::new(0.03, 0.013, 0.01)));
+                let ghost = ghost.map(|shape| {
+                    let mut definition = ToolDefinition::new(shape);
+                    definition.filter.mask = 0;
+                    definition.pose.position = Vec3::Y * 0.03;
+                    world.create_tool(&definition).expect("a tool")
+                });
+                let mut seen = Vec::new();
+                for step in 0..10 {
+                    if let Some(ball) = ball {
+                        let place = Vec3::new(0.03, 0.013 - 5e-4 * step as f32, 0.01);
+                        world.set_pose(ball, place, None).expect("a pose");
+                    }
+                    if let Some(ghost) = ghost {
+                        let place = Vec3::Y * (0.03 - 0.006 * step as f32);
+                        world.set_pose(ghost, place, None).expect("a pose");
+                    }
+                    let report = world.step(1.0 / 60.0).expect("a step");
+                    let force = ball.map(|ball| world.wrench(ball).expect("a tool").0);
+                    seen.push((report.substeps, force, bits(&world, cloth)));
+                }
+                seen
+            };
+            let without = run(None);
+            for shape in [Shape::Sphere { radius: 0.01 }, Shape::Plane, mesh] {
+                let with = run(Some(shape));
+                for (step, (with, without)) in with.iter().zip(&without).enumerate() {
+                    assert_eq!(
+                        with.0, without.0,
+                        "{solver:?}, {shape:?}, {presses}: substeps of step {step}"
+                    );
+                    assert!(with == without, "{solver:?}, {shape:?}, {presses}: step {step}");
+                }
+            }
+        }
+    }
 }

@@ -1023,3 +1023,96 @@ fn what_cannot_be_held_is_refused() {
     assert!(matches!(refused, Err(Error::InvalidArgument(_))), "{refused:?}");
     assert_eq!(held.world.state_hash(), before);
 }
+
+/// Of a node held by a whole grasp and by a point with next to no part in it, the point is left.
+#[test]
+fn what_is_left_of_a_shared_grip_has_all_of_the_force() {
+    for weight in [1e-8, 1e-30, f32::from_bits(1)] {
+        let mut held = Held::loose(SETUP);
+        let surface = body(&held.world, held.body).surface();
+        let triangle = (0..).zip(surface).find(|(_, corners)| corners.contains(&held.nodes[0]));
+        let (triangle, &corners) = triangle.expect("a triangle");
+        let mut weights = [0.5; 3];
+        let corner = corners.iter().position(|&node| node == held.nodes[0]);
+        weights[corner.expect("its corner")] = weight;
+        let node = held.world.attach_node(held.body, held.nodes[0], held.tool, 0.0);
+        let node = node.expect("an attachment");
+        let point = SurfacePoint { triangle, weights };
+        let attached = held.world.attach_points(held.body, &[point], held.tool, 1e6);
+        let attached = attached.expect("attachments");
+        held.world.step(0.004).expect("a step");
+        held.world.release(node).expect("held");
+        held.world.step(0.004).expect("a step");
+        assert_eq!(held.world.slipped(), []);
+        let force = held.world.attachment_force(attached[0]).expect("held").as_dvec3();
+        let [wrench, _] = held.wrench();
+        assert!(force.length() > 0.01, "{weight}: {force} N");
+        let off = (force + wrench).length() / wrench.length();
+        assert!(off < 1e-6, "{weight}: {force} N of {wrench} N");
+    }
+}
+
+/// Whatever came and went before, and in what order: what is held in the end counts.
+#[test]
+fn what_was_let_go_leaves_no_trace() {
+    let mut random = Random::new(12);
+    for round in 0..6 {
+        let mut held = Held::loose(SETUP);
+        let node_count = body(&held.world, held.body).node_count();
+        let nodes: Vec<u32> = (0..node_count as u32).collect();
+        let other = sphere(&mut held.world, 0.004, APART + Vec3::X);
+        // Every node goes to one of the tools; some twice.
+        let mut of_other = Vec::new();
+        let mut of_tool = Vec::new();
+        for batch in 0..8 {
+            let mut more: Vec<u32> = (0..12).map(|_| nodes[random.below(nodes.len())]).collect();
+            more.retain(|node| node % 5 == 0 || batch % 2 == 0);
+            let (theirs, ours): (Vec<u32>, Vec<u32>) = more.iter().partition(|&&node| node % 5 == 0);
+            of_other.extend(held.world.attach_nodes(held.body, &theirs, other, 0.0).expect("fit"));
+            let ids = held.world.attach_nodes(held.body, &ours, held.tool, 0.0).expect("fit");
+            of_tool.extend(ours.into_iter().zip(ids));
+            for _ in 0..batch / 2 {
+                if !of_tool.is_empty() {
+                    let (_, id) = of_tool.swap_remove(random.below(of_tool.len()));
+                    held.world.release(id).expect("held");
+                    assert!(matches!(held.world.release(id), Err(Error::StaleId(_))));
+                }
+            }
+        }
+        if round % 2 == 0 {
+            held.world.destroy_tool(other).expect("a tool");
+            assert!(of_other.iter().all(|&id| held.world.attachment_force(id).is_err()));
+        } else {
+            of_other
+                .into_iter()
+                .for_each(|id| held.world.release(id).expect("held"));
+        }
+        let mut fresh = Held::loose(SETUP);
+        of_tool.sort_unstable_by_key(|(node, _)| *node);
+        let last: Vec<u32> = of_tool.iter().map(|(node, _)| *node).collect();
+        assert!(last.len() > 8);
+        let ids = fresh
+            .world
+            .attach_nodes(fresh.body, &last, fresh.tool, 0.0)
+            .expect("fit");
+        for step in 1..=5 {
+            let time = 0.003 * step as f32;
+            for held in [&mut held, &mut fresh] {
+                held.world
+                    .set_pose(held.tool, way(time), Some(turned(time)))
+                    .expect("a pose");
+                held.world.step(0.003).expect("a step");
+            }
+            let places = [&held, &fresh].map(|held| body(&held.world, held.body).positions().to_vec());
+            assert!(places[0] == places[1], "round {round}, step {step}");
+        }
+        for ((node, id), fresh_id) in of_tool.into_iter().zip(ids) {
+            let [force, alone] = [held.world.attachment_force(id), fresh.world.attachment_force(fresh_id)];
+            let (force, alone) = (force.expect("held"), alone.expect("held"));
+            assert!(
+                force == alone && force.length() > 0.0,
+                "node {node}: {force} N for {alone} N"
+            );
+        }
+    }
+}

@@ -152,3 +152,26 @@ fn what_is_asked_wrongly_is_refused() {
     let empty = World::new(WorldDefinition::default()).expect("a world");
     assert_eq!(empty.nearest_point(Vec3::ZERO, f32::INFINITY).expect("a point"), None);
 }
+
+#[test]
+fn what_is_just_as_far_as_is_asked_for_is_found() {
+    let mesh = Mesh::block([2.0; 3], [2; 3]).expect("a block");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    add(&mut world, &mesh, Vec3::ZERO);
+    let (x, y) = (mesh.positions.iter()).fold((0.0_f32, 0.0_f32), |most, node| {
+        (most.0.max(node.x), most.1.max(node.y))
+    });
+    let place = Vec3::new(x + 1.0, y - 0.7, 0.3);
+    for limit in [1.0, 1.5, 2.0] {
+        let ray = world
+            .cast_ray(place, Vec3::NEG_X, limit)
+            .expect("a ray")
+            .expect("a hit");
+        assert_eq!(ray.distance, 1.0);
+        let near = world.nearest_point(place, limit).expect("a point").expect("a body");
+        assert_eq!(near.distance, 1.0);
+    }
+    let short = 1.0_f32.next_down();
+    assert_eq!(world.cast_ray(place, Vec3::NEG_X, short).expect("a ray"), None);
+    assert_eq!(world.nearest_point(place, short).expect("a point"), None);
+}

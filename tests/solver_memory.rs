@@ -1,13 +1,17 @@
-//! A body pays for its own solver alone: bytes that each node takes, counted at the allocator. Alone in its program.
+//! A body pays for its own solver alone, and what is destroyed for nothing: bytes, counted at the allocator. Alone in its program.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
-use sinew::{BodyDefinition, Solver, Storage, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Detection, Shape, Solver, Storage, ToolDefinition, Values, World, WorldDefinition};
 
 static HELD: AtomicUsize = AtomicUsize::new(0);
+
+/// Tests take turns.
+static TURN: Mutex<()> = Mutex::new(());
 
 struct Weighing;
 
@@ -58,6 +62,7 @@ fn beyond_verlet(solver: Solver, storage: Storage) -> usize {
 
 #[test]
 fn a_body_pays_for_its_own_solver_alone() {
+    let _turn = TURN.lock().expect("a turn");
     /// Three numbers of single and of double precision.
     const SINGLE: usize = 12;
     const DOUBLE: usize = 24;
@@ -75,6 +80,44 @@ fn a_body_pays_for_its_own_solver_alone() {
         assert!(
             (both + implicit..both + implicit + records + 16).contains(&found),
             "{storage:?}: {found}"
+        );
+    }
+}
+
+#[test]
+fn a_tool_that_is_destroyed_takes_nothing() {
+    let _turn = TURN.lock().expect("a turn");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let corner = |bits: u32| Vec3::new((bits & 1) as f32, (bits >> 1 & 1) as f32, (bits >> 2) as f32);
+    let positions: Vec<Vec3> = (0..8).map(corner).collect();
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles: Vec<[u32; 3]> = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let before = HELD.load(Ordering::Relaxed);
+    for detection in [Detection::ImageSpace, Detection::DistanceField] {
+        let tool = world.create_tool(&ToolDefinition {
+            detection,
+            resolution: 0.02,
+            ..ToolDefinition::new(Shape::Mesh {
+                positions: &positions,
+                triangles: &triangles,
+            })
+        });
+        let tool = tool.expect("a tool");
+        world.step(0.001).expect("a step");
+        let with = HELD.load(Ordering::Relaxed) - before;
+        world.destroy_tool(tool).expect("a tool");
+        // The test's own threads may take some of it meanwhile.
+        let after = HELD.load(Ordering::Relaxed) - before;
+        assert!(
+            with > 1 << 17 && after < with / 8,
+            "{detection:?}: {after} bytes of {with}"
         );
     }
 }

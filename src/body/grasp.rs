@@ -6,7 +6,7 @@
 
 use std::fmt::Display;
 
-use glam::{BVec3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::{Body, Pin, Vectors};
 use crate::contact::{Frame, ToolPath};
@@ -38,9 +38,8 @@ pub(crate) struct HeldNode {
     node: u32,
     /// The holder's place among the world's tools.
     pub tool: usize,
-    /// How many grasps hold it, and the sum of their weights.
-    grasp_count: u32,
-    weight: f32,
+    /// The sum of the weights of the grasps that hold it, in parts: exact, whatever comes and goes.
+    parts: u64,
     /// Where it is in the tool's own axes, from its position, m; `None`: where it is when the next step begins.
     offset: Option<DVec3>,
     /// What the tool did to it, mean over the last step: N, and N m about the tool's position.
@@ -49,6 +48,14 @@ pub(crate) struct HeldNode {
     /// How much faster it was led in the last step than before it, m/s.
     gain: Vec3,
     course: Course,
+}
+
+/// Weights are added up in so many parts of 1.
+const PARTS: f64 = (1_u64 << 40) as f64;
+
+/// A weight above 0 in parts, at least one.
+fn parts(weight: f32) -> u64 {
+    ((f64::from(weight) * PARTS) as u64).max(1)
 }
 
 /// What is to be held: corners, of which one may have a weight of 0 and then is left free.
@@ -91,7 +98,7 @@ pub(crate) struct Lapse {
 /// All that tools hold of a body.
 #[derive(Debug, Default)]
 pub(crate) struct Grasps {
-    /// In the order in which they came.
+    /// In the order of their names.
     grasps: Vec<Grasp>,
     /// In their order.
     nodes: Vec<HeldNode>,
@@ -107,7 +114,7 @@ impl Grip {
     }
 
     /// The corners that are held, with their weights.
-    fn held(&self) -> impl Iterator<Item = (u32, f32)> {
+    fn held(self) -> impl Iterator<Item = (u32, f32)> {
         let corners = self.corners.into_iter().zip(self.weights);
         corners.filter(|(_, weight)| *weight > 0.0)
     }
@@ -116,7 +123,11 @@ impl Grip {
 impl Grasps {
     /// The grasps of this name.
     pub fn get(&self, id: SlotId) -> Option<&Grasp> {
-        self.grasps.iter().find(|grasp| grasp.id == id)
+        self.place_of_grasp(id).map(|place| &self.grasps[place])
+    }
+
+    fn place_of_grasp(&self, id: SlotId) -> Option<usize> {
+        self.grasps.binary_search_by_key(&id, |grasp| grasp.id).ok()
     }
 
     /// Whether what is to be told of them is finite.
@@ -156,7 +167,8 @@ impl Grasps {
             grasp.force = Vec3::ZERO;
             for (corner, weight) in grasp.grip().held() {
                 if let Ok(place) = nodes.binary_search_by_key(&corner, |held| held.node) {
-                    grasp.force += nodes[place].force * (weight / nodes[place].weight);
+                    let share = parts(weight) as f64 / nodes[place].parts as f64;
+                    grasp.force += nodes[place].force * share as f32;
                 }
             }
         }
@@ -274,79 +286,104 @@ impl Body {
     }
 
     /// Has the tool in this place hold these, for which there is room and whose nodes can be held, under these names.
-    pub(crate) fn grasp(&mut self, tool: usize, grips: impl Iterator<Item = (SlotId, Grip)>, limit: f32) -> Result<()> {
-        close(self);
-        // Damping is to be that of masses as they are.
-        self.scale_masses(0.0);
+    pub(crate) fn grasp(
+        &mut self,
+        tool: usize,
+        grips: impl ExactSizeIterator<Item = (SlotId, Grip)>,
+        limit: f32,
+    ) -> Result<()> {
+        let mut more = memory::reserved(grips.len())?;
+        let mut nodes = memory::reserved(3 * grips.len())?;
         for (id, grip) in grips {
-            let grip = Grip {
+            let grasp = Grasp {
+                id,
+                tool,
                 corners: grip.corners.map(|corner| self.order.own(corner)),
-                ..grip
+                weights: grip.weights,
+                limit: if limit > 0.0 { limit } else { f32::INFINITY },
+                force: Vec3::ZERO,
             };
-            for (node, weight) in grip.held() {
-                self.hold(node, weight, tool)?;
-            }
-            if let Some(grasps) = &mut self.grasps {
-                grasps.grasps.push(Grasp {
-                    id,
-                    tool,
-                    corners: grip.corners,
-                    weights: grip.weights,
-                    limit: if limit > 0.0 { limit } else { f32::INFINITY },
-                    force: Vec3::ZERO,
-                });
-            }
+            nodes.extend(grasp.grip().held().map(|(node, _)| node));
+            more.push(grasp);
         }
-        self.forget_held();
-        Ok(())
-    }
-
-    /// Has a tool hold a node, in one grasp more where it does so already.
-    fn hold(&mut self, node: u32, weight: f32, tool: usize) -> Result<()> {
         let Some(grasps) = &mut self.grasps else {
             return Ok(());
         };
-        let place = match grasps.place_of(node) {
-            Ok(place) => {
-                let held = &mut grasps.nodes[place];
-                held.grasp_count += 1;
-                held.weight += weight;
-                return Ok(());
-            }
-            Err(place) => place,
-        };
-        self.pins.hold(node, BVec3::TRUE)?;
-        let gain = self.implicit.as_ref().map(|implicit| implicit.gain_of(node as usize));
-        grasps.nodes.insert(
-            place,
-            HeldNode {
+        more.sort_unstable_by_key(|grasp| grasp.id);
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes.retain(|&node| grasps.place_of(node).is_err());
+        let mut held = memory::reserved(nodes.len())?;
+        let mut untouched = memory::reserved(nodes.len())?;
+        untouched.extend(nodes.iter().map(|&node| (node, tool)));
+        close(self);
+        // Damping is to be that of masses as they are.
+        self.scale_masses(0.0);
+        if let Err(error) = self.pins.hold_all(&nodes) {
+            self.forget_held();
+            return Err(error);
+        }
+        for &node in &nodes {
+            let gain = self.implicit.as_ref().map(|implicit| implicit.gain_of(node as usize));
+            held.push(HeldNode {
                 node,
                 tool,
-                grasp_count: 1,
-                weight,
+                parts: 0,
                 offset: None,
                 force: Vec3::ZERO,
                 torque: Vec3::ZERO,
                 gain: gain.unwrap_or_default(),
                 course: Course::default(),
-            },
-        );
-        self.inverse_masses[node as usize] = 0.0;
-        if let Some(applied) = &mut self.applied {
-            applied.set(node as usize, Vec3::ZERO);
+            });
+            self.inverse_masses[node as usize] = 0.0;
+            if let Some(applied) = &mut self.applied {
+                applied.set(node as usize, Vec3::ZERO);
+            }
         }
         if let Some(contacts) = &mut self.contacts {
-            contacts.hold(node, tool);
+            contacts.hold(&untouched);
         }
+        if let Some(grasps) = &mut self.grasps {
+            memory::merge(&mut grasps.nodes, &held, |held| held.node);
+            for (corner, weight) in more.iter().flat_map(|grasp| grasp.grip().held()) {
+                if let Ok(place) = grasps.place_of(corner) {
+                    grasps.nodes[place].parts += parts(weight);
+                }
+            }
+            memory::merge(&mut grasps.grasps, &more, |grasp| grasp.id);
+        }
+        self.forget_held();
         Ok(())
     }
 
     /// Ends a grasp.
     pub(crate) fn let_go(&mut self, id: SlotId) {
-        self.let_go_where(|grasp| grasp.id == id, |_| ());
-        if !self.is_grasped() {
+        let Some(place) = self.grasps.as_ref().and_then(|grasps| grasps.place_of_grasp(id)) else {
+            return;
+        };
+        close(self);
+        let Some(grasps) = &mut self.grasps else {
+            return;
+        };
+        let grip = grasps.grasps.remove(place).grip();
+        for (corner, weight) in grip.held() {
+            let Ok(place) = grasps.place_of(corner) else {
+                continue;
+            };
+            grasps.nodes[place].parts -= parts(weight);
+            if grasps.nodes[place].parts == 0 {
+                let HeldNode { node, tool, .. } = grasps.nodes.remove(place);
+                self.pins.remove(node);
+                self.inverse_masses[node as usize] = 1.0 / self.masses[node as usize];
+                if let Some(contacts) = &mut self.contacts {
+                    contacts.release(node, tool);
+                }
+            }
+        }
+        if grasps.grasps.is_empty() {
             self.grasps = None;
         }
+        self.forget_held();
     }
 
     /// Ends all grasps of the tool in this place.
@@ -378,22 +415,25 @@ impl Body {
             if !stays {
                 for (corner, weight) in grasp.grip().held() {
                     if let Ok(place) = nodes.binary_search_by_key(&corner, |held| held.node) {
-                        nodes[place].grasp_count -= 1;
-                        nodes[place].weight -= weight;
+                        nodes[place].parts -= parts(weight);
                     }
                 }
                 see(grasp.id);
             }
             stays
         });
+        let is_let_go = |node: u32| {
+            let place = nodes.binary_search_by_key(&node, |held| held.node);
+            place.is_ok_and(|place| nodes[place].parts == 0)
+        };
+        pins.retain(|node| !is_let_go(node));
+        if let Some(contacts) = contacts {
+            contacts.retain_held(|node| !is_let_go(node));
+        }
         nodes.retain(|held| {
-            let stays = held.grasp_count > 0;
+            let stays = held.parts > 0;
             if !stays {
-                pins.remove(held.node);
                 inverse_masses[held.node as usize] = 1.0 / masses[held.node as usize];
-                if let Some(contacts) = contacts {
-                    contacts.release(held.node, held.tool);
-                }
             }
             stays
         });

@@ -73,6 +73,7 @@ impl Body {
         if let Some(implicit) = &self.implicit {
             implicit.hash(hasher);
         }
+        self.contact.hash(hasher);
         if let Some(contacts) = &self.contacts {
             contacts.holds.hash(hasher);
         }

@@ -598,8 +598,17 @@ impl Body {
         }
     }
 
+    /// Leaves the current state as it is, without the step that was attempted.
+    pub(crate) fn stay(&mut self) {
+        self.put_back();
+        self.clear_pending();
+        if let Some(contacts) = &mut self.contacts {
+            contacts.stay();
+        }
+    }
+
     /// Forgets the forces and the ways of pins that were meant for the last step.
-    pub(crate) fn clear_pending(&mut self) {
+    fn clear_pending(&mut self) {
         for pin in self.pins.iter_mut() {
             pin.target = None;
         }

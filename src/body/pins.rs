@@ -4,6 +4,7 @@ use glam::{BVec3, DVec3, Vec3};
 
 use super::vectors::Vectors;
 use crate::error::Result;
+use crate::memory;
 use crate::springs::TILE;
 use crate::threads::Ragged;
 
@@ -30,6 +31,20 @@ pub(crate) struct Pin {
 }
 
 impl Pin {
+    fn new(node: u32, axes: BVec3) -> Self {
+        Self {
+            node,
+            target: None,
+            force: Vec3::ZERO,
+            closing_share: 0.0,
+            goal: Vec3::ZERO,
+            travel: Vec3::ZERO,
+            force_sum: DVec3::ZERO,
+            solved: Vec3::ZERO,
+            axes,
+        }
+    }
+
     /// Where it is at this fraction of the step in progress, in the body's coordinates.
     #[inline]
     pub fn place(&self, fraction: f64) -> Vec3 {
@@ -169,19 +184,41 @@ impl Pins {
         Ok(self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?)
     }
 
+    /// Holds these nodes, which are in order and not held yet, along all axes; there is room for them.
+    pub fn hold_all(&mut self, nodes: &[u32]) -> Result<()> {
+        let Some(last) = nodes.last() else {
+            return Ok(());
+        };
+        let mut more = memory::reserved(nodes.len())?;
+        more.extend(nodes.iter().map(|&node| Pin::new(node, BVec3::TRUE)));
+        let tiles = (*last as usize / TILE + 1).max(self.tiles.len());
+        self.tiles.try_reserve(tiles - self.tiles.len())?;
+        memory::merge(&mut self.pins, &more, |pin| pin.node);
+        self.tiles.resize(tiles, 0);
+        self.find_tiles();
+        Ok(())
+    }
+
+    /// Lets go of nodes that are not to stay.
+    pub fn retain(&mut self, stays: impl Fn(u32) -> bool) {
+        self.pins.retain(|pin| stays(pin.node));
+        self.partial_count = self.pins.iter().filter(|pin| pin.is_partial()).count();
+        self.find_tiles();
+    }
+
+    /// Finds anew where the pins of each tile begin.
+    fn find_tiles(&mut self) {
+        let mut start = 0;
+        for (tile, first) in self.tiles.iter_mut().enumerate() {
+            let before = |pin: &Pin| (pin.node as usize) < tile * TILE;
+            start += self.pins[start..].iter().take_while(|pin| before(pin)).count();
+            *first = start;
+        }
+    }
+
     fn insert(&mut self, index: usize, node: u32, axes: BVec3) -> Result<()> {
         self.pins.try_reserve(1)?;
-        let pin = Pin {
-            node,
-            target: None,
-            force: Vec3::ZERO,
-            closing_share: 0.0,
-            goal: Vec3::ZERO,
-            travel: Vec3::ZERO,
-            force_sum: DVec3::ZERO,
-            solved: Vec3::ZERO,
-            axes,
-        };
+        let pin = Pin::new(node, axes);
         let tiles = node as usize / TILE + 1;
         self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?;
         self.pins.insert(index, pin);

@@ -201,7 +201,7 @@ pub struct sinew_body_def {
     /// Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
     /// enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
     pub pressure: f32,
-    /// m, at least 0: what tools and other tissue keep off the surface; default 0.
+    /// m, 0 to 1e9: what tools and other tissue keep off the surface; default 0.
     pub contact_thickness: f32,
     /// Coulomb coefficient with other tissue and with itself, at least 0; of two bodies that meet, the larger holds; default 0. With tools
     /// the tool's own holds.

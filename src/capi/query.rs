@@ -55,7 +55,8 @@ impl From<Option<SurfaceHit>> for sinew_surface_point {
 
 /// Writes the first point that a ray from `origin`, 3 floats, m, along `direction`, 3 floats of any length, meets on the surface of a
 /// body within `max_distance`, m, at least 0, at the nodes' current places. `out->struct_size` is set by the caller; where nothing is
-/// met out->body is all zero.
+/// met out->body is all zero. What lies along a triangle does not meet it. All triangles of the bodies whose box the ray meets are looked
+/// at: some 0.3 us each.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the direction is zero).
 ///
@@ -83,7 +84,8 @@ pub unsafe extern "C" fn sinew_world_cast_ray(
 }
 
 /// Writes the point of the bodies' surfaces that is nearest to `point`, 3 floats, m, at the nodes' current places, no further than
-/// `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero.
+/// `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero. All triangles of
+/// the bodies whose box is near enough are looked at: some 0.15 us each.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT.
 ///

@@ -46,9 +46,10 @@ pub struct sinew_tool_def {
     pub struct_size: usize,
     /// SINEW_SHAPE_...: sphere about the origin, capsule along y, plane y = 0 with free space above.
     pub shape: u32,
-    /// m, above 0: sphere, capsule; no default.
+    /// m, above 0, at most 1e9, as is the sum with `half_length`: sphere, capsule; no default.
     pub radius: f32,
-    /// m: capsule, between the centre and a cap's centre.
+    /// m, at least 0: capsule, between the centre and a cap's centre; with SINEW_DETECTION_IMAGE_SPACE at most 10 000 times `radius`.
+    /// What is touched is known to a ten millionth of it.
     pub half_length: f32,
     /// 0.
     pub reserved0: u32,
@@ -64,13 +65,17 @@ pub struct sinew_tool_def {
     pub detection: u32,
     /// Coulomb coefficient; default 0.
     pub friction: f32,
-    /// Where it is at first, m; default 0 0 0.
+    /// Where it is at first, m, each within 1e9 of 0; default 0 0 0.
     pub position: [f32; 3],
     /// x y z w; default 0 0 0 1; normalised, zero is refused.
     pub orientation: [f32; 4],
     /// 0.
     pub reserved: u32,
-    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: chosen from the mesh.
+    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: a 256th or a 96th of the mesh's longest
+    /// extent, or a fourth of the least where that is less. Refused where no ray or sample would lie within the mesh, by default where
+    /// fewer than two would along its least extent; and where an image would have more than 2^24 pixels or a field as many samples.
+    /// Memory: some 24 bytes for each pixel of 3 images, or 4 for each sample. Time: to draw the mesh 3 times, or as many exact distances
+    /// as there are samples, which takes minutes for 2^24 of a large mesh.
     pub resolution: f32,
     /// N, at least 0: the largest force that moves it; default infinity: it goes wherever it is sent. Where tissue resists with more it stops
     /// short of its pose: see sinew_tool_get_pose.
@@ -231,9 +236,11 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
 }
 
 /// Moves a tool to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be
-/// NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way.
+/// NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way. What of its way a tool of limited force has
+/// not gone in that step is forgotten: it is sent again.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the orientation is zero), SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0 or the orientation is zero),
+/// SINEW_STATUS_STALE_ID.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.

@@ -89,7 +89,7 @@ pub struct sinew_step_report {
     /// anything to compare.
     pub error_estimate: f32,
     /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those in a body that is closed come out again by themselves.
+    /// apart. Those of another body in one that is closed come out again by themselves.
     pub crossings: u32,
     /// 0.
     pub reserved: u32,

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::features::Features;
+use super::filter::CollisionFilter;
 use super::path::{Placement, Solid, ToolPath};
 use crate::body::{Bounds, Vectors};
 use crate::error::Result;
@@ -14,7 +15,7 @@ use crate::memory;
 #[derive(Debug)]
 pub(super) struct Candidates {
     near: Vec<u32>,
-    /// The room that the list covers, one for each tool.
+    /// The room that the list covers, one for each tool that the body meets.
     zones: Vec<Zone>,
     /// How far nodes may still move, m.
     slack: f32,
@@ -61,13 +62,11 @@ impl Candidates {
         self.slack = -1.0;
     }
 
-    /// Whether the list is good for these tools on their ways.
-    pub fn covers(&self, tools: &[ToolPath], origin: DVec3) -> bool {
-        tools.len() == self.zones.len()
-            && tools
-                .iter()
-                .zip(&self.zones)
-                .all(|(tool, zone)| zone.covers(tool, origin))
+    /// Whether the list is good for these tools on their ways and a body with this filter.
+    pub fn covers(&self, tools: &[ToolPath], filter: CollisionFilter, origin: DVec3) -> bool {
+        let mut zones = self.zones.iter();
+        let are_covered = met(tools, filter).all(|tool| zones.next().is_some_and(|zone| zone.covers(tool, origin)));
+        are_covered && zones.next().is_none()
     }
 
     /// Takes `distance` from the slack: whether the list is still good when the nodes have moved so far.
@@ -77,20 +76,19 @@ impl Candidates {
     }
 
     /// Makes the list anew: all features that can come within `margin` of a tool while no node moves further than
-    /// `slack` and no tool leaves its way by more than `slack`.
-    pub fn gather(
+    /// `slack` and no tool leaves its way by more than `slack`; `tools` are those that the body meets.
+    pub fn gather<'a>(
         &mut self,
         features: &Features,
         positions: &Vectors,
-        tools: &[ToolPath],
+        tools: impl Iterator<Item = &'a ToolPath> + Clone,
         origin: DVec3,
-        margin: f32,
-        slack: f32,
+        [margin, slack]: [f32; 2],
     ) {
         self.near.clear();
         self.zones.clear();
         self.slack = slack;
-        for tool in tools {
+        for tool in tools.clone() {
             self.zones.push(match Zone::of(tool, origin) {
                 Zone::Box { slot, bounds } => Zone::Box {
                     slot,
@@ -131,11 +129,16 @@ impl Candidates {
                     && zone.meets(&bounds, reach)
                     && zone.reaches(tool, nodes, positions, reach)
             };
-            if self.zones.iter().zip(tools).any(meets) {
+            if self.zones.iter().zip(tools.clone()).any(meets) {
                 self.near.push(index);
             }
         }
     }
+}
+
+/// Those of the tools that a body with this filter meets: the others are as if they were not there.
+pub(super) fn met(tools: &[ToolPath], filter: CollisionFilter) -> impl Iterator<Item = &ToolPath> + Clone {
+    tools.iter().filter(move |tool| tool.filter.meets(filter))
 }
 
 impl Zone {

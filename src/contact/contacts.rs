@@ -6,7 +6,7 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
-use super::candidates::Candidates;
+use super::candidates::{Candidates, met};
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::filter::{BodyContact, CollisionFilter};
@@ -17,6 +17,7 @@ use super::path::{Motion, Solid, ToolPath};
 use super::report::Touch;
 use crate::body::{Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
+use crate::memory;
 
 /// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
 const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
@@ -160,7 +161,7 @@ impl Contacts {
         self.loads.clear();
         self.loads.resize(tools.len(), Load::default());
         // A step that is begun again goes back to where its nodes were.
-        if !self.committed || !self.candidates.covers(tools, origin) {
+        if !self.committed || !self.candidates.covers(tools, self.filter, origin) {
             self.candidates.invalidate();
         }
         self.committed = false;
@@ -201,6 +202,14 @@ impl Contacts {
         }
     }
 
+    /// The step that was begun last is not taken: the body is where it was, and touches what it touched, but nothing pressed it.
+    pub fn stay(&mut self) {
+        self.touches.clear();
+        for pair in &mut self.touched {
+            *pair = [pair[0]; 2];
+        }
+    }
+
     /// What the last step that became current left of contacts with a tool at this place in the world.
     pub fn touches(&self, slot: usize) -> impl Iterator<Item = &Touch> {
         self.touches.iter().filter(move |touch| touch.slot == slot)
@@ -213,6 +222,9 @@ impl Contacts {
 
     /// A tool at this place in the world is gone.
     pub fn forget_tool(&mut self, slot: usize) {
+        // Another may come to its place.
+        self.candidates.invalidate();
+        self.holds.forget_tool(slot);
         self.touches.retain(|touch| touch.slot != slot);
         if let Some(pair) = self.touched.get_mut(slot) {
             *pair = [false; 2];
@@ -224,17 +236,21 @@ impl Contacts {
         Ok(self.held.try_reserve(count)?)
     }
 
-    /// A tool holds this node, and does not touch it any more.
-    pub fn hold(&mut self, node: u32, slot: usize) {
-        let place = self.held.partition_point(|&held| held < (node, slot));
-        self.held.insert(place, (node, slot));
+    /// Tools hold these nodes too, which are in order, and do not touch them any more; there is room for them.
+    pub fn hold(&mut self, held: &[(u32, usize)]) {
+        memory::merge(&mut self.held, held, |&held| held);
     }
 
-    /// The tool does so no longer.
+    /// The tool holds this node no longer.
     pub fn release(&mut self, node: u32, slot: usize) {
         if let Ok(place) = self.held.binary_search(&(node, slot)) {
             self.held.remove(place);
         }
+    }
+
+    /// Nodes that are not to stay are held no longer.
+    pub fn retain_held(&mut self, stays: impl Fn(u32) -> bool) {
+        self.held.retain(|&(node, _)| stays(node));
     }
 
     /// Whether the tool in this place holds a node of the feature. What it holds may lie within it, and edges and faces from there
@@ -292,7 +308,7 @@ impl Contacts {
             return;
         }
         self.find_candidates(&meeting);
-        if self.candidates.near().is_empty() || slices(&meeting) > 1 {
+        if self.candidates.near().is_empty() || self.slices(&meeting) > 1 {
             return;
         }
         let slice = Slice::ahead(&meeting);
@@ -318,7 +334,7 @@ impl Contacts {
         }
         let is_foreseen = !self.holds.is_empty();
         let slices = if meeting.drifts && !is_foreseen {
-            slices(&meeting)
+            self.slices(&meeting)
         } else {
             1
         };
@@ -382,11 +398,29 @@ impl Contacts {
         }
     }
 
+    /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
+    fn slices(&self, meeting: &Meeting) -> u32 {
+        let mut slices = 1.0_f32;
+        for tool in met(meeting.tools, self.filter) {
+            let Some(sweep) = tool.sweep(meeting.origin) else {
+                continue;
+            };
+            let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
+            let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
+            if wanted > slices {
+                let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
+                if reached.overlaps(&sweep.bounds) {
+                    slices = wanted;
+                }
+            }
+        }
+        (slices as u32).clamp(1, SLICES)
+    }
+
     fn find_candidates(&mut self, meeting: &Meeting) {
-        let tool_speed = meeting
-            .tools
-            .iter()
-            .fold(0.0_f32, |speed, tool| speed.max(tool.speed(meeting.dt)));
+        let tools = met(meeting.tools, self.filter);
+        let speeds = tools.clone().map(|tool| tool.speed(meeting.dt));
+        let tool_speed = speeds.fold(0.0, f32::max);
         let travel = meeting.substep * (meeting.fastest + tool_speed);
         if self.candidates.spend(travel) {
             return;
@@ -396,10 +430,9 @@ impl Contacts {
         self.candidates.gather(
             &self.features,
             meeting.positions,
-            meeting.tools,
+            tools,
             meeting.origin,
-            meeting.substep * tool_speed + meeting.slack + meeting.thickness,
-            slack,
+            [meeting.substep * tool_speed + meeting.slack + meeting.thickness, slack],
         );
         self.candidates.spend(travel);
     }
@@ -507,25 +540,6 @@ impl Contacts {
             }
         }
     }
-}
-
-/// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
-fn slices(meeting: &Meeting) -> u32 {
-    let mut slices = 1.0_f32;
-    for tool in meeting.tools {
-        let Some(sweep) = tool.sweep(meeting.origin) else {
-            continue;
-        };
-        let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
-        let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
-        if wanted > slices {
-            let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
-            if reached.overlaps(&sweep.bounds) {
-                slices = wanted;
-            }
-        }
-    }
-    (slices as u32).clamp(1, SLICES)
 }
 
 impl Slice {

@@ -95,6 +95,11 @@ impl DistanceField {
         Self::of(&ExactSolid::new(surface)?, cell)
     }
 
+    /// Whether any sample lies further than this within the solid, m.
+    pub(super) fn is_inside_somewhere(&self, depth: f32) -> bool {
+        self.distances.iter().any(|&distance| distance < -depth)
+    }
+
     /// The size of a cell, m.
     pub fn cell(&self) -> f32 {
         self.cell

@@ -1,7 +1,8 @@
 //! What meets what, and what a body asks of contact.
 
-use super::tool::Detection;
+use super::tool::{Detection, check_reach};
 use crate::body::not_negative;
+use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 
 /// Which tools and bodies meet: two do where each has a category that the other's mask has.
@@ -26,6 +27,12 @@ impl CollisionFilter {
         mask: u32::MAX,
     };
 
+    pub(super) fn hash(self, hasher: &mut StateHasher) {
+        for bits in [self.category, self.mask] {
+            hasher.write_u64(u64::from(bits));
+        }
+    }
+
     /// Whether both meet each other.
     pub(crate) fn meets(self, other: Self) -> bool {
         self.category & other.mask != 0 && other.category & self.mask != 0
@@ -35,7 +42,7 @@ impl CollisionFilter {
 /// What a body asks of contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyContact {
-    /// What tools and other tissue keep off its surface, m, at least 0: the thickness of a cloth on either side.
+    /// What tools and other tissue keep off its surface, m, 0 to 1e9: the thickness of a cloth on either side.
     pub thickness: f32,
     /// The Coulomb coefficient of friction with other tissue and with itself, at least 0; of two bodies that meet, the larger holds. A
     /// tool's own holds with tools.
@@ -77,8 +84,18 @@ impl BodyContact {
         filter: CollisionFilter::ALL,
     };
 
+    /// Adds the bits that the next step depends on.
+    pub(crate) fn hash(&self, hasher: &mut StateHasher) {
+        hasher.write_floats(&[self.thickness, self.friction, self.resolution]);
+        for choice in [self.with_bodies as u64, self.with_itself as u64, self.detection as u64] {
+            hasher.write_u64(choice);
+        }
+        self.filter.hash(hasher);
+    }
+
     pub(crate) fn check(&self) -> Result<()> {
         not_negative("contact_thickness", self.thickness)?;
+        check_reach("contact_thickness", self.thickness)?;
         not_negative("contact_friction", self.friction)?;
         not_negative("contact_resolution", self.resolution)?;
         if self.detection == Detection::DistanceField {

@@ -138,6 +138,13 @@ impl Holds {
         self.settled.clear();
     }
 
+    /// A tool at this place in the world is gone.
+    pub fn forget_tool(&mut self, slot: usize) {
+        for pushes in [&mut self.last, &mut self.settled] {
+            pushes.retain(|push| push.slot != slot);
+        }
+    }
+
     /// What the next step depends on.
     pub fn hash(&self, hasher: &mut StateHasher) {
         for push in &self.settled {

@@ -11,7 +11,7 @@ use super::image_space::LayeredImage;
 use super::tool::Detection;
 use crate::body::Bounds;
 use crate::diagnostics::StateHasher;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::ClosedSurface;
 
 /// What a mesh encloses.
@@ -34,9 +34,14 @@ enum Found {
     Image(Box<LayeredImage>),
 }
 
-/// The longest extent is this many pixels or cells, where it is not said how fine an image or a field is.
+/// Where it is not said how fine an image or a field is, the longest extent is this many pixels or cells, and the least so many; a few
+/// less where it would take more than so many of them in one image or in all.
 const PIXELS: f32 = 256.0;
 const CELLS: f32 = 96.0;
+const THIN: f32 = 4.0;
+const THINNEST: f32 = 2.0;
+const MOST_PIXELS: f64 = (1 << 20) as f64;
+const MOST_CELLS: f64 = (1 << 22) as f64;
 
 /// How far beside a feature's deepest point is looked at least, as a part of half the least extent.
 const BESIDE: f32 = 1e-3;
@@ -57,15 +62,11 @@ impl MeshSolid {
     ) -> Result<Arc<Self>> {
         let surface = ClosedSurface::new(positions, triangles)?;
         let bounds = Bounds::of(surface.positions().iter().copied());
+        let sides = bounds.max - bounds.min;
         let grain = if resolution > 0.0 {
             resolution
         } else {
-            let count = if detection == Detection::ImageSpace {
-                PIXELS
-            } else {
-                CELLS
-            };
-            (bounds.max - bounds.min).max_element() / count
+            grain_for(sides, detection)
         };
         let found = match detection {
             Detection::Exact => Found::Exact(Box::new(ExactSolid::new(&surface)?)),
@@ -78,6 +79,24 @@ impl MeshSolid {
                 Found::Field(Box::new(field))
             }
         };
+        let is_fine = resolution > 0.0 || grain * THINNEST <= sides.min_element();
+        let is_seen = match &found {
+            Found::Exact(_) => true,
+            Found::Field(field) => is_fine && field.is_inside_somewhere(BESIDE * sides.min_element()),
+            Found::Image(image) => is_fine && image.is_inside_somewhere(),
+        };
+        if !is_seen {
+            return Err(Error::invalid(format!(
+                "resolution is {resolution} m: {} that are {grain} m apart do not show a solid of which the least extent is {least} m: \
+                 a quarter of that would do",
+                if detection == Detection::ImageSpace {
+                    "rays"
+                } else {
+                    "samples"
+                },
+                least = sides.min_element()
+            )));
+        }
         let mut hasher = StateHasher::new();
         hasher.write_u64(detection as u64);
         hasher.write_floats(&[resolution]);
@@ -192,6 +211,28 @@ impl MeshSolid {
             ..closest
         }
     }
+}
+
+/// How fine an image or a field of a solid with these extents is.
+fn grain_for(sides: Vec3, detection: Detection) -> f32 {
+    let (longest, least) = (sides.max_element(), sides.min_element());
+    let is_image = detection == Detection::ImageSpace;
+    let whole = longest / if is_image { PIXELS } else { CELLS };
+    let fits = |grain: f32| {
+        let counts = (sides / grain).as_dvec3();
+        if is_image {
+            let largest = counts.x * counts.y.max(counts.z);
+            largest.max(counts.y * counts.z) <= MOST_PIXELS
+        } else {
+            // With some around it.
+            (counts + 8.0).element_product() <= MOST_CELLS
+        }
+    };
+    let mut grain = whole.min((least / THIN).max(whole / MOST_PIXELS.sqrt() as f32));
+    while grain < whole && !fits(grain) {
+        grain *= 1.125;
+    }
+    grain.min(whole)
 }
 
 /// Whether a plane that is parallel to a side of the box, to an edge of each, or to the face, tells that a node, edge or face keeps further

@@ -11,20 +11,21 @@ use super::rounded;
 use crate::body::{finite_vector, not_negative};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::mesh::FURTHEST;
 
 /// The shape of a tool, about its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape<'a> {
     /// A ball.
     Sphere {
-        /// Metres, above 0.
+        /// Metres, above 0, at most 1e9.
         radius: f32,
     },
     /// A cylinder along y with round caps.
     Capsule {
-        /// Metres, above 0.
+        /// Metres, above 0, at most 1e9.
         radius: f32,
-        /// Metres between the centre and a cap's centre, at least 0.
+        /// Metres between the centre and a cap's centre, 0 to 1e9. What is touched is known to a ten millionth of it.
         half_length: f32,
     },
     /// The plane y = 0, with free space above it and solid below.
@@ -53,7 +54,7 @@ pub enum Detection {
 /// Where a tool is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Metres.
+    /// Metres, each within 1e9 of 0.
     pub position: Vec3,
     /// A unit quaternion.
     pub orientation: Quat,
@@ -85,9 +86,15 @@ impl Pose {
         }
     }
 
-    /// The pose with its orientation normalised; refused where it has no direction or is not finite.
+    /// The pose with its orientation normalised; refused where it has no direction, is not finite or too far away.
     pub(crate) fn checked(self) -> Result<Self> {
         finite_vector("position", self.position)?;
+        if self.position.abs().max_element() > FURTHEST {
+            return Err(Error::invalid(format!(
+                "position is {}: must be within {FURTHEST:e} m of the origin along each axis",
+                self.position
+            )));
+        }
         let [x, y, z, w] = self.orientation.to_array();
         // In f64, so that neither large nor small quaternions overflow on the way.
         let exact = glam::DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into());
@@ -113,7 +120,8 @@ pub struct ToolDefinition<'a> {
     pub shape: Shape<'a>,
     /// How it finds what it touches.
     pub detection: Detection,
-    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0: chosen from the mesh.
+    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0: a 256th or a 96th of the mesh's longest extent, or a
+    /// fourth of the least where that is less. Refused where no ray or sample would lie within the mesh.
     pub resolution: f32,
     /// The Coulomb coefficient of friction, at least 0.
     pub friction: f32,
@@ -170,11 +178,24 @@ pub(crate) struct Tool {
     pub torque: Vec3,
 }
 
+/// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
+const SLENDEREST: f32 = 1e4;
+
+/// Refuses a length with which squares of distances would not stay finite.
+pub(super) fn check_reach(name: &str, value: f32) -> Result<()> {
+    if value <= FURTHEST {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "{name} is {value}: must be at most {FURTHEST:e} m"
+    )))
+}
+
 impl Tool {
     pub fn new(definition: &ToolDefinition) -> Result<Self> {
         let positive = |name: &str, value: f32| {
             if value > 0.0 && value.is_finite() {
-                return Ok(());
+                return check_reach(name, value);
             }
             Err(Error::invalid(format!("{name} is {value}: must be above 0 and finite")))
         };
@@ -213,6 +234,13 @@ impl Tool {
             Shape::Capsule { radius, half_length } => {
                 positive("radius", radius)?;
                 not_negative("half_length", half_length)?;
+                check_reach("half_length", half_length)?;
+                check_reach("radius + half_length", radius + half_length)?;
+                if detection == Detection::ImageSpace && half_length > SLENDEREST * radius {
+                    return Err(Error::invalid(format!(
+                        "half_length is {half_length}: at most {SLENDEREST} times the radius is possible in an image"
+                    )));
+                }
                 rounded(radius, half_length)?
             }
             Shape::Plane => Form::HalfSpace,
@@ -259,9 +287,7 @@ impl Tool {
             Form::Mesh(solid) => hasher.write_u64(solid.hash()),
         }
         hasher.write_floats(&[self.friction, self.force_limit]);
-        for bits in [self.filter.category, self.filter.mask] {
-            hasher.write_u64(u64::from(bits));
-        }
+        self.filter.hash(hasher);
         hasher.write_u64(u64::from(self.target.is_some()));
         for pose in [Some(self.pose), self.target].into_iter().flatten() {
             hasher.write_floats(&pose.position.to_array());

@@ -19,7 +19,7 @@ const CROSSING: f64 = 1e-6;
 const ROUNDS: usize = 16;
 
 /// No node lies further from the origin, m: squares of distances stay finite in `f32`.
-const FURTHEST: f32 = 1e9;
+pub(crate) const FURTHEST: f32 = 1e9;
 
 /// So many triangles of a part are tried for one that no other part touches.
 const TRIES: usize = 16;

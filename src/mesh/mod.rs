@@ -17,6 +17,7 @@ use crate::memory;
 use crate::{Error, Result};
 
 pub use closed::ClosedSurface;
+pub(crate) use closed::FURTHEST;
 pub use file::{MeshFormat, load};
 pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};

@@ -149,7 +149,7 @@ impl World {
         check_limit(force_limit)?;
         let mut ids = memory::reserved(grips.len())?;
         // All may slip in one step.
-        let count = self.attachments.iter().count() + grips.len();
+        let count = self.attachments.count() + grips.len();
         self.slipped.try_reserve(count)?;
         if grips.len() == 0 {
             return Ok(ids);
@@ -158,8 +158,15 @@ impl World {
         let holder = Holder::Tool(tool);
         self.name(Attachment { body, holder }, grips.len(), &mut ids)?;
         let held = self.bodies.get_mut(body.0)?;
-        held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit)?;
-        Ok(ids)
+        match held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit) {
+            Ok(()) => Ok(ids),
+            Err(error) => {
+                for AttachmentId(id) in ids {
+                    self.attachments.remove(id)?;
+                }
+                Err(error)
+            }
+        }
     }
 
     /// Makes names for so many attachments, for which `ids` has room.
@@ -230,7 +237,7 @@ impl World {
         if all.is_empty() {
             return Ok(ids);
         }
-        self.slipped.try_reserve(self.attachments.iter().count() + all.len())?;
+        self.slipped.try_reserve(self.attachments.count() + all.len())?;
         for place in places {
             make_walks(&mut self.walks, place)?;
         }

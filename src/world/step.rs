@@ -29,7 +29,7 @@ pub struct StepReport {
     /// anything to compare.
     pub error_estimate: f32,
     /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those of one that is closed come out again by themselves.
+    /// apart. Those of another body in one that is closed come out again by themselves.
     pub crossings: u32,
 }
 
@@ -299,10 +299,7 @@ fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: 
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit(substeps, carry, tools, team);
             }
-            _ => {
-                body.put_back();
-                body.clear_pending();
-            }
+            _ => body.stay(),
         }
     }
 }

@@ -214,6 +214,12 @@ impl LayeredImage {
         (distance <= within).then_some((distance, normal))
     }
 
+    /// Whether any point is inside: at least two images show something.
+    pub(in crate::contact) fn is_inside_somewhere(&self) -> bool {
+        let images = self.images.iter();
+        images.filter(|image| !image.layers.is_empty()).count() >= 2
+    }
+
     /// Metres.
     pub(super) fn pixel(&self) -> f32 {
         self.pixel

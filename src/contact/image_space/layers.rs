@@ -119,7 +119,7 @@ impl Layers {
         }
     }
 
-    /// Whether nothing is seen.
+    /// Whether no ray passes anything.
     pub fn is_empty(&self) -> bool {
         self.crossings.is_empty()
     }
