@@ -8,6 +8,9 @@ use super::features::Feature;
 use super::path::{Motion, Placement, Solid};
 use super::sweep::{Corners, Segment};
 
+/// What contacts that are solved together may leave open between a node and a plane that touch, as a part of its way in a slice.
+const LEFT: f32 = 1e-4;
+
 /// What rounding may leave open between a node and a plane that touch, as a part of the largest coordinate.
 const ROUNDING: f32 = 1e-6;
 
@@ -61,12 +64,12 @@ pub(super) fn meet_plane(
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
+    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal).max(0.0);
+    let way = (closing + surface_velocity.length()) * slice.duration;
     let ahead = if meeting.drifts {
-        let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal).max(0.0);
-        (closing + surface_velocity.length()) * slice.duration + meeting.slack
+        way + meeting.slack
     } else {
-        // What rounding leaves open where they touch.
-        ROUNDING * position.abs().max(point.abs()).max_element()
+        LEFT * way + ROUNDING * position.abs().max(point.abs()).max_element()
     };
     if !(gap <= meeting.thickness + ahead) {
         return None;
