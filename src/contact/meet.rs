@@ -8,6 +8,10 @@ use super::features::Feature;
 use super::path::{Motion, Placement, Solid};
 use super::sweep::{Corners, Segment};
 
+/// What contacts that are solved together may leave open between a node and a plane that touch, as a part of the way
+/// that they would come nearer in a slice.
+const LEFT: f32 = 5e-5;
+
 /// What rounding may leave open between a node and a plane that touch, as a part of the largest coordinate.
 const ROUNDING: f32 = 1e-6;
 
@@ -61,12 +65,11 @@ pub(super) fn meet_plane(
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
+    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal).max(0.0);
     let ahead = if meeting.drifts {
-        let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal).max(0.0);
         (closing + surface_velocity.length()) * slice.duration + meeting.slack
     } else {
-        // What rounding leaves open where they touch.
-        ROUNDING * position.abs().max(point.abs()).max_element()
+        LEFT * closing * slice.duration + ROUNDING * position.abs().max(point.abs()).max_element()
     };
     if !(gap <= meeting.thickness + ahead) {
         return None;
