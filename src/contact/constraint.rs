@@ -2,14 +2,10 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
-use super::contacts::{Meeting, Slice};
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::impulses::LEVERAGE;
 use crate::body::{Mobility, Vectors};
-
-/// What is no way in, as a part of how fast the tool goes.
-const MISSED: f32 = 1e-4;
 
 /// A contact over one slice of a substep.
 ///
@@ -183,29 +179,6 @@ impl Constraint {
             velocities.set(node, velocity);
         }
         given.length() / self.free_mass
-    }
-
-    /// Whether its nodes go in by more than rounding would have them.
-    pub fn is_missed(&self, velocities: &Vectors) -> bool {
-        let missing = self.least_speed - self.velocity(velocities).dot(self.normal);
-        missing > MISSED * (self.least_speed.abs() + self.surface_velocity.length())
-    }
-
-    /// Has its nodes go on from where the slice begins with the velocities that they have now.
-    pub fn lead(&self, meeting: &mut Meeting, slice: &Slice) {
-        if !meeting.drifts {
-            return;
-        }
-        for (&node, start) in self.feature.nodes().iter().zip(self.starts) {
-            let held = match meeting.pins.get_mut(node) {
-                Some(pin) if !pin.is_partial() => continue,
-                _ => meeting.pins.partial_axes_of(node),
-            };
-            let led = meeting.next_positions.get(node as usize);
-            let moved = start + meeting.velocities.get(node as usize) * slice.remains;
-            let next = Vec3::select(held, led, moved);
-            meeting.next_positions.set(node as usize, next);
-        }
     }
 
     /// What the tissue received, N s.

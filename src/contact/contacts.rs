@@ -34,9 +34,6 @@ const SLICE_TRAVEL: f32 = 0.5;
 /// Sweeps over the contacts of each of several slices at most: what is left is found again in the next.
 const SWEEPS_OF_A_SLICE: u32 = 16;
 
-/// How often what the impulses lead into tools is searched for in a slice.
-const SEARCHES: u32 = 4;
-
 /// What a tool received from a body in the step in progress, N s and N m s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Load {
@@ -106,15 +103,13 @@ pub(crate) struct Meeting<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice {
     /// Seconds from its start to the end of the substep.
-    pub remains: f32,
+    remains: f32,
     /// s
     pub duration: f32,
     first: bool,
     sweeps: u32,
     /// Whether contacts are only looked for.
     foresees: bool,
-    /// So many contacts are known: others count where they are missed.
-    known: usize,
 }
 
 impl Contacts {
@@ -347,7 +342,6 @@ impl Contacts {
                 first: index == 0,
                 sweeps: if slices == 1 { SWEEPS } else { SWEEPS_OF_A_SLICE },
                 foresees: false,
-                known: 0,
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
             if is_foreseen {
@@ -357,7 +351,7 @@ impl Contacts {
             }
             let ends = [fraction(part(index)), fraction(part(index + 1))];
             self.find(&mut meeting, &slice, ends);
-            self.solve(&mut meeting, &slice, ends);
+            self.solve(&mut meeting, &slice);
         }
         if self.given != Bounds::EMPTY {
             let fastest = self.given.min.abs().max(self.given.max.abs()).length();
@@ -474,49 +468,28 @@ impl Contacts {
         let Some(mut constraint) = found else {
             return;
         };
-        if slice.known > 0 && !constraint.is_missed(meeting.velocities) {
-            return;
-        }
         constraint.tool = tool;
         if self.constraints.len() < self.together {
             self.constraints.push(constraint);
         } else if !slice.foresees {
             constraint.solve(meeting.velocities);
-            constraint.lead(meeting, slice);
-            self.settle(meeting, &constraint);
+            self.settle(meeting, slice, &constraint, true);
         }
     }
 
-    /// Gives the impulses of the contacts of a slice between these fractions of the step; where something is fast until they lead to no
-    /// others: what is kept off at one place may turn about it.
-    fn solve(&mut self, meeting: &mut Meeting, slice: &Slice, ends: [f64; 2]) {
-        let searches = if slice.sweeps < SWEEPS { SEARCHES } else { 0 };
-        let mut first = None;
-        for search in 0..=searches {
-            let constraints = &mut self.constraints;
-            first = Some(relax(slice.sweeps, first, || {
-                let changes = constraints
-                    .iter_mut()
-                    .map(|constraint| constraint.solve(meeting.velocities));
-                changes.fold(0.0, f32::max)
-            }));
-            // Where nothing was given beside what an equation found the nodes are where that has put them.
-            if first > Some(0.0) || self.holds.is_empty() {
-                for constraint in &self.constraints {
-                    constraint.lead(meeting, slice);
-                }
-            }
-            let known = self.constraints.len();
-            if search < searches {
-                self.find(meeting, &Slice { known, ..*slice }, ends);
-            }
-            if self.constraints.len() == known {
-                break;
-            }
-        }
+    fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
+        let constraints = &mut self.constraints;
+        let first = relax(slice.sweeps, None, || {
+            let changes = constraints
+                .iter_mut()
+                .map(|constraint| constraint.solve(meeting.velocities));
+            changes.fold(0.0, f32::max)
+        });
+        // Where nothing was given beside what an equation found the nodes are where that has put them.
+        let moves = first > 0.0 || self.holds.is_empty();
         for index in 0..self.constraints.len() {
             let constraint = self.constraints[index];
-            self.settle(meeting, &constraint);
+            self.settle(meeting, slice, &constraint, moves);
         }
         if meeting.drifts {
             for constraint in &self.constraints {
@@ -527,16 +500,29 @@ impl Contacts {
         }
     }
 
-    /// Adds what a contact gave to its tool's load, and to what pins hold.
-    fn settle(&mut self, meeting: &mut Meeting, constraint: &Constraint) {
+    /// Adds what a contact gave to its tool's load, and moves its nodes.
+    fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint, moves: bool) {
         let load = &mut self.loads[constraint.tool];
         let received = -constraint.given().as_dvec3();
         load.impulse += received;
         load.angular_impulse += constraint.arm.as_dvec3().cross(received);
-        for (&node, weight) in constraint.feature.nodes().iter().zip(constraint.weights) {
-            self.given = self.given.with(meeting.velocities.get(node as usize));
+        let corners = constraint.starts.iter().zip(constraint.weights);
+        for (&node, (&start, weight)) in constraint.feature.nodes().iter().zip(corners) {
             if let Some(pin) = meeting.pins.get_mut(node) {
                 pin.force_sum += received * f64::from(weight / meeting.substep);
+                if !pin.is_partial() {
+                    continue;
+                }
+            }
+            let velocity = meeting.velocities.get(node as usize);
+            self.given = self.given.with(velocity);
+            if meeting.drifts && moves {
+                let held = meeting.pins.partial_axes_of(node);
+                let led = meeting.next_positions.get(node as usize);
+                let moved = start + velocity * slice.remains;
+                meeting
+                    .next_positions
+                    .set(node as usize, Vec3::select(held, led, moved));
             }
         }
     }
@@ -551,7 +537,6 @@ impl Slice {
             first: true,
             sweeps: SWEEPS,
             foresees: true,
-            known: 0,
         }
     }
 }
