@@ -1,6 +1,11 @@
 //! A body pays for its own solver alone, and what is destroyed for nothing: bytes, counted at the allocator. Alone in its program.
 #![allow(unsafe_code)]
 
+#[path = "support/solid.rs"]
+mod solid;
+#[path = "support/tissue.rs"]
+mod tissue;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -88,17 +93,7 @@ fn a_body_pays_for_its_own_solver_alone() {
 fn a_tool_that_is_destroyed_takes_nothing() {
     let _turn = TURN.lock().expect("a turn");
     let mut world = World::new(WorldDefinition::default()).expect("a world");
-    let corner = |bits: u32| Vec3::new((bits & 1) as f32, (bits >> 1 & 1) as f32, (bits >> 2) as f32);
-    let positions: Vec<Vec3> = (0..8).map(corner).collect();
-    let sides = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles: Vec<[u32; 3]> = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let (positions, triangles) = solid::cuboid(Vec3::ZERO, Vec3::ONE);
     let before = HELD.load(Ordering::Relaxed);
     for detection in [Detection::ImageSpace, Detection::DistanceField] {
         let tool = world.create_tool(&ToolDefinition {

@@ -129,16 +129,10 @@ pub unsafe extern "C" fn sinew_body_attach_points(
     // SAFETY: the same contract.
     unsafe {
         with_world_mut(world, |world| {
-            let triangles = memory::array("triangles", triangles, count)?;
-            let weights = memory::array("weights", weights.cast::<[f32; 3]>(), count)?;
-            let out = memory::output_array("out", out, count)?;
+            let given = surface_points(["triangles", "weights"], triangles, weights, count)?;
             let mut points = crate::memory::reserved(count)?;
-            points.extend(
-                triangles
-                    .iter()
-                    .zip(weights)
-                    .map(|(&triangle, &weights)| SurfacePoint { triangle, weights }),
-            );
+            points.extend(given);
+            let out = memory::output_array("out", out, count)?;
             write(out, world.attach_points(body.id(), &points, tool.id(), force_limit)?);
             Ok(())
         })
@@ -269,22 +263,37 @@ unsafe fn anchors_of_nodes(name: &str, nodes: *const u32, count: usize) -> Resul
 }
 
 /// # Safety
-/// The arrays are NULL or as long as stated.
+/// As for [`surface_points`].
 unsafe fn anchors_of_points(
-    [of_triangles, of_weights]: [&str; 2],
+    names: [&str; 2],
     triangles: *const u32,
     weights: *const f32,
     count: usize,
 ) -> Result<Vec<Anchor>> {
     // SAFETY: the same contract.
-    let (triangles, weights) = unsafe {
-        let triangles = memory::array(of_triangles, triangles, count)?;
-        (triangles, memory::array(of_weights, weights.cast::<[f32; 3]>(), count)?)
-    };
+    let points = unsafe { surface_points(names, triangles, weights, count)? };
     let mut anchors = crate::memory::reserved(count)?;
-    let points = triangles.iter().zip(weights);
-    anchors.extend(points.map(|(&triangle, &weights)| Anchor::Point(SurfacePoint { triangle, weights })));
+    anchors.extend(points.map(Anchor::Point));
     Ok(anchors)
+}
+
+/// Points of a surface by the arrays of these names.
+///
+/// # Safety
+/// The arrays are NULL or as long as stated, and nobody changes them while the points are taken.
+unsafe fn surface_points<'a>(
+    [of_triangles, of_weights]: [&str; 2],
+    triangles: *const u32,
+    weights: *const f32,
+    count: usize,
+) -> Result<impl Iterator<Item = SurfacePoint> + 'a> {
+    // SAFETY: the same contract.
+    let (triangles, weights): (&'a [u32], &'a [[f32; 3]]) = unsafe {
+        let triangles = memory::array(of_triangles, triangles, count)?;
+        (triangles, memory::array(of_weights, weights.cast(), count)?)
+    };
+    let pairs = triangles.iter().zip(weights);
+    Ok(pairs.map(|(&triangle, &weights)| SurfacePoint { triangle, weights }))
 }
 
 fn write(out: &mut [sinew_attachment_id], ids: Vec<AttachmentId>) {

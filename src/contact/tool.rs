@@ -287,6 +287,10 @@ impl Tool {
             Form::Mesh(solid) => hasher.write_u64(solid.hash()),
         }
         hasher.write_floats(&[self.friction, self.force_limit]);
+        if self.force_limit.is_finite() {
+            // The search for how far it gets begins with it.
+            hasher.write_floats(&self.force.to_array());
+        }
         self.filter.hash(hasher);
         hasher.write_u64(u64::from(self.target.is_some()));
         for pose in [Some(self.pose), self.target].into_iter().flatten() {
