@@ -1553,6 +1553,20 @@ sinew_status sinew_body_is_closed(const struct sinew_world *world,
                                   uint32_t *out);
 
 /**
+ * Has a body be of these categories and meet those of `mask`, a bit for each, from the next step on: see sinew_body_def. What of tools and
+ * other bodies lies within it when they meet again is pushed out.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_set_collision(struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      uint32_t category,
+                                      uint32_t mask);
+
+/**
  * Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is
  * swept. What tools hold they hold there.
  *
@@ -1980,6 +1994,44 @@ sinew_status sinew_tool_set_pose(struct sinew_world *world,
                                  struct sinew_tool_id tool,
                                  const float *position,
                                  const float *orientation);
+
+/**
+ * Gives a tool this Coulomb coefficient of friction, at least 0, from the next step on.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_tool_set_friction(struct sinew_world *world,
+                                     struct sinew_tool_id tool,
+                                     float friction);
+
+/**
+ * Has `force_limit`, N, at least 0 or infinity, be the largest force that moves a tool, from the next step on: see sinew_tool_def.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_tool_set_force_limit(struct sinew_world *world,
+                                        struct sinew_tool_id tool,
+                                        float force_limit);
+
+/**
+ * Has a tool be of these categories and meet those of `mask`, a bit for each, from the next step on: see sinew_tool_def. With mask 0 it
+ * meets nothing; tissue that lies within it when it meets it again is pushed out.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_tool_set_collision(struct sinew_world *world,
+                                      struct sinew_tool_id tool,
+                                      uint32_t category,
+                                      uint32_t mask);
 
 /**
  * Writes where a tool is: its position, 3 floats, m, and its orientation, 4 floats, x y z w; either may be NULL. Where its force is

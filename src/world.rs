@@ -6,7 +6,7 @@ mod step;
 use glam::{Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
-use crate::contact::{Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
@@ -289,6 +289,36 @@ impl World {
             orientation: orientation.unwrap_or(pose.orientation),
         };
         tool.target = Some(target.checked()?);
+        Ok(())
+    }
+
+    /// Gives a tool this Coulomb coefficient of friction, at least 0, from the next step on.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not finite.
+    pub fn set_friction(&mut self, tool: ToolId, friction: f32) -> Result<()> {
+        self.tools.get_mut(tool.0)?.set_friction(friction)
+    }
+
+    /// Has this force, N, at least 0 or infinity, be the largest that moves a tool, from the next step on.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not a number.
+    pub fn set_force_limit(&mut self, tool: ToolId, limit: f32) -> Result<()> {
+        self.tools.get_mut(tool.0)?.set_force_limit(limit)
+    }
+
+    /// Has a tool meet what this filter says, from the next step on. Tissue that lies within it then is pushed out.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`].
+    pub fn set_collision_filter(&mut self, tool: ToolId, filter: CollisionFilter) -> Result<()> {
+        self.tools.get_mut(tool.0)?.filter = filter;
+        for (_, body) in self.bodies.iter_mut() {
+            if let Some(contacts) = &mut body.contacts {
+                contacts.look_again();
+            }
+        }
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Body, Vectors};
-use crate::contact::Moment;
+use crate::contact::{CollisionFilter, Moment};
 use crate::error::Result;
 use crate::solver::close;
 
@@ -11,6 +11,14 @@ impl Body {
     /// Whether it meets other bodies, or itself, and has something to meet with.
     pub(crate) fn meets_tissue(&self) -> bool {
         (self.contact.with_bodies || self.contact.with_itself) && !self.surface.is_empty()
+    }
+
+    /// Has tools and other bodies meet it as this filter says, from the next step on. What lies within it or them then is pushed out.
+    pub fn set_collision_filter(&mut self, filter: CollisionFilter) {
+        self.contact.filter = filter;
+        if let Some(contacts) = &mut self.contacts {
+            contacts.set_filter(filter);
+        }
     }
 
     /// Its surface in its own numbers.

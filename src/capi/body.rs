@@ -7,6 +7,7 @@ use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
 use crate::body::Body;
+use crate::contact::CollisionFilter;
 use crate::error::{Error, Result};
 use crate::slots::SlotId;
 use crate::world::BodyId;
@@ -243,6 +244,29 @@ pub unsafe extern "C" fn sinew_body_is_closed(
     unsafe {
         with_body(world, body, |body| {
             *memory::output("out", out)? = u32::from(body.is_closed());
+            Ok(())
+        })
+    }
+}
+
+/// Has a body be of these categories and meet those of `mask`, a bit for each, from the next step on: see sinew_body_def. What of tools and
+/// other bodies lies within it when they meet again is pushed out.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_collision(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    category: u32,
+    mask: u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.set_collision_filter(CollisionFilter { category, mask });
             Ok(())
         })
     }

@@ -262,6 +262,60 @@ pub unsafe extern "C" fn sinew_tool_set_pose(
     }
 }
 
+/// Gives a tool this Coulomb coefficient of friction, at least 0, from the next step on.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_set_friction(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    friction: f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world_mut(world, |world| world.set_friction(tool.id(), friction)) }
+}
+
+/// Has `force_limit`, N, at least 0 or infinity, be the largest force that moves a tool, from the next step on: see sinew_tool_def.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_set_force_limit(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    force_limit: f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world_mut(world, |world| world.set_force_limit(tool.id(), force_limit)) }
+}
+
+/// Has a tool be of these categories and meet those of `mask`, a bit for each, from the next step on: see sinew_tool_def. With mask 0 it
+/// meets nothing; tissue that lies within it when it meets it again is pushed out.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_set_collision(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    category: u32,
+    mask: u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            world.set_collision_filter(tool.id(), CollisionFilter { category, mask })
+        })
+    }
+}
+
 /// Writes where a tool is: its position, 3 floats, m, and its orientation, 4 floats, x y z w; either may be NULL. Where its force is
 /// limited it may have stopped short of where it was sent.
 ///

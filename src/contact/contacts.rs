@@ -215,10 +215,21 @@ impl Contacts {
         self.touched.get(slot).copied().unwrap_or_default()
     }
 
+    /// Has the body meet what this filter says.
+    pub fn set_filter(&mut self, filter: CollisionFilter) {
+        self.filter = filter;
+        self.look_again();
+    }
+
+    /// Other tools may meet the body than those that what is near was gathered for.
+    pub fn look_again(&mut self) {
+        self.candidates.invalidate();
+    }
+
     /// A tool at this place in the world is gone.
     pub fn forget_tool(&mut self, slot: usize) {
         // Another may come to its place.
-        self.candidates.invalidate();
+        self.look_again();
         self.holds.forget_tool(slot);
         self.touches.retain(|touch| touch.slot != slot);
         if let Some(pair) = self.touched.get_mut(slot) {

@@ -201,12 +201,7 @@ impl Tool {
         };
         not_negative("friction", definition.friction)?;
         not_negative("resolution", definition.resolution)?;
-        if !(definition.force_limit >= 0.0) {
-            return Err(Error::invalid(format!(
-                "force_limit is {}: must be at least 0",
-                definition.force_limit
-            )));
-        }
+        check_force_limit(definition.force_limit)?;
         let pose = definition.pose.checked()?;
         let (detection, resolution) = (definition.detection, definition.resolution);
         let is_refused = match definition.shape {
@@ -262,7 +257,29 @@ impl Tool {
     }
 }
 
+/// Refuses a limit of force that is none.
+fn check_force_limit(limit: f32) -> Result<()> {
+    if limit >= 0.0 {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("force_limit is {limit}: must be at least 0")))
+}
+
 impl Tool {
+    /// Gives it this friction from the next step on.
+    pub fn set_friction(&mut self, friction: f32) -> Result<()> {
+        not_negative("friction", friction)?;
+        self.friction = friction;
+        Ok(())
+    }
+
+    /// Has this force, N, be the largest that moves it from the next step on.
+    pub fn set_force_limit(&mut self, limit: f32) -> Result<()> {
+        check_force_limit(limit)?;
+        self.force_limit = limit;
+        Ok(())
+    }
+
     /// Where the step in progress takes it.
     pub fn aim(&self) -> Pose {
         let target = self.target.unwrap_or(self.pose);

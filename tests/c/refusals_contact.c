@@ -139,6 +139,18 @@ static void results(void)
     REFUSED(INVALID, "out", sinew_body_is_closed(the.world, the.body, NULL));
 }
 
+static void what_changes_while_it_runs(void)
+{
+    REFUSES_NO_BODY(sinew_body_set_collision(world, body, 1, 1));
+    REFUSES_NO_TOOL(sinew_tool_set_collision(world, tool, 1, 1));
+    REFUSES_NO_TOOL(sinew_tool_set_friction(world, tool, 0.5f));
+    REFUSES_NO_TOOL(sinew_tool_set_force_limit(world, tool, 0.5f));
+    REFUSED(INVALID, "friction", sinew_tool_set_friction(the.world, the.tool, -1.0f));
+    REFUSED(INVALID, "friction", sinew_tool_set_friction(the.world, the.tool, NAN));
+    REFUSED(INVALID, "force_limit", sinew_tool_set_force_limit(the.world, the.tool, -1.0f));
+    REFUSED(INVALID, "force_limit", sinew_tool_set_force_limit(the.world, the.tool, NAN));
+}
+
 int main(void)
 {
     set_up();
@@ -146,5 +158,6 @@ int main(void)
     meshes();
     what_they_ask();
     results();
+    what_changes_while_it_runs();
     return tear_down();
 }
