@@ -9,7 +9,7 @@ use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_fo
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
-    /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node, nor
+    /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node or one that a tool holds, nor
     /// along an axis along which a node is held.
     ///
     /// # Errors

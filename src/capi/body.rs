@@ -138,7 +138,7 @@ pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew
 }
 
 /// Adds `force`, 3 floats, N, to what acts on a node: constant over the whole next step, cleared when that is
-/// SINEW_STATUS_OK; nothing on a pinned node, nor along an axis along which a node is held.
+/// SINEW_STATUS_OK; nothing on a pinned node or one that a tool holds, nor along an axis along which a node is held.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
 ///
