@@ -216,10 +216,10 @@ fn a_plane_that_jerks_away_puts_the_body_back() {
         let body = |press: &Press| press.world.body(press.body).expect("the body").positions().to_vec();
         let before = body(&press);
         for (side, tool) in press.planes {
-            let aside = Vec3::new(3e38, side * 0.025, 0.0);
+            let aside = Vec3::new(1e9, side * 0.025, 0.0);
             press.world.set_pose(tool, aside, None).expect("a pose");
         }
-        let report = press.world.step(1e-3).expect("a step");
+        let report = press.world.step(1e-30).expect("a step");
         assert_eq!(report.bodies_restored, 1, "{solver:?}: {report:?}");
         assert_eq!(body(&press), before, "{solver:?}");
     }
