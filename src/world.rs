@@ -154,7 +154,7 @@ impl World {
     /// Lets a body that asks for it meet tissue.
     fn join_tissue(&mut self, id: SlotId) -> Result<()> {
         let place = self.bodies.place(id)?;
-        let body = self.bodies.get_mut(id)?;
+        let body = self.bodies.get(id)?;
         if !body.meets_tissue() {
             return Ok(());
         }

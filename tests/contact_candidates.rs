@@ -207,20 +207,13 @@ fn a_step_that_could_not_be_taken_leaves_no_trace() {
 
 /// A cloth in the plane y = 0 whose rim is held.
 fn drum(world: &mut World, solver: Solver) -> sinew::BodyId {
-    let mesh = square(0.2, 10);
-    let node_mass = 0.02 / mesh.positions.len() as f32;
-    let cloth = world
-        .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            masses: Values::Uniform(node_mass),
-            node_dampings: Values::Uniform(20.0 * node_mass),
-            stiffnesses: Values::Uniform(30.0),
-            spring_dampings: Values::Uniform(0.01),
-            triangles: &mesh.triangles,
-            solver,
-            ..Default::default()
-        })
-        .expect("a cloth");
+    let calm = Tissue {
+        mass: 0.02,
+        stiffness: 30.0,
+        drag: 20.0,
+        spring_damping: 0.01,
+    };
+    let cloth = calm.put_for(solver, world, &square(0.2, 10));
     pin_all(world, cloth, &rim(10));
     cloth
 }

@@ -4,27 +4,21 @@
 mod tissue;
 
 use glam::Vec3;
-use sinew::{BodyDefinition, BodyId, CollisionFilter, Error, Shape, Solver, ToolDefinition, ToolId, Values, World};
+use sinew::{BodyId, CollisionFilter, Error, Shape, Solver, ToolDefinition, ToolId, World};
 use tissue::*;
 
 const NOTHING: CollisionFilter = CollisionFilter { category: 1, mask: 0 };
 
 /// A cloth that is held at its rim, and a ball above it that goes sideways.
 fn scene(solver: Solver, definition: &ToolDefinition) -> (World, BodyId, ToolId) {
-    let mesh = square(0.1, 8);
-    let node_mass = 0.02 / mesh.positions.len() as f32;
+    let calm = Tissue {
+        mass: 0.02,
+        stiffness: 100.0,
+        drag: 20.0,
+        spring_damping: 0.01,
+    };
     let mut world = world(Vec3::ZERO);
-    let cloth = world.create_body(&BodyDefinition {
-        positions: &mesh.positions,
-        masses: Values::Uniform(node_mass),
-        node_dampings: Values::Uniform(20.0 * node_mass),
-        stiffnesses: Values::Uniform(100.0),
-        spring_dampings: Values::Uniform(0.01),
-        triangles: &mesh.triangles,
-        solver,
-        ..Default::default()
-    });
-    let cloth = cloth.expect("a body");
+    let cloth = calm.put_for(solver, &mut world, &square(0.1, 8));
     pin_all(&mut world, cloth, &rim(8));
     let tool = world.create_tool(definition).expect("a tool");
     (world, cloth, tool)

@@ -1,10 +1,14 @@
 //! Closed surfaces, and what lies within them by exact tests.
 
-use std::path::Path;
+#[path = "support/solid.rs"]
+mod solid;
+#[path = "support/tissue.rs"]
+mod tissue;
 
 use glam::{Quat, Vec3};
 use sinew::detection::exact::{Exact, Overlap};
-use sinew::mesh::{ClosedSurface, Mesh, MeshFormat, load};
+use sinew::mesh::{ClosedSurface, Mesh};
+use solid::real;
 
 /// A box from -0.04 to 0.04 along each axis.
 const HALF: f32 = 0.04;
@@ -129,21 +133,14 @@ fn solids_of_parts_are_taken() {
 
 #[test]
 fn real_meshes() {
-    let Some(folder) = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .ancestors()
-        .map(|above| above.join("shared/meshes"))
-        .find(|folder| folder.is_dir())
-    else {
-        use std::io::Write;
-        let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes is missing");
-        return;
-    };
     for (name, scale) in [
         ("stomach.stl", 1e-3),
         ("forceps_jaw_left.stl", 1e-3),
         ("liver_collision.stl", 1e-3),
     ] {
-        let mut mesh = load(folder.join(name), MeshFormat::Auto, scale).expect("a mesh").mesh;
+        let Some(mut mesh) = real(name, scale) else {
+            continue;
+        };
         let volume = mesh.volume().expect("a volume");
         let surface = ClosedSurface::new(&mesh.positions, &mesh.triangles).expect(name);
         assert!(

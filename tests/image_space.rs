@@ -6,7 +6,6 @@ mod solid;
 mod tissue;
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::Error;
@@ -14,7 +13,8 @@ use sinew::detection::exact::Exact;
 use sinew::detection::image_space::{
     Form, ImageSpace, ImageSpaceDefinition, LayeredImage, Overlap, Placed, Surface, Views,
 };
-use sinew::mesh::{ClosedSurface, MeshFormat, load};
+use sinew::mesh::ClosedSurface;
+use solid::real;
 
 /// Half the diagonal of a pixel: how far a point can be from the ray in the middle of its pixel.
 const HALF_DIAGONAL: f64 = 0.7072;
@@ -657,17 +657,10 @@ fn what_is_below_a_groove_narrower_than_a_pixel_is_not_deep_inside() {
 
 #[test]
 fn organs_are_seen_as_they_are_but_for_a_pixel() {
-    let Some(folder) = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .ancestors()
-        .map(|above| above.join("shared/meshes"))
-        .find(|folder| folder.is_dir())
-    else {
-        use std::io::Write;
-        let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes is missing");
-        return;
-    };
     for name in ["stomach.stl", "liver_collision.stl"] {
-        let mesh = load(folder.join(name), MeshFormat::Auto, 1e-3).expect("a mesh").mesh;
+        let Some(mesh) = real(name, 1e-3) else {
+            continue;
+        };
         let surface = ClosedSurface::new(&mesh.positions, &mesh.triangles).expect(name);
         let exact = Exact::new(&surface).expect("a solid");
         let [low, high] =

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "every test takes a part of it")]
 
 use std::f64::consts::PI;
-use std::path::PathBuf;
+use std::path::Path;
 
 use glam::{BVec3, DVec3, Vec3};
 use sinew::Pose;
@@ -54,13 +54,13 @@ impl Solid {
 
 /// A real mesh with its size multiplied by `scale`; `None`, said aloud, where it is missing.
 pub fn real(name: &str, scale: f32) -> Option<Mesh> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
-    let path = folder.join(name);
-    if !path.exists() {
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let mut paths = above.map(|folder| folder.join("shared/meshes").join(name));
+    let Some(path) = paths.find(|path| path.exists()) else {
         use std::io::Write;
         let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes/{name} is missing");
         return None;
-    }
+    };
     Some(sinew::mesh::load(path, MeshFormat::Stl, scale).expect("a mesh").mesh)
 }
 

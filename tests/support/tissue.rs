@@ -4,7 +4,9 @@
 
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{Body, BodyDefinition, BodyId, Pose, Shape, ToolDefinition, ToolId, Values, World, WorldDefinition};
+use sinew::{
+    Body, BodyDefinition, BodyId, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World, WorldDefinition,
+};
 
 /// Numbers from a fixed seed.
 pub struct Random(u64);
@@ -94,6 +96,10 @@ impl Tissue {
     }
 
     pub fn put(&self, world: &mut World, mesh: &Mesh) -> BodyId {
+        self.put_for(Solver::default(), world, mesh)
+    }
+
+    pub fn put_for(&self, solver: Solver, world: &mut World, mesh: &Mesh) -> BodyId {
         let node_mass = self.node_mass(mesh);
         world
             .create_body(&BodyDefinition {
@@ -104,6 +110,7 @@ impl Tissue {
                 spring_dampings: Values::Uniform(self.spring_damping),
                 triangles: &mesh.triangles,
                 tetrahedra: &mesh.tetrahedra,
+                solver,
                 ..Default::default()
             })
             .expect("a body")

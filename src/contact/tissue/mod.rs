@@ -74,11 +74,8 @@ pub(crate) struct Tissue {
 }
 
 impl Tissue {
-    /// Makes room for a body at this place in the world.
-    pub fn join(&mut self, place: usize, body: &mut Body) -> Result<()> {
-        if !body.meets_tissue() {
-            return Ok(());
-        }
+    /// Makes room for a body at this place in the world, which meets tissue.
+    pub fn join(&mut self, place: usize, body: &Body) -> Result<()> {
         let mut skin = Skin::new(body)?;
         self.add_images(&mut skin)?;
         self.groups.make_place(place)?;
@@ -111,10 +108,9 @@ impl Tissue {
         }
         // The first of its world too is refused what it asks for.
         if skin.asks_for_images {
-            skin.add_images()
-        } else {
-            Ok(())
+            skin.add_images()?;
         }
+        Ok(())
     }
 
     /// A body is gone.
