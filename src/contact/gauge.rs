@@ -57,6 +57,26 @@ impl Gauge {
             }
         }
     }
+
+    /// By how much the gap grows from the one to the other, where the corners go these ways, m: with as many digits for a short way as
+    /// for a long one, which the difference of two gaps has not.
+    pub fn opening(&self, before: &Meets, after: &Meets, ways: &[DVec3]) -> f64 {
+        /// A way is short as a part of the distance between the feature and the middle of the tool: then the slope changes evenly.
+        const SHORT: f64 = 1e-5;
+        let along = |meets: &Meets| weighted(ways, meets.weights).dot(meets.normal);
+        let is_straight = match *self {
+            Self::Flat { .. } => true,
+            Self::Rounded { radius, .. } => {
+                let short = SHORT * (before.gap + radius);
+                ways.iter().all(|way| way.length_squared() <= short * short)
+            }
+        };
+        if is_straight {
+            0.5 * (along(before) + along(after))
+        } else {
+            after.gap - before.gap
+        }
+    }
 }
 
 fn weighted(corners: &[DVec3], weights: [f64; 3]) -> DVec3 {

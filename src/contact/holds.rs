@@ -322,7 +322,8 @@ impl Holds {
             let after = hold.answer_to(|node| push_of(node) + vector_of(node));
             // Where it pushes all along, nothing small is found as a difference of what is large.
             let growth = if before.force.min(after.force) > 0.0 {
-                -hold.stiffness * (after.meets.gap - before.meets.gap)
+                let ways = hold.nodes.map(|node| vector_of(node as usize));
+                -hold.stiffness * hold.gauge.opening(&before.meets, &after.meets, &ways[..hold.count])
             } else {
                 after.force - before.force
             };

@@ -141,6 +141,7 @@ impl Descent {
             }
             self.equation.holds.let_go();
             let (gone, gain) = self.go(promised);
+            let used = shift;
             farthest = farthest.max(longest(&self.equation.ways));
             if gain > 0.75 && gone >= 1.0 {
                 shift *= 0.1;
@@ -156,10 +157,12 @@ impl Descent {
                 vain + 1
             };
             found.error = size * gone.max(1.0);
-            let held_back = shift * self.inertia_of_correction();
+            let held_back = shift.min(used) * self.inertia_of_correction();
             let is_short = found.error <= goal.absolute.max(goal.relative * farthest);
+            // So short, what the function changes by is rounding too, and may lead nowhere.
+            let is_nothing = size <= goal.absolute;
             let is_noise = size <= goal.rounding && vain >= 3;
-            if (is_short && gone >= 1.0 || is_noise) && held_back <= 0.1 * promised {
+            if (is_short && gone >= 1.0 || is_nothing || is_noise) && held_back <= 0.1 * promised {
                 found.converged = true;
                 break;
             }
