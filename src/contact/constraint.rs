@@ -186,9 +186,9 @@ impl Constraint {
         self.normal * self.impulse + self.friction_impulse
     }
 
-    /// Moves the nodes out of the tool by `part` of how deep they were, without giving them speed.
-    pub fn push_out(&self, positions: &mut Vectors, part: f32) {
-        let push = self.normal * (self.depth * part * self.effective_mass);
+    /// Moves the nodes out of the tool by so much, m, without giving them speed.
+    pub fn push_out(&self, positions: &mut Vectors, way: f32) {
+        let push = self.normal * (way * self.effective_mass);
         for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
             let node = node as usize;
             let position = positions.get(node) + push * answer;

@@ -505,7 +505,16 @@ impl Contacts {
         if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
-                    constraint.push_out(meeting.next_positions, PUSHED_OUT);
+                    constraint.push_out(meeting.next_positions, PUSHED_OUT * constraint.depth);
+                }
+            }
+            // What an equation that was not solved to the end has let in.
+            for index in 0..self.holds.len() {
+                let lacks = self
+                    .holds
+                    .lacks(index, |node| meeting.next_positions.get(node as usize));
+                if lacks > 0.0 {
+                    self.constraints[index].push_out(meeting.next_positions, lacks as f32);
                 }
             }
         }

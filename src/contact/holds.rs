@@ -161,6 +161,10 @@ impl Holds {
         self.holds.is_empty()
     }
 
+    pub fn len(&self) -> usize {
+        self.holds.len()
+    }
+
     pub fn clear(&mut self) {
         self.holds.clear();
         self.shares.clear();
@@ -405,6 +409,18 @@ impl Holds {
     pub(super) fn found(&self, index: usize) -> (Meets, f64, f64) {
         let Hold { answer, least, .. } = &self.holds[index];
         (answer.meets, answer.force, answer.meets.gap - least)
+    }
+
+    /// How much deeper than it may be contact number `index` is with its nodes at these positions, m; 0 where it does not push, or gives
+    /// way.
+    pub(super) fn lacks(&self, index: usize, position_of: impl Fn(u32) -> Vec3) -> f64 {
+        let hold = &self.holds[index];
+        if hold.answer.force <= 0.0 || hold.kept < 1.0 {
+            return 0.0;
+        }
+        let corners = hold.nodes.map(|node| position_of(node).as_dvec3());
+        let meets = hold.gauge.meet(&corners[..hold.count]);
+        (hold.least - meets.gap).max(0.0)
     }
 
     /// Whether a feature is among the contacts with this tool of the step.
