@@ -4,16 +4,10 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::{BodyDefinition, Error, Solver, Storage, World, WorldDefinition};
+use support::scene::STORAGES;
 use support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use support::euler::{euler_step, uneven_block};
 use support::motion::two_masses;
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 
 fn implicit(parts: &Parts, world: WorldDefinition, order: u32, accuracy: f32) -> Scene {
     Scene::with(parts, world, |definition| BodyDefinition {

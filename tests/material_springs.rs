@@ -7,19 +7,13 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3, Vec3};
 use sinew::material::presets;
+use support::scene::STORAGES;
 use sinew::mesh::{Mesh, is_closed};
 use sinew::{BodyDefinition, BodyId, Error, Material, RestStateDefinition, Solver, Storage, Values, World};
 use support::bodies::{FREE, Random};
 use support::statics::{cubic_cell, stress, triangle_cell, uniaxial};
 
 const YOUNG_MODULUS: f32 = 5000.0;
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 
 const TISSUE: Material = Material {
     model: sinew::Model::Springs,

@@ -5,6 +5,7 @@ mod support;
 
 use glam::{DMat3, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
+use support::scene::{SOLVERS, STORAGES};
 use sinew::{
     BodyDefinition, BodyId, Kernel, Material, Model, Pose, RestStateDefinition, Shape, Solver, Storage, ToolDefinition,
     Values, World, WorldDefinition,
@@ -13,13 +14,6 @@ use support::bodies::{FREE, Random};
 
 const YOUNG: f32 = 5000.0;
 const DENSITY: f32 = 1060.0;
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 
 fn tissue(nu: f32) -> Material {
     Material {

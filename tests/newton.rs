@@ -4,16 +4,10 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::{BodyDefinition, Solver, Storage, WorldDefinition};
+use support::scene::STORAGES;
 use support::bodies::{FREE, Parts, Scene, largest_difference};
 use support::euler::{euler_step, uneven_block};
 use support::motion::two_masses;
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 
 const HANGING: WorldDefinition = WorldDefinition {
     gravity: Vec3::new(0.0, -9.81, 0.0),

@@ -4,21 +4,13 @@ mod support;
 
 use glam::{BVec3, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
+use support::scene::{SOLVERS, STORAGES};
 use sinew::{
     BodyDefinition, Error, Material, Model, Pose, RestStateDefinition, Shape, Solver, Storage, ToolDefinition, Values,
     World, WorldDefinition,
 };
 use support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use support::motion::Mode;
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
-
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 const X: [bool; 3] = [true, false, false];
 const Y: [bool; 3] = [false, true, false];

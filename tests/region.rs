@@ -4,19 +4,13 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
+use support::scene::{SOLVERS, STORAGES};
 use sinew::{
     Body, BodyDefinition, BodyId, Error, Material, Model, RestStateDefinition, Solver, SpringLaw, Storage, Values,
     World, WorldDefinition,
 };
 use support::bodies::{FREE, Random, largest_difference};
 
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 const MASS: f32 = 1e-4;
 const YOUNG: f32 = 3000.0;
 const STIFFNESS: f32 = 4.0;

@@ -4,17 +4,9 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::{BodyDefinition, Error, RestStateDefinition, RestStateReport, Solver, Storage, WorldDefinition};
+use support::scene::{SOLVERS, STORAGES};
 use support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use support::euler::uneven_block;
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
-
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 const HANGING: WorldDefinition = WorldDefinition {
     gravity: Vec3::new(0.0, -9.81, 0.0),

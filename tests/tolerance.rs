@@ -5,10 +5,9 @@ mod support;
 
 use glam::Vec3;
 use sinew::{BodyDefinition, Error, Solver, WorldDefinition};
+use support::scene::SOLVERS;
 use support::bodies::{FREE, Parts, Scene, largest_difference};
 use support::organ::{cloth, gravity, organ};
-
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 /// A chain that lies level, held at one end.
 fn level_chain() -> Parts {

@@ -5,16 +5,9 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
+use support::scene::{SOLVERS, STORAGES};
 use sinew::{Body, Error, Solver, SpringLaw, Storage, Values};
 use support::bodies::{FREE, Parts, Random, Scene, largest_difference};
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 /// An organ of springs that are all a little different, or all alike.
 fn organ(spacing: f32, is_even: bool, random: &mut Random) -> Parts {
