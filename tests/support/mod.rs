@@ -5,11 +5,14 @@
 
 pub mod bodies;
 pub mod euler;
+pub mod hanging;
 pub mod motion;
 pub mod organ;
 pub mod reference;
 pub mod scene;
+pub mod solid;
 pub mod statics;
+pub mod tissue;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

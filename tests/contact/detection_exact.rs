@@ -1,0 +1,244 @@
+//! Closed surfaces, and what lies within them by exact tests.
+
+use crate::support::solid::real;
+use glam::{Quat, Vec3};
+use sinew::detection::exact::{Exact, Overlap};
+use sinew::mesh::{ClosedSurface, Mesh};
+
+/// A box from -0.04 to 0.04 along each axis.
+const HALF: f32 = 0.04;
+
+fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let mesh = Mesh::lattice(0.02, [4; 3]).expect("a lattice");
+    let surface = mesh.surface().expect("a surface");
+    let bounds = |pick: fn(Vec3, Vec3) -> Vec3| mesh.positions.iter().copied().reduce(pick).expect("nodes");
+    let centre = (bounds(Vec3::min) + bounds(Vec3::max)) * 0.5;
+    (mesh.positions.iter().map(|place| *place - centre).collect(), surface)
+}
+
+fn moved((positions, triangles): (Vec<Vec3>, Vec<[u32; 3]>), by: Vec3) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    (positions.iter().map(|place| *place + by).collect(), triangles)
+}
+
+fn both(first: (Vec<Vec3>, Vec<[u32; 3]>), second: (Vec<Vec3>, Vec<[u32; 3]>)) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let (mut positions, mut triangles) = first;
+    let count = positions.len() as u32;
+    positions.extend(second.0);
+    triangles.extend(second.1.iter().map(|nodes| nodes.map(|node| node + count)));
+    (positions, triangles)
+}
+
+fn turned((positions, mut triangles): (Vec<Vec3>, Vec<[u32; 3]>)) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    for triangle in &mut triangles {
+        triangle.swap(1, 2);
+    }
+    (positions, triangles)
+}
+
+/// Numbers from -1 to 1, the same on every run.
+fn numbers(mut seed: u64) -> impl FnMut() -> f32 {
+    move || {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+}
+
+fn refusal((positions, triangles): &(Vec<Vec3>, Vec<[u32; 3]>)) -> String {
+    ClosedSurface::new(positions, triangles)
+        .expect_err("refused")
+        .to_string()
+}
+
+#[test]
+fn what_is_no_solid_is_refused() {
+    let whole = cube();
+    assert!(ClosedSurface::new(&whole.0, &whole.1).is_ok());
+    assert!(refusal(&(whole.0.clone(), Vec::new())).contains("no triangles"));
+    let mut broken = whole.clone();
+    broken.1[7][2] = 4_000;
+    assert!(refusal(&broken).contains("triangle 7 names node 4000"));
+    let mut broken = whole.clone();
+    broken.0[3].y = f32::NAN;
+    assert!(refusal(&broken).contains("the position of node 3"));
+    let mut broken = whole.clone();
+    broken.0[3].y = 2e9;
+    assert!(refusal(&broken).contains("the position of node 3"));
+    let mut broken = whole.clone();
+    broken.1[5][1] = broken.1[5][0];
+    assert!(refusal(&broken).contains("triangle 5 has no area"));
+    let mut broken = whole.clone();
+    let [a, b, c] = broken.1.remove(11);
+    let told = refusal(&broken);
+    assert!(told.contains("not closed"), "{told}");
+    assert!(
+        [a, b, c]
+            .iter()
+            .filter(|node| told.contains(&format!("node {node}")))
+            .count()
+            >= 2,
+        "{told}"
+    );
+    let mut broken = whole.clone();
+    broken.1[11].swap(0, 1);
+    assert!(refusal(&broken).contains("not closed"));
+    assert!(refusal(&turned(whole.clone())).contains("face inward"));
+    // There and back again over the same triangle encloses nothing.
+    let sheet = (whole.0[..3].to_vec(), vec![[0, 1, 2], [0, 2, 1]]);
+    assert!(!refusal(&sheet).is_empty());
+    let crossed = both(whole.clone(), moved(whole.clone(), Vec3::new(0.031, 0.027, 0.013)));
+    assert!(refusal(&crossed).contains("pass through each other"));
+    let apart = Vec3::X * 0.2;
+    let aside = both(both(whole.clone(), whole.clone()), turned(moved(whole.clone(), apart)));
+    assert!(!refusal(&aside).is_empty());
+    let half: Vec<Vec3> = whole.0.iter().map(|place| *place * 0.5).collect();
+    let within = both(whole.clone(), (half.clone(), whole.1.clone()));
+    assert!(refusal(&within).contains("lies within another part"));
+    let larger: Vec<Vec3> = whole.0.iter().map(|place| *place * 2.0).collect();
+    let beside = both((larger, whole.1.clone()), turned(moved(whole.clone(), Vec3::X)));
+    assert!(refusal(&beside).contains("inside out"));
+}
+
+#[test]
+fn solids_of_parts_are_taken() {
+    let whole = cube();
+    let volume = f64::from(2.0 * HALF).powi(3);
+    let half = (whole.0.iter().map(|place| *place * 0.5).collect(), whole.1.clone());
+    let hollow = both(whole.clone(), turned(half));
+    let surface = ClosedSurface::new(&hollow.0, &hollow.1).expect("a hollow cube");
+    assert!((surface.volume() / volume - 0.875).abs() < 1e-6);
+    let exact = Exact::new(&surface).expect("a solid");
+    assert!(!exact.is_inside(Vec3::ZERO) && exact.is_inside(Vec3::X * 0.03) && !exact.is_inside(Vec3::X * 0.05));
+    // Two that touch along an edge, which four triangles share.
+    let touching = both(
+        whole.clone(),
+        moved(whole.clone(), Vec3::new(2.0 * HALF, 2.0 * HALF, 0.0)),
+    );
+    let surface = ClosedSurface::new(&touching.0, &touching.1).expect("two cubes");
+    assert!((surface.volume() / volume - 2.0).abs() < 1e-6);
+    // Each triangle with corners of its own, as in STL files.
+    let corners: Vec<Vec3> = whole.1.iter().flatten().map(|&node| whole.0[node as usize]).collect();
+    let alone: Vec<[u32; 3]> = (0..whole.1.len() as u32)
+        .map(|index| [0, 1, 2].map(|corner| 3 * index + corner))
+        .collect();
+    let surface = ClosedSurface::new(&corners, &alone).expect("a cube");
+    assert!((surface.volume() / volume - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn real_meshes() {
+    for (name, scale) in [
+        ("stomach.stl", 1e-3),
+        ("forceps_jaw_left.stl", 1e-3),
+        ("liver_collision.stl", 1e-3),
+    ] {
+        let Some(mut mesh) = real(name, scale) else {
+            continue;
+        };
+        let volume = mesh.volume().expect("a volume");
+        let surface = ClosedSurface::new(&mesh.positions, &mesh.triangles).expect(name);
+        assert!(
+            (surface.volume() / volume - 1.0).abs() < 1e-5,
+            "{name}: {} for {volume}",
+            surface.volume()
+        );
+        mesh.triangles.swap_remove(17);
+        let told = refusal(&(mesh.positions, mesh.triangles));
+        assert!(told.contains("not closed"), "{name}: {told}");
+    }
+}
+
+/// The fractions of a segment between which it is within the box.
+fn clipped(from: Vec3, to: Vec3) -> Option<(f64, f64)> {
+    let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
+    for axis in 0..3 {
+        let (start, way) = (f64::from(from[axis]), f64::from(to[axis]) - f64::from(from[axis]));
+        let [a, b] = [-HALF, HALF].map(|side| (f64::from(side) - start) / way);
+        enters = enters.max(a.min(b));
+        leaves = leaves.min(a.max(b));
+    }
+    (leaves > enters).then_some((enters, leaves))
+}
+
+#[test]
+fn points_and_edges_within_a_box() {
+    let (positions, triangles) = cube();
+    let surface = ClosedSurface::new(&positions, &triangles).expect("a cube");
+    let (shift, turn) = (Vec3::new(0.3, -0.2, 0.1), Quat::from_rotation_y(0.7));
+    let rigid = Exact::new(&surface).expect("a solid");
+    let mut changed = Exact::changing(&surface).expect("a solid");
+    let elsewhere: Vec<Vec3> = positions.iter().map(|place| turn * *place + shift).collect();
+    changed.refit(&elsewhere).expect("other places");
+    let mut number = numbers(3);
+    let points: Vec<Vec3> = (0..2000)
+        .map(|_| Vec3::new(number(), number(), number()) * 0.08)
+        .collect();
+    let edges: Vec<[u32; 2]> = (0..1999).map(|point| [point, point + 1]).collect();
+    let there: Vec<Vec3> = points.iter().map(|place| turn * *place + shift).collect();
+    let mut overlap = Overlap::default();
+    for (exact, points, tolerance) in [(&rigid, &points, 1e-6), (&changed, &there, 1e-5)] {
+        exact.find(points, &edges, &mut overlap).expect("an overlap");
+        let own = |place: Vec3| {
+            if std::ptr::eq(points, &there) {
+                turn.inverse() * (place - shift)
+            } else {
+                place
+            }
+        };
+        let mut found = overlap.points.iter();
+        for (index, &place) in (0_u32..).zip(points) {
+            let depth = HALF - own(place).abs().max_element();
+            if depth > 1e-7 {
+                let inside = found.next().expect("a point");
+                assert_eq!(inside.point, index);
+                assert!((inside.depth - depth).abs() < tolerance, "{} for {depth}", inside.depth);
+                assert!((inside.normal.length() - 1.0).abs() < 1e-5);
+            }
+        }
+        assert!(found.next().is_none() && overlap.points.len() > 100);
+        let mut found = overlap.edges.iter();
+        for (index, &[a, b]) in (0_u32..).zip(&edges) {
+            let [from, to] = [a, b].map(|end| own(points[end as usize]));
+            if let Some((enters, leaves)) = clipped(from, to)
+                && leaves - enters > 1e-5
+            {
+                let inside = found.next().expect("an edge");
+                assert_eq!(inside.edge, index);
+                assert!(
+                    (f64::from(inside.enters) - enters).abs() < 1e-4,
+                    "{inside:?} for {enters}"
+                );
+                assert!(
+                    (f64::from(inside.leaves) - leaves).abs() < 1e-4,
+                    "{inside:?} for {leaves}"
+                );
+            }
+        }
+        assert!(found.next().is_none() && overlap.edges.len() > 300);
+    }
+}
+
+#[test]
+fn what_is_asked_wrongly_is_refused() {
+    let (positions, triangles) = cube();
+    let surface = ClosedSurface::new(&positions, &triangles).expect("a cube");
+    let mut exact = Exact::new(&surface).expect("a solid");
+    let mut overlap = Overlap::default();
+    let told = exact.refit(&positions[1..]).expect_err("refused").to_string();
+    assert!(told.contains(&format!("{} positions", positions.len() - 1)), "{told}");
+    let told = exact
+        .find(&[Vec3::ZERO], &[[0, 1]], &mut overlap)
+        .expect_err("refused")
+        .to_string();
+    assert!(told.contains("edge 0 joins points [0, 1]"), "{told}");
+    let told = exact
+        .find(&[Vec3::ZERO, Vec3::NAN], &[], &mut overlap)
+        .expect_err("refused")
+        .to_string();
+    assert!(told.contains("the position of point 1"), "{told}");
+    assert!(exact.is_inside(Vec3::ZERO));
+    let (distance, normal) = exact.distance(Vec3::X * 0.05, 0.02).expect("near");
+    assert!((distance - 0.01).abs() < 1e-6 && normal.distance(Vec3::X) < 1e-5);
+    assert!(exact.distance(Vec3::X * 0.07, 0.02).is_none());
+}

@@ -1,0 +1,130 @@
+//! Coulomb friction: it holds below its limit, drags at it, and never exceeds it.
+
+use crate::support::tissue::*;
+use glam::{DVec3, Quat, Vec3};
+use sinew::Shape;
+
+const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
+
+#[test]
+fn the_cone_is_never_left() {
+    // A plane's normal is the same everywhere, so that the cone can be seen in the whole force.
+    let mut random = Random::new(2);
+    for friction in [0.05_f32, 0.3, 1.0] {
+        let mut world = world(DOWN);
+        let plane = tool(&mut world, Shape::Plane, friction, Vec3::ZERO, Quat::IDENTITY);
+        let cloth = Tissue::VISCOUS.put(&mut world, &moved(square(0.2, 8), Vec3::Y * 0.002));
+        let mut slipped = false;
+        for step in 0..200 {
+            let aside = Vec3::new(
+                random.between(-0.01, 0.01),
+                random.between(-0.002, 0.002),
+                random.between(-0.01, 0.01),
+            );
+            let pose = world.pose(plane).expect("a tool");
+            world.set_pose(plane, pose.position + aside, None).expect("a pose");
+            world.step(0.01).expect("a step");
+            let force = world.wrench(plane).expect("a tool").0.as_dvec3();
+            let pressed = -force.y;
+            let dragged = DVec3::new(force.x, 0.0, force.z).length();
+            let limit = f64::from(friction) * pressed;
+            assert!(pressed >= 0.0, "step {step}: it pulls, {force}");
+            assert!(
+                dragged <= limit * (1.0 + 1e-5),
+                "friction {friction}, step {step}: {dragged} N above {limit}"
+            );
+            slipped |= dragged > 0.999 * limit && limit > 0.0;
+        }
+        assert!(
+            slipped || friction > 0.9,
+            "friction {friction}: the limit was never reached"
+        );
+        assert!(all_finite(body(&world, cloth)));
+    }
+}
+
+/// How far the middle of a cloth on a smooth plane follows a ball that presses on it and moves by `way`.
+fn dragged(friction: f32, way: Vec3, spin: Vec3) -> (DVec3, DVec3, DVec3) {
+    let mut world = world(DOWN);
+    tool(&mut world, Shape::Plane, 0.0, Vec3::ZERO, Quat::IDENTITY);
+    let cloth = Tissue::CALM.put(&mut world, &square(0.2, 16));
+    let radius = 0.02;
+    // Between a node, an edge and a face, and deep enough to be squeezed against the plane.
+    let start = Vec3::new(0.004, radius - 0.0002, 0.003);
+    let ball = tool(&mut world, Shape::Sphere { radius }, friction, start, Quat::IDENTITY);
+    for _ in 0..50 {
+        world.step(0.005).expect("a step");
+    }
+    let before = centre(body(&world, cloth));
+    let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+    for step in 1..=200 {
+        let part = step as f32 / 200.0;
+        let turned = Quat::from_scaled_axis(spin * part);
+        world.set_pose(ball, start + way * part, Some(turned)).expect("a pose");
+        world.step(0.005).expect("a step");
+        let felt = world.wrench(ball).expect("a tool");
+        force += felt.0.as_dvec3() / 200.0;
+        torque += felt.1.as_dvec3() / 200.0;
+    }
+    (centre(body(&world, cloth)) - before, force, torque)
+}
+
+#[test]
+fn a_moving_ball_drags_the_cloth_by_friction_alone() {
+    let way = Vec3::new(0.05, 0.0, 0.02);
+    let (followed, _, _) = dragged(5.0, way, Vec3::ZERO);
+    // It sticks at the few nodes under the ball, and the rest of the cloth comes after.
+    let part = followed.dot(way.as_dvec3()) / way.as_dvec3().length_squared();
+    assert!((0.5..1.02).contains(&part), "{followed} of {way}");
+    let (stayed, _, _) = dragged(0.0, way, Vec3::ZERO);
+    assert!(
+        stayed.length() < 0.1 * followed.length(),
+        "{stayed} without friction, {followed} with it"
+    );
+}
+
+/// What a ball feels that was pressed into a cloth held at its rim and spins there.
+fn spun(friction: f32) -> (DVec3, DVec3) {
+    let mut world = world(Vec3::ZERO);
+    let cloth = Tissue::CALM.put(&mut world, &square(0.2, 12));
+    pin_all(&mut world, cloth, &rim(12));
+    let start = Vec3::new(0.004, 0.021, 0.003);
+    let ball = tool(
+        &mut world,
+        Shape::Sphere { radius: 0.02 },
+        friction,
+        start,
+        Quat::IDENTITY,
+    );
+    let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+    for step in 1..=300_u16 {
+        let place = start - Vec3::Y * 0.03 * (f32::from(step) / 100.0).min(1.0);
+        let turned = Quat::from_rotation_z(0.1 * f32::from(step.saturating_sub(100)));
+        world.set_pose(ball, place, Some(turned)).expect("a pose");
+        world.step(0.005).expect("a step");
+        if step > 200 {
+            let felt = world.wrench(ball).expect("a tool");
+            force += felt.0.as_dvec3() / 100.0;
+            torque += felt.1.as_dvec3() / 100.0;
+        }
+    }
+    (force, torque)
+}
+
+#[test]
+fn a_spinning_ball_drags_sideways() {
+    // Turning about +z, its lowest point moves along +x; the cloth holds it back there.
+    let friction = 0.3;
+    let (force, torque) = spun(friction);
+    assert!(force.y > 0.05, "{force}");
+    assert!(force.x < -0.5 * f64::from(friction) * force.y, "{force}");
+    // All of it slips, so that friction acts at its limit: at most mu times what presses, on an arm of the radius. What
+    // presses adds up to more than the upward force, by less than half here, because it points to the middle.
+    let least = 0.02 * f64::from(friction) * force.y;
+    assert!(
+        (0.8..1.5).contains(&(-torque.z / least)),
+        "torque {torque}, at least about {least}"
+    );
+    let (_, smooth) = spun(0.0);
+    assert!(smooth.length() < 1e-4 * least, "{smooth}");
+}

@@ -1,0 +1,26 @@
+//! Contact: tools and tissue, tissue and tissue, grasping, detection.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod attach_tissue;
+mod candidates;
+mod changed;
+mod detection_exact;
+mod doors;
+mod friction;
+mod grasp;
+mod hard;
+mod image_space;
+mod limit;
+mod mesh;
+mod mesh_momentum;
+mod mesh_refused;
+mod mesh_sweep;
+mod momentum;
+mod press;
+mod query;
+mod rest;
+mod stop;
+mod sweep;
+mod tissue_pairs;

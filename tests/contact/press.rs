@@ -1,0 +1,172 @@
+//! Spheres and capsules pressed into a cloth that is held at its rim: what they feel is what the rim carries.
+
+use crate::support::tissue::*;
+use glam::{Quat, Vec3};
+use sinew::Shape;
+
+const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
+const SIZE: f32 = 0.2;
+const TISSUE: Tissue = Tissue {
+    mass: 0.05,
+    stiffness: 30.0,
+    drag: 8.0,
+    spring_damping: 0.02,
+};
+
+/// A tool pressed into a cloth of `cells` by `depth` over half a second, then held: checks all of it.
+fn press(dt: f32, cells: u32, shape: Shape, radius: f32, turned: Quat, aside: Vec3, depth: f32) {
+    let case = format!("dt {dt}, {cells} cells, {shape:?}, aside {aside}");
+    let mesh = square(SIZE, cells);
+    let mut world = world(DOWN);
+    let cloth = TISSUE.put(&mut world, &mesh);
+    let pins = rim(cells);
+    pin_all(&mut world, cloth, &pins);
+    // The cloth hangs through before it is touched.
+    for _ in 0..(0.5 / dt) as u32 {
+        world.step(dt).expect("a step");
+    }
+    let start = aside + Vec3::Y * (radius + 0.001);
+    let tip = tool(&mut world, shape, 0.0, start, turned);
+    let coming = (0.5 / dt) as u32;
+    let mut deepest = f64::NEG_INFINITY;
+    for step in 1..=coming {
+        let way = depth * step as f32 / coming as f32;
+        world.set_pose(tip, start - Vec3::Y * way, None).expect("a pose");
+        world.step(dt).expect("a step");
+        deepest = deepest.max(penetration_of(&world, cloth, shape, tip));
+    }
+    for step in 0..(2.0 / dt) as u32 {
+        world.step(dt).expect("a step");
+        if step % 10 == 0 {
+            deepest = deepest.max(penetration_of(&world, cloth, shape, tip));
+        }
+    }
+    assert!(deepest < 0.001, "{case}: {deepest} m deep");
+    assert!(kinetic(&world, cloth) < 1e-9, "{case}: J {}", kinetic(&world, cloth));
+
+    // At rest the tool, the rim and the weight hold each other.
+    let (force, torque) = world.wrench(tip).expect("a tool");
+    let mass = f64::from(TISSUE.node_mass(&mesh));
+    let weight = DOWN.as_dvec3() * mass * mesh.positions.len() as f64;
+    let carried = pin_forces(&world, cloth, &pins) + weight;
+    let off = force.as_dvec3().distance(carried);
+    assert!(carried.y > 0.02, "{case}: nothing to be measured, {carried}");
+    assert!(
+        off < 0.02 * carried.length(),
+        "{case}: {force} on the tool, {carried} carried"
+    );
+    let pose = world.pose(tip).expect("a tool").position.as_dvec3();
+    let middle = centre(body(&world, cloth));
+    let moment = pin_moments(&world, cloth, &pins, pose) + (middle - pose).cross(weight);
+    let off = torque.as_dvec3().distance(moment);
+    assert!(
+        off < 0.02 * carried.length() * f64::from(SIZE) / 2.0,
+        "{case}: torque {torque} on the tool, {moment} carried"
+    );
+    // A ball without friction feels no torque about its middle.
+    if let Shape::Sphere { .. } = shape {
+        let off = f64::from(torque.length());
+        assert!(
+            off < 1e-4 * carried.length() * f64::from(radius),
+            "{case}: torque {torque}"
+        );
+    }
+    // It leaves, and feels nothing at all.
+    world.set_pose(tip, start + Vec3::Y * 0.2, None).expect("a pose");
+    world.step(dt).expect("a step");
+    world.step(dt).expect("a step");
+    let (force, torque) = world.wrench(tip).expect("a tool");
+    assert_eq!((force, torque), (Vec3::ZERO, Vec3::ZERO), "{case}: gone, yet felt");
+}
+
+#[test]
+fn spheres_feel_what_the_rim_carries() {
+    for dt in [0.001, 1.0 / 60.0, 1.0 / 30.0] {
+        for cells in [8, 20] {
+            let radius = 0.02;
+            let aside = Vec3::new(0.013, 0.0, 0.021);
+            press(dt, cells, Shape::Sphere { radius }, radius, Quat::IDENTITY, aside, 0.05);
+        }
+    }
+}
+
+#[test]
+fn spheres_smaller_than_the_mesh_do_not_slip_through() {
+    // On a face, an edge, a node, and anywhere: faces and edges are all that such a sphere meets.
+    let spacing = SIZE / 10.0;
+    let places = [
+        Vec3::new(0.3, 0.0, 0.15),
+        Vec3::new(0.5, 0.0, 0.0),
+        Vec3::new(0.5, 0.0, 0.5),
+        Vec3::new(0.0, 0.0, 0.0),
+        Vec3::new(0.0, 0.0, 0.37),
+        Vec3::new(-1.71, 0.0, 2.23),
+    ];
+    for dt in [0.002, 1.0 / 60.0, 1.0 / 30.0] {
+        for place in places {
+            for radius in [0.002, 0.006] {
+                press(
+                    dt,
+                    10,
+                    Shape::Sphere { radius },
+                    radius,
+                    Quat::IDENTITY,
+                    place * spacing,
+                    0.03,
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn capsules_lie_in_the_cloth() {
+    for (dt, cells, angle) in [
+        (0.001, 16, 0.0),
+        (1.0 / 60.0, 16, 0.5),
+        (1.0 / 60.0, 9, 1.1),
+        (1.0 / 30.0, 20, 0.3),
+    ] {
+        for (radius, half_length) in [(0.01, 0.04), (0.004, 0.05)] {
+            let lying = Quat::from_rotation_y(angle) * Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
+            let shape = Shape::Capsule { radius, half_length };
+            press(dt, cells, shape, radius, lying, Vec3::new(0.011, 0.0, -0.007), 0.03);
+        }
+    }
+}
+
+#[test]
+fn a_standing_capsule_is_a_sphere_at_its_tip() {
+    let shape = Shape::Capsule {
+        radius: 0.005,
+        half_length: 0.05,
+    };
+    for dt in [0.002, 1.0 / 60.0] {
+        press(dt, 12, shape, 0.055, Quat::IDENTITY, Vec3::new(0.004, 0.0, 0.001), 0.03);
+    }
+}
+
+#[test]
+fn what_a_pinned_node_takes_from_a_tool_its_pin_takes() {
+    // All nodes but the middle one are pinned, and the ball lies on edges and faces between it and them.
+    let mut world = world(Vec3::ZERO);
+    let cloth = TISSUE.put(&mut world, &square(0.1, 2));
+    let pins = rim(2);
+    pin_all(&mut world, cloth, &pins);
+    let ball = sphere(&mut world, 0.01, Vec3::new(0.03, 0.011, 0.004));
+    for step in 1..=600 {
+        let down = 0.011 - 0.02 * (step as f32 / 200.0).min(1.0);
+        world
+            .set_pose(ball, Vec3::new(0.03, down, 0.004), None)
+            .expect("a pose");
+        world.step(0.005).expect("a step");
+    }
+    let force = world.wrench(ball).expect("a tool").0.as_dvec3();
+    let carried = pin_forces(&world, cloth, &pins);
+    assert!(kinetic(&world, cloth) < 1e-10);
+    assert!(force.length() > 0.01, "nothing to be measured: {force}");
+    assert!(
+        force.distance(carried) < 0.02 * force.length(),
+        "{force} on the tool, {carried} carried"
+    );
+}

@@ -1,0 +1,248 @@
+//! Bodies that rest on planes or slide down them.
+
+use crate::support::tissue::*;
+use glam::{DVec3, Quat, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Shape, Values, World, WorldDefinition};
+
+const GRAVITY: f32 = 9.81;
+const DOWN: Vec3 = Vec3::new(0.0, -GRAVITY, 0.0);
+
+/// The mean force on a tool over `count` steps.
+fn mean_force(world: &mut World, tool: sinew::ToolId, dt: f32, count: u32) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for _ in 0..count {
+        world.step(dt).expect("a step");
+        sum += world.wrench(tool).expect("a tool").0.as_dvec3();
+    }
+    sum / f64::from(count)
+}
+
+#[test]
+fn a_plane_carries_the_weight_of_a_cloth() {
+    for dt in [0.001, 1.0 / 60.0, 1.0 / 30.0] {
+        for (drag, friction) in [(0.0, 0.0), (2.0, 0.5), (20.0, 0.0), (100.0, 0.5)] {
+            {
+                let tissue = Tissue {
+                    drag,
+                    ..Tissue::VISCOUS
+                };
+                let mut world = world(DOWN);
+                let plane = tool(&mut world, Shape::Plane, friction, Vec3::ZERO, Quat::IDENTITY);
+                let cloth = tissue.put(&mut world, &moved(square(0.2, 10), Vec3::Y * 0.001));
+                let settling = (2.0 / dt) as u32;
+                for _ in 0..settling {
+                    world.step(dt).expect("a step");
+                }
+                let (force, torque) = world.wrench(plane).expect("a tool");
+                let weight = tissue.mass * GRAVITY;
+                let case = format!("dt {dt}, drag {drag}, friction {friction}: {force} of {weight}");
+                assert!((force + Vec3::Y * weight).length() < 0.01 * weight, "{case}");
+                // The plane's position is below the middle of the cloth.
+                assert!(torque.length() < 0.01 * weight * 0.1, "{case}: torque {torque}");
+                assert!(kinetic(&world, cloth) < 1e-12, "{case}: J {}", kinetic(&world, cloth));
+                let deepest = penetration_of(&world, cloth, Shape::Plane, plane);
+                assert!(deepest < 1e-6, "{case}: {deepest} m deep");
+                // Nothing jitters: neither a single step's force nor a node's place.
+                let before = body(&world, cloth).positions().to_vec();
+                for _ in 0..20 {
+                    world.step(dt).expect("a step");
+                    let now = world.wrench(plane).expect("a tool").0;
+                    assert!((now - force).length() < 1e-4 * weight, "{case}: then {now}");
+                }
+                for (before, after) in before.iter().zip(body(&world, cloth).positions()) {
+                    assert!(before.distance(*after) < 1e-6, "{case}: {before} to {after}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plane_carries_the_weight_of_a_block() {
+    let tissue = Tissue {
+        mass: 0.5,
+        stiffness: 400.0,
+        drag: 10.0,
+        spring_damping: 0.5,
+    };
+    for (dt, friction) in [(0.002, 0.0), (1.0 / 60.0, 0.4), (1.0 / 30.0, 1.0)] {
+        let mut world = world(DOWN);
+        let plane = tool(
+            &mut world,
+            Shape::Plane,
+            friction,
+            Vec3::new(0.3, 0.0, 0.0),
+            Quat::IDENTITY,
+        );
+        let mesh = Mesh::block([0.08, 0.04, 0.08], [8, 4, 8]).expect("a block");
+        let block = tissue.put(&mut world, &moved(mesh, Vec3::Y * 0.025));
+        for _ in 0..(3.0 / dt) as u32 {
+            world.step(dt).expect("a step");
+        }
+        let (force, torque) = world.wrench(plane).expect("a tool");
+        let weight = tissue.mass * GRAVITY;
+        let case = format!("dt {dt}, friction {friction}: {force} of {weight}");
+        assert!((force + Vec3::Y * weight).length() < 0.01 * weight, "{case}");
+        // The weight acts at the middle of the block, the torque is about the plane's position.
+        let arm = centre(body(&world, block)) - DVec3::new(0.3, 0.0, 0.0);
+        let expected = arm.cross(DVec3::NEG_Y * f64::from(weight));
+        let off = torque.as_dvec3().distance(expected);
+        assert!(off < 0.01 * expected.length(), "{case}: torque {torque} of {expected}");
+        assert!(kinetic(&world, block) < 1e-9, "{case}: J {}", kinetic(&world, block));
+        let deepest = penetration_of(&world, block, Shape::Plane, plane);
+        assert!(deepest < 1e-6, "{case}: {deepest} m deep");
+    }
+}
+
+/// A cloth lying on a plane that leans by `angle`, moved and turned with it.
+fn on_a_slope(angle: f32, friction: f32, height: f32) -> (World, sinew::BodyId, sinew::ToolId, Quat) {
+    let lean = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), angle);
+    let mut mesh = square(0.2, 8);
+    for position in &mut mesh.positions {
+        *position = lean * (*position + Vec3::Y * height);
+    }
+    let mut world = world(DOWN);
+    let plane = tool(&mut world, Shape::Plane, friction, Vec3::ZERO, lean);
+    let cloth = Tissue::VISCOUS.put(&mut world, &mesh);
+    (world, cloth, plane, lean)
+}
+
+#[test]
+fn friction_above_the_slope_holds() {
+    for dt in [0.001, 1.0 / 60.0] {
+        let (mut world, cloth, plane, _) = on_a_slope(0.4, 1.05 * 0.4_f32.tan(), 0.0);
+        let before = centre(body(&world, cloth));
+        let force = mean_force(&mut world, plane, dt, (1.0 / dt) as u32);
+        let slid = centre(body(&world, cloth)).distance(before);
+        assert!(slid < 1e-5, "dt {dt}: slid {slid} m");
+        let weight = f64::from(Tissue::VISCOUS.mass * GRAVITY);
+        assert!((force + DVec3::Y * weight).length() < 0.01 * weight, "dt {dt}: {force}");
+    }
+}
+
+#[test]
+fn friction_below_the_slope_lets_it_slide() {
+    for dt in [0.001, 1.0 / 60.0] {
+        for (angle, friction) in [(0.4_f32, 0.0), (0.4, 0.2), (0.7, 0.5)] {
+            let (mut world, cloth, plane, lean) = on_a_slope(angle, friction, 0.0);
+            let start = centre(body(&world, cloth));
+            let steps = (0.5 / dt) as u32;
+            let force = mean_force(&mut world, plane, dt, steps);
+            let seconds = f64::from(steps) * f64::from(dt);
+            let slid = centre(body(&world, cloth)) - start;
+            let acceleration = f64::from(GRAVITY * (angle.sin() - friction * angle.cos()));
+            let expected = 0.5 * acceleration * seconds * seconds;
+            let case = format!("dt {dt}, angle {angle}, friction {friction}");
+            assert!(
+                (slid.length() / expected - 1.0).abs() < 0.01,
+                "{case}: slid {slid}, {expected} m"
+            );
+            let normal = lean.as_dquat() * DVec3::Y;
+            assert!(slid.dot(normal).abs() < 1e-5, "{case}: left the plane, {slid}");
+            let press = -force.dot(normal);
+            let pressed = f64::from(Tissue::VISCOUS.mass * GRAVITY * angle.cos());
+            assert!(
+                (press / pressed - 1.0).abs() < 0.01,
+                "{case}: pressed by {press}, {pressed} N"
+            );
+            let drag = (force + normal * press).length();
+            assert!(
+                (drag - f64::from(friction) * press).abs() < 0.01 * pressed,
+                "{case}: dragged by {drag} N"
+            );
+        }
+    }
+}
+
+#[test]
+fn single_nodes_rest_in_grooves_and_corners() {
+    // Two planes at right angles for a groove, three for a corner: each carries its share of a node without a surface.
+    for (count, directions) in [
+        (2, [Vec3::new(1.0, 1.0, 0.0), Vec3::new(-1.0, 1.0, 0.0), Vec3::ZERO]),
+        (
+            3,
+            [
+                Vec3::new(1.0, 1.0, 1.0),
+                Vec3::new(-2.0, 1.0, 1.0),
+                Vec3::new(1.0, 1.0, -2.0),
+            ],
+        ),
+    ] {
+        let mut world = world(DOWN);
+        let planes: Vec<_> = directions[..count]
+            .iter()
+            .map(|direction| {
+                let lean = Quat::from_rotation_arc(Vec3::Y, direction.normalize());
+                tool(&mut world, Shape::Plane, 0.0, Vec3::ZERO, lean)
+            })
+            .collect();
+        let node = world
+            .create_body(&BodyDefinition {
+                positions: &[Vec3::Y * 0.002],
+                masses: Values::Uniform(0.01),
+                ..Default::default()
+            })
+            .expect("a body");
+        for step in 0..200 {
+            world.step(0.005).expect("a step");
+            for &plane in &planes {
+                let deepest = penetration_of(&world, node, Shape::Plane, plane);
+                assert!(deepest < 1e-5, "{count} planes, step {step}: {deepest} m deep");
+            }
+        }
+        let force: Vec3 = planes.iter().map(|&plane| world.wrench(plane).expect("a tool").0).sum();
+        let weight = 0.01 * GRAVITY;
+        assert!(
+            (force + Vec3::Y * weight).length() < 0.01 * weight,
+            "{count} planes: {force}"
+        );
+        assert!(
+            kinetic(&world, node) < 1e-9,
+            "{count} planes: {}",
+            kinetic(&world, node)
+        );
+    }
+}
+
+#[test]
+fn a_thrown_body_stops_at_a_plane() {
+    // 100 m/s against resting planes and planes that come towards it, in one or in many substeps.
+    for substeps in [0, 1, 7] {
+        for (dt, towards) in [(0.001, 0.0), (1.0 / 60.0, 0.0), (1.0 / 30.0, 0.01), (1.0 / 60.0, 0.3)] {
+            let mut world = World::new(WorldDefinition {
+                gravity: Vec3::ZERO,
+                substeps,
+                ..Default::default()
+            })
+            .expect("a world");
+            let plane = tool(&mut world, Shape::Plane, 0.3, Vec3::ZERO, Quat::IDENTITY);
+            let soft = Tissue {
+                stiffness: 0.5,
+                ..Tissue::SOFT
+            };
+            let mesh = moved(square(0.2, 6), Vec3::Y * 1.0);
+            let cloth = soft.put(&mut world, &mesh);
+            let fast = vec![Vec3::new(20.0, -100.0, 5.0); mesh.positions.len()];
+            world
+                .body_mut(cloth)
+                .expect("a body")
+                .set_velocities(&fast)
+                .expect("velocities");
+            for step in 0..(0.1 / dt) as u32 {
+                if step < 3 {
+                    let pose = world.pose(plane).expect("a tool");
+                    world
+                        .set_pose(plane, pose.position + Vec3::Y * towards, None)
+                        .expect("a pose");
+                }
+                world.step(dt).expect("a step");
+                let deepest = penetration_of(&world, cloth, Shape::Plane, plane);
+                assert!(
+                    deepest < 1e-5,
+                    "{substeps} substeps, dt {dt}, step {step}: {deepest} m deep"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,690 @@
+//! Terms beside springs: their forces against derivatives of formulas in `f64`, energy and momentum, the same in every solver, storage
+//! and number of threads, what a removed spring takes with it, and what is refused.
+
+use crate::support::bodies::{FREE, Random, largest_difference};
+use crate::support::scene::{SOLVERS, STORAGES, Scene};
+use glam::{DMat3, DVec3, Quat, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Error, RestStateDefinition, Solver, SpringLaw, Storage, Values, World, WorldDefinition};
+
+const STIFFNESS: f64 = 4.0;
+const HOME: f64 = 0.5;
+const RIGIDITY: f64 = 3e-5;
+const FIBRE: f64 = 4000.0;
+const MASS: f32 = 1e-4;
+
+/// A block with a surface that has edges, faces and fibres.
+struct Tissue {
+    mesh: Mesh,
+    surface: Vec<[u32; 3]>,
+    springs: Vec<[u32; 2]>,
+    directions: Vec<Vec3>,
+}
+
+/// Which terms a body has.
+#[derive(Clone, Copy, Debug, Default)]
+struct Asked {
+    home: bool,
+    bending: bool,
+    law: SpringLaw,
+    fibres: bool,
+}
+
+const EXPONENTIAL: SpringLaw = SpringLaw::Exponential {
+    steepness: 8.0,
+    limit: 0.2,
+};
+const CUBIC: SpringLaw = SpringLaw::Cubic {
+    quadratic: 3.0,
+    cubic: 4.0,
+    limit: 0.25,
+};
+const ALL: Asked = Asked {
+    home: true,
+    bending: true,
+    law: EXPONENTIAL,
+    fibres: true,
+};
+
+/// Each term alone, and all.
+fn each() -> [Asked; 6] {
+    let none = Asked::default();
+    [
+        Asked { home: true, ..none },
+        Asked { bending: true, ..none },
+        Asked {
+            law: EXPONENTIAL,
+            ..none
+        },
+        Asked { law: CUBIC, ..none },
+        Asked { fibres: true, ..none },
+        ALL,
+    ]
+}
+
+impl Tissue {
+    /// Large enough for several tiles where `cells` are many.
+    fn new(cells: [u32; 3]) -> Self {
+        let size = cells.map(|count| count as f32 * 0.01);
+        let mut mesh = Mesh::block(size, cells).expect("a block");
+        let mut random = Random::new(11);
+        for position in &mut mesh.positions {
+            *position += random.vector() * 1e-3;
+        }
+        let mut world = World::new(FREE).expect("a world");
+        let body = world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            masses: Values::Uniform(MASS),
+            ..BodyDefinition::default()
+        });
+        let body = world.body(body.expect("a body")).expect("the body");
+        let directions = mesh.tetrahedra.iter().enumerate().map(|(index, _)| {
+            if index % 5 == 0 {
+                Vec3::ZERO
+            } else {
+                (Vec3::X + 0.3 * random.vector()).normalize()
+            }
+        });
+        Self {
+            directions: directions.collect(),
+            surface: body.surface().to_vec(),
+            springs: body.spring_pairs().expect("springs"),
+            mesh,
+        }
+    }
+
+    fn definition(&self, asked: Asked) -> BodyDefinition<'_> {
+        BodyDefinition {
+            positions: &self.mesh.positions,
+            masses: Values::Uniform(MASS),
+            springs: Some(&self.springs),
+            stiffnesses: Values::Uniform(STIFFNESS as f32),
+            tetrahedra: &self.mesh.tetrahedra,
+            triangles: &self.surface,
+            home_stiffnesses: Values::Uniform(if asked.home { HOME as f32 } else { 0.0 }),
+            bending_stiffness: if asked.bending { RIGIDITY as f32 } else { 0.0 },
+            spring_law: asked.law,
+            fibre_directions: if asked.fibres { &self.directions } else { &[] },
+            fibre_stiffnesses: Values::Uniform(if asked.fibres { FIBRE as f32 } else { 0.0 }),
+            ..BodyDefinition::default()
+        }
+    }
+
+    fn rest(&self, node: u32) -> DVec3 {
+        self.mesh.positions[node as usize].as_dvec3()
+    }
+
+    /// The hinges: the edge, and the nodes opposite.
+    fn hinges(&self) -> Vec<[u32; 4]> {
+        let mut sides = std::collections::BTreeMap::new();
+        for &[a, b, c] in &self.surface {
+            for [a, b, c] in [[a, b, c], [b, c, a], [c, a, b]] {
+                sides.entry([a.min(b), a.max(b)]).or_insert(Vec::new()).push(c);
+            }
+        }
+        let hinges = sides.into_iter().filter(|(_, corners)| corners.len() == 2);
+        hinges.map(|([a, b], corners)| [a, b, corners[0], corners[1]]).collect()
+    }
+
+    /// The elastic energy as the documentation states it.
+    fn energy(&self, asked: Asked, at: &[DVec3]) -> f64 {
+        let mut energy = 0.0;
+        for &[a, b] in &self.springs {
+            let rest_length = f64::from(self.rest(a).distance(self.rest(b)) as f32);
+            let strain = at[a as usize].distance(at[b as usize]) / rest_length - 1.0;
+            energy += STIFFNESS * rest_length * rest_length * integral(asked.law, strain);
+        }
+        if asked.home {
+            for (place, rest) in at.iter().zip(&self.mesh.positions) {
+                energy += 0.5 * HOME * place.distance_squared(rest.as_dvec3());
+            }
+        }
+        if asked.bending {
+            for nodes in self.hinges() {
+                let rest = nodes.map(|node| self.rest(node));
+                energy += RIGIDITY * hinge(rest, nodes.map(|node| at[node as usize]));
+            }
+        }
+        if asked.fibres {
+            for (corners, direction) in self.mesh.tetrahedra.iter().zip(&self.directions) {
+                let edges = |at: &dyn Fn(u32) -> DVec3| {
+                    let [a, b, c, d] = corners.map(at);
+                    DMat3::from_cols(b - a, c - a, d - a)
+                };
+                let rest = edges(&|node| self.rest(node));
+                let gradient = edges(&|node| at[node as usize]) * rest.inverse();
+                let stretch = ((gradient * direction.as_dvec3()).length() - 1.0).max(0.0);
+                energy += 0.5 * FIBRE * rest.determinant().abs() / 6.0 * stretch * stretch;
+            }
+        }
+        energy
+    }
+
+    /// Minus the slope of that.
+    fn force(&self, asked: Asked, at: &mut [DVec3], node: usize) -> DVec3 {
+        const STEP: f64 = 1e-7;
+        DVec3::from_array([0, 1, 2].map(|axis| {
+            let place = at[node][axis];
+            at[node][axis] = place + STEP;
+            let more = self.energy(asked, at);
+            at[node][axis] = place - STEP;
+            let less = self.energy(asked, at);
+            at[node][axis] = place;
+            (less - more) / (2.0 * STEP)
+        }))
+    }
+}
+
+/// The energy of a spring of stiffness and length 1: the integral of its pull over its strain.
+fn integral(law: SpringLaw, strain: f64) -> f64 {
+    let pull_to = |strain: f64| match law {
+        SpringLaw::Linear => [strain, 0.5 * strain * strain, 1.0],
+        SpringLaw::Exponential { steepness, .. } => {
+            let b = f64::from(steepness);
+            let e = (b * strain).exp();
+            if strain < 0.0 {
+                [strain, 0.5 * strain * strain, 1.0]
+            } else {
+                [(e - 1.0) / b, (e - 1.0) / (b * b) - strain / b, e]
+            }
+        }
+        SpringLaw::Cubic { quadratic, cubic, .. } => {
+            let (a, b) = (f64::from(quadratic), f64::from(cubic));
+            [
+                strain + a * strain.powi(2) + b * strain.powi(3),
+                strain.powi(2) / 2.0 + a * strain.powi(3) / 3.0 + b * strain.powi(4) / 4.0,
+                1.0 + 2.0 * a * strain + 3.0 * b * strain.powi(2),
+            ]
+        }
+    };
+    let limit = match law {
+        SpringLaw::Linear => return pull_to(strain)[1],
+        SpringLaw::Exponential { limit, .. } | SpringLaw::Cubic { limit, .. } => f64::from(limit),
+    };
+    let [pull, energy, slope] = pull_to(strain.min(limit));
+    let beyond = (strain - limit).max(0.0);
+    energy + pull * beyond + 0.5 * slope * beyond * beyond
+}
+
+/// The energy of a hinge of flexural rigidity 1, as the documentation of bending has it.
+fn hinge(rest: [DVec3; 4], places: [DVec3; 4]) -> f64 {
+    let [a, b, opposite @ ..] = rest;
+    let edge = b - a;
+    let feet = opposite.map(|corner| (corner - a).dot(edge) / edge.length_squared());
+    let heights = [0, 1].map(|arm| (opposite[arm] - a - edge * feet[arm]).length());
+    let arms = |[a, b, c, d]: [DVec3; 4]| {
+        let edge = b - a;
+        [
+            (c - a - edge * feet[0]) / heights[0],
+            (d - a - edge * feet[1]) / heights[1],
+        ]
+    };
+    let [first, second] = arms(rest);
+    // The angle between the arms is half a turn less the angle of the hinge.
+    let angle = std::f64::consts::PI - first.cross(second).length().atan2(first.dot(second));
+    let side = (first + second).dot(edge.cross(first - second)).signum();
+    let (sine, cosine) = (0.5 * angle).sin_cos();
+    let [t, u] = arms(places);
+    let turn = (t + u) * cosine - (places[1] - places[0]).cross(t - u) * (side * sine / edge.length());
+    let areas = 0.5 * edge.length() * (heights[0] + heights[1]);
+    0.5 * edge.length_squared() / areas * turn.length_squared()
+}
+
+impl Scene {
+    fn momentum(&self) -> [DVec3; 2] {
+        let body = self.body();
+        let nodes = body.positions().iter().zip(body.velocities());
+        nodes.fold([DVec3::ZERO; 2], |[linear, angular], (position, velocity)| {
+            let momentum = velocity.as_dvec3() * f64::from(MASS);
+            [linear + momentum, angular + position.as_dvec3().cross(momentum)]
+        })
+    }
+}
+
+/// Far from rest, every spring, hinge and fibre otherwise.
+fn deformed(mesh: &Mesh, seed: u64) -> Vec<Vec3> {
+    let mut random = Random::new(seed);
+    let turned = Quat::from_rotation_y(0.4) * Quat::from_rotation_x(0.3);
+    let stretched = |position: &Vec3| turned * (*position * Vec3::new(1.2, 0.9, 1.0)) + random.vector() * 1.5e-3;
+    mesh.positions.iter().map(stretched).collect()
+}
+
+#[test]
+fn forces_and_energy_are_those_of_the_formulas() {
+    let tissue = Tissue::new([4, 3, 3]);
+    for asked in each() {
+        for storage in STORAGES {
+            for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+                if storage != Storage::Packed && solver != Solver::Verlet {
+                    continue;
+                }
+                let definition = BodyDefinition {
+                    storage,
+                    solver,
+                    ..tissue.definition(asked)
+                };
+                let mut scene = Scene::new(FREE, &definition);
+                let places = deformed(&tissue.mesh, 4);
+                let body = scene.body_mut();
+                for node in 0..places.len() as u32 {
+                    body.pin(node).expect("a node");
+                }
+                body.set_positions(&places).expect("places");
+                scene.world.step(1e-5).expect("a step");
+                let mut at: Vec<DVec3> = places.iter().map(|place| place.as_dvec3()).collect();
+                let forces: Vec<DVec3> = (0..at.len()).map(|node| tissue.force(asked, &mut at, node)).collect();
+                let size = forces.iter().map(|force| force.length()).fold(0.0, f64::max);
+                for (node, expected) in forces.iter().enumerate() {
+                    let force = -scene.body().pin_force(node as u32).expect("a pin").as_dvec3();
+                    let off = force.distance(*expected) / size;
+                    assert!(
+                        off < 3e-6,
+                        "{asked:?}, {storage:?}, {solver:?}, node {node}: {force} {expected}, {off:e} off"
+                    );
+                }
+                let (energy, expected) = (scene.energy(), tissue.energy(asked, &at));
+                assert!(
+                    (energy - expected).abs() < 1e-6 * expected,
+                    "{asked:?}: {energy} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_shape_given_is_at_rest() {
+    let tissue = Tissue::new([4, 3, 3]);
+    for solver in SOLVERS {
+        let definition = BodyDefinition {
+            solver,
+            ..tissue.definition(ALL)
+        };
+        let mut scene = Scene::new(FREE, &definition);
+        let before = scene.positions();
+        for _ in 0..50 {
+            scene.world.step(2e-3).expect("a step");
+        }
+        let moved = largest_difference(&before, &scene.positions());
+        assert!(moved < 1e-8, "{solver:?}: {moved} m");
+    }
+}
+
+#[test]
+fn verlet_keeps_energy_and_momentum() {
+    let tissue = Tissue::new([14, 6, 6]);
+    for asked in each() {
+        let mut scene = Scene::new(FREE, &tissue.definition(asked));
+        let mut random = Random::new(2);
+        let spin = Vec3::new(1.0, 2.0, -1.0);
+        let velocities: Vec<Vec3> = tissue
+            .mesh
+            .positions
+            .iter()
+            .map(|position| spin.cross(*position) + random.vector() * 0.05)
+            .collect();
+        scene.body_mut().set_velocities(&velocities).expect("velocities");
+        let (energy, [linear, angular]) = (scene.energy(), scene.momentum());
+        let mut most = 0.0_f64;
+        for _ in 0..100 {
+            scene.world.step(2e-3).expect("a step");
+            most = most.max((scene.energy() / energy - 1.0).abs());
+        }
+        let substeps = scene.world.step(2e-3).expect("a step").substeps;
+        assert!(
+            most < 0.03,
+            "{asked:?}: {most} of the energy, in steps of {substeps} substeps"
+        );
+        if !asked.home {
+            let [then, turning] = scene.momentum();
+            let size = f64::from(MASS) * 0.1 * tissue.mesh.positions.len() as f64;
+            assert!(then.distance(linear) < 2e-6 * size, "{asked:?}: {linear} {then}");
+            assert!(
+                turning.distance(angular) < 2e-6 * size,
+                "{asked:?}: {angular} {turning}"
+            );
+        }
+    }
+}
+
+#[test]
+fn implicit_steps_keep_linear_momentum() {
+    let tissue = Tissue::new([4, 3, 3]);
+    for solver in [Solver::Implicit, Solver::Newton] {
+        let asked = Asked { home: false, ..ALL };
+        let definition = BodyDefinition {
+            solver,
+            ..tissue.definition(asked)
+        };
+        let mut scene = Scene::new(FREE, &definition);
+        scene
+            .body_mut()
+            .set_positions(&deformed(&tissue.mesh, 9))
+            .expect("places");
+        let energy = scene.energy();
+        for _ in 0..20 {
+            scene.world.step(5e-3).expect("a step");
+        }
+        assert!(scene.energy() < energy, "{solver:?}: {energy} {}", scene.energy());
+        // Backward differences do not keep the angular momentum of motion that is not even.
+        let [linear, _] = scene.momentum();
+        let size = (2.0 * energy * f64::from(MASS) * tissue.mesh.positions.len() as f64).sqrt();
+        assert!(linear.length() < 3e-5 * size, "{solver:?}: {linear} of {size}");
+    }
+}
+
+#[test]
+fn every_solver_comes_to_the_same_rest() {
+    let tissue = Tissue::new([6, 3, 3]);
+    let gravity = Vec3::new(0.0, -2.0, 0.0);
+    for asked in each() {
+        let mut rests = Vec::new();
+        for solver in SOLVERS {
+            for storage in STORAGES {
+                if storage != Storage::Packed && solver != Solver::Verlet {
+                    continue;
+                }
+                let definition = BodyDefinition {
+                    storage,
+                    solver,
+                    node_dampings: Values::Uniform(4e-3),
+                    accuracy: if solver == Solver::Implicit { 1e-4 } else { 0.0 },
+                    ..tissue.definition(asked)
+                };
+                let mut scene = Scene::new(WorldDefinition { gravity, ..FREE }, &definition);
+                let pinned: Vec<u32> = (0..tissue.mesh.positions.len() as u32)
+                    .filter(|&node| tissue.mesh.positions[node as usize].x < -0.025)
+                    .collect();
+                for node in pinned {
+                    scene.body_mut().pin(node).expect("a node");
+                }
+                for _ in 0..150 {
+                    scene.world.step(1.0 / 60.0).expect("a step");
+                }
+                rests.push(scene.positions());
+                if solver == Solver::Newton {
+                    let report = scene.world.rest_state(scene.id, &RestStateDefinition::default());
+                    report.expect("a state of rest");
+                    rests.push(scene.positions());
+                }
+            }
+        }
+        let lowest = rests[0].iter().zip(&tissue.mesh.positions);
+        let sunk = lowest.map(|(at, rest)| f64::from(rest.y) - at.y).fold(0.0, f64::max);
+        assert!(sunk > 5e-5, "{asked:?}: it hangs {sunk} m");
+        for (number, rest) in rests.iter().enumerate() {
+            let off = largest_difference(&rests[0], rest);
+            assert!(off < 0.003 * sunk, "{asked:?}, rest {number}: {off} m of {sunk}");
+        }
+    }
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let tissue = Tissue::new([20, 8, 8]);
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let hashes = [1, 3].map(|thread_count| {
+            let definition = BodyDefinition {
+                solver,
+                ..tissue.definition(ALL)
+            };
+            let mut scene = Scene::new(WorldDefinition { thread_count, ..FREE }, &definition);
+            scene
+                .body_mut()
+                .set_positions(&deformed(&tissue.mesh, 5))
+                .expect("places");
+            for _ in 0..3 {
+                scene.world.step(1e-3).expect("a step");
+            }
+            scene.world.state_hash()
+        });
+        assert_eq!(hashes[0], hashes[1], "{solver:?}");
+    }
+}
+
+#[test]
+fn a_home_spring_goes_where_a_body_does() {
+    // Far from the origin, where the body counts from a place of its own, which moves after it.
+    let far = Vec3::new(1000.0, -500.0, 250.0);
+    let positions = [far, far + Vec3::X];
+    let definition = BodyDefinition {
+        positions: &positions,
+        masses: Values::Uniform(0.5),
+        home_stiffnesses: Values::Each(&[8.0, 0.0]),
+        ..BodyDefinition::default()
+    };
+    let mut scene = Scene::new(FREE, &definition);
+    scene
+        .body_mut()
+        .set_positions(&[far + Vec3::new(0.0, 25.0, 0.0), far])
+        .expect("places");
+    let quarter = 0.5 * std::f32::consts::PI * (0.5_f32 / 8.0).sqrt();
+    for _ in 0..2000 {
+        scene.world.step(quarter / 2000.0).expect("a step");
+    }
+    let at = scene.positions();
+    assert!(at[0].distance(far.as_dvec3()) < 1e-3, "{}", at[0]);
+    assert_eq!(at[1], far.as_dvec3());
+    let speed = f64::from(scene.body().velocities()[0].y);
+    assert!((speed + 100.0).abs() < 0.01, "{speed}");
+}
+
+#[test]
+fn what_a_removed_spring_had_goes_with_it() {
+    let tissue = Tissue::new([4, 3, 3]);
+    for solver in SOLVERS {
+        let definition = BodyDefinition {
+            solver,
+            ..tissue.definition(ALL)
+        };
+        let mut scene = Scene::new(FREE, &definition);
+        let places = deformed(&tissue.mesh, 4);
+        for node in 0..places.len() as u32 {
+            scene.body_mut().pin(node).expect("a node");
+        }
+        let [a, b] = [tissue.surface[7][0], tissue.surface[7][1]];
+        scene.body_mut().remove_spring(a, b).expect("a spring");
+        scene.body_mut().set_positions(&places).expect("places");
+        scene.world.step(1e-5).expect("a step");
+        // What has the edge is left out.
+        let has = |nodes: &[u32]| nodes.contains(&a) && nodes.contains(&b);
+        let (mut tetrahedra, mut directions) = (Vec::new(), Vec::new());
+        for (corners, direction) in tissue.mesh.tetrahedra.iter().zip(&tissue.directions) {
+            if !has(corners) {
+                tetrahedra.push(*corners);
+                directions.push(*direction);
+            }
+        }
+        let mut left = Tissue {
+            mesh: Mesh {
+                tetrahedra,
+                ..tissue.mesh.clone()
+            },
+            directions,
+            springs: tissue.springs.clone(),
+            surface: tissue.surface.clone(),
+        };
+        left.springs.retain(|pair| !has(pair));
+        left.surface.retain(|corners| !has(corners));
+        let mut at: Vec<DVec3> = places.iter().map(|place| place.as_dvec3()).collect();
+        for node in [a, b, 0, 20] {
+            let expected = left.force(ALL, &mut at, node as usize);
+            let force = -scene.body().pin_force(node).expect("a pin").as_dvec3();
+            assert!(
+                force.distance(expected) < 1e-5 * expected.length().max(0.01),
+                "{solver:?}, node {node}: {force} {expected}"
+            );
+        }
+        assert!(matches!(
+            scene.body_mut().remove_spring(a, b),
+            Err(Error::InvalidArgument(_))
+        ));
+    }
+}
+
+#[test]
+fn whatever_becomes_of_a_body_is_finite() {
+    let tissue = Tissue::new([4, 3, 3]);
+    for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+        let definition = BodyDefinition {
+            solver,
+            node_dampings: Values::Uniform(1e-3),
+            ..tissue.definition(ALL)
+        };
+        let count = tissue.mesh.positions.len();
+        let flat: Vec<Vec3> = tissue.mesh.positions.iter().map(|p| Vec3::new(p.x, 0.0, 0.0)).collect();
+        let turned: Vec<Vec3> = tissue.mesh.positions.iter().map(|p| -3.0 * *p).collect();
+        for places in [vec![Vec3::ZERO; count], flat, turned] {
+            let mut scene = Scene::new(
+                WorldDefinition {
+                    max_substeps: 100_000,
+                    ..FREE
+                },
+                &definition,
+            );
+            scene.body_mut().set_positions(&places).expect("places");
+            let before = scene.energy();
+            for _ in 0..20 {
+                let report = scene.world.step(1e-3).expect("a step");
+                assert_eq!(report.bodies_restored, 0, "{solver:?}");
+            }
+            assert!(scene.positions().iter().all(|place| place.is_finite()), "{solver:?}");
+            assert!(
+                scene.energy() <= 1.05 * before,
+                "{solver:?}: {before} J, {} J",
+                scene.energy()
+            );
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused_by_name() {
+    let tissue = Tissue::new([2, 2, 2]);
+    let whole = tissue.definition(ALL);
+    let count = tissue.mesh.positions.len();
+    let mut wrong = vec![1.0; count];
+    wrong[3] = -2.0;
+    let mut long = tissue.directions.clone();
+    long[4] = Vec3::new(0.0, 2.0, 0.0);
+    let fan = [[0, 1, 2], [0, 1, 3], [1, 0, 4]];
+    let twice = [[0, 1, 2], [1, 0, 2]];
+    let exponential = |steepness, limit| SpringLaw::Exponential { steepness, limit };
+    let cubic = |quadratic, cubic, limit| SpringLaw::Cubic {
+        quadratic,
+        cubic,
+        limit,
+    };
+    let law = |law| BodyDefinition {
+        spring_law: law,
+        ..whole
+    };
+    let cases = [
+        (
+            BodyDefinition {
+                home_stiffnesses: Values::Uniform(f32::NAN),
+                ..whole
+            },
+            ["home_stiffness", "NaN"],
+        ),
+        (
+            BodyDefinition {
+                home_stiffnesses: Values::Each(&wrong),
+                ..whole
+            },
+            ["home_stiffnesses[3]", "-2"],
+        ),
+        (
+            BodyDefinition {
+                home_stiffnesses: Values::Each(&wrong[..5]),
+                ..whole
+            },
+            ["home_stiffnesses has 5", "27"],
+        ),
+        (
+            BodyDefinition {
+                bending_stiffness: -1.5,
+                ..whole
+            },
+            ["bending_stiffness", "-1.5"],
+        ),
+        (
+            BodyDefinition {
+                triangles: &[],
+                ..whole
+            },
+            ["bending_stiffness", "no triangles"],
+        ),
+        (
+            BodyDefinition {
+                triangles: &fan,
+                ..whole
+            },
+            ["3 triangles share the edge of nodes [0, 1]", "bending_stiffness"],
+        ),
+        (
+            BodyDefinition {
+                triangles: &twice,
+                ..whole
+            },
+            ["triangles[0] and triangles[1]", "bending_stiffness"],
+        ),
+        (law(exponential(0.0, 0.1)), ["steepness", "is 0"]),
+        (law(exponential(5.0, f32::INFINITY)), ["limit", "inf"]),
+        (law(exponential(100.0, 0.5)), ["steepness of spring_law is 100", "0.5"]),
+        (law(cubic(2.0, 1.0, 0.5)), ["quadratic of spring_law is 2", "cubic 1"]),
+        (law(cubic(0.0, 1.0, -0.5)), ["limit", "-0.5"]),
+        (
+            BodyDefinition {
+                springs: Some(&[]),
+                ..whole
+            },
+            ["spring_law", "no springs"],
+        ),
+        (
+            BodyDefinition {
+                tetrahedra: &[],
+                ..whole
+            },
+            ["fibre_directions", "no tetrahedra"],
+        ),
+        (
+            BodyDefinition {
+                fibre_directions: &long,
+                ..whole
+            },
+            ["fibre_directions[4]", "2 long"],
+        ),
+        (
+            BodyDefinition {
+                fibre_directions: &long[..3],
+                ..whole
+            },
+            ["fibre_directions has 3", "40"],
+        ),
+        (
+            BodyDefinition {
+                fibre_directions: &[],
+                ..whole
+            },
+            ["fibre_stiffness", "fibre_directions"],
+        ),
+        (
+            BodyDefinition {
+                fibre_stiffnesses: Values::Uniform(-3.0),
+                ..whole
+            },
+            ["fibre_stiffness", "-3"],
+        ),
+    ];
+    let mut world = World::new(FREE).expect("a world");
+    for (definition, parts) in cases {
+        match world.create_body(&definition) {
+            Err(Error::InvalidArgument(message)) => {
+                assert!(parts.iter().all(|part| message.contains(part)), "{message}: {parts:?}");
+            }
+            other => panic!("{parts:?}: {other:?}"),
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Tetrahedra against the theory of elasticity, and against the same meshes in `f64`: sizes that are cheap. `cargo bench --bench accuracy`
+//! has the rest, and writes tables of all.
+
+#[path = "../accuracy/mod.rs"]
+mod accuracy;
+
+use crate::support::bodies::largest_difference;
+use accuracy::cantilever::{Cantilever, refined};
+use accuracy::hertz::{DEEPEST, Layer, RADIUS};
+use accuracy::press::{Block, SIDE};
+use sinew::Solver;
+
+/// Poisson's ratio, and how far the end of a beam comes over what beam theory says, with cubes without end (Richardson, from beams 2, 4 and
+/// 8 cubes thick).
+const REFINED: [(f32, f64); 4] = [(0.0, 1.021), (0.25, 1.009), (0.4, 0.997), (0.49, 0.994)];
+
+#[test]
+fn a_cantilever_gives_way_as_its_mesh_in_f64_does() {
+    for (nu, _) in REFINED {
+        for thick in [2, 4] {
+            let cantilever = Cantilever::new(thick, nu);
+            let (found, exact) = (cantilever.found(), cantilever.exact());
+            let off = (found / exact - 1.0).abs();
+            // Both are the least energy of one mesh; coordinates in f32 leave strains of 1e-6 of those here.
+            assert!(off < 2e-5, "nu {nu}, {thick} thick: {found} for {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_cantilever_nears_what_a_beam_does() {
+    for (nu, limit) in REFINED {
+        let [coarse, middle] = [2, 4].map(|thick| Cantilever::new(thick, nu).found());
+        // The theory of beams has no clamp that keeps its end from getting thinner: within 3 % of it.
+        assert!((limit - 1.0).abs() < 0.03);
+        let order = ((limit - coarse) / (limit - middle)).log2();
+        assert!(
+            (1.2..2.0).contains(&order),
+            "nu {nu}: {coarse} {middle}, of order {order}"
+        );
+        if nu < 0.4 {
+            let fine = Cantilever::new(8, nu).found();
+            let (found, order) = refined([coarse, middle, fine]);
+            assert!((found - limit).abs() < 1e-3, "nu {nu}: refines to {found}");
+            assert!((1.2..2.0).contains(&order), "nu {nu}: of order {order}");
+        }
+    }
+}
+
+/// Tetrahedra of Poisson's ratio 0.49 lose 3.8 % of their volume where they are pressed to half their height, because that is what the law
+/// says: its bulk modulus is 50 times the shear modulus. To keep it to 1e-4 takes a ratio of 0.49997. So what they lose is compared with
+/// what the law says, to 1e-5.
+#[test]
+fn a_block_between_sliding_plates_is_pressed_as_its_law_says() {
+    for (nu, by) in [(0.3, 0.35), (0.49, 0.2), (0.49, 0.5)] {
+        let block = Block::new(4, nu, by);
+        let (side, force) = block.even();
+        let expected = side * side * (1.0 - by);
+        let found = block.sliding();
+        let (whole, off) = found.volume(&block, expected);
+        assert!(
+            (whole - expected).abs() < 1e-5,
+            "nu {nu}, by {by}: {whole} for {expected}"
+        );
+        assert!(off < 1e-5, "nu {nu}, by {by}: volumes about nodes are off by {off}");
+        let ratio = found.force / force;
+        assert!(
+            (ratio - 1.0).abs() < 1e-3,
+            "nu {nu}, by {by}: {} N for {force} N",
+            found.force
+        );
+    }
+}
+
+#[test]
+fn a_block_bonded_to_plates_is_pressed_as_its_mesh_in_f64_is() {
+    for (nu, by) in [(0.3, 0.2), (0.3, 0.5), (0.49, 0.2), (0.49, 0.5)] {
+        let block = Block::new(4, nu, by);
+        let (found, exact) = (block.bonded(), block.exact());
+        let off = largest_difference(&found.at, &exact.at) / f64::from(SIDE);
+        assert!(off < 1e-6, "nu {nu}, by {by}: {off} of its side apart");
+        let ratio = found.force / exact.force;
+        assert!(
+            (ratio - 1.0).abs() < 1e-4,
+            "nu {nu}, by {by}: {} N for {}",
+            found.force,
+            exact.force
+        );
+    }
+}
+
+#[test]
+fn a_block_bonded_to_plates_nears_what_finer_ones_do() {
+    let [coarse, middle, fine] = [2, 4, 8].map(|thick| Block::new(thick, 0.3, 0.2).bonded().force);
+    let (limit, order) = refined([coarse, middle, fine]);
+    assert!(
+        (1.2..2.0).contains(&order),
+        "{coarse} {middle} {fine}: of order {order}"
+    );
+    for force in [middle, fine] {
+        assert!((force / limit - 1.0).abs() < 0.1, "{force} N for {limit} N");
+    }
+}
+
+/// A contact three cells in radius. Eight of them, where theory is the measure, are in the bench.
+#[test]
+fn a_sphere_feels_what_the_same_mesh_in_f64_does() {
+    let layer = Layer::new(3, 0.3);
+    let depth = DEEPEST * RADIUS;
+    let found = layer.found(Solver::Verlet, &[depth])[0];
+    let exact = layer.exact(depth);
+    assert!((found / exact - 1.0).abs() < 1e-3, "{found} N for {exact} N");
+    // Linear tetrahedra and a contact of few faces are too stiff, by 11 % here, 7 % with four cells.
+    let (theory, _) = layer.theory(depth);
+    assert!(
+        (1.0..1.15).contains(&(found / theory)),
+        "{found} N, and {theory} N by theory"
+    );
+}

@@ -1,0 +1,9 @@
+//! Meshes and pictures.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod files;
+mod picture_values;
+mod raster;
+mod shapes;

@@ -1,0 +1,382 @@
+//! IMPLICIT and NEWTON against motions that are known: each against the exact solution of its own formula, oscillators, damping,
+//! falls, waves, the pendulum, momentum, and the same motion turned and moved.
+
+use std::f64::consts::PI;
+
+use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+use crate::support::motion::{
+    Mode, Pendulum, STRETCH, Waves, fixed_chain, omega, period_of, rounding, stretch, two_masses,
+};
+use glam::{DVec3, Quat, Vec3};
+use sinew::{BodyDefinition, Solver, WorldDefinition};
+
+const SOLVERS: [Solver; 2] = [Solver::Implicit, Solver::Newton];
+
+/// Solved as exactly as can be asked for, so that the formula is what is seen.
+fn scene(parts: &Parts, world: WorldDefinition, solver: Solver, order: u32) -> Scene {
+    Scene::with(parts, world, |definition| BodyDefinition {
+        solver,
+        order,
+        accuracy: 1e-6,
+        ..definition
+    })
+}
+
+fn under(gravity: Vec3) -> WorldDefinition {
+    WorldDefinition { gravity, ..FREE }
+}
+
+const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
+
+/// The two masses, damped at their nodes: 0.75 kg reduced mass.
+fn damped_masses(zeta: f64) -> (Parts, Mode) {
+    let (mut parts, _) = two_masses();
+    let rate = 2.0 * zeta * omega();
+    parts.node_dampings = parts.masses.iter().map(|m| m * rate as f32).collect();
+    (parts, Mode::new(omega(), rate, STRETCH, 0.0))
+}
+
+/// The motion after so many steps.
+fn damped(solver: Solver, order: u32, parts: &Parts, mode: &Mode, h: f32, steps: usize) -> Scene {
+    let mut scene = scene(parts, FREE, solver, order);
+    let v0 = mode.now[1];
+    let velocities = [Vec3::X * (-0.75 * v0) as f32, Vec3::X * (0.25 * v0) as f32];
+    scene.body_mut().set_velocities(&velocities).expect("velocities");
+    scene.run(h, steps);
+    scene
+}
+
+#[test]
+fn oscillators_follow_the_discrete_solution() {
+    for solver in SOLVERS {
+        for order in [1, 2] {
+            for zeta in [0.0, 0.05, 0.2, 2.0] {
+                for x in [0.02, 0.2, 2.0, 20.0] {
+                    let (parts, mode) = damped_masses(zeta);
+                    let h = (x / omega()) as f32;
+                    for steps in [1, 2, 30] {
+                        let scene = damped(solver, order, &parts, &mode, h, steps);
+                        let mut expected = mode;
+                        expected.run(order, f64::from(h), steps);
+                        let (q, v) = stretch(&scene);
+                        let error = (q - expected.now[0]).hypot((v - expected.now[1]) / omega()) / STRETCH;
+                        let named = format!("{solver:?}, order {order}, zeta {zeta}, h omega {x}, {steps} steps");
+                        // Positions are rounded to 7.5e-9 m, 1.5e-7 of the stretch, again and again with IMPLICIT.
+                        assert!(error < 2e-6, "{named}: {error:.2e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn damped_oscillators_converge_and_decay_alike() {
+    for solver in SOLVERS {
+        for zeta in [0.05, 0.2] {
+            let (parts, mut mode) = damped_masses(zeta);
+            mode.now[1] = -zeta * omega() * STRETCH;
+            let errors = [1.0, 2.0, 4.0].map(|finer| {
+                let (h, steps) = ((0.024 / finer / omega()) as f32, (400.0 * finer) as usize);
+                let scene = damped(solver, 2, &parts, &mode, h, steps);
+                let t = f64::from(h) * steps as f64;
+                let turns = omega() * (1.0 - zeta * zeta).sqrt();
+                let (q, v) = stretch(&scene);
+                let (re, im) = (q, -(v + zeta * omega() * q) / turns);
+                let amplitude = STRETCH * (-zeta * omega() * t).exp();
+                let decay = -(re.hypot(im) / STRETCH).ln() / (zeta * omega() * t);
+                // The formula's own is (h omega)² more, and what its first step takes.
+                assert!((decay - 1.0).abs() < 1e-3, "{solver:?}, zeta {zeta}: decay {decay}");
+                (re - amplitude * (turns * t).cos()).hypot(im - amplitude * (turns * t).sin()) / amplitude
+            });
+            for pair in errors.windows(2) {
+                let order = (pair[0] / pair[1]).log2();
+                assert!(
+                    (order - 2.0).abs() < 0.05,
+                    "{solver:?}, zeta {zeta}: order {order}, {errors:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn nodes_reach_their_terminal_velocity_at_every_step() {
+    let mut parts = Parts::nodes(vec![Vec3::ZERO, Vec3::X, Vec3::Y], 0.0);
+    parts.masses = vec![0.001, 0.5, 20.0];
+    parts.node_dampings = vec![1.0, 20.0, 1000.0];
+    let all: f32 = parts.masses.iter().sum();
+    for solver in SOLVERS {
+        for order in [1, 2] {
+            for h in [1e-4_f32, 1e-3, 1.0 / 60.0, 0.1, 1.0] {
+                let mut scene = scene(&parts, under(DOWN), solver, order);
+                let rate = |node: usize| f64::from(parts.node_dampings[node]) / f64::from(parts.masses[node]);
+                let mut modes = [0, 1, 2].map(|node| Mode {
+                    push: f64::from(DOWN.y),
+                    ..Mode::new(0.0, rate(node), 0.0, 0.0)
+                });
+                let steps = (0.6 / h).ceil() as usize + 60;
+                for step in 1..=steps {
+                    scene.step(h);
+                    for (node, velocity) in scene.velocities().into_iter().enumerate() {
+                        modes[node].step(order, f64::from(h));
+                        let terminal = f64::from(DOWN.y) / rate(node);
+                        let error = (velocity.y - modes[node].now[1]) / terminal;
+                        // A step rounds the velocity by 6e-8, and forgets the part h rate of it.
+                        let rounded = f64::max(1e-5, 3.6e-7 / (rate(node) * f64::from(h)));
+                        // A millionth of what all nodes do together, in the norm of their masses, may be missing.
+                        let unsolved = match solver {
+                            Solver::Implicit => f64::from(all / parts.masses[node]).sqrt() * 1e-6,
+                            _ => 0.0,
+                        };
+                        let allowed = rounded.max(unsolved);
+                        let named = format!("{solver:?}, order {order}, {h} s, node {node}, step {step}");
+                        assert!(error.abs() < allowed, "{named}: {error:.2e}");
+                        if step == steps {
+                            let error = velocity.y / terminal - 1.0;
+                            assert!(error.abs() < allowed, "{named}: {error:.2e} at last");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// g n (n + 1) h² / 2 with order 1; g t² / 2 with order 2, but for its first step.
+#[test]
+fn bodies_fall_as_the_formula_says_far_from_the_origin() {
+    let h = 1e-4_f32;
+    for solver in SOLVERS {
+        for order in [1, 2] {
+            for offset in [0.0_f32, 10.0, 10_000.0] {
+                let parts = Parts::block([1, 1, 1], 0.05, 0.01, 50.0)
+                    .moved(Quat::IDENTITY, Vec3::new(-offset, offset, 0.3 * offset));
+                let mut scene = scene(&parts, under(DOWN), solver, order);
+                // Of the centre: the roundings of its places make a body's nodes tremble against each other.
+                let centre = |vectors: &[DVec3]| vectors.iter().sum::<DVec3>() / vectors.len() as f64;
+                let start = centre(&scene.positions());
+                let mut expected = Mode {
+                    push: f64::from(DOWN.y),
+                    ..Mode::new(0.0, 0.0, 0.0, 0.0)
+                };
+                let mut done = 0;
+                for steps in [100, 1000, 10_000] {
+                    scene.run(h, steps - done);
+                    expected.run(order, f64::from(h), steps - done);
+                    done = steps;
+                    let t = f64::from(h) * steps as f64;
+                    let named = format!("{solver:?}, order {order}, {offset} m, {t} s");
+                    let fall = start.y - centre(&scene.positions()).y;
+                    let rounding = rounding(start.y) + rounding(fall);
+                    let [y, v] = expected.now;
+                    let error = (fall + y).abs();
+                    // 3e-5 is aimed at; what f32 rounds off the velocity in each step adds up to 7e-5 of the fall.
+                    assert!(error < 1e-4 * fall + rounding, "{named}: {:.2e}", error / fall);
+                    // Of the true fall, order 1 is off by h / t.
+                    let error = (fall / (0.5 * f64::from(-DOWN.y) * t * t) - 1.0).abs();
+                    let discrete = if order == 1 { 1.01 * f64::from(h) / t } else { 0.0 };
+                    assert!(t < 0.9 || error < 1e-4 + discrete + rounding, "{named}: {error:.2e}");
+                    let off = centre(&scene.velocities()).distance(DVec3::Y * v) / v.abs();
+                    // 1e-4 is aimed at; 1.3e-4 comes of it.
+                    assert!(off < 2e-4, "{named}: velocity {off:.2e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn all_modes_of_a_chain_follow_the_discrete_solution() {
+    let (free, spacing, mass, stiffness) = (100, 0.01_f32, 0.01_f32, 100.0_f32);
+    let parts = fixed_chain(free, spacing, mass, stiffness);
+    let (h, steps) = (0.004_f32, 25);
+    for solver in SOLVERS {
+        for mode in 1..=free {
+            let angle = mode as f64 * PI / (free + 1) as f64;
+            let shape: Vec<f64> = (0..free + 2).map(|i| (angle * i as f64).sin()).collect();
+            let norm: f64 = shape.iter().map(|s| s * s).sum();
+            let amplitude = 0.2 * f64::from(spacing) / (angle / 2.0).sin();
+            let mut started = parts.clone();
+            for (position, s) in started.positions.iter_mut().zip(&shape) {
+                position.x = (f64::from(position.x) + amplitude * s) as f32;
+            }
+            let mut scene = scene(&started, FREE, solver, 2);
+            scene.run(h, steps);
+            let project = |vectors: &[DVec3], from: f64| {
+                let along = vectors.iter().zip(&shape).enumerate();
+                along.map(|(i, (v, s))| (v.x - from * i as f64) * s).sum::<f64>() / norm
+            };
+            let q = project(&scene.positions(), f64::from(spacing));
+            let v = project(&scene.velocities(), 0.0);
+            let omega = 2.0 * (f64::from(stiffness) / f64::from(mass)).sqrt() * (angle / 2.0).sin();
+            let mut expected = Mode::new(omega, 0.0, amplitude, 0.0);
+            expected.run(2, f64::from(h), steps);
+            let error = (q - expected.now[0]).hypot((v - expected.now[1]) / omega) / amplitude;
+            assert!(error < 1e-5, "{solver:?}, mode {mode}: {error:.2e}");
+        }
+    }
+}
+
+#[test]
+fn waves_travel_at_their_speed() {
+    for (solver, free) in [(Solver::Implicit, 799), (Solver::Newton, 239)] {
+        let waves = Waves::new(free);
+        let mut scene = scene(&waves.parts, FREE, solver, 2);
+        waves.start(&mut scene);
+        // A node in 10 ms: what the ends do does not come to the middle.
+        let h = 0.001;
+        let steps = (free - 39) * 5 / 2;
+        scene.run(h, steps);
+        let (speed, dispersed) = waves.speed(&scene, f64::from(h) * steps as f64, 40);
+        assert!(
+            (speed / dispersed - 1.0).abs() < 1e-3,
+            "{solver:?}: {speed} for {dispersed}"
+        );
+    }
+}
+
+/// The period of the pendulum from 150 degrees over what it should be, less 1, in steps of 1 ms.
+fn error_of_period(solver: Solver) -> f64 {
+    let (pendulum, h) = (Pendulum::from_150_degrees(), 1e-3_f32);
+    let mut scene = scene(&pendulum.parts, under(Vec3::NEG_Y * pendulum.gravity), solver, 2);
+    let period = period_of(f64::from(h), || {
+        scene.step(h);
+        scene.positions()[1].x
+    });
+    period / pendulum.period() - 1.0
+}
+
+#[test]
+fn a_pendulum_from_150_degrees_keeps_its_period() {
+    for solver in SOLVERS {
+        let error = error_of_period(solver);
+        assert!(error.abs() < 1e-4, "{solver:?}: {error:.2e}");
+    }
+}
+
+/// Springs give a body neither momentum nor a torque: the sum over the nodes of `x1 x m (3 v1 - 4 v0 + v')`, with the velocities
+/// before and the positions now, is nothing. (The angular momentum itself is not kept by these formulas.)
+#[test]
+fn springs_give_no_momentum_and_no_torque() {
+    for solver in SOLVERS {
+        for order in [1, 2] {
+            let mut random = Random::new(2);
+            let mut parts = Parts::block([3, 2, 2], 0.05, 0.01, 40.0);
+            for mass in &mut parts.masses {
+                *mass *= 2.0 + random.signed();
+            }
+            let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 0.3 * random.vector()).collect();
+            let mut scene = scene(&parts, FREE, solver, order);
+            scene.body_mut().set_velocities(&velocities).expect("velocities");
+            let mut states = vec![scene.velocities()];
+            let momentum = |velocities: &[DVec3]| -> DVec3 {
+                let each = velocities.iter().zip(&parts.masses);
+                each.map(|(v, &mass)| *v * f64::from(mass)).sum()
+            };
+            let first = momentum(&states[0]);
+            let size: f64 = velocities
+                .iter()
+                .zip(&parts.masses)
+                .map(|(v, m)| f64::from(m * v.length()))
+                .sum();
+            for step in 0..200 {
+                scene.step(2e-3);
+                states.push(scene.velocities());
+                let [.., last, before, now] = &states[..] else {
+                    continue;
+                };
+                let lost = momentum(now).distance(first) / size;
+                assert!(
+                    lost < 1e-6,
+                    "{solver:?}, order {order}, step {step}: momentum {lost:.2e}"
+                );
+                let (mut torque, mut reach) = (DVec3::ZERO, 0.0);
+                for (node, position) in scene.positions().into_iter().enumerate() {
+                    let gain = match order {
+                        1 => now[node] - before[node],
+                        _ => 1.5 * now[node] - 2.0 * before[node] + 0.5 * last[node],
+                    };
+                    torque += position.cross(gain) * f64::from(parts.masses[node]);
+                    reach += position.length() * now[node].length() * f64::from(parts.masses[node]);
+                }
+                let torque = torque.length() / reach;
+                assert!(
+                    torque < 1e-6,
+                    "{solver:?}, order {order}, step {step}: torque {torque:.2e}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_motion_turns_and_moves_with_the_scene() {
+    let gravity = Vec3::new(1.0, -9.0, 2.0);
+    let mut parts = Parts::block([3, 2, 2], 0.05, 0.01, 40.0);
+    let mut random = Random::new(3);
+    for (position, mass) in parts.positions.iter_mut().zip(&mut parts.masses) {
+        if position.x == 0.0 {
+            *mass = 0.0;
+        }
+        *position += 0.005 * random.vector();
+    }
+    let axis = Vec3::new(1.0, 2.0, -2.0) / 3.0;
+    for solver in SOLVERS {
+        for (h, steps) in [(2e-3, 60), (1.0 / 60.0, 20)] {
+            let mut still = scene(&parts, under(gravity), solver, 2);
+            still.run(h, steps);
+            for degrees in [0.0_f32, 10.0, 90.0, 180.0] {
+                let offset = Vec3::new(0.25, -0.5, 0.125);
+                let rotation = Quat::from_axis_angle(axis, degrees.to_radians());
+                let turned = under((rotation.as_dquat() * gravity.as_dvec3()).as_vec3());
+                let mut moved = scene(&parts.moved(rotation, offset), turned, solver, 2);
+                moved.run(h, steps);
+                let image = |p: DVec3| rotation.as_dquat() * p + offset.as_dvec3();
+                let expected: Vec<DVec3> = still.positions().into_iter().map(image).collect();
+                let error = largest_difference(&moved.positions(), &expected) / parts.size();
+                assert!(error < 1e-6, "{solver:?}, {h} s, {degrees} degrees: {error:.2e}");
+            }
+        }
+    }
+}
+
+/// In a step of one equation a pin without mass is held against the spring at it, as that is at the end: however often the step was
+/// tried, which chains that are flung about in steps of any length have happen.
+#[test]
+fn what_holds_a_pin_is_counted_once() {
+    let mut looked_at = 0;
+    for seed in 0..100 {
+        let mut random = Random::new(seed);
+        let stiffness = 10_f32.powf(1.0 + 2.0 * random.signed());
+        let mut parts = Parts::chain(3 + random.below(6), Vec3::X * 0.1, 0.01, stiffness);
+        parts.masses[0] = 0.0;
+        let solver = SOLVERS[seed as usize % 2];
+        let gravity = if random.below(2) == 0 { DOWN } else { Vec3::ZERO };
+        let mut scene = Scene::with(&parts, under(gravity), |definition| BodyDefinition {
+            solver,
+            ..definition
+        });
+        let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 3.0 * random.vector()).collect();
+        scene.body_mut().set_velocities(&velocities).expect("velocities");
+        let longest = 10_f32.powf(-1.5 + random.signed());
+        for step in 0..60 {
+            let h = longest * (1.0 + 0.6 * random.signed());
+            if scene.step(h).substeps > 1 {
+                continue;
+            }
+            looked_at += 1;
+            let positions = scene.positions();
+            let way = positions[1] - positions[0];
+            let stretch = way.length() - f64::from(parts.rest_lengths[0]);
+            let expected = way.normalize() * (-f64::from(stiffness) * stretch);
+            let found = scene.body().pin_force(0).expect("a pin").as_dvec3();
+            let error = found.distance(expected) / expected.length().max(1e-3);
+            assert!(
+                error < 0.05,
+                "{solver:?}, seed {seed}, step {step}: {found} N for {expected} N"
+            );
+        }
+    }
+    assert!(looked_at > 3000, "{looked_at} steps");
+}

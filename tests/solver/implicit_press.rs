@@ -1,0 +1,123 @@
+//! IMPLICIT pressed at the speed of a hand, 0.1 m/s, in frames of 1/60 s: it finds the forces that VERLET does, and its equations are
+//! solved within their budget, however many contacts come and go.
+
+use crate::support::solid::ball;
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+
+const CELL: f32 = 0.005;
+const CELLS: [u32; 3] = [14, 5, 14];
+const RADIUS: f32 = 0.04;
+const FRAME: f32 = 1.0 / 60.0;
+const SPEED: f32 = 0.1;
+const DEPTH: f32 = 0.006;
+
+/// Of a frame.
+struct Felt {
+    /// N
+    force: f64,
+    products: u32,
+    converged: bool,
+}
+
+/// What a ball feels that is pressed into a block and stays there.
+fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Felt> {
+    let size = CELLS.map(|count| count as f32 * CELL);
+    let mesh = Mesh::block(size, CELLS).expect("a block");
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        max_substeps: 1000,
+        ..Default::default()
+    })
+    .expect("a world");
+    let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
+    let definition = BodyDefinition {
+        positions: &mesh.positions,
+        node_dampings: Values::Uniform(200.0 * node_mass),
+        triangles: &mesh.triangles,
+        tetrahedra: &mesh.tetrahedra,
+        solver,
+        ..Default::default()
+    };
+    let definition = if elements {
+        BodyDefinition {
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                young_modulus: 10e3,
+                poisson_ratio: 0.3,
+                density: 1000.0,
+                ..Default::default()
+            }),
+            ..definition
+        }
+    } else {
+        BodyDefinition {
+            masses: Values::Uniform(node_mass),
+            stiffnesses: Values::Uniform(50.0),
+            ..definition
+        }
+    };
+    let body = world.create_body(&definition).expect("a body");
+    let top = 0.5 * size[1];
+    let below: Vec<u32> = (0..)
+        .zip(&mesh.positions)
+        .filter(|(_, position)| position.y < -0.99 * top)
+        .map(|(node, _)| node)
+        .collect();
+    crate::support::tissue::pin_all(&mut world, body, &below);
+    // Aside of the mesh's symmetry, and a little above.
+    let at = |depth: f32| Vec3::new(0.3 * CELL, top + RADIUS - depth, 0.1 * CELL);
+    let tool = world
+        .create_tool(&ToolDefinition {
+            pose: Pose {
+                position: at(-1e-3),
+                ..Pose::IDENTITY
+            },
+            ..ToolDefinition::new(shape)
+        })
+        .expect("a tool");
+    let coming = ((DEPTH + 1e-3) / (SPEED * FRAME)).ceil() as usize;
+    (1..=coming + 5)
+        .map(|frame| {
+            let depth = (SPEED * FRAME * frame as f32 - 1e-3).min(DEPTH);
+            world.set_pose(tool, at(depth), None).expect("a pose");
+            world.step(FRAME).expect("a step");
+            let report = world.body(body).expect("the body").solver_report();
+            Felt {
+                force: f64::from(world.wrench(tool).expect("a tool").0.y),
+                products: report.iterations,
+                converged: report.converged,
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_tool_pressed_by_hand_feels_what_it_should() {
+    let round = ball(RADIUS, 3);
+    let mesh = Shape::Mesh {
+        positions: &round.positions,
+        triangles: &round.triangles,
+    };
+    let mut failures = Vec::new();
+    let sphere = Shape::Sphere { radius: RADIUS };
+    for (name, shape, elements) in [("sphere", sphere, false), ("mesh", mesh, false), ("mesh", mesh, true)] {
+        let case = format!("{name}, elements {elements}");
+        let right = press(Solver::Verlet, elements, shape);
+        let found = press(Solver::Implicit, elements, shape);
+        let largest = right.iter().map(|felt| felt.force).fold(0.0, f64::max);
+        assert!(largest > 0.5, "{case}: nothing to be measured, {largest} N");
+        for (frame, (found, right)) in found.iter().zip(&right).enumerate() {
+            // Parts of 1 ms are of order 1.
+            let off = (found.force - right.force).abs() / largest;
+            if off > 0.02 || !found.converged || found.products > 700 {
+                failures.push(format!(
+                    "{case}, frame {frame}: {} N, {} N is right, {} products, solved: {}",
+                    found.force, right.force, found.products, found.converged
+                ));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}:\n{}", failures.len(), failures.join("\n"));
+}

@@ -1,0 +1,73 @@
+//! Rest shapes that IMPLICIT and NEWTON come to under damping, and states of rest, against statics: a catenary, patches of lattice
+//! and triangles under even stress (Cauchy-Born). Chains that hang are in `implicit.rs`, `newton.rs` and `rest_state.rs`.
+
+use crate::support::bodies::{FREE, Parts, Scene};
+use crate::support::statics::{Catenary, G, Patch, damp};
+use glam::Vec3;
+use sinew::{BodyDefinition, RestStateDefinition, Solver, Storage, WorldDefinition};
+
+/// A solver and a storage for each: every solver with two of them, and by motion or by a search for rest.
+const WAYS: [(Solver, Storage, bool); 8] = [
+    (Solver::Implicit, Storage::Packed, true),
+    (Solver::Implicit, Storage::FastLink, true),
+    (Solver::Implicit, Storage::Efficient, true),
+    (Solver::Implicit, Storage::DynamicBulk, true),
+    (Solver::Newton, Storage::Packed, true),
+    (Solver::Newton, Storage::DynamicBulk, true),
+    (Solver::Verlet, Storage::Efficient, false),
+    (Solver::Implicit, Storage::Packed, false),
+];
+
+/// The body after a minute of frames, or in its state of rest; `load` is what acts on it.
+fn settled(
+    parts: &Parts,
+    gravity: Vec3,
+    (solver, storage, moves): (Solver, Storage, bool),
+    load: impl Fn(&mut Scene),
+) -> Scene {
+    let mut scene = Scene::with(parts, WorldDefinition { gravity, ..FREE }, |definition| {
+        BodyDefinition {
+            solver,
+            storage,
+            ..definition
+        }
+    });
+    if moves {
+        for _ in 0..1200 {
+            load(&mut scene);
+            scene.step(1.0 / 60.0);
+        }
+    } else {
+        load(&mut scene);
+        let found = scene.world.rest_state(scene.id, &RestStateDefinition::default());
+        found.expect("a state of rest");
+    }
+    scene
+}
+
+#[test]
+fn a_chain_held_at_both_ends_hangs_as_the_discrete_catenary() {
+    let mut chain = Catenary::new();
+    damp(&mut chain.parts, 2.0);
+    for way in WAYS {
+        let scene = settled(&chain.parts, Vec3::NEG_Y * G, way, |_| {});
+        let error = chain.error_of(&scene);
+        assert!(error < 1e-6, "{way:?}: {error:.2e}");
+    }
+}
+
+#[test]
+fn patches_stretch_as_their_lattices() {
+    for (name, mut patch) in [
+        ("lattice", Patch::lattice(1.08)),
+        ("triangles along x", Patch::triangles(0, 1, 1.06)),
+        ("triangles along y", Patch::triangles(1, 0, 1.06)),
+    ] {
+        damp(&mut patch.parts, 10.0);
+        for way in WAYS {
+            let scene = settled(&patch.parts, Vec3::ZERO, way, |scene| patch.load(scene));
+            let error = patch.error_of(&scene);
+            assert!(error < 1e-5, "{name}, {way:?}: {error:.2e}");
+        }
+    }
+}

@@ -1,0 +1,454 @@
+//! Mass scaling: a few light nodes between stiff springs, as slivers of a mesh have them, do not hold up the body.
+
+use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+use glam::{DVec3, Vec3};
+use sinew::{BodyDefinition, Error, Solver, Storage, Values, World, WorldDefinition};
+
+const FRAME: f32 = 1.0 / 60.0;
+const G: f32 = 9.81;
+/// The part of the mass that may be added where nothing else is asked for.
+const DEFAULT: f64 = 0.001;
+/// A part that is enough for the slivers of a small body.
+const PLENTY: f64 = 0.02;
+/// The part of the longest stable substep that is used.
+const RESERVE: f64 = 0.9;
+
+fn gravity() -> WorldDefinition {
+    WorldDefinition {
+        gravity: Vec3::NEG_Y * G,
+        ..FREE
+    }
+}
+
+/// A block of uneven cells with `count` nodes of a thousandth of the mass in it, each joined to the eight about it. What is at
+/// the top is held, where `held`.
+fn slivers(cells: usize, count: usize, held: bool) -> Parts {
+    const SPACING: f32 = 0.01;
+    const MASS: f32 = 1e-3;
+    const STIFFNESS: f32 = 100.0;
+    let mut random = Random::new(21);
+    let mut parts = Parts::block([cells; 3], SPACING, MASS, STIFFNESS);
+    let regular = parts.positions.len();
+    for sliver in 0..count {
+        let mut along = || (random.below(cells) as f32 + 0.5) * SPACING;
+        let place = Vec3::new(along(), along(), along());
+        parts.positions.push(place + 0.1 * SPACING * random.vector());
+        parts.masses.push(1e-3 * MASS);
+        parts.node_dampings.push(0.0);
+        let mut others: Vec<usize> = (0..regular).collect();
+        others.sort_by(|&a, &b| {
+            let distance = |node: usize| parts.positions[node].distance_squared(place);
+            distance(a).total_cmp(&distance(b))
+        });
+        for &other in &others[..8] {
+            parts.join(regular + sliver, other, 0.1 * STIFFNESS);
+        }
+    }
+    if held {
+        let top = SPACING * cells as f32;
+        for (position, mass) in parts.positions.iter().zip(&mut parts.masses) {
+            if position.y > top - 1e-4 {
+                *mass = 0.0;
+            }
+        }
+    }
+    parts
+}
+
+fn total_mass(parts: &Parts) -> f64 {
+    parts.masses.iter().map(|&mass| f64::from(mass)).sum()
+}
+
+fn scene(parts: &Parts, world: WorldDefinition, mass_scaling: f32) -> Scene {
+    Scene::with(parts, world, |definition| BodyDefinition {
+        mass_scaling,
+        ..definition
+    })
+}
+
+fn added(scene: &Scene) -> f64 {
+    scene.body().solver_report().added_mass
+}
+
+/// What each node needs for this substep, kg, and is given where that is more than it has.
+fn masses_for(parts: &Parts, substep: f64) -> Vec<f64> {
+    let mut stiffnesses = vec![0.0; parts.positions.len()];
+    for (spring, &stiffness) in parts.springs.iter().zip(&parts.stiffnesses) {
+        for &node in spring {
+            stiffnesses[node as usize] += f64::from(stiffness);
+        }
+    }
+    let step = substep / RESERVE;
+    let masses = parts.masses.iter().zip(&stiffnesses);
+    masses
+        .map(|(&mass, stiffness)| match f64::from(mass) {
+            0.0 => 0.0,
+            mass => mass.max(0.5 * step * step * stiffness),
+        })
+        .collect()
+}
+
+/// Leapfrog in `f64` with this inertia and the weight as it is, from rest.
+fn leapfrog(parts: &Parts, inertia: &[f64], substep: f64, substeps: u32) -> Vec<DVec3> {
+    let mut reference = parts.reference(Vec3::ZERO);
+    let weights: Vec<DVec3> = (parts.masses.iter().map(|&mass| DVec3::NEG_Y * f64::from(G * mass))).collect();
+    for index in 0..substeps {
+        let forces = reference.forces();
+        let time = if index == 0 { 0.5 * substep } else { substep };
+        for node in 0..inertia.len() {
+            if inertia[node] > 0.0 {
+                reference.velocities[node] += (forces[node] + weights[node]) / inertia[node] * time;
+                let way = reference.velocities[node] * substep;
+                reference.positions[node] += way;
+            }
+        }
+    }
+    reference.positions
+}
+
+#[test]
+fn a_body_moves_with_the_inertia_that_is_reported_and_the_weight_it_had() {
+    let parts = slivers(8, 6, true);
+    let mut scene = scene(&parts, gravity(), DEFAULT as f32);
+    let mut substeps = 0;
+    for _ in 0..6 {
+        substeps += scene.step(FRAME).substeps;
+    }
+    let substep = 6.0 * f64::from(FRAME) / f64::from(substeps);
+    let inertia = masses_for(&parts, substep);
+    let expected = inertia.iter().sum::<f64>() - total_mass(&parts);
+    assert!(expected > 0.0 && expected <= DEFAULT * total_mass(&parts), "{expected}");
+    assert!(
+        (added(&scene) / expected - 1.0).abs() < 1e-5,
+        "{} of {expected}",
+        added(&scene)
+    );
+    let reference = leapfrog(&parts, &inertia, substep, substeps);
+    let error = largest_difference(&scene.positions(), &reference) / parts.size();
+    assert!(error < 1e-5, "{error:e}");
+    // As few substeps as the mass allows: with one fewer a step there would be too much.
+    let fewer = f64::from(FRAME) / (f64::from(substeps / 6) - 1.0);
+    let more = masses_for(&parts, fewer).iter().sum::<f64>() - total_mass(&parts);
+    assert!(more > DEFAULT * total_mass(&parts), "{more}");
+}
+
+/// What is added acts as a load of its mass times its acceleration: of the weight of the body no larger part than it is of
+/// its mass, times what a sudden load makes of a steady one (2), and once more for accelerations beyond g. A light node also
+/// lags behind by what its springs need to bring what was added to it along, twice that after a sudden start, and twice more where
+/// the body turns round.
+#[test]
+fn the_motion_is_that_without_added_mass() {
+    let parts = slivers(8, 6, true);
+    let mut plain = scene(&parts, gravity(), 0.0);
+    let mut scaled = scene(&parts, gravity(), DEFAULT as f32);
+    let start = plain.positions();
+    let mut farthest = 0.0_f64;
+    for frame in 0..60 {
+        let (many, few) = (plain.step(FRAME).substeps, scaled.step(FRAME).substeps);
+        assert!(3 * few <= many, "{few} substeps for {many}");
+        farthest = farthest.max(largest_difference(&plain.positions(), &start));
+        let error = largest_difference(&plain.positions(), &scaled.positions());
+        let inertia = masses_for(&parts, f64::from(FRAME) / f64::from(few));
+        let masses = inertia.iter().zip(&parts.masses);
+        let heaviest = masses.fold(0.0_f64, |most, (inertia, &mass)| most.max(inertia - f64::from(mass)));
+        // Eight springs of 10 N/m, a third of them along each axis.
+        let lag = 4.0 * heaviest * f64::from(G) / (8.0 * 10.0 / 3.0);
+        // The slowest mode swings by half of that about a sag of as much, and falls behind: by half of what its mass grows, and by
+        // the h² omega² / 24 of a longer substep. Faster ones swing less, by the square of what they are faster.
+        let omega = (2.0 * f64::from(G) / farthest).sqrt();
+        let substep = f64::from(FRAME) / f64::from(few);
+        let behind =
+            omega * f64::from(FRAME) * f64::from(frame + 1) * (DEFAULT / 2.0 + (substep * omega).powi(2) / 24.0);
+        let most = lag + (4.0 * DEFAULT + behind) * farthest;
+        assert!(
+            error < most,
+            "frame {frame}: {error:e}, at most {most:e} of {farthest:e}"
+        );
+        assert!(most < 0.1 * farthest, "{most:e} of {farthest:e}");
+    }
+    assert_eq!(added(&plain), 0.0);
+    assert!(added(&scaled) > 0.0);
+}
+
+#[test]
+fn pins_carry_the_weight_as_it_was() {
+    let mut parts = slivers(4, 4, true);
+    for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
+        *damping = 15.0 * mass;
+    }
+    // A larger part, so that it would be seen.
+    let mut scene = scene(&parts, gravity(), 0.02);
+    scene.run(FRAME, 300);
+    let part = added(&scene) / total_mass(&parts);
+    assert!(part > 1e-3, "{part}");
+    let held = (0..parts.masses.len() as u32).filter(|&node| parts.masses[node as usize] == 0.0);
+    let force: DVec3 = held
+        .map(|node| scene.body().pin_force(node).expect("a pin").as_dvec3())
+        .sum();
+    let weight = total_mass(&parts) * f64::from(G);
+    assert!(
+        (force - DVec3::Y * weight).length() < 1e-5 * weight,
+        "{force} for {weight}"
+    );
+}
+
+/// With damping in proportion to mass all nodes fall alike, so that no spring is ever stretched.
+#[test]
+fn weight_and_damping_of_a_heavier_node_are_as_they_were() {
+    const RATE: f32 = 5.0;
+    let mut parts = slivers(6, 5, false);
+    for (damping, mass) in parts.node_dampings.iter_mut().zip(&parts.masses) {
+        *damping = RATE * mass;
+    }
+    let mut scene = scene(&parts, gravity(), PLENTY as f32);
+    scene.run(FRAME, 240);
+    assert!(added(&scene) > 0.0);
+    for velocity in scene.velocities() {
+        let error = velocity - DVec3::NEG_Y * f64::from(G / RATE);
+        assert!(error.length() < 1e-4 * f64::from(G / RATE), "{error}");
+    }
+}
+
+#[test]
+fn nothing_is_added_where_substeps_are_fixed_or_a_tolerance_is_asked_for() {
+    let parts = slivers(4, 4, true);
+    let fixed = WorldDefinition {
+        substeps: 400,
+        ..gravity()
+    };
+    let tolerant = WorldDefinition {
+        tolerance: 1e-3,
+        max_substeps: 100_000,
+        ..gravity()
+    };
+    for world in [fixed, tolerant] {
+        let mut scenes = [0.0, 0.02].map(|part| scene(&parts, world, part));
+        for scene in &mut scenes {
+            scene.run(FRAME, 5);
+            assert_eq!(added(scene), 0.0);
+        }
+        assert_eq!(scenes[0].positions(), scenes[1].positions());
+        assert_eq!(scenes[0].velocities(), scenes[1].velocities());
+    }
+    // The same body is made heavier where it may be.
+    let mut free = scene(&parts, gravity(), 0.02);
+    free.step(FRAME);
+    assert!(added(&free) > 0.0);
+}
+
+#[test]
+fn a_body_without_slivers_is_what_it_would_be_without_mass_scaling() {
+    let even = Parts::block([6; 3], 0.01, 1e-3, 100.0);
+    let mut scenes = [0.0, DEFAULT as f32].map(|part| scene(&even, gravity(), part));
+    for scene in &mut scenes {
+        scene.run(FRAME, 20);
+        assert_eq!(added(scene), 0.0);
+    }
+    assert_eq!(scenes[0].world.state_hash(), scenes[1].world.state_hash());
+    // Nor does a step that is short anyway ask for mass.
+    let parts = slivers(6, 4, true);
+    let mut short = scene(&parts, gravity(), DEFAULT as f32);
+    for _ in 0..10 {
+        assert_eq!(short.step(1e-5).substeps, 1);
+    }
+    assert_eq!(added(&short), 0.0);
+}
+
+/// Leapfrog keeps a shadow energy; the energy is at most E0 / (1 - (h omega)²/4), with h omega up to 0.9 of its limit.
+#[test]
+fn energy_does_not_grow() {
+    const SHADOW: f64 = 1.0 / (1.0 - RESERVE * RESERVE);
+    for (part, spring_damping) in [(0.003, 0.0), (0.02, 0.0), (0.2, 0.0), (0.02, 1e-4)] {
+        let mut parts = slivers(5, 5, false);
+        parts.spring_damping = spring_damping;
+        let mut scene = scene(&parts, FREE, part);
+        let mut random = Random::new(22);
+        let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 0.2 * random.vector()).collect();
+        scene.body_mut().set_velocities(&velocities).expect("velocities");
+        scene.step(FRAME);
+        let most = SHADOW * scene.energy();
+        for step in 0..600 {
+            // Masses follow the length of the step.
+            let report = scene.step(FRAME * (0.75 + 0.25 * random.signed()));
+            assert!(report.stable_substep * report.substeps as f32 >= 0.5 * FRAME);
+            let energy = scene.energy();
+            assert!(energy <= most, "step {step}, {part}: {energy} J of {most}");
+            assert!(added(&scene) <= f64::from(part) * total_mass(&parts));
+        }
+        assert!(added(&scene) > 0.0, "{part}");
+    }
+}
+
+#[test]
+fn momentum_is_kept() {
+    let parts = slivers(5, 5, false);
+    let mut scene = scene(&parts, FREE, PLENTY as f32);
+    scene.step(FRAME);
+    assert!(added(&scene) > 0.0);
+    let mut random = Random::new(23);
+    let velocities: Vec<Vec3> = parts.positions.iter().map(|_| 0.2 * random.vector()).collect();
+    scene.body_mut().set_velocities(&velocities).expect("velocities");
+    let substep = f64::from(FRAME) / f64::from(scene.step(FRAME).substeps);
+    let inertia = masses_for(&parts, substep);
+    let momentum = |scene: &Scene| -> DVec3 { scene.velocities().iter().zip(&inertia).map(|(v, m)| v * m).sum() };
+    let start = momentum(&scene);
+    scene.run(FRAME, 30);
+    let change = (momentum(&scene) - start).length();
+    let scale: f64 = inertia.iter().sum::<f64>() * 0.2;
+    assert!(change < 1e-6 * scale, "{change:e} of {scale:e}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let parts = slivers(20, 30, true);
+    assert!(parts.positions.len() > 8192);
+    let hashes = [1, 2, 5].map(|thread_count| {
+        let world = WorldDefinition {
+            thread_count,
+            ..gravity()
+        };
+        let mut scene = scene(&parts, world, DEFAULT as f32);
+        scene.run(FRAME, 4);
+        assert!(added(&scene) > 0.0);
+        scene.world.state_hash()
+    });
+    assert!(hashes.iter().all(|&hash| hash == hashes[0]));
+}
+
+#[test]
+fn all_storages_agree() {
+    let parts = slivers(8, 6, true);
+    let storages = [
+        Storage::Packed,
+        Storage::Efficient,
+        Storage::FastLink,
+        Storage::DynamicBulk,
+    ];
+    let runs = storages.map(|storage| {
+        let mut scene = Scene::with(&parts, gravity(), |definition| BodyDefinition { storage, ..definition });
+        let mut substeps = 0;
+        for _ in 0..10 {
+            substeps += scene.step(FRAME).substeps;
+        }
+        (substeps, added(&scene), scene.positions())
+    });
+    for (storage, (substeps, mass, positions)) in storages.iter().zip(&runs) {
+        assert_eq!(*substeps, runs[0].0, "{storage:?}");
+        assert!(
+            *mass > 0.0 && (mass / runs[0].1 - 1.0).abs() < 1e-5,
+            "{storage:?}: {mass}"
+        );
+        let error = largest_difference(positions, &runs[0].2) / parts.size();
+        assert!(error < 1e-5, "{storage:?}: {error:e}");
+    }
+}
+
+#[test]
+fn a_step_that_fails_leaves_masses_as_they_were() {
+    let parts = slivers(5, 5, true);
+    let mut tried = scene(&parts, gravity(), PLENTY as f32);
+    let mut plain = scene(&parts, gravity(), PLENTY as f32);
+    for scene in [&mut tried, &mut plain] {
+        scene.run(FRAME, 3);
+        assert!(added(scene) > 0.0);
+    }
+    for dt in [10.0, 1e-3, 30.0] {
+        let (before, mass) = (tried.world.state_hash(), added(&tried));
+        if dt > 1.0 {
+            assert!(matches!(tried.world.step(dt), Err(Error::Unstable { .. })));
+            assert_eq!((tried.world.state_hash(), added(&tried)), (before, mass));
+        }
+        for scene in [&mut tried, &mut plain] {
+            scene.run(1e-3, 2);
+            scene.run(FRAME, 2);
+        }
+        assert_eq!(tried.world.state_hash(), plain.world.state_hash());
+    }
+    // A body that becomes infinite is put back with its masses.
+    let far = vec![Vec3::splat(1e30); parts.positions.len()];
+    tried.body_mut().set_velocities(&far).expect("velocities");
+    let mass = added(&tried);
+    assert_eq!(tried.world.step(FRAME).expect("a step").bodies_restored, 1);
+    assert_eq!(added(&tried), mass);
+}
+
+#[test]
+fn pins_and_springs_that_come_and_go_change_what_is_needed() {
+    let parts = slivers(5, 5, true);
+    let sliver = (parts.positions.len() - 1) as u32;
+    let mut scene = scene(&parts, gravity(), PLENTY as f32);
+    scene.run(FRAME, 3);
+    let all = added(&scene);
+    let start = scene.energy();
+    scene.body_mut().pin(sliver).expect("a pin");
+    let others = added(&scene);
+    assert!(others < 0.9 * all, "{others} of {all}");
+    scene.run(FRAME, 3);
+    scene.body_mut().unpin(sliver).expect("a pin");
+    scene.run(FRAME, 3);
+    assert!((added(&scene) / all - 1.0).abs() < 1e-5);
+    // Let go of by all its neighbours a light node needs nothing.
+    let own: Vec<[u32; 2]> = parts
+        .springs
+        .iter()
+        .copied()
+        .filter(|pair| pair.contains(&sliver))
+        .collect();
+    for &[a, b] in &own {
+        let before = scene.velocities();
+        scene.body_mut().remove_spring(a, b).expect("a spring");
+        let error = largest_difference(&before, &scene.velocities());
+        assert!(error < 1e-4, "{error:e} m/s");
+    }
+    scene.run(FRAME, 1);
+    assert!((added(&scene) / others - 1.0).abs() < 1e-5);
+    for &[a, b] in &own {
+        scene.body_mut().add_spring(a, b, 10.0, None).expect("no spring");
+    }
+    scene.run(FRAME, 1);
+    assert!((added(&scene) / all - 1.0).abs() < 1e-5, "{} of {all}", added(&scene));
+    // What is refused changes nothing.
+    let before = scene.world.state_hash();
+    assert!(scene.body_mut().add_spring(0, 1, 1e5, None).is_err());
+    assert_eq!(scene.world.state_hash(), before);
+    let far = (parts.positions.len() / 2) as u32;
+    scene
+        .body_mut()
+        .add_spring(sliver - 1, far, 10.0, None)
+        .expect("no spring");
+    for _ in 0..120 {
+        scene.step(FRAME);
+        assert!(added(&scene) <= PLENTY * total_mass(&parts));
+        assert!(scene.is_finite() && scene.energy() < start + 0.1 * start.abs());
+    }
+}
+
+#[test]
+fn what_is_out_of_range_is_refused() {
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let positions = [Vec3::ZERO, Vec3::X];
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let definition = |mass_scaling| BodyDefinition {
+            positions: &positions,
+            masses: Values::Uniform(1.0),
+            solver,
+            mass_scaling,
+            ..BodyDefinition::default()
+        };
+        for bad in [-1e-6, 1.0001, f32::NAN, f32::INFINITY] {
+            match world.create_body(&definition(bad)) {
+                Err(Error::InvalidArgument(message)) => {
+                    assert!(message.starts_with("mass_scaling is "), "{message}");
+                }
+                other => panic!("{bad}: {other:?}"),
+            }
+        }
+        for good in [0.0, 0.001, 1.0] {
+            world.create_body(&definition(good)).expect("a body");
+        }
+    }
+    assert_eq!(
+        f64::from(BodyDefinition::default().mass_scaling),
+        f64::from(DEFAULT as f32)
+    );
+}
