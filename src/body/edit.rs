@@ -272,7 +272,7 @@ impl Body {
         if link.is_none() && removed == 0 {
             return Err(not_joined(a, b));
         }
-        if self.contact.with_bodies && !self.is_cut_open {
+        if !self.is_cut_open {
             let has = |triangle: &[u32; 3]| triangle.contains(&a) && triangle.contains(&b);
             self.is_cut_open = self.surface.iter().any(has);
         }
