@@ -273,8 +273,10 @@ impl Body {
             return Err(not_joined(a, b));
         }
         if !self.is_cut_open {
+            // Whether they are corners at all is told far sooner, and mostly they are not.
+            let corners = self.surface.as_flattened();
             let has = |triangle: &[u32; 3]| triangle.contains(&a) && triangle.contains(&b);
-            self.is_cut_open = self.surface.iter().any(has);
+            self.is_cut_open = corners.contains(&a) && corners.contains(&b) && self.surface.iter().any(has);
         }
         Ok(())
     }
