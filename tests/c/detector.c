@@ -17,6 +17,10 @@ static const float wall_low[3] = {0.08f, -0.05f, -0.03f}, wall_high[3] = {0.28f,
 /* Through the cube along z. */
 static const float rod_low[3] = {0.03f, 0.06f, -0.1f}, rod_high[3] = {0.05f, 0.08f, 0.2f};
 
+/* The same, inward. */
+static const uint32_t box_inside_out[3 * FACES] = {0, 6, 4, 0, 2, 6, 1, 7, 3, 1, 5, 7, 0, 5, 1, 0, 4, 5,
+                                                   2, 7, 6, 2, 3, 7, 0, 3, 2, 0, 1, 3, 4, 7, 5, 4, 6, 7};
+
 static void corners_of(const float low[3], const float high[3], float *corners)
 {
     int corner, axis;
@@ -387,14 +391,10 @@ static void a_definition_is_refused_by_name(void)
     sinew_world *world = a_world(0.0f);
     const sinew_body_id cube = a_box(world, cube_low, cube_high), wall = a_box(world, wall_low, wall_high);
     const sinew_body_id sheet = a_sheet(world), bare = loose_nodes(world, 2), none = {0, 0};
-    uint32_t inward[3 * FACES];
     sinew_body_id inside_out;
     float corners[3 * CORNERS];
-    int i;
-    for (i = 0; i < 3 * FACES; i++)
-        inward[i] = box_triangles[3 * FACES - 1 - i];
     corners_of(cube_low, cube_high, corners);
-    inside_out = a_surface(world, corners, CORNERS, inward, FACES);
+    inside_out = a_surface(world, corners, CORNERS, box_inside_out, FACES);
     REFUSED_DEF(SINEW_STATUS_UNSUPPORTED, "DISTANCE_FIELD", def.detection = SINEW_DETECTION_DISTANCE_FIELD);
     REFUSED_DEF(INVALID, "detection is 9", def.detection = 9);
     REFUSED_DEF(INVALID, "form is 2", def.form = 2);
@@ -442,11 +442,13 @@ static void a_search_is_refused_and_what_was_found_stays(void)
     sinew_dvec3_view view;
     size_t count = 77;
     double volume, sum[3];
+    float corners[3 * CORNERS];
     volume = found(detector, world).volume;
     a_box(twin, cube_low, cube_high);
     a_box(twin, wall_low, wall_high);
     CHECK(found(detector, twin).volume == volume); /* The same bodies in every respect. */
-    a_sheet(strange);
+    corners_of(cube_low, cube_high, corners);
+    a_surface(strange, corners, CORNERS, box_inside_out, FACES);
     a_box(strange, wall_low, wall_high);
 
     memset(&report, 0, sizeof report);
