@@ -268,6 +268,30 @@
 #define SINEW_COLOURS_SEQUENTIAL 1
 
 /**
+ * By the intervals in which the ray of each pixel is inside a body: no edge is lost, and no point that is deeper than 0.71 pixels.
+ */
+#define SINEW_IMAGE_FORM_INTERVALS 0
+
+/**
+ * As its authors describe it (CInDeR; Halic et al., section 2.1): edges are drawn into a depth buffer, faces in front of them counted.
+ * Of edges that share a pixel only the nearest is seen, edges shorter than a pixel or along the view are not drawn; no points, no
+ * volume. For comparison.
+ */
+#define SINEW_IMAGE_FORM_COUNTED 1
+
+/**
+ * In `triangle`: none is named.
+ */
+#define SINEW_NO_TRIANGLE UINT32_MAX
+
+/**
+ * Finds what two bodies have in common, in memory of its own. It belongs to the caller; it changes no world, and may outlive it.
+ *
+ * As `const sinew_detector *` it may be used by any number of threads at once; as `sinew_detector *` by one, with nobody else inside.
+ */
+typedef struct sinew_detector sinew_detector;
+
+/**
  * A mesh: positions, triangles, tetrahedra and cells. It belongs to the caller, never changes, and may be read by any number of
  * threads at once.
  */
@@ -1312,6 +1336,165 @@ typedef struct sinew_surface_point {
    */
   uint32_t reserved;
 } sinew_surface_point;
+
+/**
+ * Which two bodies are compared, and how. Filled by sinew_detector_def_init; used only during sinew_detector_create.
+ */
+typedef struct sinew_detector_def {
+  /**
+   * Set by sinew_detector_def_init.
+   */
+  size_t struct_size;
+  /**
+   * The first and the second; no default. Both have triangles, tetrahedra or cells, and one at least has a closed surface.
+   */
+  struct sinew_body_id bodies[2];
+  /**
+   * SINEW_DETECTION_EXACT, the default: trees of triangles, refitted (the rest, but `bodies`, is not used then, and `thickness` 0); or
+   * SINEW_DETECTION_IMAGE_SPACE: rays through the pixels of a parallel view. SINEW_DETECTION_DISTANCE_FIELD is for rigid
+   * tools: SINEW_STATUS_UNSUPPORTED.
+   */
+  uint32_t detection;
+  /**
+   * SINEW_IMAGE_FORM_...; default SINEW_IMAGE_FORM_INTERVALS.
+   */
+  uint32_t form;
+  /**
+   * IMAGE_SPACE: m, the side of a pixel, above 0; no default. A 256th of a body's size finds all but a thousandth of its edges.
+   */
+  float pixel;
+  /**
+   * IMAGE_SPACE: along which to look, of any length; 0 0 0, the default: along the three axes, one after the other, and what any of them
+   * sees counts. Depths are along the view: along three axes some 2 % of the size more than the shortest way out, along one 6 %.
+   */
+  float direction[3];
+  /**
+   * IMAGE_SPACE: room for so many pixels in an image, 1 to 2^24; default 2^18. A pair whose boxes overlap so far that it is not enough is
+   * drawn with pixels of twice the size, and so on.
+   */
+  uint32_t pixels;
+  /**
+   * INTERVALS: room for so many crossings of rays with faces in an image of one body, at least 1; likewise; default 2^20. Both
+   * defaults take some 18 MB.
+   */
+  uint32_t crossings;
+  /**
+   * IMAGE_SPACE: m, at least 0; default 0 0: how much further along the view than its faces each of the two counts as there, so that
+   * thin parts are not missed; depths, and the volume that a view sees, are those of bodies that are so much thicker.
+   */
+  float thickness[2];
+} sinew_detector_def;
+
+/**
+ * What a detector found, but for lists. Index 0 is of the first body, 1 of the second.
+ */
+typedef struct sinew_detector_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * INTERVALS: what both enclose, m^3, the mean over the views (Faure et al. 2008); 0 where one of them is open, and with COUNTED and
+   * EXACT.
+   */
+  double volume;
+  /**
+   * The direction of unit length in which the first has to be moved so that the volume shrinks fastest; 0 where there is no volume.
+   */
+  float normal[3];
+  /**
+   * How far it has to be moved, were the volume to shrink so all the way, m.
+   */
+  float depth;
+  /**
+   * The largest pixel used, m: that asked for, or twice that and so on where there was not enough room; EXACT: 0.
+   */
+  float pixel;
+  /**
+   * Entries of sinew_detector_get_points.
+   */
+  uint32_t point_counts[2];
+  /**
+   * Entries of sinew_detector_get_edges.
+   */
+  uint32_t edge_counts[2];
+  /**
+   * Parts of edges inside that there was no room for: more than four an edge, on average.
+   */
+  uint32_t unlisted[2];
+  /**
+   * 1: the body is closed, so that the other can be inside of it; 0: it is open, or was cut open: nothing is found within it, and in image
+   * space of itself edges alone. As sinew_body_is_closed, but that a detector made for an open body does not ask again.
+   */
+  uint32_t closed[2];
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_detector_report;
+
+/**
+ * A node of a body that lies within the other.
+ */
+typedef struct sinew_point_inside {
+  /**
+   * The node.
+   */
+  uint32_t node;
+  /**
+   * IMAGE_SPACE: the triangle of the other's surface at the end of the way out; EXACT: SINEW_NO_TRIANGLE.
+   */
+  uint32_t triangle;
+  /**
+   * m: IMAGE_SPACE: the way out along the view, the shortest of those of several views; EXACT: how far the other's surface is.
+   */
+  float depth;
+  /**
+   * EXACT: the shortest way out, of unit length; IMAGE_SPACE: 0.
+   */
+  float normal[3];
+} sinew_point_inside;
+
+/**
+ * A part of an edge of a body that lies within the other.
+ */
+typedef struct sinew_edge_inside {
+  /**
+   * From the first to the second.
+   */
+  uint32_t nodes[2];
+  /**
+   * Where it goes in, as a fraction of the edge; 0 where it begins inside.
+   */
+  float entry;
+  /**
+   * Where it comes out; 1 where it ends inside.
+   */
+  float exit;
+  /**
+   * IMAGE_SPACE: the longest of the ways out along the view, m, of several views the one that sees the least; COUNTED: from the edge to
+   * the next face; EXACT: 0.
+   */
+  float depth;
+} sinew_edge_inside;
+
+/**
+ * Vector i is at (const char *)data + i * stride; valid as long as what gave it says.
+ */
+typedef struct sinew_dvec3_view {
+  /**
+   * The first.
+   */
+  const double *data;
+  /**
+   * How many.
+   */
+  size_t count;
+  /**
+   * Bytes from one to the next.
+   */
+  size_t stride;
+} sinew_dvec3_view;
 
 /**
  * Done.
@@ -2440,6 +2623,110 @@ sinew_status sinew_world_find_nearest(const struct sinew_world *world,
                                       const float *point,
                                       float max_distance,
                                       struct sinew_surface_point *out);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_detector_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_detector_def_init(struct sinew_detector_def *def, size_t struct_size);
+
+/**
+ * Makes a detector for two bodies of a world, whether or not they meet each other there, and reserves its memory; nothing is looked for
+ * yet. The caller destroys it with sinew_detector_destroy.
+ *
+ * The methods: Halic, Kockara, Bayrak, Rowe, Chen, section 2.1 (CInDeR), and Faure, Barbier, Allard, Falipou 2008 for volumes; EXACT: signed
+ * distances by pseudonormals (Baerentzen, Aanaes 2005), from the closest of a tree of triangles.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also for one and the same body twice, a body without triangles, and two that are open or were cut
+ * open; with EXACT for a closed one that is inside out, passes through itself, or has two nodes at the same place or a triangle along a line
+ * where it is now), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (SINEW_DETECTION_DISTANCE_FIELD), SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_detector_create(const struct sinew_world *world,
+                                   const struct sinew_detector_def *def,
+                                   struct sinew_detector **out);
+
+/**
+ * Compares the two bodies where they are now: each is looked for in the other, where that is closed. Writes what was found to `report`,
+ * whose struct_size is set by the caller; the lists are read with sinew_detector_get_points, sinew_detector_get_edges and
+ * sinew_detector_get_gradient. In image space it allocates nothing, and takes a time linear in polygons and in the pixels covered.
+ *
+ * An open body gives edges alone in image space (and points with EXACT), and nothing is found within it. So it is with one that was cut open
+ * since (sinew_body_is_closed): `report->closed` says so; where both were, nothing is found. Bodies are compared where they are: what passes
+ * through a thin part between two calls is not seen. Whether a surface has come to pass through itself is not asked: EXACT is then not sure of
+ * sides; in images a part that is inside out counts as outside.
+ *
+ * A world in which the two ids are of bodies with the same surfaces is as good as the one that the detector was made with.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where one of the bodies was destroyed, or has another surface, as in another world),
+ * SINEW_STATUS_CAPACITY (a single ray passes more faces than `crossings`), SINEW_STATUS_OUT_OF_MEMORY (EXACT, which may allocate); then what
+ * was found before stays.
+ *
+ * # Safety
+ * `detector` is NULL or a detector nobody else uses; `world` is NULL or a world nobody changes; `report` is NULL or writable for the size
+ * that it states.
+ */
+sinew_status sinew_detector_find(struct sinew_detector *detector,
+                                 const struct sinew_world *world,
+                                 struct sinew_detector_report *report);
+
+/**
+ * Writes where the nodes of a body that lie within the other are listed, in ascending order, those within a tetrahedral body and those on
+ * no triangle among them, and how many there are: of the first body with `side` 0, of the second with 1. Empty before the first
+ * sinew_detector_find, and with COUNTED; valid until the next, or the detector's end.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `detector` is NULL or a detector nobody changes; `points` and `count` are NULL or writable.
+ */
+sinew_status sinew_detector_get_points(const struct sinew_detector *detector,
+                                       uint32_t side,
+                                       const struct sinew_point_inside **points,
+                                       size_t *count);
+
+/**
+ * Writes where the parts of a body's edges that lie within the other are listed, by edge and along it, and how many there are: of the first
+ * body with `side` 0, of the second with 1. Edges are those of the surface's triangles. Empty before the first sinew_detector_find; valid
+ * until the next, or the detector's end.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `detector` is NULL or a detector nobody changes; `edges` and `count` are NULL or writable.
+ */
+sinew_status sinew_detector_get_edges(const struct sinew_detector *detector,
+                                      uint32_t side,
+                                      const struct sinew_edge_inside **edges,
+                                      size_t *count);
+
+/**
+ * Writes a view of how the volume changes with each node of a body, m^2, in the caller's order (Faure et al. 2008): of the first body with
+ * `side` 0, of the second with 1. Moving nodes against it parts the bodies. Empty before the first sinew_detector_find, with COUNTED and EXACT,
+ * and where one of the bodies is open: there is no volume then. Valid until the next sinew_detector_find, or the detector's end.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `detector` is NULL or a detector nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_detector_get_gradient(const struct sinew_detector *detector,
+                                         uint32_t side,
+                                         struct sinew_dvec3_view *out);
+
+/**
+ * Destroys a detector; what its lists and views show ends. NULL: nothing.
+ *
+ * # Safety
+ * `detector` is NULL or a detector that is not destroyed and that nobody uses any more.
+ */
+void sinew_detector_destroy(struct sinew_detector *detector);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,4 +1,4 @@
-//! A step allocates nothing, taken or refused.
+//! A step allocates nothing, taken or refused, nor does a detection in image space.
 #![allow(unsafe_code)]
 
 #[path = "support/counting.rs"]
@@ -8,6 +8,14 @@ use std::cell::Cell;
 
 use counting::Counting;
 use glam::{Quat, Vec3};
+use sinew::capi::body::{sinew_body_create, sinew_body_set_positions};
+use sinew::capi::definition::{sinew_body_def, sinew_body_def_init};
+use sinew::capi::detector::{
+    SINEW_IMAGE_FORM_COUNTED, SINEW_IMAGE_FORM_INTERVALS, sinew_detector_create, sinew_detector_def,
+    sinew_detector_def_init, sinew_detector_destroy, sinew_detector_find, sinew_detector_report,
+};
+use sinew::capi::tool::SINEW_DETECTION_IMAGE_SPACE;
+use sinew::capi::world::{sinew_world_create, sinew_world_def_init, sinew_world_destroy};
 use sinew::mesh::Mesh;
 use sinew::{
     BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage, ToolDefinition,
@@ -88,6 +96,52 @@ fn tissue_against_tissue_allocates_nothing() {
         // They met: it would have fallen three centimetres.
         let places = world.body(first.expect("a body")).expect("a body").positions();
         assert!(places.iter().all(|place| place.y > 0.001), "{detection:?}");
+    }
+}
+
+#[test]
+fn a_detection_in_image_space_allocates_nothing() {
+    let mesh = Mesh::organ(0.1, 0.01).expect("an organ");
+    let mut moved = mesh.positions.clone();
+    moved.iter_mut().for_each(|place| *place += Vec3::new(0.03, 0.01, 0.02));
+    let surface = mesh.surface().expect("memory");
+    for form in [SINEW_IMAGE_FORM_INTERVALS, SINEW_IMAGE_FORM_COUNTED] {
+        // SAFETY: definitions are filled by their init functions, pointers are to what lives, the detector ends before its world.
+        unsafe {
+            let mut world_def = std::mem::zeroed();
+            assert_eq!(sinew_world_def_init(&mut world_def, size_of_val(&world_def)), 0);
+            let mut world = std::ptr::null_mut();
+            assert_eq!(sinew_world_create(&world_def, &mut world), 0);
+            let mut def: sinew_detector_def = std::mem::zeroed();
+            assert_eq!(sinew_detector_def_init(&mut def, size_of_val(&def)), 0);
+            for (body, positions) in def.bodies.iter_mut().zip([&mesh.positions, &moved]) {
+                let mut body_def: sinew_body_def = std::mem::zeroed();
+                assert_eq!(sinew_body_def_init(&mut body_def, size_of_val(&body_def)), 0);
+                body_def.positions = positions.as_ptr().cast();
+                body_def.node_count = positions.len();
+                body_def.triangles = surface.as_ptr().cast();
+                body_def.triangle_count = surface.len();
+                body_def.node_mass = 1e-3;
+                assert_eq!(sinew_body_create(world, &body_def, body), 0);
+            }
+            def.detection = SINEW_DETECTION_IMAGE_SPACE;
+            def.form = form;
+            def.pixel = 5e-4;
+            let mut detector = std::ptr::null_mut();
+            assert_eq!(sinew_detector_create(world, &def, &mut detector), 0);
+            let mut report: sinew_detector_report = std::mem::zeroed();
+            report.struct_size = size_of_val(&report);
+            for shift in [Vec3::ZERO, Vec3::new(-0.02, 0.0, -0.01)] {
+                let places: Vec<_> = moved.iter().map(|place| *place + shift).collect();
+                let (data, count) = (places.as_ptr().cast(), places.len());
+                assert_eq!(sinew_body_set_positions(world, def.bodies[1], data, count), 0);
+                let find = || assert_eq!(sinew_detector_find(detector, world, &mut report), 0);
+                assert_eq!(asked(find), 0, "form {form}");
+                assert!(report.edge_counts.iter().all(|&count| count > 10), "they overlap");
+            }
+            sinew_detector_destroy(detector);
+            sinew_world_destroy(world);
+        }
     }
 }
 

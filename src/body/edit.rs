@@ -5,6 +5,7 @@ use glam::{BVec3, Vec3};
 use super::definition::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
 use super::{Body, Bounds, Vectors};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
@@ -272,10 +273,7 @@ impl Body {
         if link.is_none() && removed == 0 {
             return Err(not_joined(a, b));
         }
-        if self.contact.with_bodies && !self.is_cut_open {
-            let has = |triangle: &[u32; 3]| triangle.contains(&a) && triangle.contains(&b);
-            self.is_cut_open = self.surface.iter().any(has);
-        }
+        self.is_cut_open = self.is_cut_open || self.has_on_surface(a, b);
         Ok(())
     }
 
@@ -297,6 +295,28 @@ impl Body {
             implicit.forget_energy();
         }
         Ok(())
+    }
+
+    /// Whether two nodes are corners of one triangle of the surface.
+    fn has_on_surface(&mut self, a: u32, b: u32) -> bool {
+        // That nodes are no corners at all, as mostly in a cut through a volume, is kept from the first cut on.
+        if self.corners.is_empty()
+            && !self.surface.is_empty()
+            && let Ok(corners) = memory::filled(0_u64, self.node_count().div_ceil(64))
+        {
+            self.corners = corners;
+            for &corner in self.surface.as_flattened() {
+                self.corners[corner as usize / 64] |= 1 << (corner % 64);
+            }
+        }
+        // Out of memory: it is not known.
+        let is_corner = |node: u32| {
+            self.corners
+                .get(node as usize / 64)
+                .is_none_or(|bits| bits >> (node % 64) & 1 == 1)
+        };
+        let has = |triangle: &[u32; 3]| triangle.contains(&a) && triangle.contains(&b);
+        is_corner(a) && is_corner(b) && self.surface.iter().any(has)
     }
 
     /// Removes a spring, given as the first of its nodes sees it.

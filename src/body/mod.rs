@@ -101,6 +101,8 @@ pub struct Body {
     pub(crate) contact: BodyContact,
     /// Whether an edge of its surface was taken away.
     pub(crate) is_cut_open: bool,
+    /// A bit for each node that the surface has, in the caller's numbers; empty before a spring is removed.
+    corners: Vec<u64>,
     /// What tools hold of it.
     pub(crate) grasps: Option<Box<Grasps>>,
     pub(crate) carry: Carry,
@@ -225,6 +227,7 @@ impl Body {
             contacts: None,
             contact: definition.contact,
             is_cut_open: false,
+            corners: Vec::new(),
             grasps: None,
             carry: Carry {
                 stability: Stability::UNKNOWN,

@@ -39,3 +39,5 @@ pub mod mesh;
 pub mod picture;
 
 pub mod query;
+
+pub mod detector;

@@ -101,6 +101,7 @@ impl Counted {
             part.exit = part.exit.max(pixel.share);
             part.depth = part.depth.max(pixel.free);
         }
-        self.found.iter().flatten().for_each(|part| inside.add(*part));
+        let first = inside.edges.len();
+        self.found.iter().flatten().for_each(|part| inside.add(*part, first));
     }
 }

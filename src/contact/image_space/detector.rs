@@ -231,7 +231,10 @@ impl ImageSpace {
                     let others = inside.edges.len();
                     trace_edges(projection, &layers[1 - side], thickness, body, inside);
                     inside.join_one_view(others);
-                    find_points(projection, &layers[1 - side], thickness, body, inside);
+                    // An open body gives edges alone.
+                    if body.surface.is_closed() {
+                        find_points(projection, &layers[1 - side], thickness, body, inside);
+                    }
                 }
                 if first.surface.is_closed() && second.surface.is_closed() {
                     overlap.volume += add_volume(projection, layers, bodies, &mut overlap.gradients);

@@ -28,7 +28,7 @@ pub struct Overlap {
 /// What of a surface lies inside another.
 #[derive(Debug, Default)]
 pub struct Inside {
-    /// In ascending order.
+    /// In ascending order; none of a surface that is open.
     pub points: Vec<PointInside>,
     /// By edge, then from its first node on.
     pub edges: Vec<EdgeInside>,
@@ -111,9 +111,9 @@ impl Overlap {
 }
 
 impl Inside {
-    /// Adds a part of an edge, joined to the one before where it goes on from there.
-    pub(super) fn add(&mut self, part: EdgeInside) {
-        if let Some(last) = self.edges.last_mut()
+    /// Adds a part of an edge, joined to the one before where it goes on from there; those before `first` are of other views.
+    pub(super) fn add(&mut self, part: EdgeInside, first: usize) {
+        if let Some(last) = self.edges[first..].last_mut()
             && last.edge == part.edge
             && part.entry <= last.exit
             && last.entry <= part.exit

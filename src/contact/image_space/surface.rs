@@ -66,6 +66,11 @@ impl Surface {
         self.closed
     }
 
+    /// Whether others can be inside of it from now on: of one that was closed and is cut.
+    pub(crate) fn set_closed(&mut self, closed: bool) {
+        self.closed = closed;
+    }
+
     /// How many positions it has.
     pub fn node_count(&self) -> usize {
         self.node_count

@@ -20,6 +20,7 @@ pub(super) fn trace_edges(
     inside: &mut Inside,
 ) {
     let window = projection.window();
+    let first = inside.edges.len();
     for (index, edge) in body.surface.edges().iter().enumerate() {
         let ends = edge.map(|node| projection.project(body.positions[node as usize]));
         let (start, way) = (ends[0].depth, ends[1].depth - ends[0].depth);
@@ -36,12 +37,13 @@ pub(super) fn trace_edges(
                     let depths = [start + entry * way, start + exit * way];
                     let middle = (interval.entry + interval.exit) / 2.0;
                     let deepest = middle.clamp(depths[0].min(depths[1]), depths[0].max(depths[1]));
-                    inside.add(EdgeInside {
+                    let part = EdgeInside {
                         edge: index as u32,
                         entry: entry as f32,
                         exit: exit as f32,
                         depth: interval.depth_of(deepest).0.max(0.0) as f32,
-                    });
+                    };
+                    inside.add(part, first);
                 }
             }
         });
