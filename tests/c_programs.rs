@@ -168,10 +168,10 @@ fn run_all(programs: impl Iterator<Item = Command>) {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-fn every_program_runs(build: &Build) {
+fn every_program_runs<'a>(compilers: impl Iterator<Item = &'a Compiler>, build: &Build) {
     let programs = sources("tests/c");
     assert!(!programs.is_empty(), "there are programs in tests/c");
-    run_all(Compiler::installed().flat_map(|compiler| {
+    run_all(compilers.flat_map(|compiler| {
         let built = programs.iter().map(move |source| compiler.build(source, build));
         built.map(Command::new)
     }));
@@ -179,12 +179,14 @@ fn every_program_runs(build: &Build) {
 
 #[test]
 fn programs_run_with_the_shared_library() {
-    every_program_runs(&SHARED);
+    every_program_runs(Compiler::installed(), &SHARED);
 }
 
 #[test]
 fn programs_run_with_the_static_library() {
-    every_program_runs(&STATIC);
+    // What compilers make of the programs does not depend on the library: one for each language links it.
+    let of = |language: &str| Compiler::installed().find(move |compiler| compiler.language == language);
+    every_program_runs(["c", "c++"].into_iter().filter_map(of), &STATIC);
 }
 
 #[test]
@@ -192,7 +194,6 @@ fn the_examples_compile_as_c_and_as_cxx() {
     for compiler in Compiler::installed() {
         for source in sources("c_examples") {
             compiler.build(&source, &SHARED);
-            compiler.build(&source, &STATIC);
         }
     }
 }

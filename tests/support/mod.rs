@@ -16,7 +16,7 @@ pub mod tissue;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
 /// The crate's own folder.
@@ -91,7 +91,7 @@ pub struct Library {
 }
 
 impl Library {
-    /// Built once, in a folder of its own: what `cargo test` leaves in `target/<profile>` may be of another build.
+    /// Built once: what `cargo test` leaves in `target/<profile>` may be of another build.
     pub fn get() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
         LIBRARY.get_or_init(Self::build)
@@ -108,14 +108,24 @@ impl Library {
     }
 
     fn build() -> Self {
-        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("library");
+        let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let target = scratch.parent().expect("the target folder");
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let output = succeed(
+        succeed(
             Command::new(cargo)
-                .args(["rustc", "--release", "--lib", "--target-dir"])
-                .arg(&target)
-                .args(["--", "--print", "native-static-libs"])
+                .args(["build", "--release", "--lib", "--target-dir"])
+                .arg(target)
                 .current_dir(root()),
+        );
+        // The crate brings no native libraries of its own: they are those of a crate with nothing in it.
+        let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+        let output = succeed(
+            Command::new(rustc)
+                .args(["--crate-type", "staticlib", "--crate-name", "nothing"])
+                .args(["--print", "native-static-libs", "-o"])
+                .arg(scratch.join("libnothing.a"))
+                .arg("-")
+                .stdin(Stdio::null()),
         );
         let said = String::from_utf8_lossy(&output.stderr);
         let native_libraries = said
@@ -126,12 +136,17 @@ impl Library {
             .split_whitespace()
             .map(str::to_owned)
             .collect();
-        let folder = target.join("release");
+        let folder = scratch.join("library");
+        std::fs::create_dir_all(&folder).expect("the target directory can be written");
         #[cfg(unix)]
-        {
-            let named = folder.join("libsinew.so.0.1");
-            let _ = std::fs::remove_file(&named);
-            std::os::unix::fs::symlink("libsinew.so", &named).expect("a link beside the library");
+        for (name, built) in [
+            ("libsinew.so", "libsinew.so"),
+            ("libsinew.so.0.1", "libsinew.so"),
+            ("libsinew.a", "libsinew.a"),
+        ] {
+            let link = folder.join(name);
+            let _ = std::fs::remove_file(&link);
+            std::os::unix::fs::symlink(target.join("release").join(built), &link).expect("a link to the library");
         }
         Self {
             folder,
