@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::closest::Closest;
 use super::distance_field::DistanceField;
 use super::exact::ExactSolid;
+use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::tool::Detection;
 use crate::body::Bounds;
@@ -158,6 +159,18 @@ impl MeshSolid {
         }
         let closest = self.deepest(corners, within)?;
         if closest.inside && closest.distance < 0.0 && corners.len() > 1 {
+            if let Found::Exact(solid) = &self.found {
+                match solid.way_out(corners) {
+                    WayOut::Between(way) => return Some(way),
+                    WayOut::Elsewhere => {
+                        return Some(Closest {
+                            inside: false,
+                            ..closest
+                        });
+                    }
+                    WayOut::Whole => return Some(closest),
+                }
+            }
             return Some(self.led_out(corners, closest));
         }
         Some(closest)
