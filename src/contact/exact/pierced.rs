@@ -31,9 +31,9 @@ const ROUNDING: f64 = 1e-3;
 pub(crate) enum WayOut {
     /// It passes through no triangle: all of it is on one side.
     Whole,
-    /// It is led out of itself.
+    /// It is led out between its ends.
     Between(Closest),
-    /// Its corners or its border are a shorter way, or there is none.
+    /// It is not: an edge or a corner of it has a shorter way, or something without an end has passed through it.
     Elsewhere,
 }
 
@@ -49,36 +49,39 @@ struct Way {
 impl ExactSolid {
     /// What leads an edge or face (2 or 3 corners) out that has passed into the solid.
     pub fn way_out(&self, corners: &[Vec3]) -> WayOut {
-        let (found, aside) = match *corners {
+        let way = match *corners {
             [a, b] => {
-                let Some(aside) = self.past_sides_of_edge([a, b]) else {
+                let Some(beyond) = self.past_sides_of_edge([a, b]) else {
                     return WayOut::Whole;
                 };
-                (self.past_edges([a, b], aside), aside)
+                self.past_edges([a, b], beyond)
             }
             [a, b, c] => {
-                let Some(mut aside) = self.past_sides_of_face([a, b, c]) else {
+                let Some(beyond) = self.past_sides_of_face([a, b, c]) else {
                     return WayOut::Whole;
                 };
-                for border in [[a, b], [b, c], [c, a]] {
-                    if let Some(sides) = self.past_sides_of_edge(border) {
-                        let way = self.past_edges(border, sides.min(aside));
-                        aside = way.map_or(aside, |way| way.depth.min(aside));
-                    }
+                let way = self.past_corners([a, b, c], beyond);
+                let limit = way.map_or(beyond, |way| way.depth);
+                let is_shorter = |border: [Vec3; 2]| {
+                    let beyond = self.past_sides_of_edge(border);
+                    let beside = beyond.and_then(|beyond| self.past_edges(border, beyond.min(limit)));
+                    beside.is_some_and(|beside| beside.depth < limit)
+                };
+                if [[a, b], [b, c], [c, a]].into_iter().any(is_shorter) {
+                    return WayOut::Elsewhere;
                 }
-                (self.past_corners([a, b, c], aside), aside)
+                way
             }
             _ => return WayOut::Whole,
         };
-        match found {
-            Some(way) if way.depth <= aside * (1.0 + ROUNDING) => WayOut::Between(Closest {
-                weights: way.weights.map(|weight| weight as f32),
-                distance: -way.depth as f32,
-                normal: way.normal.as_vec3(),
-                inside: true,
-            }),
-            _ => WayOut::Elsewhere,
-        }
+        way.map_or(WayOut::Elsewhere, |way| WayOut::Between(way.closest()))
+    }
+
+    /// What leads a face out past the corner of the solid that is deepest behind it; `None` where that lies beside it.
+    pub fn past_corner(&self, corners: [Vec3; 3]) -> Option<Closest> {
+        let [a, b, c] = corners;
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        self.past_corners(corners, f64::from(longest)).map(Way::closest)
     }
 
     /// The shortest way that takes all of an edge before one of the sides that it passes through, along that side's normal.
@@ -133,7 +136,7 @@ impl ExactSolid {
             let same = ways.clone().filter(|other| other.normal.dot(way.normal) > SAME_SIDE);
             same.copied().fold(*way, |last, other| if other.depth > last.depth { other } else { last })
         };
-        ways.clone().map(last).reduce(|best, other| if other.depth < best.depth { other } else { best })
+        shortest(ways.clone().map(last), within)
     }
 
     /// The way of a face out past a corner of the solid, along its own perpendicular, no longer than `within`.
@@ -157,7 +160,7 @@ impl ExactSolid {
                 }
             }
         });
-        ways.into_iter().flatten().reduce(|best, other| if other.depth < best.depth { other } else { best })
+        shortest(ways.into_iter().flatten(), within)
     }
 
     /// Shows the places of all triangles that are no further than `within` from a feature.
@@ -169,6 +172,23 @@ impl ExactSolid {
             limit
         });
     }
+}
+
+impl Way {
+    fn closest(self) -> Closest {
+        Closest {
+            weights: self.weights.map(|weight| weight as f32),
+            distance: -self.depth as f32,
+            normal: self.normal.as_vec3(),
+            inside: true,
+        }
+    }
+}
+
+/// The shortest of several ways, where it is no longer than `within`.
+fn shortest(ways: impl Iterator<Item = Way>, within: f64) -> Option<Way> {
+    let best = ways.reduce(|best, other| if other.depth < best.depth { other } else { best })?;
+    (best.depth <= within * (1.0 + ROUNDING)).then_some(best)
 }
 
 /// The way of an edge from `a` to `b` out past an edge of a solid, where it has passed that.
