@@ -54,7 +54,7 @@ impl Press {
                 .create_tool(&ToolDefinition {
                     detection,
                     pose: Pose {
-                        position: pose.position + Vec3::Y * 1e-3,
+                        position: pose.position + Vec3::Y * 0.5e-3,
                         ..pose
                     },
                     ..ToolDefinition::new(shape)
@@ -121,7 +121,7 @@ fn feels_what_is_stored(name: &str, parts: &[[Vec3; 2]], at: [f32; 2], turned: Q
         orientation: turned,
     };
     let mut press = Press::new(tissue, 20, shape, detection, pose);
-    let [first, middle, last] = [0.004, 0.005, 0.006].map(|depth| {
+    let [first, middle, last] = [0.003, 0.004, 0.005].map(|depth| {
         press.press(depth, 40);
         press.rest()
     });
@@ -149,9 +149,17 @@ fn blades_needles_and_forks_feel_what_the_cloth_has_stored() {
         Quat::from_rotation_y(yaw) * Quat::from_rotation_x(tilt) * Quat::from_rotation_z(roll)
     };
     let exact = Detection::Exact;
-    for (at, yaw) in [([0.0, 2.7], 0.3), ([1.3, -0.5], -0.9)] {
-        feels_what_is_stored("fork", &fork(), at, turned(yaw, 0.0, 0.0), exact);
+    let (at, askew) = ([-0.04072666, 2.733_957], turned(1.2197274, 0.0, 0.0));
+    for detection in [exact, Detection::DistanceField] {
+        feels_what_is_stored("fork", &fork(), at, askew, detection);
     }
+    feels_what_is_stored(
+        "fork",
+        &fork(),
+        [1.2576871, -0.47673368],
+        turned(0.1774326, 0.0, 0.0),
+        exact,
+    );
     feels_what_is_stored("fork", &fork(), [0.8, 1.1], turned(0.2, 0.1, 0.15), exact);
     let blade = [upright(0.5, 10.0, 0.0)];
     feels_what_is_stored("blade", &blade, [0.0, 0.0], Quat::IDENTITY, exact);
@@ -185,8 +193,12 @@ fn a_thin_tool_over_pinned_tissue_feels_what_others_do() {
             triangles: &triangles,
         };
         let (most, force) = force(shape, Quat::IDENTITY, -0.5e-3 * height, detection);
-        // Slowly pressed it never feels much more than in the end.
-        assert!(most < 1.2 * force, "{height} x {width} mm {detection:?}: {most} N, then {force} N");
+        // Slowly pressed it never feels much more than in the end; a pixel or a cell is a part of a thin one.
+        let more = if detection == Detection::Exact { 1.2 } else { 5.0 };
+        assert!(
+            most < more * force,
+            "{height} x {width} mm {detection:?}: {most} N, then {force} N"
+        );
         force
     };
     let tall = lying(20.0, 10.0, Detection::Exact);
@@ -196,12 +208,16 @@ fn a_thin_tool_over_pinned_tissue_feels_what_others_do() {
         half_length: 0.1,
     };
     let (_, round) = force(rod, Quat::from_rotation_z(FRAC_PI_2), -radius, Detection::Exact);
-    for detection in [Detection::Exact] {
-        for height in [0.5, 4.0] {
-            let blade = lying(height, 10.0, detection);
-            assert!((blade / tall - 1.0).abs() < 0.05, "{height} mm {detection:?}: {blade} N of {tall} N");
-        }
+    for detection in [Detection::Exact, Detection::DistanceField, Detection::ImageSpace] {
+        let blade = lying(0.5, 10.0, detection);
+        assert!(
+            (blade / tall - 1.0).abs() < 0.05,
+            "{detection:?}: {blade} N of {tall} N"
+        );
         let needle = lying(0.4, 0.4, detection);
-        assert!((needle / round - 1.0).abs() < 0.15, "needle {detection:?}: {needle} N of {round} N");
+        assert!(
+            (needle / round - 1.0).abs() < 0.15,
+            "needle {detection:?}: {needle} N of {round} N"
+        );
     }
 }

@@ -106,9 +106,7 @@ impl ExactSolid {
             if passes(place) {
                 let normal = self.facets.normal(place, Part::Face).normalize_or_zero();
                 let on_side = self.tree.placed(place).exact()[0];
-                let ways = corners
-                    .iter()
-                    .map(|corner| (on_side - corner.as_dvec3()).dot(normal));
+                let ways = corners.iter().map(|corner| (on_side - corner.as_dvec3()).dot(normal));
                 let way = ways.fold(0.0, f64::max);
                 least = Some(least.map_or(way, |least| least.min(way)));
             }
@@ -134,7 +132,8 @@ impl ExactSolid {
         // Of several edges on one side the furthest is the last to be passed.
         let last = |way: &Way| {
             let same = ways.clone().filter(|other| other.normal.dot(way.normal) > SAME_SIDE);
-            same.copied().fold(*way, |last, other| if other.depth > last.depth { other } else { last })
+            same.copied()
+                .fold(*way, |last, other| if other.depth > last.depth { other } else { last })
         };
         shortest(ways.clone().map(last), within)
     }
