@@ -227,7 +227,9 @@ impl Zone {
         let spread = corners
             .iter()
             .fold(0.0_f32, |spread, corner| spread.max(corner.distance(corners[0])));
-        solid.closest(&corners[..1], reach + allowance + spread).is_some()
+        solid
+            .closest(&corners[..1], reach + allowance + spread, false)
+            .is_some()
     }
 
     /// Whether something within `bounds` may come into the zone when it moves by `reach`.

@@ -152,7 +152,11 @@ pub(super) fn meet_mesh(
             own.steps[corner] = to.own(point + step) - own.points[corner];
         }
     }
-    let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack)?;
+    let is_pinned = feature
+        .nodes()
+        .iter()
+        .any(|&node| meeting.mobility.of(node as usize) == 0.0);
+    let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack, is_pinned)?;
     if !closest.inside {
         return None;
     }

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::closest::Closest;
 use super::distance_field::DistanceField;
 use super::exact::ExactSolid;
+use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::tool::Detection;
 use crate::body::Bounds;
@@ -19,6 +20,8 @@ use crate::mesh::ClosedSurface;
 pub(crate) struct MeshSolid {
     surface: ClosedSurface,
     found: Found,
+    /// Its corners, edges and sides, past which something that passed into it is led out; as it is found, where that is by these.
+    exact: ExactSolid,
     bounds: Bounds,
     reach: f32,
     hash: u64,
@@ -29,7 +32,7 @@ pub(crate) struct MeshSolid {
 /// How what it encloses is found.
 #[derive(Debug)]
 enum Found {
-    Exact(Box<ExactSolid>),
+    Exact,
     Field(Box<DistanceField>),
     Image(Box<LayeredImage>),
 }
@@ -68,20 +71,20 @@ impl MeshSolid {
         } else {
             grain_for(sides, detection)
         };
-        let found = match detection {
-            Detection::Exact => Found::Exact(Box::new(ExactSolid::new(&surface)?)),
+        let (found, exact) = match detection {
+            Detection::Exact => (Found::Exact, ExactSolid::new(&surface)?),
             Detection::ImageSpace => {
                 let image = LayeredImage::new(surface.positions(), surface.triangles(), grain)?;
-                Found::Image(Box::new(image))
+                (Found::Image(Box::new(image)), ExactSolid::changing(&surface)?)
             }
             Detection::DistanceField => {
-                let field = DistanceField::of(&ExactSolid::new(&surface)?, grain)?;
-                Found::Field(Box::new(field))
+                let exact = ExactSolid::new(&surface)?;
+                (Found::Field(Box::new(DistanceField::of(&exact, grain)?)), exact)
             }
         };
         let is_fine = resolution > 0.0 || grain * THINNEST <= sides.min_element();
         let is_seen = match &found {
-            Found::Exact(_) => true,
+            Found::Exact => true,
             Found::Field(field) => is_fine && field.is_inside_somewhere(BESIDE * sides.min_element()),
             Found::Image(image) => is_fine && image.is_inside_somewhere(),
         };
@@ -108,6 +111,7 @@ impl MeshSolid {
         }
         let solid = Self {
             found,
+            exact,
             bounds,
             reach: surface
                 .positions()
@@ -151,21 +155,34 @@ impl MeshSolid {
         self.hash
     }
 
-    /// The closest that a node, edge or face with these corners comes; `None`: no closer than `within`.
-    pub(super) fn closest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
+    /// The closest that a node, edge or face with these corners comes; `None`: no closer than `within`. One that is pinned somewhere
+    /// cannot give way as it likes: where it has passed into the solid it is met if it has a way out of its own, and else lets the solid by.
+    pub(super) fn closest(&self, corners: &[Vec3], within: f32, is_pinned: bool) -> Option<Closest> {
         if is_apart(&self.bounds, corners, within) {
             return None;
         }
         let closest = self.deepest(corners, within)?;
-        if closest.inside && closest.distance < 0.0 && corners.len() > 1 {
-            return Some(self.led_out(corners, closest));
+        if !(closest.inside && closest.distance < 0.0 && corners.len() > 1) {
+            return Some(closest);
         }
-        Some(closest)
+        let way = if is_pinned {
+            self.exact.way_out(corners)
+        } else {
+            WayOut::Whole
+        };
+        Some(match way {
+            WayOut::Between(way) => way,
+            WayOut::Elsewhere => Closest {
+                inside: false,
+                ..closest
+            },
+            WayOut::Whole => self.led_out(corners, closest),
+        })
     }
 
     fn deepest(&self, corners: &[Vec3], within: f32) -> Option<Closest> {
         match &self.found {
-            Found::Exact(solid) => solid.closest(corners, within),
+            Found::Exact => self.exact.closest(corners, within),
             Found::Field(field) => field.closest(corners, within),
             Found::Image(image) => image.closest(corners, within),
         }
@@ -202,7 +219,11 @@ impl MeshSolid {
             let further = |most: f32, look: f32| if look.abs() > most.abs() { look } else { most };
             let most = looks.into_iter().fold(closest.normal.dot(across), further);
             if most.abs() < ACROSS {
-                return closest;
+                // All sides of a thin wall look along a face that is flat on its end.
+                return match *corners {
+                    [a, b, c] => self.exact.past_corner([a, b, c]).unwrap_or(closest),
+                    _ => closest,
+                };
             }
             across * most
         };

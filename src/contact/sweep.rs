@@ -151,14 +151,21 @@ impl Corners {
 
     /// The same for what a mesh encloses, in whose own frame the corners are: also when that is, a fraction of the substep. They touch
     /// where they are `clearance` apart.
-    pub fn approach_mesh(&self, solid: &MeshSolid, clearance: f32, margin: f32) -> Option<(Closest, f32)> {
+    pub fn approach_mesh(
+        &self,
+        solid: &MeshSolid,
+        clearance: f32,
+        margin: f32,
+        is_pinned: bool,
+    ) -> Option<(Closest, f32)> {
+        let closest_at = |time: f32, within: f32| solid.closest(&self.at(time)[..self.count], within, is_pinned);
         let closing = self.steps[..self.count]
             .iter()
             .fold(0.0, |closing: f32, step| closing.max(step.length()));
         let touching = TOUCHING * solid.thickness();
         let within = clearance + margin.max(touching);
         let mut time = 0.0;
-        let mut closest = solid.closest(&self.at(0.0)[..self.count], within + closing)?;
+        let mut closest = closest_at(0.0, within + closing)?;
         for _ in 0..ADVANCES {
             let gap = closest.distance - clearance;
             // So short a way sees the solid as flat.
@@ -167,12 +174,12 @@ impl Corners {
             }
             time += gap / closing;
             if !(time < 1.0) {
-                let last = solid.closest(&self.at(1.0)[..self.count], within)?;
+                let last = closest_at(1.0, within)?;
                 return Some((last, 1.0));
             }
             // Further away than the tool can still come to meet it.
             let left = closing * (1.0 - time);
-            closest = solid.closest(&self.at(time)[..self.count], within + left)?;
+            closest = closest_at(time, within + left)?;
         }
         Some((closest, time))
     }

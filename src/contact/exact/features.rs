@@ -186,7 +186,7 @@ impl ExactSolid {
 
     /// A point, as weights, where a face and the border of the triangle at a place pass through each other, and the
     /// normals of what meets there.
-    fn crossed(&self, face: [DVec3; 3], place: usize) -> Option<([f64; 3], [DVec3; 2])> {
+    pub(super) fn crossed(&self, face: [DVec3; 3], place: usize) -> Option<([f64; 3], [DVec3; 2])> {
         let triangle = self.tree.placed(place).exact();
         if lies_beside(triangle, face) || lies_beside(face, triangle) {
             return None;

@@ -8,6 +8,7 @@ mod deepest;
 mod facets;
 mod features;
 pub(crate) mod overlap;
+pub(super) mod pierced;
 #[cfg(test)]
 pub(super) mod tests;
 
