@@ -23,4 +23,5 @@ mod query;
 mod rest;
 mod stop;
 mod sweep;
+mod thin;
 mod tissue_pairs;

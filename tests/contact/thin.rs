@@ -1,16 +1,11 @@
 //! Tools that are much thinner than the edges of the tissue that they press: they feel what the tissue has stored, no more.
 
-#[path = "support/solid.rs"]
-mod solid;
-#[path = "support/tissue.rs"]
-mod tissue;
-
 use std::f32::consts::FRAC_PI_2;
 
+use crate::support::solid::cuboid;
+use crate::support::tissue::*;
 use glam::{DVec3, Quat, Vec3};
 use sinew::{BodyId, Detection, Pose, Shape, ToolDefinition, ToolId, World};
-use solid::cuboid;
-use tissue::*;
 
 /// Of a cloth, m.
 const SIZE: f32 = 0.1;
