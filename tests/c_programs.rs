@@ -6,6 +6,8 @@ mod support;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Mutex;
+use std::thread;
 
 use support::{Library, failure, installed, root, skip, succeed};
 
@@ -154,21 +156,33 @@ fn sources(folder: &str) -> Vec<PathBuf> {
     sources
 }
 
-/// Runs all of these programs and tells of every one that fails. Each finds its library by its own path alone: cargo puts
-/// older builds on the loader's.
-fn run_all(programs: impl Iterator<Item = Command>) {
-    let failures: Vec<String> = programs
-        .filter_map(|mut program| {
+/// Runs all of these programs, some side by side, and tells of every one that fails. Each finds its library by its own path alone:
+/// cargo puts older builds on the loader's.
+fn run_all(programs: impl Iterator<Item = Command> + Send) {
+    let programs = Mutex::new(programs);
+    let next = || programs.lock().expect("no program panicked").next();
+    let run = || {
+        let mut failures = Vec::new();
+        while let Some(mut program) = next() {
             program
                 .env_remove("LD_LIBRARY_PATH")
                 .current_dir(env!("CARGO_TARGET_TMPDIR"));
-            failure(&mut program)
-        })
-        .collect();
+            failures.extend(failure(&mut program));
+        }
+        failures
+    };
+    let failures: Vec<String> = thread::scope(|scope| {
+        let count = thread::available_parallelism().map_or(1, usize::from);
+        let running: Vec<_> = (0..count).map(|_| scope.spawn(run)).collect();
+        let ended = running
+            .into_iter()
+            .map(|thread| thread.join().expect("a program that builds"));
+        ended.flatten().collect()
+    });
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-fn every_program_runs<'a>(compilers: impl Iterator<Item = &'a Compiler>, build: &Build) {
+fn every_program_runs<'a>(compilers: impl Iterator<Item = &'a Compiler> + Send, build: &Build) {
     let programs = sources("tests/c");
     assert!(!programs.is_empty(), "there are programs in tests/c");
     run_all(compilers.flat_map(|compiler| {
