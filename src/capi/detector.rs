@@ -7,7 +7,7 @@ use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
-use crate::body::Body;
+use crate::body::{Body, finite_vector};
 use crate::contact::Detection;
 use crate::detection::exact::{self, Exact};
 use crate::detection::image_space::{self, Form, ImageSpace, ImageSpaceDefinition, Placed, Surface, Views};
@@ -205,9 +205,7 @@ impl sinew_detector_def {
 
     fn image(&self) -> Result<ImageSpaceDefinition> {
         let direction = Vec3::from_array(self.direction);
-        if !direction.is_finite() {
-            return Err(Error::invalid(format!("direction is {direction}: must be finite")));
-        }
+        finite_vector("direction", direction)?;
         Ok(ImageSpaceDefinition {
             pixel: self.pixel,
             views: if direction == Vec3::ZERO {
