@@ -37,6 +37,11 @@ pub(crate) fn merge<T: Copy, K: Ord>(values: &mut Vec<T>, more: &[T], key: impl 
     }
 }
 
+/// Makes room for `count` values in all.
+pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
+    Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
+}
+
 /// Appends `value`, growing the vector fallibly.
 pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     values.try_reserve(1)?;

@@ -25,6 +25,22 @@ impl CoarseStep {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        self.all_mut()
+            .into_iter()
+            .try_for_each(|vectors| vectors.reserve(node_count))
+    }
+
+    /// Adds nodes, for which there is room, up to so many in all.
+    pub fn grow(&mut self, node_count: usize) {
+        self.all_mut().into_iter().for_each(|vectors| vectors.grow(node_count));
+    }
+
+    fn all_mut(&mut self) -> [&mut Vectors; 3] {
+        [&mut self.middle, &mut self.positions, &mut self.velocities]
+    }
+
     /// Compares the positions within the step with those kept, and keeps them instead.
     pub fn pass_middle(&mut self, positions: &Vectors) {
         self.middle_difference = self.middle.largest_distance(positions);

@@ -30,6 +30,20 @@ impl NodeDamping {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        [&mut self.rates, &mut self.loss, &mut self.gain]
+            .into_iter()
+            .try_for_each(|values| memory::reserve(values, node_count))
+    }
+
+    /// Adds a node, for which there is room, that is damped as another is.
+    pub fn copy(&mut self, source: usize) {
+        for values in [&mut self.rates, &mut self.loss, &mut self.gain] {
+            values.push(values[source]);
+        }
+    }
+
     pub fn rates(&self) -> &[f32] {
         &self.rates
     }

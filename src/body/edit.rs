@@ -3,7 +3,7 @@
 use glam::{BVec3, Vec3};
 
 use super::definition::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
-use super::{Body, Bounds, Vectors};
+use super::{Body, Bounds};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
@@ -33,10 +33,11 @@ impl Body {
                 return Err(Error::invalid(format!("forces[{index}] is {force}: must be finite")));
             }
         }
-        let count = self.node_count();
-        let applied = match &mut self.applied {
-            Some(applied) => applied,
-            None => self.applied.insert(Vectors::zeros(count)?),
+        if self.applied.is_none() {
+            self.applied = Some(self.zeros()?);
+        }
+        let Some(applied) = &mut self.applied else {
+            return Ok(());
         };
         for (&node, &force) in nodes.iter().zip(forces) {
             let node = self.order.own(node) as usize;

@@ -1,10 +1,12 @@
 //! A body: nodes with mass, joined by springs.
 
+mod bindings;
 mod coarse;
 mod damping;
 mod definition;
 mod edit;
 mod grasp;
+mod grow;
 mod hash;
 mod nodes;
 mod order;
@@ -21,6 +23,7 @@ mod vectors;
 
 use glam::{BVec3, DVec3, Vec3};
 
+pub(crate) use bindings::{Bindings, Bound};
 pub(crate) use coarse::CoarseStep;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
@@ -28,6 +31,8 @@ pub(crate) use definition::{
     SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices, not_negative,
 };
 pub(crate) use grasp::{Grasps, Grip, Lapse};
+#[allow(unused_imports)]
+pub(crate) use grow::NewNode;
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
@@ -99,6 +104,10 @@ pub struct Body {
     pub(crate) applied: Option<Vectors>,
     pub(crate) contacts: Option<Contacts>,
     pub(crate) contact: BodyContact,
+    /// Points of its surface without mass; kept only by bodies that may be cut.
+    pub(crate) bindings: Option<Bindings>,
+    /// How many nodes there is room for; 0: for those that there are.
+    node_room: usize,
     /// Whether an edge of its surface was taken away.
     pub(crate) is_cut_open: bool,
     /// A bit for each node that the surface has, in the caller's numbers; empty before a spring is removed.
@@ -226,6 +235,8 @@ impl Body {
             applied: None,
             contacts: None,
             contact: definition.contact,
+            bindings: None,
+            node_room: 0,
             is_cut_open: false,
             corners: Vec::new(),
             grasps: None,
@@ -585,6 +596,7 @@ impl Body {
             contacts.commit(tools);
         }
         self.clear_pending();
+        self.follow_nodes();
         self.publish(team);
         self.follow();
     }

@@ -58,6 +58,24 @@ impl NodeOrder {
         Ok(Self { own, caller })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        if self.is_callers() {
+            return Ok(());
+        }
+        memory::reserve(&mut self.own, node_count)?;
+        memory::reserve(&mut self.caller, node_count)
+    }
+
+    /// Adds nodes, for which there is room, up to so many in all: they are called as they are kept.
+    pub fn grow(&mut self, node_count: usize) {
+        if !self.is_callers() {
+            let more = self.own.len() as u32..node_count as u32;
+            self.own.extend(more.clone());
+            self.caller.extend(more);
+        }
+    }
+
     /// The body's own number of one of the caller's.
     #[inline]
     pub fn own(&self, caller: u32) -> u32 {

@@ -34,6 +34,22 @@ impl Published {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        self.forget_velocities();
+        let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
+        memory::reserve(blank, node_count)?;
+        memory::reserve(&mut self.positions, node_count)
+    }
+
+    /// Adds nodes, for which there is room, up to so many in all.
+    pub fn grow(&mut self, node_count: usize) {
+        self.forget_velocities();
+        let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
+        blank.resize(node_count, Vec3::ZERO);
+        self.positions.resize(node_count, Vec3::ZERO);
+    }
+
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }

@@ -20,6 +20,16 @@ impl Records {
         Ok(Self(memory::filled(Record::default(), count)?))
     }
 
+    /// Makes room for so many in all.
+    pub fn reserve(&mut self, count: usize) -> Result<()> {
+        memory::reserve(&mut self.0, count)
+    }
+
+    /// Adds zeros, for which there is room, up to so many in all.
+    pub fn grow(&mut self, count: usize) {
+        self.0.resize(count, Record::default());
+    }
+
     pub fn as_slice(&self) -> &[Record] {
         &self.0
     }

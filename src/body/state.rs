@@ -48,6 +48,33 @@ impl State {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        self.all_mut().try_for_each(|vectors| vectors.reserve(node_count))
+    }
+
+    /// Adds nodes at zero, for which there is room, up to so many in all.
+    pub fn grow(&mut self, node_count: usize) {
+        self.all_mut().for_each(|vectors| vectors.grow(node_count));
+    }
+
+    /// Has a node move as another does.
+    pub fn copy(&mut self, source: usize, node: usize) {
+        let current = [
+            &mut self.positions[self.current],
+            &mut self.velocities[self.settled],
+            &mut self.forces[self.settled],
+        ];
+        for vectors in current {
+            vectors.set(node, vectors.get(source));
+        }
+    }
+
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Vectors> {
+        let moving = self.positions.iter_mut().chain(&mut self.velocities);
+        moving.chain(&mut self.forces)
+    }
+
     pub fn positions(&self) -> &Vectors {
         &self.positions[self.current]
     }

@@ -52,7 +52,7 @@ impl Body {
     /// Makes room for forces on nodes that are attached.
     pub(crate) fn reserve_bonds(&mut self) -> Result<()> {
         if self.applied.is_none() {
-            self.applied = Some(Vectors::zeros(self.node_count())?);
+            self.applied = Some(self.zeros()?);
         }
         Ok(())
     }

@@ -17,6 +17,10 @@ pub(crate) const MARGIN: usize = 16;
 /// Numbers in a cache line.
 const LINE: usize = 16;
 
+/// How many cache lines further into its memory each axis begins than it had to. Arrays that begin at the same place of a memory page get
+/// in each other's way: a load waits for the store before it where their addresses agree in the last twelve bits.
+const SKEWS: [usize; 3] = [0, 21, 42];
+
 /// One number per node, aligned to a cache line, with zeros on both sides that may be read.
 #[derive(Debug)]
 struct Floats {
@@ -28,7 +32,12 @@ struct Floats {
 impl Floats {
     /// `count` zeros, `skew` cache lines further into the memory taken than they had to be.
     fn zeros(count: usize, skew: usize) -> Result<Self> {
-        let padded = count.next_multiple_of(LINE);
+        Self::with_room(count, count, skew)
+    }
+
+    /// The same with room for `room` numbers, at least as many, to be grown into.
+    fn with_room(count: usize, room: usize, skew: usize) -> Result<Self> {
+        let padded = room.next_multiple_of(LINE);
         let values = memory::filled(0.0_f32, LINE * (skew + 1) + padded + 2 * MARGIN)?;
         // What cannot be aligned is not, and only slower.
         let aligned = values.as_ptr().align_offset(LINE * size_of::<f32>()).min(LINE);
@@ -37,6 +46,18 @@ impl Floats {
             first: aligned + LINE * skew + MARGIN,
             count,
         })
+    }
+
+    /// Makes room for so many numbers in all.
+    fn reserve(&mut self, room: usize, skew: usize) -> Result<()> {
+        if self.first + room.next_multiple_of(LINE) + MARGIN <= self.values.len() {
+            return Ok(());
+        }
+        let mut roomier = Self::with_room(self.count, room, skew)?;
+        let places = roomier.places();
+        roomier.values[places].copy_from_slice(&self.values[self.places()]);
+        *self = roomier;
+        Ok(())
     }
 
     fn places(&self) -> Range<usize> {
@@ -135,12 +156,24 @@ pub(crate) struct Vectors {
 impl Vectors {
     /// `count` zero vectors.
     pub fn zeros(count: usize) -> Result<Self> {
-        // Arrays that begin at the same place of a memory page get in each other's way: a load waits for the store before
-        // it where their addresses agree in the last twelve bits.
-        let axis = |skew| Floats::zeros(count, skew);
-        Ok(Self {
-            axes: [axis(0)?, axis(21)?, axis(42)?],
-        })
+        let [x, y, z] = SKEWS.map(|skew| Floats::zeros(count, skew));
+        Ok(Self { axes: [x?, y?, z?] })
+    }
+
+    /// Makes room for so many vectors in all.
+    pub fn reserve(&mut self, count: usize) -> Result<()> {
+        for (axis, skew) in self.axes.iter_mut().zip(SKEWS) {
+            axis.reserve(count, skew)?;
+        }
+        Ok(())
+    }
+
+    /// Adds zero vectors, for which there is room, up to so many in all.
+    pub fn grow(&mut self, count: usize) {
+        for axis in &mut self.axes {
+            assert!(axis.first + count.next_multiple_of(LINE) + MARGIN <= axis.values.len());
+            axis.count = axis.count.max(count);
+        }
     }
 
     #[inline(always)]

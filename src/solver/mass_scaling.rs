@@ -214,6 +214,11 @@ impl MassScaling {
         }
     }
 
+    /// Nodes differ in mass from now on.
+    pub fn forget_uniform(&mut self) {
+        self.uniform_inverse_mass = None;
+    }
+
     /// Whether one of these nodes may be made heavier.
     pub fn concerns(&self, nodes: [u32; 2]) -> bool {
         nodes.into_iter().any(|node| self.find(node).is_ok())

@@ -233,6 +233,15 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
         });
     }
 
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.nodes, node_count)
+    }
+
+    fn grow(&mut self, node_count: usize) -> Result<()> {
+        self.nodes.resize_with(node_count, Bulks::none);
+        Ok(())
+    }
+
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
         if self.nodes[a as usize].has(b) {

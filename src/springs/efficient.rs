@@ -112,6 +112,15 @@ impl Springs for Efficient {
         }
     }
 
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.lists, node_count)
+    }
+
+    fn grow(&mut self, node_count: usize) -> Result<()> {
+        self.lists.resize_with(node_count, || Chain::EMPTY);
+        Ok(())
+    }
+
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
         if self.has(a, b) {

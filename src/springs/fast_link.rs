@@ -124,6 +124,17 @@ impl<L: KeptLink> Springs for FastLink<L> {
         });
     }
 
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
+        let places = node_count.checked_mul(self.springs_per_node);
+        memory::reserve(&mut self.places, places.ok_or(Error::OutOfMemory)?)
+    }
+
+    fn grow(&mut self, node_count: usize) -> Result<()> {
+        self.places.resize(node_count * self.springs_per_node, L::EMPTY);
+        self.node_count = node_count;
+        Ok(())
+    }
+
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
         if place_of(self.row(a), b).is_some() {

@@ -167,6 +167,12 @@ pub(crate) trait Springs: Debug + Send + Sync {
         sum
     }
 
+    /// Makes room for so many nodes in all.
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()>;
+
+    /// Adds nodes without springs, for which room was made, up to so many in all. Changes nothing where it fails.
+    fn grow(&mut self, node_count: usize) -> Result<()>;
+
     /// Adds a spring between two nodes of the body; refused where the pair has one already. Its damping counts only where
     /// springs are damped. Changes nothing where it fails.
     fn add(&mut self, spring: &Spring) -> Result<()>;

@@ -48,6 +48,21 @@ impl Blocks {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.stiffness, node_count)?;
+        let mut entries = self.inverse.iter_mut();
+        entries.try_for_each(|entry| memory::reserve(entry, node_count))
+    }
+
+    /// Adds nodes, for which there is room, up to so many in all.
+    pub fn grow(&mut self, node_count: usize) {
+        self.stiffness.resize(node_count, [0.0; 6]);
+        for entry in &mut self.inverse {
+            entry.resize(node_count, 0.0);
+        }
+    }
+
     /// Takes in the springs at these positions.
     pub fn gather(&mut self, springs: &dyn Springs, positions: &Vectors, tangent: Tangent, team: &Team) {
         let node_count = positions.len();

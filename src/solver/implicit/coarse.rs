@@ -82,6 +82,21 @@ impl Coarse {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.clusters, node_count.div_ceil(BLOCK))?;
+        self.places.reserve(node_count)?;
+        memory::reserve(&mut self.free, node_count)
+    }
+
+    /// Adds nodes, for which there is room, up to so many in all: to the last cluster, which is a worse one then.
+    pub fn grow(&mut self, node_count: usize) {
+        let last = self.clusters.last().copied().unwrap_or(0);
+        self.clusters.resize(node_count.div_ceil(BLOCK), last);
+        self.places.grow(node_count);
+        self.free.resize(node_count, 0.0);
+    }
+
     /// How many numbers describe a motion of all clusters.
     pub fn size(&self) -> usize {
         self.count * MOTIONS

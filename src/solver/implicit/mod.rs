@@ -239,6 +239,101 @@ impl Implicit {
         })
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
+        for history in &mut self.histories {
+            for vectors in [&mut history.ways, &mut history.gains] {
+                vectors.reserve(count)?;
+            }
+        }
+        self.pushes.reserve(count)?;
+        if let Some(means) = &mut self.means {
+            means.reserve(count)?;
+        }
+        if self.newton.is_some() {
+            return Ok(());
+        }
+        self.solved_mut()
+            .into_iter()
+            .try_for_each(|vectors| vectors.reserve(count))?;
+        if let Some(records) = &mut self.search_records {
+            records.reserve(count)?;
+        }
+        memory::reserve(&mut self.inertia, count)?;
+        self.blocks.reserve(count)?;
+        self.coarse.reserve(count)?;
+        memory::reserve(&mut self.loads, self.coarse.size() * tile_count(count))?;
+        memory::reserve(&mut self.partials, tile_count(count))
+    }
+
+    /// Adds nodes, for which there is room, up to so many in all; NEWTON is to be told its springs anew.
+    pub fn grow(&mut self, count: usize) {
+        for history in &mut self.histories {
+            history.ways.grow(count);
+            history.gains.grow(count);
+        }
+        self.pushes.grow(count);
+        if let Some(means) = &mut self.means {
+            means.grow(count);
+        }
+        if self.newton.is_some() {
+            return;
+        }
+        self.solved_mut().into_iter().for_each(|vectors| vectors.grow(count));
+        if let Some(records) = &mut self.search_records {
+            records.grow(count);
+        }
+        self.inertia.resize(count, 0.0);
+        self.blocks.grow(count);
+        self.coarse.grow(count);
+        self.loads.resize(self.coarse.size() * tile_count(count), 0.0);
+        self.partials.resize(tile_count(count), Partial::default());
+    }
+
+    /// What there is for each node whose equation is solved by conjugate gradients.
+    fn solved_mut(&mut self) -> [&mut Vectors; 7] {
+        let [first, second] = &mut self.histories;
+        [
+            &mut first.remainders,
+            &mut second.remainders,
+            &mut self.corrections,
+            &mut self.residuals,
+            &mut self.searches,
+            &mut self.products,
+            &mut self.preconditioned,
+        ]
+    }
+
+    /// Has a new node go on as another does.
+    pub fn copy_motion(&mut self, source: usize, node: usize) {
+        let History {
+            ways,
+            gains,
+            remainders,
+            ..
+        } = &mut self.histories[self.settled];
+        for vectors in [ways, gains, remainders] {
+            if node < vectors.len() {
+                vectors.set(node, vectors.get(source));
+            }
+        }
+    }
+
+    /// Springs, elements or nodes have changed so that what is kept of them is to be made anew; it fails before anything is changed.
+    pub fn rebuild(
+        &mut self,
+        node_count: usize,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
+    ) -> Result<()> {
+        self.prepared = 0.0;
+        if let Some(newton) = &mut self.newton {
+            newton.rebuild(node_count, springs, elements, beside)?;
+        }
+        Ok(())
+    }
+
     /// Makes room for what elements change by.
     pub fn join(&mut self, elements: &Elements) -> Result<()> {
         if self.newton.is_none() {

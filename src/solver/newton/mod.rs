@@ -56,6 +56,24 @@ impl Newton {
         })
     }
 
+    /// Makes it that of a body whose springs and nodes have changed; positions keep what they lack. Changes nothing where it fails.
+    pub fn rebuild(
+        &mut self,
+        node_count: usize,
+        springs: &dyn Springs,
+        elements: Option<&Elements>,
+        beside: (Option<&Terms>, Option<&Enclosed>),
+    ) -> Result<()> {
+        let mut rebuilt = Self::new(node_count, springs, elements, beside)?;
+        for (vectors, before) in rebuilt.remainders.iter_mut().zip(&self.remainders) {
+            for (node, vector) in before.iter().enumerate() {
+                vectors.set(node, vector);
+            }
+        }
+        *self = rebuilt;
+        Ok(())
+    }
+
     /// Makes room for so many springs in all, so that a step needs no memory.
     pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
         self.descent.make_room(spring_count)

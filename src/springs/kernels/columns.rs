@@ -239,6 +239,29 @@ impl Columns {
         )
     }
 
+    /// Adds nodes without links, up to this one in the order of the body. Changes nothing where it fails.
+    pub fn grow(&mut self, end: usize) -> Result<()> {
+        let count = end - self.first;
+        assert!(count <= TILE);
+        let blocks = count.div_ceil(LANES);
+        memory::reserve(&mut self.blocks, blocks)?;
+        let (_, empty) = match self.blocks.len() {
+            0 => Default::default(),
+            known => self.ends(known - 1),
+        };
+        self.blocks.resize(blocks, empty);
+        self.count = count;
+        self.reach(end);
+        self.reads_also(self.first as isize..end.next_multiple_of(LANES) as isize);
+        Ok(())
+    }
+
+    /// The body has so many nodes now.
+    pub fn reach(&mut self, node_count: usize) {
+        self.node_count = self.node_count.max(node_count);
+        self.strays.reach(node_count);
+    }
+
     /// A column of the sixteen nodes from `first` on.
     fn push_column(&mut self, first: usize, column: &Column, materials: &[Material]) -> Result<()> {
         let Column { lanes, .. } = *column;

@@ -48,6 +48,11 @@ impl Strays {
         }
     }
 
+    /// The body has so many nodes now.
+    pub(super) fn reach(&mut self, node_count: usize) {
+        self.node_count = self.node_count.max(node_count);
+    }
+
     pub fn len(&self) -> usize {
         self.places.len()
     }

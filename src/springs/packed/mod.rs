@@ -232,6 +232,27 @@ impl Springs for Packed {
             .half_energy(self.kernel, &self.materials, positions)
     }
 
+    fn reserve_nodes(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.tiles, tile_count(node_count))
+    }
+
+    fn grow(&mut self, node_count: usize) -> Result<()> {
+        let known = self.tiles.len();
+        let mut more = memory::reserved(tile_count(node_count).saturating_sub(known))?;
+        for tile in known..tile_count(node_count) {
+            let nodes = tile_nodes(tile, node_count);
+            let mut columns = Columns::new(nodes.clone(), node_count, None, self.damped);
+            columns.grow(nodes.end)?;
+            more.push(Tile::new(columns, 0));
+        }
+        if let Some(last) = self.tiles.last_mut() {
+            last.columns.grow(tile_nodes(known - 1, node_count).end)?;
+        }
+        self.tiles.append(&mut more);
+        self.node_count = node_count;
+        Ok(())
+    }
+
     fn add(&mut self, spring: &Spring) -> Result<()> {
         let [a, b] = spring.nodes;
         if self.has(a, b) {
@@ -239,7 +260,10 @@ impl Springs for Packed {
         }
         for node in [a, b] {
             // Both ends may be in one tile.
-            self.tile_mut(node).columns.reserve_strays(2)?;
+            let node_count = self.node_count;
+            let columns = &mut self.tile_mut(node).columns;
+            columns.reach(node_count);
+            columns.reserve_strays(2)?;
         }
         for (node, link) in spring.nodes.into_iter().zip(Link::ends(spring)) {
             self.tile_mut(node).columns.insert_stray(node as usize, &link);

@@ -1,0 +1,125 @@
+//! Nodes that come after a body was made, as cuts make them: room for them is made at the door, so that adding one moves nothing.
+
+use super::{Body, Bound, Vectors};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::solver::Survey;
+use crate::springs::tile_count;
+
+use super::origin::Bounds;
+
+/// What a new node is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum NewNode {
+    /// It moves as this one does, and is damped as it is; it has no mass yet, and is held by nothing.
+    Copy(u32),
+    /// A point that is bound to others.
+    Bound(Bound),
+}
+
+impl Body {
+    /// Makes room for so many nodes more than there are.
+    pub(crate) fn reserve_nodes(&mut self, more: usize) -> Result<()> {
+        let count = self.node_count().checked_add(more).ok_or(Error::OutOfMemory)?;
+        self.order.reserve(count)?;
+        self.springs.reserve_nodes(count)?;
+        for values in [&mut self.masses, &mut self.inverse_masses] {
+            memory::reserve(values, count)?;
+        }
+        if let Some(damping) = &mut self.damping {
+            damping.reserve(count)?;
+        }
+        memory::reserve(&mut self.surveys, tile_count(count))?;
+        memory::reserve(&mut self.boxes, tile_count(count))?;
+        self.state.reserve(count)?;
+        if let Some(records) = &mut self.records {
+            records.reserve(count)?;
+        }
+        if let Some(velocities) = &mut self.predicted_velocities {
+            velocities.reserve(count)?;
+        }
+        if let Some(applied) = &mut self.applied {
+            applied.reserve(count)?;
+        }
+        if let Some(coarse) = &mut self.coarse {
+            coarse.reserve(count)?;
+        }
+        if let Some(implicit) = &mut self.implicit {
+            implicit.reserve_nodes(count)?;
+        }
+        self.published.reserve(count)?;
+        self.node_room = count;
+        self.bindings.get_or_insert_default().reserve(more)
+    }
+
+    /// A zero vector for each node, with room for those that may come.
+    pub(crate) fn zeros(&self) -> Result<Vectors> {
+        let mut vectors = Vectors::zeros(self.node_count())?;
+        vectors.reserve(self.node_room)?;
+        Ok(vectors)
+    }
+
+    /// Adds nodes, for which there is room, in their own numbers: they follow those that there are. Changes nothing where it fails.
+    pub(crate) fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
+        let known = self.node_count();
+        let count = known + nodes.len();
+        self.springs.grow(count)?;
+        self.order.grow(count);
+        self.masses.resize(count, 0.0);
+        self.inverse_masses.resize(count, 0.0);
+        self.state.grow(count);
+        if let Some(records) = &mut self.records {
+            records.grow(count);
+        }
+        for vectors in [&mut self.predicted_velocities, &mut self.applied] {
+            if let Some(vectors) = vectors {
+                vectors.grow(count);
+            }
+        }
+        if let Some(coarse) = &mut self.coarse {
+            coarse.grow(count);
+        }
+        if let Some(implicit) = &mut self.implicit {
+            implicit.grow(count);
+        }
+        self.published.grow(count);
+        self.surveys.resize(tile_count(count), Survey::NOTHING);
+        self.boxes.resize(tile_count(count), Bounds::EMPTY);
+        // Nodes differ in mass now.
+        self.uniform_inverse_mass = None;
+        if let Some(scaling) = &mut self.scaling {
+            scaling.forget_uniform();
+        }
+        for (node, new) in (known..).zip(nodes) {
+            match new {
+                NewNode::Copy(source) => self.copy_motion(*source as usize, node),
+                NewNode::Bound(bound) => {
+                    if let Some(damping) = &mut self.damping {
+                        damping.copy(bound.nodes[0] as usize);
+                    }
+                    self.bindings.get_or_insert_default().push(*bound);
+                }
+            }
+        }
+        self.follow_nodes();
+        Ok(())
+    }
+
+    fn copy_motion(&mut self, source: usize, node: usize) {
+        self.state.copy(source, node);
+        if let Some(damping) = &mut self.damping {
+            damping.copy(source);
+        }
+        if let Some(implicit) = &mut self.implicit {
+            implicit.copy_motion(source, node);
+        }
+    }
+
+    /// Puts bound points where their nodes are.
+    pub(super) fn follow_nodes(&mut self) {
+        if let Some(bindings) = &self.bindings {
+            bindings.follow(self.state.positions_mut());
+            bindings.follow(self.state.velocities_mut());
+        }
+    }
+}
