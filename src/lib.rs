@@ -3,6 +3,7 @@
 mod body;
 pub mod capi;
 mod contact;
+pub mod cutting;
 pub mod detection;
 mod diagnostics;
 mod elements;

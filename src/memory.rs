@@ -42,6 +42,12 @@ pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
 }
 
+/// Sorts the values and leaves each once.
+pub(crate) fn sort_once<T: Ord>(values: &mut Vec<T>) {
+    values.sort_unstable();
+    values.dedup();
+}
+
 /// Appends `value`, growing the vector fallibly.
 pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     values.try_reserve(1)?;

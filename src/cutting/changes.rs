@@ -1,0 +1,107 @@
+//! What a cut has changed, for the solver and for a renderer.
+
+/// A part of what a node was before the cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PieceOfNode {
+    /// The node: its source, which keeps its number, or a new one, which starts with its source's position and velocity.
+    pub node: u32,
+    /// The node that it was.
+    pub source: u32,
+    /// Its part of the source's mass as it was, above 0; those of one source add up to 1.
+    pub part: f64,
+}
+
+/// A part of what a spring was before the cut. It has its source's rest length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PieceOfSpring {
+    /// Its nodes, in the order of `source`.
+    pub nodes: [u32; 2],
+    /// The nodes of the spring that it was, in ascending order.
+    pub source: [u32; 2],
+    /// Its part of the source's stiffness as it was, above 0; those of one source add up to 1.
+    pub part: f64,
+}
+
+/// A part of what a cell was before the cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PieceOfCell {
+    /// The cell: its source, which keeps its number, or a new one.
+    pub cell: u32,
+    /// The cell that it was.
+    pub source: u32,
+    /// Its nodes.
+    pub nodes: [u32; 3],
+    /// Its part of the source's material as it was, above 0; those of one source add up to 1.
+    pub part: f64,
+}
+
+/// A point of what is drawn that is at no node, but bound to some.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundPoint {
+    /// Its number among nodes.
+    pub point: u32,
+    /// The nodes that it is bound to; those beyond the first may repeat it with weight 0.
+    pub nodes: [u32; 3],
+    /// How much of each, at least 0, 1 in all.
+    pub weights: [f64; 3],
+}
+
+/// Where a new node or point that is drawn comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Source {
+    /// Its number among nodes.
+    pub point: u32,
+    /// Those that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0.
+    pub sources: [u32; 3],
+    /// How much of each, at least 0, 1 in all.
+    pub weights: [f64; 3],
+}
+
+/// Where a new vertex comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NewVertex {
+    /// The vertices that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0.
+    pub sources: [u32; 3],
+    pub weights: [f64; 3],
+}
+
+/// A new edge of the rim. Each edge that was cut is two of them, one on either side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RimEdge {
+    /// Its ends, by their numbers among nodes, in the order in which its triangle has them.
+    pub points: [u32; 2],
+    /// The triangle that it is a side of.
+    pub triangle: u32,
+    /// The triangle that lay across.
+    pub across: u32,
+}
+
+/// What a cut has changed. New nodes and points, cells and triangles are numbered from their count before the cut on. The order of all lists
+/// depends on the surface and the blade alone.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Changes {
+    /// All parts of each node that fell apart; new ones in ascending order.
+    pub nodes: Vec<PieceOfNode>,
+    /// All parts of each spring along an edge of cells that fell apart or changed a node.
+    pub springs: Vec<PieceOfSpring>,
+    /// The springs that are no more: none of their parts has their nodes.
+    pub removed_springs: Vec<[u32; 2]>,
+    /// All parts of each cell that fell apart, and cells that changed a node.
+    pub cells: Vec<PieceOfCell>,
+    /// Points that are bound to nodes: new ones, in ascending order, and others whose nodes changed.
+    pub bound: Vec<BoundPoint>,
+    /// The new nodes that are not drawn.
+    pub undrawn: Vec<u32>,
+    /// Where what is drawn and new comes from, in the order of numbers.
+    pub sources: Vec<Source>,
+    /// The number of the first new triangle.
+    pub first_triangle: u32,
+    /// The triangles whose corners or cell changed, and the new ones.
+    pub triangles: Vec<u32>,
+    /// The vertices where the blade's edge stands at the end of the step, in the surface or on its border: where it goes on from if the
+    /// surface moves before the next step.
+    pub ends: Vec<u32>,
+    /// The new edges of the rim.
+    pub rim: Vec<RimEdge>,
+    pub(crate) vertices: Vec<NewVertex>,
+}

@@ -1,0 +1,198 @@
+//! A cut from its beginning to its end.
+
+use glam::{DVec3, Vec3};
+
+use super::changes::Changes;
+use super::surface::CutSurface;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// What a blade's edge, a segment, passes over in one step: two triangles, which meet from the start's first point to the end's second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// Both ends of the edge before the step.
+    pub start: [Vec3; 2],
+    /// Both ends of the edge after the step.
+    pub end: [Vec3; 2],
+}
+
+impl Sweep {
+    /// The two triangles; the last side of each is the one that they share, the first the blade's edge before and after the step.
+    fn triangles(&self) -> [[Vec3; 3]; 2] {
+        let ([a, b], [c, d]) = (self.start, self.end);
+        [[a, b, d], [d, c, a]]
+    }
+}
+
+/// How many there may be after a cut; one that needs more is refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Nodes, with copies and bound points.
+    pub nodes: u32,
+    /// Vertices of what is drawn.
+    pub vertices: u32,
+    /// Triangles that are drawn.
+    pub triangles: u32,
+}
+
+impl Limits {
+    /// As many as can be numbered.
+    pub const NONE: Self = Self {
+        nodes: u32::MAX / 3,
+        vertices: u32::MAX / 3,
+        triangles: u32::MAX / 3,
+    };
+
+    /// Refuses one more than `count` if there may be no more than `limit`.
+    pub(crate) fn check(&self, what: &str, count: u32, limit: u32) -> Result<()> {
+        if count < limit.min(u32::MAX / 3) {
+            return Ok(());
+        }
+        Err(Error::Capacity(format!(
+            "the cut needs more than the {limit} {what} there may be"
+        )))
+    }
+}
+
+/// A cut that is being made.
+pub(crate) struct Cut<'a> {
+    pub(crate) surface: &'a mut CutSurface,
+    pub(crate) limits: Limits,
+    pub(crate) changes: Changes,
+    /// Where the side that the swept triangles share passes through, in the rest shape, with the vertices there.
+    pub(crate) joints: Vec<(DVec3, u32)>,
+    /// Vertices that a point was snapped to, and ends of cuts within the snapping distance of it.
+    pub(crate) joins: Vec<[u32; 2]>,
+}
+
+impl CutSurface {
+    /// Cuts what a blade passes through while nodes are at `positions`. Of the triangles `candidates` alone, in any order, it finds those
+    /// that are met: all whose box meets the sweep's.
+    ///
+    /// Where the blade crosses an edge or ends in a triangle there is a vertex from then on: one that is there, or on an edge that is there, if
+    /// it lies within 5 % of the shortest edge of the cell, in the rest shape. Edges between them are cut. A cell whose material falls apart is
+    /// copied for each piece; copies share nodes where their material hangs together across an edge (Molino, Bao, Fedkiw 2004). Of the
+    /// copies of a node that keeps its number which moves what is drawn at the node; of several that with the most material.
+    ///
+    /// The cost is that of what is met. [`CutSurface::undo`] takes it back until the next cut.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] if there is not one position for each node, if one that is needed or the blade is not finite, or if a
+    /// candidate is unknown; [`Error::Capacity`] beyond the limits; [`Error::OutOfMemory`]. Then nothing has changed.
+    pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
+        self.check(sweep, positions, candidates)?;
+        self.begin();
+        let cut = Cut {
+            limits,
+            changes: Changes {
+                first_triangle: self.triangles.count(),
+                ..Changes::default()
+            },
+            joints: Vec::new(),
+            joins: Vec::new(),
+            surface: self,
+        };
+        let changes = cut.make(sweep, positions, candidates);
+        if changes.is_err() {
+            self.undo();
+        }
+        changes
+    }
+
+    /// Takes back the last cut; a second time, nothing.
+    pub fn undo(&mut self) {
+        self.nodes.undo();
+        self.cells.undo();
+        self.triangles.undo();
+        self.vertices.undo();
+    }
+
+    fn begin(&mut self) {
+        self.nodes.begin();
+        self.cells.begin();
+        self.triangles.begin();
+        self.vertices.begin();
+    }
+
+    /// The triangles whose box meets the sweep's if nodes are at `positions`, found by going through all.
+    pub fn near(&self, sweep: &Sweep, positions: &[Vec3]) -> Result<Vec<u32>> {
+        let corners = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
+        let (low, high) = bounds(&corners);
+        let mut near = Vec::new();
+        for (number, triangle) in self.triangles().iter().enumerate() {
+            let (from, to) = bounds(&triangle.corners.map(|corner| self.place(corner, positions)));
+            if from.cmple(high).all() && low.cmple(to).all() {
+                memory::push(&mut near, number as u32)?;
+            }
+        }
+        Ok(near)
+    }
+
+    fn check(&self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<()> {
+        if positions.len() != self.node_count() as usize {
+            return Err(Error::invalid(format!(
+                "{} positions for {} nodes",
+                positions.len(),
+                self.node_count()
+            )));
+        }
+        let ends = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
+        if let Some(end) = ends.iter().find(|end| !end.is_finite()) {
+            return Err(Error::invalid(format!("an end of the blade is at {end}")));
+        }
+        for &triangle in candidates {
+            let Some(triangle) = self.triangles().get(triangle as usize) else {
+                return Err(Error::invalid(format!(
+                    "candidate {triangle} of {} triangles",
+                    self.triangles.count()
+                )));
+            };
+            for node in self.cells[triangle.cell].nodes {
+                let place = positions[node as usize];
+                if !place.is_finite() {
+                    return Err(Error::invalid(format!("node {node} is at {place}")));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Cut<'_> {
+    fn make(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
+        let mut candidates = memory::copied(candidates)?;
+        memory::sort_once(&mut candidates);
+        let [first, second] = sweep.triangles();
+        self.carve(first, false, positions, &candidates)?;
+        // What the first has added lies where candidates were.
+        let added = self.surface.triangles.count_before()..self.surface.triangles.count();
+        candidates.try_reserve(added.len())?;
+        candidates.extend(added);
+        self.carve(second, true, positions, &candidates)?;
+        self.keep_crumbs()?;
+        let cells = self.open()?;
+        let nodes = self.part_cells(&cells)?;
+        self.part_nodes(&nodes)?;
+        self.finish()
+    }
+
+    /// The lists that only the end can tell.
+    fn finish(mut self) -> Result<Changes> {
+        memory::sort_once(&mut self.changes.ends);
+        self.changes.triangles = self.surface.triangles.touched()?;
+        self.number_points()?;
+        for edge in &mut self.changes.rim {
+            edge.points = edge.points.map(|vertex| self.surface.vertices[vertex].point);
+        }
+        Ok(self.changes)
+    }
+}
+
+fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
+    points
+        .iter()
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &point| {
+            (low.min(point), high.max(point))
+        })
+}

@@ -1,0 +1,89 @@
+//! Numbers for what is drawn: a vertex at a node has that of the node, any other one of its own among nodes.
+
+use super::changes::{BoundPoint, PieceOfNode, Source};
+use super::cut::Cut;
+use super::surface::{NONE, Node};
+use crate::error::Result;
+use crate::memory;
+
+impl Cut<'_> {
+    /// Numbers what is drawn and new, and lists it.
+    pub(crate) fn number_points(&mut self) -> Result<()> {
+        let touched = self.surface.vertices.touched()?;
+        let mut drawn = memory::reserved(touched.len())?;
+        for vertex in touched {
+            let it = self.surface.vertices[vertex];
+            let is_at_node = it.weights[0] == 1.0;
+            let point = if is_at_node {
+                it.nodes[0]
+            } else if it.point == NONE {
+                self.limits
+                    .check("nodes", self.surface.nodes.count(), self.limits.nodes)?;
+                self.surface.nodes.push(Node::BOUND)?
+            } else {
+                it.point
+            };
+            if point != it.point {
+                self.surface.vertices.edit(vertex, |vertex| vertex.point = point)?;
+                for (triangle, _) in self.ring(vertex)? {
+                    memory::push(&mut self.changes.triangles, triangle)?;
+                }
+            }
+            if is_at_node {
+                drawn.push(point);
+            } else {
+                let (nodes, weights) = (it.nodes, it.weights);
+                memory::push(&mut self.changes.bound, BoundPoint { point, nodes, weights })?;
+            }
+        }
+        memory::sort_once(&mut self.changes.triangles);
+        self.changes.bound.sort_unstable_by_key(|bound| bound.point);
+        memory::sort_once(&mut drawn);
+        self.list_copies(&drawn)?;
+        self.list_sources()
+    }
+
+    /// Copies of nodes: those that are drawn come from their sources.
+    fn list_copies(&mut self, drawn: &[u32]) -> Result<()> {
+        for &PieceOfNode { node, source, .. } in &self.changes.nodes {
+            if node == source {
+                continue;
+            }
+            if drawn.binary_search(&node).is_err() {
+                memory::push(&mut self.changes.undrawn, node)?;
+                continue;
+            }
+            let source = Source {
+                point: node,
+                sources: [source; 3],
+                weights: [1.0, 0.0, 0.0],
+            };
+            memory::push(&mut self.changes.sources, source)?;
+        }
+        Ok(())
+    }
+
+    fn list_sources(&mut self) -> Result<()> {
+        let before = self.surface.vertices.before()?;
+        let first = self.surface.vertices.count_before();
+        for (vertex, new) in (first..).zip(&self.changes.vertices) {
+            let it = self.surface.vertices[vertex];
+            if it.weights[0] == 1.0 {
+                continue;
+            }
+            // Of a vertex that is at a copy now what it was at has the lower number.
+            let point_of = |vertex: u32| match before.binary_search_by_key(&vertex, |&(at, _)| at) {
+                Ok(place) => before[place].1.point,
+                Err(_) => self.surface.vertices[vertex].point,
+            };
+            let source = Source {
+                point: it.point,
+                sources: new.sources.map(point_of),
+                weights: new.weights,
+            };
+            memory::push(&mut self.changes.sources, source)?;
+        }
+        self.changes.sources.sort_unstable_by_key(|source| source.point);
+        Ok(())
+    }
+}

@@ -1,0 +1,339 @@
+//! The surface that is cut: cells of material, the triangles that are drawn, and the vertices that bind them to nodes.
+
+use glam::{DVec3, Vec3};
+
+use super::tracked::Tracked;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// No triangle, or no corner.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// What is snapped lies within this part of a cell's shortest edge.
+pub(crate) const SNAP: f64 = 0.05;
+
+/// A triangle that is simulated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceCell {
+    /// Its nodes.
+    pub nodes: [u32; 3],
+    /// The area of its material in the rest shape, m²: that of the triangles drawn in it.
+    pub area: f64,
+    /// How far what is snapped in it may be moved, in the rest shape, m.
+    pub snap: f64,
+    /// The first of the triangles drawn in it.
+    pub(crate) first: u32,
+    /// For each of its nodes the next corner at the node; corner k of cell c has the number 3 c + k.
+    pub(crate) next: [u32; 3],
+}
+
+/// A triangle that is drawn and touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceTriangle {
+    /// Its vertices.
+    pub corners: [u32; 3],
+    /// The cell that it lies in.
+    pub cell: u32,
+    /// Whether the side from each corner to the next was cut.
+    pub rim: [bool; 3],
+    /// The triangle across the side from each corner to the next.
+    pub(crate) neighbours: [u32; 3],
+    /// The next triangle of the same cell.
+    pub(crate) next: u32,
+}
+
+/// A corner of what is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceVertex {
+    /// The nodes that it is bound to; unused ones repeat the first with weight 0.
+    pub nodes: [u32; 3],
+    /// How much of each, at least 0, 1 in all.
+    pub weights: [f64; 3],
+    /// Its number among nodes: that of the node that it is at, or one of its own, which no other node or point has.
+    pub point: u32,
+    /// One of the triangles about it.
+    pub(crate) around: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Node {
+    /// Of a point that is bound to others nothing is said here.
+    pub(crate) rest: Vec3,
+    /// The first of the cells' corners at it.
+    pub(crate) first: u32,
+}
+
+impl Node {
+    /// A point that is bound to others.
+    pub(crate) const BOUND: Self = Self {
+        rest: Vec3::ZERO,
+        first: NONE,
+    };
+}
+
+/// A surface that can be cut.
+#[derive(Clone, Debug)]
+pub struct CutSurface {
+    pub(crate) nodes: Tracked<Node>,
+    pub(crate) cells: Tracked<SurfaceCell>,
+    pub(crate) triangles: Tracked<SurfaceTriangle>,
+    pub(crate) vertices: Tracked<SurfaceVertex>,
+}
+
+impl CutSurface {
+    /// Of the rest positions of its nodes, m, and of cells with three nodes each; what is drawn are the cells, with a vertex for each node.
+    ///
+    /// Refused unless positions are finite, nodes are known, each cell has an area, and the surface is manifold and turned one way all over:
+    /// at most two cells at an edge, which run along it in opposite directions, and one fan of cells at a node.
+    pub fn new(rest: &[Vec3], cells: &[[u32; 3]]) -> Result<Self> {
+        if let Some(at) = rest.iter().position(|place| !place.is_finite()) {
+            return Err(Error::invalid(format!("rest position {at} is {}", rest[at])));
+        }
+        if rest.len().max(cells.len()) >= (NONE / 3) as usize {
+            return Err(Error::invalid("more than 2^32 / 3 nodes or cells"));
+        }
+        let mut nodes = memory::reserved(rest.len())?;
+        nodes.extend(rest.iter().map(|&rest| Node { rest, first: NONE }));
+        let mut vertices = memory::reserved(rest.len())?;
+        vertices.extend((0..rest.len() as u32).map(|node| SurfaceVertex {
+            nodes: [node; 3],
+            weights: [1.0, 0.0, 0.0],
+            point: node,
+            around: NONE,
+        }));
+        let mut made = memory::reserved(cells.len())?;
+        let mut triangles = memory::reserved(cells.len())?;
+        for (number, &corners) in cells.iter().enumerate() {
+            if let Some(&node) = corners.iter().find(|&&node| node as usize >= rest.len()) {
+                return Err(Error::invalid(format!(
+                    "cell {number} has node {node} of {}",
+                    rest.len()
+                )));
+            }
+            let places = corners.map(|node| rest[node as usize].as_dvec3());
+            let area = area_of(places);
+            if !(area > 0.0) {
+                return Err(Error::invalid(format!(
+                    "cell {number} of nodes {corners:?} has no area"
+                )));
+            }
+            let shortest = (0..3)
+                .map(|k| places[k].distance(places[(k + 1) % 3]))
+                .fold(f64::INFINITY, f64::min);
+            let mut next = [NONE; 3];
+            for (k, &node) in corners.iter().enumerate() {
+                next[k] = std::mem::replace(&mut nodes[node as usize].first, 3 * number as u32 + k as u32);
+                vertices[node as usize].around = number as u32;
+            }
+            made.push(SurfaceCell {
+                nodes: corners,
+                area,
+                snap: SNAP * shortest,
+                first: number as u32,
+                next,
+            });
+            triangles.push(SurfaceTriangle {
+                corners,
+                cell: number as u32,
+                rim: [false; 3],
+                neighbours: [NONE; 3],
+                next: NONE,
+            });
+        }
+        join_neighbours(&mut triangles)?;
+        let surface = Self {
+            nodes: Tracked::new(nodes),
+            cells: Tracked::new(made),
+            triangles: Tracked::new(triangles),
+            vertices: Tracked::new(vertices),
+        };
+        surface.check_fans()?;
+        Ok(surface)
+    }
+
+    /// Reserves room for so many more nodes, and for as much of all else as cuts that make them need in general, so that cuts do not have to
+    /// move what is there.
+    pub fn reserve(&mut self, nodes: u32) -> Result<()> {
+        let nodes = nodes as usize;
+        self.nodes.reserve(nodes)?;
+        self.cells.reserve(2 * nodes)?;
+        self.triangles.reserve(4 * nodes)?;
+        self.vertices.reserve(4 * nodes)
+    }
+
+    /// How many nodes there are: those of the body, and copies and bound points, which are numbered on.
+    pub fn node_count(&self) -> u32 {
+        self.nodes.count()
+    }
+
+    /// Where a node is in the rest shape.
+    pub fn rest(&self, node: u32) -> Vec3 {
+        self.nodes[node].rest
+    }
+
+    /// The cells; those made by cuts follow the first ones.
+    pub fn cells(&self) -> &[SurfaceCell] {
+        self.cells.values()
+    }
+
+    /// The triangles that are drawn; none is ever taken away.
+    pub fn triangles(&self) -> &[SurfaceTriangle] {
+        self.triangles.values()
+    }
+
+    /// The vertices of what is drawn; none is ever taken away.
+    pub fn vertices(&self) -> &[SurfaceVertex] {
+        self.vertices.values()
+    }
+
+    /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
+    pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
+        let vertex = &self.vertices[vertex];
+        if vertex.weights[0] == 1.0 {
+            return positions[vertex.nodes[0] as usize];
+        }
+        weighed(vertex, |node| positions[node as usize]).as_vec3()
+    }
+
+    /// Where a vertex is in the rest shape.
+    pub fn rest_place(&self, vertex: u32) -> DVec3 {
+        weighed(&self.vertices[vertex], |node| self.nodes[node].rest)
+    }
+
+    /// Where a point of a cell, by weights of its corners, is in the rest shape.
+    pub(crate) fn rest_place_in(&self, cell: u32, weights: [f64; 3]) -> DVec3 {
+        let nodes = self.cells[cell].nodes;
+        (0..3).map(|k| weights[k] * self.nodes[nodes[k]].rest.as_dvec3()).sum()
+    }
+
+    /// The weights of a vertex, by the corners of a cell that it lies in.
+    pub fn weights_in(&self, vertex: u32, cell: u32) -> [f64; 3] {
+        let vertex = &self.vertices[vertex];
+        self.cells[cell].nodes.map(|node| {
+            (0..3)
+                .filter(|&k| vertex.nodes[k] == node)
+                .map(|k| vertex.weights[k])
+                .sum()
+        })
+    }
+
+    /// How much of its cell, if that were whole, a triangle covers.
+    pub fn part_of_cell(&self, triangle: u32) -> f64 {
+        let SurfaceTriangle { corners, cell, .. } = self.triangles[triangle];
+        turn(corners.map(|corner| self.weights_in(corner, cell)))
+    }
+
+    /// The corners of a triangle, by their numbers among nodes.
+    pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
+        let corners = self.triangles[triangle].corners;
+        corners.map(|corner| self.vertices[corner].point)
+    }
+
+    /// The area of a triangle in the rest shape.
+    pub(crate) fn rest_area(&self, triangle: u32) -> f64 {
+        area_of(self.triangles[triangle].corners.map(|corner| self.rest_place(corner)))
+    }
+
+    /// The triangles about a vertex, counterclockwise, each with the vertex's number in it; of an open fan from its first triangle on.
+    pub(crate) fn ring(&self, vertex: u32, ring: &mut Vec<(u32, usize)>) -> Result<()> {
+        ring.clear();
+        let start = self.vertices[vertex].around;
+        let mut triangle = start;
+        while triangle != NONE {
+            let corner = self.corner(triangle, vertex);
+            memory::push(ring, (triangle, corner))?;
+            triangle = self.triangles[triangle].neighbours[(corner + 2) % 3];
+            if triangle == start {
+                return Ok(());
+            }
+        }
+        // The fan is open: what lies before its start is still missing.
+        let count = ring.len();
+        let mut triangle = self.triangles[start].neighbours[ring[0].1];
+        while triangle != NONE {
+            let corner = self.corner(triangle, vertex);
+            memory::push(ring, (triangle, corner))?;
+            triangle = self.triangles[triangle].neighbours[corner];
+        }
+        ring[count..].reverse();
+        ring.rotate_left(count);
+        Ok(())
+    }
+
+    /// Which corner of a triangle a vertex is.
+    pub(crate) fn corner(&self, triangle: u32, vertex: u32) -> usize {
+        let corners = self.triangles[triangle].corners;
+        (0..2).find(|&k| corners[k] == vertex).unwrap_or(2)
+    }
+
+    fn check_fans(&self) -> Result<()> {
+        let mut counts = memory::reserved(self.vertices.values().len())?;
+        counts.resize(self.vertices.values().len(), 0);
+        for corner in self.triangles.values().iter().flat_map(|triangle| triangle.corners) {
+            counts[corner as usize] += 1;
+        }
+        let mut ring = Vec::new();
+        for (vertex, &count) in counts.iter().enumerate().filter(|&(_, &count)| count > 0) {
+            self.ring(vertex as u32, &mut ring)?;
+            if ring.len() != count {
+                return Err(Error::invalid(format!(
+                    "node {vertex} has {count} cells, of which {} hang together by edges",
+                    ring.len()
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Finds the neighbours of each triangle.
+fn join_neighbours(triangles: &mut [SurfaceTriangle]) -> Result<()> {
+    let mut sides = memory::reserved(3 * triangles.len())?;
+    for (number, triangle) in triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (from, to) = (triangle.corners[k], triangle.corners[(k + 1) % 3]);
+            sides.push((from.min(to), from.max(to), from > to, number as u32, k));
+        }
+    }
+    sides.sort_unstable();
+    for at_edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let (low, high, ..) = at_edge[0];
+        match *at_edge {
+            [_] => {}
+            [(.., false, a, side_a), (.., true, b, side_b)] => {
+                triangles[a as usize].neighbours[side_a] = b;
+                triangles[b as usize].neighbours[side_b] = a;
+            }
+            [(.., a, _), (.., b, _)] => {
+                return Err(Error::invalid(format!(
+                    "cells {a} and {b} run along the edge of nodes {low} and {high} in the same direction"
+                )));
+            }
+            _ => {
+                return Err(Error::invalid(format!(
+                    "{} cells have the edge of nodes {low} and {high}",
+                    at_edge.len()
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn weighed(vertex: &SurfaceVertex, place: impl Fn(u32) -> Vec3) -> DVec3 {
+    (0..3)
+        .filter(|&k| vertex.weights[k] != 0.0)
+        .map(|k| vertex.weights[k] * place(vertex.nodes[k]).as_dvec3())
+        .sum()
+}
+
+/// The area of a triangle.
+pub(crate) fn area_of([a, b, c]: [DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// The area of a triangle between points that are given by weights, as a part of the triangle that they are weights of; above 0 if it is turned
+/// the same way.
+pub(crate) fn turn([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
+}

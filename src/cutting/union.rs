@@ -1,0 +1,39 @@
+//! Which of a few things hang together (union-find).
+
+use crate::error::Result;
+
+/// Sets of the numbers from 0 on.
+#[derive(Default)]
+pub(crate) struct Union {
+    parents: Vec<u32>,
+}
+
+impl Union {
+    /// Each of `count` numbers is alone.
+    pub(crate) fn reset(&mut self, count: usize) -> Result<()> {
+        self.parents.clear();
+        self.parents.try_reserve(count)?;
+        self.parents.extend(0..count as u32);
+        Ok(())
+    }
+
+    /// The lowest number of the set that `at` is in.
+    pub(crate) fn lowest(&mut self, mut at: usize) -> usize {
+        while self.parents[at] as usize != at {
+            let parent = self.parents[at] as usize;
+            self.parents[at] = self.parents[parent];
+            at = parent;
+        }
+        at
+    }
+
+    pub(crate) fn unite(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.lowest(a), self.lowest(b));
+        self.parents[a.max(b)] = a.min(b) as u32;
+    }
+
+    /// Whether all are in one set.
+    pub(crate) fn is_one(&mut self) -> bool {
+        (0..self.parents.len()).all(|at| self.lowest(at) == 0)
+    }
+}

@@ -1,0 +1,9 @@
+//! Cuts: surfaces fall apart where the blade went.
+#![allow(clippy::unwrap_used)]
+
+mod sheet;
+
+mod curved;
+mod random;
+mod refused;
+mod shapes;

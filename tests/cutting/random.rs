@@ -1,0 +1,91 @@
+//! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
+
+use super::sheet::{Body, Random, far, flat, grid, snap, unstructured, wavy};
+use glam::{Vec2, vec2, vec3};
+
+/// Rounds in which what seldom matters does.
+const RARE: [usize; 1] = [1237];
+
+#[test]
+fn loops_of_any_size_and_pace_cut_a_piece_out() {
+    let sheets = [grid(12), unstructured(12, 6), unstructured(12, 7)];
+    for round in (0..200).chain(RARE) {
+        let mut random = Random(100_000 + round as u64);
+        let center = vec2(random.between(4.0, 8.0), random.between(4.0, 8.0));
+        let (wide, high) = (random.between(0.6, 3.5), random.between(0.6, 3.5));
+        let steps = (4.0 * 100f64.powf(random.next())) as usize;
+        let ellipse: Vec<Vec2> = (0..=steps)
+            .map(|at| (at % steps) as f32 / steps as f32 * std::f32::consts::TAU)
+            .map(|angle| center + Vec2::from_angle(angle) * vec2(wide, high))
+            .collect();
+        let mut body = Body::new(sheets[round % 3].clone(), [flat, wavy, far][round / 3 % 3]);
+        body.cut_along(&ellipse);
+        let areas = body.piece_areas();
+        assert_eq!(
+            body.check(),
+            2,
+            "round {round}: {steps} steps about {center}, {wide} x {high}: {areas:?}"
+        );
+        let (rim, way) = body.off_the_way(&ellipse);
+        assert!(
+            rim.max(way) < 1.002 * snap(&body),
+            "round {round}: rim {rim}, way {way}, snap {}",
+            snap(&body)
+        );
+    }
+}
+
+#[test]
+fn wild_lines_from_border_to_border_part_a_sheet() {
+    let sheets = [grid(12), unstructured(12, 8), unstructured(12, 9)];
+    for round in (0..200).chain(RARE) {
+        let mut random = Random(200_000 + round as u64);
+        let steps = (4.0 * 100f64.powf(random.next())) as usize;
+        let [a, b, c] = [0; 3].map(|_| random.between(-1.5, 1.5));
+        let line: Vec<Vec2> = (0..=steps)
+            .map(|at| 14.0 * at as f32 / steps as f32 - 1.0)
+            .map(|x| vec2(x, 6.0 + a * (0.5 * x).sin() + b * (1.3 * x).cos() + c * (2.9 * x).sin()))
+            .collect();
+        let mut body = Body::new(sheets[round % 3].clone(), [flat, wavy, far][round / 3 % 3]);
+        body.cut_along(&line);
+        let areas = body.piece_areas();
+        assert_eq!(body.check(), 2, "round {round}: {steps} steps, {a} {b} {c}: {areas:?}");
+    }
+}
+
+#[test]
+fn a_thousand_cuts_in_a_row() {
+    for (sheet, seed) in [(unstructured(30, 2), 1), (unstructured(99, 5), 2)] {
+        let side = sheet.0.last().map_or(0.0, |place| place.x);
+        let mut body = Body::new(sheet, wavy);
+        let (nodes, triangles) = (body.positions.len(), body.triangles.len());
+        let before = body.worst_ratio();
+        let mut random = Random(seed);
+        let mut worst = 0.0f64;
+        for cut in 0..1000 {
+            let from = vec2(random.between(-1.0, side + 1.0), random.between(-1.0, side + 1.0));
+            let way = Vec2::from_angle(random.between(0.0, 7.0)) * random.between(0.01, 8.0);
+            // The wounds gape, and nodes go where they like.
+            for (place, &rest) in body.positions.iter_mut().zip(&body.rest) {
+                *place = wavy(rest) + 0.1 * vec3(random.between(-1.0, 1.0), random.between(-1.0, 1.0), 0.0);
+            }
+            body.cut(from, from + way);
+            if cut % 100 == 99 {
+                body.check();
+                worst = worst.max(body.worst_ratio() / before);
+            }
+        }
+        let counts = [
+            body.simulated_count() as usize,
+            body.surface.triangles().len(),
+            body.surface.vertices().len(),
+        ];
+        assert!(worst < 2.0, "stiffness by mass {worst} times what it was");
+        // A cut is 4 long in the mean: it crosses some 15 edges at most, each of which adds a vertex, a copy of it and three triangles.
+        assert!(
+            counts[0] < nodes + 18_000 && counts[1] < triangles + 50_000 && counts[2] < nodes + 55_000,
+            "{nodes} nodes and {triangles} triangles, then nodes, triangles, vertices {counts:?}"
+        );
+        body.check();
+    }
+}
