@@ -5,8 +5,9 @@ mod step;
 
 use glam::{Quat, Vec3};
 
-use crate::body::{Body, BodyDefinition, Needs, finite_vector, not_negative};
+use crate::body::{Body, BodyDefinition, CutReport, Needs, finite_vector, not_negative};
 use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::cutting::Sweep;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::slots::{SlotId, Slots};
@@ -174,6 +175,28 @@ impl World {
         }
         self.forget_attachments_of(body);
         Ok(())
+    }
+
+    /// Cuts a body where a blade's edge passed from one place to another, while its nodes are where they are.
+    ///
+    /// Where the blade crosses an edge of the surface, or ends within a triangle, there is a point of the surface from then on: one that is there, or
+    /// on an edge that is there, if it lies within 5 % of the shortest edge of the triangle that is simulated there, in the rest shape. Between them
+    /// the surface is open. What is simulated stays as well shaped as it was: a triangle whose material fell apart is copied for each piece, with nodes
+    /// that are not drawn where its material is beyond the cut, and with its part of masses and stiffnesses; copies share nodes where their
+    /// material hangs together (Molino, Bao, Fedkiw 2004). Springs along no edge of a triangle are taken away where the blade passed through them.
+    ///
+    /// Nodes keep their numbers, and new ones are numbered on: copies, which move as what they copied moved, and points of the surface between nodes,
+    /// which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where
+    /// it is drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none.
+    ///
+    /// Positions and triangles that were lent before are stale. [`Body::changes_since`] tells a renderer what has changed.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`]. [`Error::Unsupported`]: the body was made without [`BodyDefinition::spare_nodes`]. [`Error::InvalidArgument`]: an end of
+    /// the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no free place in a row of fixed
+    /// length. [`Error::OutOfMemory`]. Then nothing has changed.
+    pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
+        self.bodies.get_mut(body.0)?.cut(sweep)
     }
 
     /// A body, to look at.

@@ -175,6 +175,12 @@ pub struct BodyDefinition<'a> {
     /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay
     /// as they are. See [`SolverReport::added_mass`](crate::SolverReport::added_mass).
     pub mass_scaling: f32,
+    /// How many nodes cuts may add, of which room is made: copies of nodes, and points of the surface between them. Some five for each triangle that
+    /// a blade passes through. 0: the body cannot be cut, and pays nothing for it.
+    ///
+    /// A surface that is to be cut is one of triangles turned one way all over, of which two at most have an edge and those about a node hang
+    /// together.
+    pub spare_nodes: u32,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -214,6 +220,7 @@ impl Default for BodyDefinition<'_> {
             iterations: 0,
             accuracy: 0.0,
             mass_scaling: 0.001,
+            spare_nodes: 0,
         }
     }
 }

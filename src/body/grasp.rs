@@ -265,6 +265,11 @@ impl Body {
         Ok(())
     }
 
+    /// Whether a tool holds one of its own nodes.
+    pub(super) fn is_held_by_tool(&self, own: u32) -> bool {
+        self.grasps.as_ref().is_some_and(|grasps| grasps.place_of(own).is_ok())
+    }
+
     /// Makes room for so many grasps more.
     pub(crate) fn reserve_grasps(&mut self, count: usize) -> Result<()> {
         let corners = count.saturating_mul(3).min(self.masses.len());

@@ -4,7 +4,7 @@ use super::{Body, Bound, Vectors};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::solver::Survey;
-use crate::springs::tile_count;
+use crate::springs::{TILE, tile_count};
 
 use super::origin::Bounds;
 
@@ -63,7 +63,7 @@ impl Body {
     pub(crate) fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
         let known = self.node_count();
         let count = known + nodes.len();
-        self.springs.grow(count)?;
+        self.springs.resize(count)?;
         self.order.grow(count);
         self.masses.resize(count, 0.0);
         self.inverse_masses.resize(count, 0.0);
@@ -112,6 +112,16 @@ impl Body {
         }
         if let Some(implicit) = &mut self.implicit {
             implicit.copy_motion(source, node);
+        }
+    }
+
+    /// Shows callers the nodes from this one on, which are new.
+    pub(super) fn publish_new(&mut self, first: usize) {
+        for node in first..self.node_count() {
+            let local = self.state.positions().get(node);
+            self.published.positions_mut()[node] = (local.as_dvec3() + self.origin).as_vec3();
+            let bounds = &mut self.boxes[node / TILE];
+            *bounds = bounds.with(local);
         }
     }
 

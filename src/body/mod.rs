@@ -1,7 +1,10 @@
 //! A body: nodes with mass, joined by springs.
 
 mod bindings;
+mod change_log;
 mod coarse;
+mod cut;
+mod cuttable;
 mod damping;
 mod definition;
 mod edit;
@@ -24,7 +27,10 @@ mod vectors;
 use glam::{BVec3, DVec3, Vec3};
 
 pub(crate) use bindings::{Bindings, Bound};
+pub use change_log::TopologyChanges;
 pub(crate) use coarse::CoarseStep;
+pub use cut::CutReport;
+use cuttable::Cuttable;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{
@@ -106,6 +112,8 @@ pub struct Body {
     pub(crate) contact: BodyContact,
     /// Points of its surface without mass; kept only by bodies that may be cut.
     pub(crate) bindings: Option<Bindings>,
+    /// For bodies that may be cut.
+    cuttable: Option<Box<Cuttable>>,
     /// How many nodes there is room for; 0: for those that there are.
     node_room: usize,
     /// Whether an edge of its surface was taken away.
@@ -175,6 +183,7 @@ impl Body {
             }
         }
         let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
+        let cuttable = Cuttable::new(definition, &springs, &order)?;
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
@@ -236,6 +245,7 @@ impl Body {
             contacts: None,
             contact: definition.contact,
             bindings: None,
+            cuttable,
             node_room: 0,
             is_cut_open: false,
             corners: Vec::new(),
@@ -288,12 +298,30 @@ impl Body {
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
         }
+        if definition.spare_nodes > 0 {
+            if body.terms.is_some() {
+                return Err(Error::Unsupported(format!(
+                    "spare_nodes is {}: bodies with terms beside springs cannot be cut",
+                    definition.spare_nodes
+                )));
+            }
+            body.reserve_nodes(definition.spare_nodes as usize)?;
+        }
         Ok(body)
     }
 
     /// How many nodes it has.
     pub fn node_count(&self) -> usize {
         self.masses.len()
+    }
+
+    /// The mass of a node, kg: 0 of one that is pinned for good, or bound to others.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: there is no such node.
+    pub fn node_mass(&self, node: u32) -> Result<f32> {
+        self.check_node(&"node", node)?;
+        Ok(self.masses[self.order.own(node) as usize])
     }
 
     /// The triangles that are drawn and touched, outward: those of its definition, or the boundary of its tetrahedra
@@ -460,6 +488,14 @@ impl Body {
             };
             scaling.apply(step, heavier);
         }
+    }
+
+    /// Has contacts know the surface as it is now.
+    pub(crate) fn remake_contacts(&mut self) -> Result<()> {
+        if let Some(tools) = self.contacts.take().map(|contacts| contacts.tool_places()) {
+            self.make_contacts(tools)?;
+        }
+        Ok(())
     }
 
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {

@@ -5,7 +5,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::{DVec3, Vec3};
 
-use super::Body;
+use super::{Bindings, Body};
 use super::origin::Bounds;
 use crate::error::Result;
 use crate::memory;
@@ -109,6 +109,10 @@ impl Body {
             let closing = self.carry.closing;
             if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
                 put(0..self.node_count(), self.state.velocities().axes());
+            }
+            for bound in self.bindings.iter().flat_map(Bindings::iter) {
+                let velocity = bound.of(|node| to[self.order.caller(node as u32) as usize]);
+                to[self.order.caller(bound.node) as usize] = velocity;
             }
         })
     }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Body, Vectors};
+use super::Body;
 use crate::contact::{CollisionFilter, Moment};
 use crate::error::Result;
 use crate::solver::close;

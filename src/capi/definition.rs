@@ -222,6 +222,12 @@ pub struct sinew_body_def {
     pub collision_category: u32,
     /// The categories that it meets, a bit for each; default 0xffffffff.
     pub collision_mask: u32,
+    /// How many nodes cuts may add, of which room is made: some five for each triangle that a blade passes through. 0, the default: the body
+    /// cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
+    /// have an edge and those about a node hang together. See sinew_body_cut.
+    pub spare_nodes: u32,
+    /// 0.
+    pub reserved3: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -233,6 +239,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, home_stiffnesses),
         offset_of!(Self, retardation_time),
         offset_of!(Self, contact_thickness),
+        offset_of!(Self, spare_nodes),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -305,6 +312,8 @@ impl sinew_body_def {
             contact_resolution: 0.0,
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
+            spare_nodes: 0,
+            reserved3: 0,
         }
     }
 
@@ -412,6 +421,7 @@ impl sinew_body_def {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
         memory::reserved("reserved2", self.reserved2)?;
+        memory::reserved("reserved3", self.reserved3)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -479,6 +489,7 @@ impl sinew_body_def {
                 enclosed_stiffness: self.enclosed_stiffness,
                 pressure: self.pressure,
                 contact: self.contact()?,
+                spare_nodes: self.spare_nodes,
             })
         }
     }

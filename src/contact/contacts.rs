@@ -205,6 +205,11 @@ impl Contacts {
         }
     }
 
+    /// How many tools there is room for.
+    pub fn tool_places(&self) -> usize {
+        self.touched.len()
+    }
+
     /// What the last step that became current left of contacts with a tool at this place in the world.
     pub fn touches(&self, slot: usize) -> impl Iterator<Item = &Touch> {
         self.touches.iter().filter(move |touch| touch.slot == slot)

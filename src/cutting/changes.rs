@@ -74,6 +74,8 @@ pub struct RimEdge {
     pub triangle: u32,
     /// The triangle that lay across.
     pub across: u32,
+    /// How long it is in the rest shape, m.
+    pub length: f64,
 }
 
 /// What a cut has changed. New nodes and points, cells and triangles are numbered from their count before the cut on. The order of all lists

@@ -18,7 +18,7 @@ pub struct Sweep {
 
 impl Sweep {
     /// The two triangles; the last side of each is the one that they share, the first the blade's edge before and after the step.
-    fn triangles(&self) -> [[Vec3; 3]; 2] {
+    pub(crate) fn triangles(&self) -> [[Vec3; 3]; 2] {
         let ([a, b], [c, d]) = (self.start, self.end);
         [[a, b, d], [d, c, a]]
     }

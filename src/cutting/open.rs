@@ -44,6 +44,10 @@ impl Cut<'_> {
                 points: [corners[side], corners[(side + 1) % 3]],
                 triangle,
                 across,
+                length: self
+                    .surface
+                    .rest_place(corners[side])
+                    .distance(self.surface.rest_place(corners[(side + 1) % 3])),
             });
         }
         Ok(cells)

@@ -229,6 +229,25 @@ impl CutSurface {
         corners.map(|corner| self.vertices[corner].point)
     }
 
+    /// A third of the material of the cells at a node, m².
+    pub fn area_at(&self, node: u32) -> f64 {
+        self.cells_at(node).map(|cell| cell.area / 3.0).sum()
+    }
+
+    /// Whether two nodes are corners of one cell.
+    pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
+        self.cells_at(a).any(|cell| cell.nodes.contains(&b))
+    }
+
+    fn cells_at(&self, node: u32) -> impl Iterator<Item = &SurfaceCell> {
+        let next = |&corner: &u32| {
+            let next = self.cells[corner / 3].next[corner as usize % 3];
+            (next != NONE).then_some(next)
+        };
+        let first = Some(self.nodes[node].first).filter(|&corner| corner != NONE);
+        std::iter::successors(first, next).map(|corner| &self.cells[corner / 3])
+    }
+
     /// The area of a triangle in the rest shape.
     pub(crate) fn rest_area(&self, triangle: u32) -> f64 {
         area_of(self.triangles[triangle].corners.map(|corner| self.rest_place(corner)))

@@ -237,7 +237,7 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
         memory::reserve(&mut self.nodes, node_count)
     }
 
-    fn grow(&mut self, node_count: usize) -> Result<()> {
+    fn resize(&mut self, node_count: usize) -> Result<()> {
         self.nodes.resize_with(node_count, Bulks::none);
         Ok(())
     }

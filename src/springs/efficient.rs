@@ -116,7 +116,7 @@ impl Springs for Efficient {
         memory::reserve(&mut self.lists, node_count)
     }
 
-    fn grow(&mut self, node_count: usize) -> Result<()> {
+    fn resize(&mut self, node_count: usize) -> Result<()> {
         self.lists.resize_with(node_count, || Chain::EMPTY);
         Ok(())
     }

@@ -7,7 +7,9 @@ use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::kernels::Eights;
-use super::{Change, ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
+use super::{
+    Change, ChosenKernel, Link, Motion, Rewiring, Springs, TileForces, already_joined, not_joined, tile_nodes,
+};
 use crate::body::Spring;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -64,6 +66,27 @@ impl<L: KeptLink> FastLink<L> {
     fn row_mut(&mut self, node: u32) -> &mut [L] {
         let width = self.springs_per_node;
         &mut self.places[node as usize * width..][..width]
+    }
+
+    /// Whether each node's row has room for what it is to have.
+    fn check_room(&self, Rewiring { removed, added, .. }: &Rewiring) -> Result<()> {
+        let mut ends = memory::reserved(2 * (removed.len() + added.len()))?;
+        for (springs, more) in [(removed, -1), (added, 1)] {
+            ends.extend(springs.iter().flat_map(|spring| spring.nodes).map(|node| (node, more)));
+        }
+        ends.sort_unstable();
+        for of_node in ends.chunk_by(|a, b| a.0 == b.0) {
+            let node = of_node[0].0;
+            let more: isize = of_node.iter().map(|&(_, more)| more).sum();
+            let count = links(self.row(node)).len().saturating_add_signed(more);
+            let width = self.springs_per_node;
+            if count > width {
+                return Err(Error::Capacity(format!(
+                    "node {node} needs {count} springs: springs_per_node is {width}"
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// The place of a node's next link.
@@ -129,7 +152,7 @@ impl<L: KeptLink> Springs for FastLink<L> {
         memory::reserve(&mut self.places, places.ok_or(Error::OutOfMemory)?)
     }
 
-    fn grow(&mut self, node_count: usize) -> Result<()> {
+    fn resize(&mut self, node_count: usize) -> Result<()> {
         self.places.resize(node_count * self.springs_per_node, L::EMPTY);
         self.node_count = node_count;
         Ok(())
@@ -155,6 +178,19 @@ impl<L: KeptLink> Springs for FastLink<L> {
             vacate(self.row_mut(node), place);
         }
         self.spring_count -= 1;
+        Ok(())
+    }
+
+    fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
+        self.check_room(rewiring)?;
+        for spring in &rewiring.removed {
+            let [a, b] = spring.nodes;
+            self.remove(a, b)?;
+        }
+        self.set(&rewiring.changed)?;
+        for spring in &rewiring.added {
+            self.add(spring)?;
+        }
         Ok(())
     }
 

@@ -27,6 +27,7 @@ pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
 use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
 use crate::error::{Error, Result};
+use crate::memory;
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
 use fast_link::FastLink;
@@ -74,6 +75,34 @@ impl Change {
             ..self.after
         };
         [(self.node, self.after), (self.after.neighbour, other)]
+    }
+}
+
+/// What a cut makes of springs.
+#[derive(Debug, Default)]
+pub(crate) struct Rewiring {
+    /// Springs that there are.
+    pub removed: Vec<Spring>,
+    /// Others that there are, each once.
+    pub changed: Vec<Change>,
+    /// Between nodes that have none.
+    pub added: Vec<Spring>,
+}
+
+impl Rewiring {
+    /// What undoes it.
+    pub fn reverse(&self) -> Result<Self> {
+        let mut changed = memory::reserved(self.changed.len())?;
+        changed.extend(self.changed.iter().map(|change| Change {
+            node: change.node,
+            before: change.after,
+            after: change.before,
+        }));
+        Ok(Self {
+            removed: memory::copied(&self.added)?,
+            changed,
+            added: memory::copied(&self.removed)?,
+        })
     }
 }
 
@@ -170,8 +199,9 @@ pub(crate) trait Springs: Debug + Send + Sync {
     /// Makes room for so many nodes in all.
     fn reserve_nodes(&mut self, node_count: usize) -> Result<()>;
 
-    /// Adds nodes without springs, for which room was made, up to so many in all. Changes nothing where it fails.
-    fn grow(&mut self, node_count: usize) -> Result<()>;
+    /// Adds nodes without springs, for which room was made, up to so many in all, or takes the last away again. Changes nothing where it
+    /// fails.
+    fn resize(&mut self, node_count: usize) -> Result<()>;
 
     /// Adds a spring between two nodes of the body; refused where the pair has one already. Its damping counts only where
     /// springs are damped. Changes nothing where it fails.
@@ -182,6 +212,26 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// Gives springs that there are, each once, other stiffnesses and rest lengths. Changes nothing where it fails.
     fn set(&mut self, changes: &[Change]) -> Result<()>;
+
+    /// Changes springs as a cut does. Changes nothing where it fails.
+    fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
+        let Rewiring {
+            removed,
+            changed,
+            added,
+        } = rewiring;
+        for (done, spring) in added.iter().enumerate() {
+            if let Err(error) = self.add(spring) {
+                take_back(self, &added[..done])?;
+                return Err(error);
+            }
+        }
+        if let Err(error) = self.set(changed) {
+            take_back(self, added)?;
+            return Err(error);
+        }
+        take_back(self, removed)
+    }
 }
 
 /// `springs`, kept as a body's definition asks.
@@ -199,6 +249,15 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
         }
         (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?),
     })
+}
+
+/// Removes springs that there are.
+fn take_back<S: Springs + ?Sized>(springs: &mut S, removed: &[Spring]) -> Result<()> {
+    for spring in removed {
+        let [a, b] = spring.nodes;
+        springs.remove(a, b)?;
+    }
+    Ok(())
 }
 
 /// Why a spring is not added.

@@ -4,6 +4,7 @@
 mod sheet;
 
 mod curved;
+mod motion;
 mod random;
 mod refused;
 mod shapes;

@@ -256,6 +256,15 @@ impl Columns {
         Ok(())
     }
 
+    /// Takes away the last nodes of the body, of which those of the tile have no links, up to this one.
+    pub fn shrink_nodes(&mut self, end: usize, node_count: usize) {
+        self.count = end - self.first;
+        self.blocks.truncate(self.count.div_ceil(LANES));
+        self.node_count = self.node_count.min(node_count);
+        self.reads.end = self.reads.end.min(node_count.next_multiple_of(LANES) as isize);
+        self.strays.shrink(node_count);
+    }
+
     /// The body has so many nodes now.
     pub fn reach(&mut self, node_count: usize) {
         self.node_count = self.node_count.max(node_count);

@@ -53,6 +53,11 @@ impl Strays {
         self.node_count = self.node_count.max(node_count);
     }
 
+    /// The body has no more nodes than so many now.
+    pub(super) fn shrink(&mut self, node_count: usize) {
+        self.node_count = self.node_count.min(node_count);
+    }
+
     pub fn len(&self) -> usize {
         self.places.len()
     }

@@ -142,6 +142,15 @@ impl Packed {
         &mut self.tiles[node as usize / TILE]
     }
 
+    /// Takes away the last nodes, which have no springs.
+    fn shrink(&mut self, node_count: usize) {
+        self.tiles.truncate(tile_count(node_count));
+        for (tile, of) in self.tiles.iter_mut().enumerate() {
+            of.columns.shrink_nodes(tile_nodes(tile, node_count).end, node_count);
+        }
+        self.node_count = node_count;
+    }
+
     fn has(&self, a: u32, b: u32) -> bool {
         let mut found = false;
         self.visit(a as usize, &mut |link| found |= link.neighbour == b);
@@ -236,7 +245,11 @@ impl Springs for Packed {
         memory::reserve(&mut self.tiles, tile_count(node_count))
     }
 
-    fn grow(&mut self, node_count: usize) -> Result<()> {
+    fn resize(&mut self, node_count: usize) -> Result<()> {
+        if node_count < self.node_count {
+            self.shrink(node_count);
+            return Ok(());
+        }
         let known = self.tiles.len();
         let mut more = memory::reserved(tile_count(node_count).saturating_sub(known))?;
         for tile in known..tile_count(node_count) {

@@ -1,0 +1,456 @@
+//! A cut: what the blade parted falls apart in everything that a body is moved with.
+
+use glam::{BVec3, Vec3};
+
+use super::change_log::{TopologyChanges, UNCHANGED};
+use super::cuttable::{Cuttable, passes};
+use super::{Body, Bound, NewNode, Spring};
+use crate::cutting::{Changes, Limits, PieceOfSpring, Sweep};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::solver::{close, make_up_for};
+use crate::springs::{Change, Link, Rewiring, pull};
+
+/// What a cut did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CutReport {
+    /// Nodes that are new: copies of others, and points of the surface that are bound to nodes.
+    pub new_nodes: u32,
+    /// Triangles of the surface that are new.
+    pub new_triangles: u32,
+    /// Springs that are gone: taken away by the blade, or replaced by springs of copies.
+    pub springs_removed: u32,
+    /// How many more pieces the surface has.
+    pub pieces_parted: u32,
+    /// How long the cut is, in the rest shape, m.
+    pub length: f64,
+}
+
+/// A node whose springs or mass a cut changes.
+struct Touched {
+    /// In its own number.
+    node: u32,
+    source: u32,
+    /// Its part of the mass that it, or its source, had.
+    part: f32,
+    /// What springs did to its source, N.
+    before: Vec3,
+}
+
+impl Body {
+    /// Cuts the surface where a blade's edge passed since the last step, while nodes are where they are: see [`CutSurface::cut`] for what
+    /// is drawn then. What is simulated stays as well shaped as it was: triangles that fell apart are copied for each of their pieces, with nodes that
+    /// are not drawn where their material is beyond the cut, and with their parts of masses and stiffnesses (Molino, Bao, Fedkiw 2004). Springs
+    /// along no edge of a triangle are taken away where the blade passed through them.
+    ///
+    /// Velocities and places stay what they were, and with them momentum and energy. A node that is held stays held where it is drawn; copies of it
+    /// beyond the cut are free, and have the mass that their material has in the mean where it had none.
+    ///
+    /// [`CutSurface::cut`]: crate::cutting::CutSurface::cut
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: the body was made without [`BodyDefinition::spare_nodes`](crate::BodyDefinition::spare_nodes).
+    /// [`Error::InvalidArgument`]: an end of the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no
+    /// free place in a row of fixed length. [`Error::OutOfMemory`]. Then nothing has changed.
+    pub(crate) fn cut(&mut self, sweep: &Sweep) -> Result<CutReport> {
+        let mut cuttable = self
+            .cuttable
+            .take()
+            .ok_or_else(|| Error::Unsupported("spare_nodes is 0: the body was not made to be cut".into()))?;
+        let report = self.cut_with(&mut cuttable, sweep);
+        self.cuttable = Some(cuttable);
+        report
+    }
+
+    /// What has changed since a version of the topology, 0 when the body was made, for a renderer that follows.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: the version is to come.
+    pub fn changes_since(&self, version: u64) -> Result<TopologyChanges<'_>> {
+        match &self.cuttable {
+            Some(cuttable) => cuttable.log.since(version),
+            None if version == 0 => Ok(UNCHANGED),
+            None => Err(Error::invalid(format!(
+                "version is {version}: the body's topology has version 0"
+            ))),
+        }
+    }
+
+    fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
+        let first_triangle = cuttable.surface.triangles().len() as u32;
+        let near = self.triangles_near(cuttable, sweep)?;
+        let limits = Limits {
+            nodes: self.node_room as u32,
+            ..Limits::NONE
+        };
+        let changes = cuttable.surface.cut(sweep, self.positions(), &near, limits)?;
+        let applied = self.apply(cuttable, sweep, &near, &changes, first_triangle);
+        if applied.is_err() {
+            cuttable.surface.undo();
+        }
+        applied
+    }
+
+    /// Makes the body what the changes say. Changes nothing where it fails.
+    fn apply(
+        &mut self,
+        cuttable: &mut Cuttable,
+        sweep: &Sweep,
+        near: &[u32],
+        changes: &Changes,
+        first_triangle: u32,
+    ) -> Result<CutReport> {
+        if self.carry.masses_for > 0.0 {
+            // What closes the last step is made with the masses that it was taken with.
+            close(self);
+        }
+        let surface = &cuttable.surface;
+        let known = self.node_count();
+        let new_triangles = surface.triangles().len() - first_triangle as usize;
+        // What may fail comes first.
+        let pieces_parted = surface.parted(&changes.rim, usize::MAX)?.unwrap_or(0);
+        let mut rewiring = self.rewiring(changes)?;
+        if !cuttable.springs_are_edges {
+            self.take_away(surface, sweep, near, changes, &mut rewiring)?;
+        }
+        let nodes = self.new_nodes(changes)?;
+        let touched = self.touched(changes, &rewiring)?;
+        let copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
+        cuttable
+            .search
+            .reserve(surface, copies.clone().count(), &changes.triangles)?;
+        let mut gone = memory::reserved(rewiring.removed.len())?;
+        gone.extend(
+            rewiring
+                .removed
+                .iter()
+                .map(|spring| spring.nodes.map(|node| self.order.caller(node))),
+        );
+        cuttable.log.reserve(
+            changes.sources.len(),
+            changes.triangles.len(),
+            gone.len(),
+            changes.rim.len(),
+        )?;
+        self.surface.try_reserve(new_triangles)?;
+        self.pins.reserve(nodes.len(), known + nodes.len())?;
+        if let Some(scaling) = &mut self.scaling {
+            scaling.reserve(touched.len())?;
+        }
+        let mut changing = memory::reserved(touched.len())?;
+        changing.extend(touched.iter().map(|touched| touched.node));
+        let reverse = rewiring.reverse()?;
+        self.springs.resize(known + nodes.len())?;
+        if let Err(error) = self.springs.rewire(&rewiring) {
+            self.springs.resize(known)?;
+            return Err(error);
+        }
+        if let Some(implicit) = &mut self.implicit {
+            // NEWTON allocates for what it is told; where it cannot, springs are put back.
+            let (elements, beside) = (
+                self.elements.as_deref(),
+                (self.terms.as_deref(), self.enclosed.as_deref()),
+            );
+            if let Err(error) = implicit.rebuild(known + nodes.len(), &*self.springs, elements, beside) {
+                self.springs.rewire(&reverse)?;
+                self.springs.resize(known)?;
+                return Err(error);
+            }
+        }
+        // From here on nothing fails.
+        self.add_nodes(&nodes)?;
+        self.share_masses(cuttable, changes)?;
+        self.go_on(&touched, &changing);
+        let surface = &cuttable.surface;
+        self.surface.resize(surface.triangles().len(), [0; 3]);
+        for &triangle in &changes.triangles {
+            self.surface[triangle as usize] = surface.corner_points(triangle);
+        }
+        cuttable.search.add_cells(copies.map(|piece| piece.source));
+        cuttable.search.see(surface, &changes.triangles, first_triangle);
+        if !changes.triangles.is_empty() || !gone.is_empty() {
+            cuttable
+                .log
+                .add(&changes.sources, &changes.triangles, &gone, &changes.rim);
+        }
+        self.publish_new(known);
+        self.remake_contacts()?;
+        Ok(CutReport {
+            new_nodes: nodes.len() as u32,
+            new_triangles: new_triangles as u32,
+            springs_removed: gone.len() as u32,
+            pieces_parted,
+            length: 0.5 * changes.rim.iter().map(|edge| edge.length).sum::<f64>(),
+        })
+    }
+
+    /// What becomes of springs along edges of cells.
+    fn rewiring(&self, changes: &Changes) -> Result<Rewiring> {
+        let mut rewiring = Rewiring::default();
+        let own = |nodes: [u32; 2]| nodes.map(|node| self.order.own(node));
+        for pieces in changes.springs.chunk_by(|a, b| a.source == b.source) {
+            let source = own(pieces[0].source);
+            let Some(link) = self.link(source) else {
+                continue;
+            };
+            let is_source = |piece: &&PieceOfSpring| piece.nodes == piece.source;
+            match pieces.iter().find(is_source) {
+                Some(piece) => memory::push(&mut rewiring.changed, part_of(source[0], link, piece.part))?,
+                None => memory::push(&mut rewiring.removed, spring_of(source, &link, 1.0))?,
+            }
+            for piece in pieces.iter().filter(|piece| !is_source(piece)) {
+                memory::push(&mut rewiring.added, spring_of(own(piece.nodes), &link, piece.part))?;
+            }
+        }
+        Ok(rewiring)
+    }
+
+    /// Springs along no edge of a cell: those that the blade passed through go, and those of nodes that fell apart become as much softer as
+    /// the lighter of their nodes becomes lighter.
+    fn take_away(
+        &self,
+        surface: &crate::cutting::CutSurface,
+        sweep: &Sweep,
+        near: &[u32],
+        changes: &Changes,
+        rewiring: &mut Rewiring,
+    ) -> Result<()> {
+        let mut nodes = memory::reserved(3 * near.len())?;
+        for &triangle in near {
+            let cell = surface.triangles()[triangle as usize].cell;
+            nodes.extend(surface.cells()[cell as usize].nodes.map(|node| self.order.own(node)));
+        }
+        // New ones have no springs yet.
+        let known = self.node_count() as u32;
+        nodes.retain(|&node| node < known);
+        let parted = changes.nodes.iter().filter(|piece| piece.node == piece.source);
+        let mut parts = memory::reserved(changes.nodes.len())?;
+        parts.extend(parted.map(|piece| (self.order.own(piece.node), piece.part)));
+        parts.sort_unstable_by_key(|&(node, _)| node);
+        nodes.try_reserve(parts.len())?;
+        nodes.extend(parts.iter().map(|&(node, _)| node));
+        memory::sort_once(&mut nodes);
+        let part_of_node = |node: u32| match parts.binary_search_by_key(&node, |&(node, _)| node) {
+            Ok(place) => parts[place].1,
+            Err(_) => 1.0,
+        };
+        let mut known_ends = memory::reserved(rewiring.removed.len() + rewiring.changed.len())?;
+        let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
+        known_ends.extend(rewiring.removed.iter().map(|spring| ordered(spring.nodes)));
+        known_ends.extend(
+            rewiring
+                .changed
+                .iter()
+                .map(|change| ordered([change.node, change.before.neighbour])),
+        );
+        known_ends.sort_unstable();
+        let (positions, swept) = (self.positions(), sweep.triangles());
+        let mut found = Vec::new();
+        for &node in &nodes {
+            let mut room = Ok(());
+            self.springs.visit(node as usize, &mut |link| {
+                let ends = ordered([node, link.neighbour]);
+                // Of two nodes that are both looked at the lower sees to it.
+                let is_seen = ends[0] != node && nodes.binary_search(&ends[0]).is_ok();
+                if !is_seen && room.is_ok() && known_ends.binary_search(&ends).is_err() {
+                    room = memory::push(&mut found, (node, link));
+                }
+            });
+            room?;
+        }
+        for (node, link) in found {
+            let ends = [node, link.neighbour];
+            let callers = ends.map(|node| self.order.caller(node));
+            if surface.has_edge(callers) {
+                continue;
+            }
+            let segment = callers.map(|node| positions[node as usize]);
+            let part = part_of_node(node).min(part_of_node(link.neighbour));
+            if swept.into_iter().any(|triangle| passes(segment, triangle)) {
+                memory::push(&mut rewiring.removed, spring_of(ends, &link, 1.0))?;
+            } else if part < 1.0 {
+                memory::push(&mut rewiring.changed, part_of(node, link, part))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The new nodes in the order of their numbers.
+    fn new_nodes(&self, changes: &Changes) -> Result<Vec<NewNode>> {
+        let known = self.node_count() as u32;
+        let mut nodes = memory::reserved(changes.nodes.len() + changes.bound.len())?;
+        for piece in &changes.nodes {
+            if piece.node >= known {
+                nodes.push((piece.node, NewNode::Copy(self.order.own(piece.source))));
+            }
+        }
+        for bound in &changes.bound {
+            if bound.point >= known {
+                nodes.push((bound.point, NewNode::Bound(self.bound(bound))));
+            }
+        }
+        nodes.sort_unstable_by_key(|&(node, _)| node);
+        let mut new = memory::reserved(nodes.len())?;
+        new.extend(nodes.into_iter().map(|(_, new)| new));
+        Ok(new)
+    }
+
+    fn bound(&self, bound: &crate::cutting::BoundPoint) -> Bound {
+        let own = |node: u32| {
+            if (node as usize) < self.node_count() {
+                self.order.own(node)
+            } else {
+                node
+            }
+        };
+        let [a, b, c] = bound.nodes.map(own);
+        let [u, v, w] = bound.weights.map(|weight| weight as f32);
+        Bound {
+            node: bound.point,
+            nodes: [a, b, c, a],
+            weights: [u, v, w, 0.0],
+        }
+    }
+
+    /// All nodes whose springs or mass are to change, in order, with what springs do to them now.
+    fn touched(&self, changes: &Changes, rewiring: &Rewiring) -> Result<Vec<Touched>> {
+        let known = self.node_count() as u32;
+        let mut touched: Vec<Touched> = Vec::new();
+        for piece in &changes.nodes {
+            memory::push(
+                &mut touched,
+                Touched {
+                    node: if piece.node < known {
+                        self.order.own(piece.node)
+                    } else {
+                        piece.node
+                    },
+                    source: self.order.own(piece.source),
+                    part: piece.part as f32,
+                    before: Vec3::ZERO,
+                },
+            )?;
+        }
+        let changed = rewiring
+            .changed
+            .iter()
+            .flat_map(|change| [change.node, change.before.neighbour]);
+        let ends = rewiring.removed.iter().flat_map(|spring| spring.nodes).chain(changed);
+        let added = rewiring.added.iter().flat_map(|spring| spring.nodes);
+        for node in ends.chain(added.filter(|&node| node < known)) {
+            let (source, part, before) = (node, 1.0, Vec3::ZERO);
+            memory::push(
+                &mut touched,
+                Touched {
+                    node,
+                    source,
+                    part,
+                    before,
+                },
+            )?;
+        }
+        // Of a node that fell apart what is known of that comes first.
+        touched.sort_unstable_by(|a, b| a.node.cmp(&b.node).then(a.part.total_cmp(&b.part)));
+        touched.dedup_by_key(|touched| touched.node);
+        for touched in &mut touched {
+            touched.before = self.spring_force(touched.source);
+        }
+        Ok(touched)
+    }
+
+    /// What springs do to a node where it is, but for their damping, N; nothing where nobody asks.
+    fn spring_force(&self, node: u32) -> Vec3 {
+        let mut force = Vec3::ZERO;
+        if self.carry.closing.is_some() {
+            let positions = self.state.positions();
+            let here = positions.get(node as usize);
+            self.springs.visit(node as usize, &mut |link| {
+                force += pull(
+                    node as usize,
+                    &link,
+                    positions.get(link.neighbour as usize) - here,
+                    None,
+                );
+            });
+        }
+        force
+    }
+
+    /// Gives nodes that fell apart their parts of the mass, and holds copies of held nodes that are drawn.
+    fn share_masses(&mut self, cuttable: &Cuttable, changes: &Changes) -> Result<()> {
+        for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
+            let source = self.order.own(pieces[0].source);
+            let whole = f64::from(self.masses[source as usize]);
+            // Of what a tool holds no copies are held.
+            let axes = if self.is_held_by_tool(source) {
+                BVec3::FALSE
+            } else {
+                self.pins.axes_of(source)
+            };
+            let is_held = self.inverse_masses[source as usize] == 0.0;
+            for piece in pieces {
+                let node = self.order.own(piece.node);
+                let is_drawn = changes.undrawn.binary_search(&piece.node).is_err();
+                let is_copy = piece.node != piece.source;
+                let mass = if whole > 0.0 {
+                    whole * piece.part
+                } else if is_drawn {
+                    0.0
+                } else {
+                    cuttable.density * cuttable.surface.area_at(piece.node)
+                } as f32;
+                if is_copy && is_drawn && axes.any() {
+                    self.pins.hold(node, axes)?;
+                }
+                let stays_held = mass == 0.0
+                    || if is_copy {
+                        is_drawn && axes == BVec3::TRUE
+                    } else {
+                        is_held
+                    };
+                self.masses[node as usize] = mass;
+                self.inverse_masses[node as usize] = if stays_held { 0.0 } else { 1.0 / mass };
+            }
+        }
+        Ok(())
+    }
+
+    /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
+    fn go_on(&mut self, touched: &[Touched], nodes: &[u32]) {
+        self.forces_current = false;
+        self.published.forget_velocities();
+        self.scale_for_springs(nodes);
+        for touched in touched {
+            let force = self.spring_force(touched.node);
+            make_up_for(self, touched.node, touched.before * touched.part - force);
+        }
+        self.follow_nodes();
+        self.forget_rates();
+        self.see_stability_of(nodes);
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
+        }
+    }
+}
+
+/// A spring of the ends of a link, with a part of its stiffness and damping.
+fn spring_of(nodes: [u32; 2], link: &Link, part: f64) -> Spring {
+    Spring {
+        nodes,
+        stiffness: (f64::from(link.stiffness) * part) as f32,
+        rest_length: link.rest_length,
+        damping: (f64::from(link.damping) * part) as f32,
+    }
+}
+
+fn part_of(node: u32, link: Link, part: f64) -> Change {
+    Change {
+        node,
+        before: link,
+        after: Link {
+            stiffness: (f64::from(link.stiffness) * part) as f32,
+            damping: (f64::from(link.damping) * part) as f32,
+            ..link
+        },
+    }
+}
