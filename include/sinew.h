@@ -722,6 +722,16 @@ typedef struct sinew_body_def {
    * The categories that it meets, a bit for each; default 0xffffffff.
    */
   uint32_t collision_mask;
+  /**
+   * How many nodes cuts may add, of which room is made: some five for each triangle that a blade passes through. 0, the default: the body
+   * cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
+   * have an edge and those about a node hang together. See sinew_body_cut.
+   */
+  uint32_t spare_nodes;
+  /**
+   * 0.
+   */
+  uint32_t reserved3;
 } sinew_body_def;
 
 /**
@@ -756,6 +766,129 @@ typedef struct sinew_vec3_view {
    */
   size_t stride;
 } sinew_vec3_view;
+
+/**
+ * What a cut did.
+ */
+typedef struct sinew_cut_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Nodes that are new: copies of others, and points of the surface that are bound to nodes.
+   */
+  uint32_t new_nodes;
+  /**
+   * Triangles of the surface that are new.
+   */
+  uint32_t new_triangles;
+  /**
+   * Springs that are gone: taken away by the blade, or replaced by springs of copies.
+   */
+  uint32_t springs_removed;
+  /**
+   * How many more pieces the surface has.
+   */
+  uint32_t pieces_parted;
+  /**
+   * How long the cut is, in the rest shape, m.
+   */
+  double length;
+} sinew_cut_report;
+
+/**
+ * Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+ */
+typedef struct sinew_new_node {
+  /**
+   * The new node: one more than that of the entry before.
+   */
+  uint32_t node;
+  /**
+   * Those that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0. A copy has the
+   * node that it was copied from alone.
+   */
+  uint32_t sources[3];
+  /**
+   * How much of each, at least 0, 1 in all.
+   */
+  float weights[3];
+} sinew_new_node;
+
+/**
+ * An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
+ */
+typedef struct sinew_rim_edge {
+  /**
+   * Its ends, in the order in which its triangle has them.
+   */
+  uint32_t nodes[2];
+  /**
+   * The triangle of the surface that it is a side of.
+   */
+  uint32_t triangle;
+} sinew_rim_edge;
+
+/**
+ * What has come, changed or gone. The lists are valid until the next change of topology of the body, or its end.
+ */
+typedef struct sinew_topology_changes {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * What the body's topology has now; to be asked with next time.
+   */
+  uint64_t version;
+  /**
+   * All new nodes, in the order of their numbers.
+   */
+  const struct sinew_new_node *nodes;
+  /**
+   * How many.
+   */
+  size_t node_count;
+  /**
+   * Triangles, by their places in sinew_body_get_triangles, whose corners changed or that are new; one may be named several times.
+   */
+  const uint32_t *triangles;
+  /**
+   * How many.
+   */
+  size_t triangle_count;
+  /**
+   * Springs that are gone, 2 removed_spring_count nodes: taken away by a blade, or replaced by springs of copies.
+   */
+  const uint32_t *removed_springs;
+  /**
+   * How many.
+   */
+  size_t removed_spring_count;
+  /**
+   * New edges of the rim, as they were when they came: later cuts may have split or renumbered them.
+   */
+  const struct sinew_rim_edge *rim;
+  /**
+   * How many.
+   */
+  size_t rim_count;
+} sinew_topology_changes;
+
+/**
+ * Triangles of three nodes each, outward by the right-hand rule; valid until the next change of topology of the body, or its end.
+ */
+typedef struct sinew_triangle_view {
+  /**
+   * 3 `count` nodes.
+   */
+  const uint32_t *data;
+  /**
+   * How many triangles.
+   */
+  size_t count;
+} sinew_triangle_view;
 
 /**
  * How a triangle or tetrahedron is strained, as a part of its lengths at rest: 0 wherever it is moved and turned, 0.1 where it is a
@@ -1968,6 +2101,93 @@ sinew_status sinew_body_scale_region(struct sinew_world *world,
                                      size_t node_count,
                                      float stiffness_factor,
                                      float length_factor);
+
+/**
+ * Cuts a body where a blade's edge passed from one place to another, while its nodes are where they are: `start` and `end` are the two
+ * ends of the edge, 6 floats each, m. Between them it swept two triangles, which share the way from the first end at the start to the second at
+ * the end. `report` is nullable; its struct_size is set by the caller.
+ *
+ * Where the blade crosses an edge of the surface, or ends within a triangle, there is a point of the surface from then on: one that is there, or on
+ * an edge that is there, if it lies within 5 % of the shortest edge of the triangle that is simulated there, at rest. Between them the
+ * surface is open; a cut that goes on where the last ended joins it. What is simulated stays as well shaped as it was: a triangle whose material
+ * fell apart is copied for each piece, with nodes that are not drawn where its material is beyond the cut, and with its part of masses and
+ * stiffnesses; copies share nodes where their material hangs together (Molino, Bao, Fedkiw 2004). Springs along no edge of a triangle are taken
+ * away where the blade passed through them.
+ *
+ * Nodes keep their numbers, and new ones are numbered on: copies, which move as what they copied moved, and points of the surface between nodes,
+ * which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where it is
+ * drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none. It takes as long as the cut is
+ * large. Positions and triangles that were lent before are stale; sinew_body_get_topology_changes tells what has changed.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (spare_nodes was 0), SINEW_STATUS_CAPACITY (there are
+ * not as many spare nodes left, or FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY; then nothing has changed.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated; `report` is NULL or writable for the size that it
+ * states.
+ */
+sinew_status sinew_body_cut(struct sinew_world *world,
+                            struct sinew_body_id body,
+                            const float *start,
+                            const float *end,
+                            struct sinew_cut_report *report);
+
+/**
+ * Writes what has changed since a version of a body's topology: 0 when it was made, and what was told as `version` the last time.
+ * `out->struct_size` is set by the caller. Nothing is copied, but for bodies that were not cut the lists are empty.
+ *
+ * A renderer that follows gives each new node what its sources carry, by their weights, and reads the triangles that are named again.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the version is to come), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_body_get_topology_changes(const struct sinew_world *world,
+                                             struct sinew_body_id body,
+                                             uint64_t since_version,
+                                             struct sinew_topology_changes *out);
+
+/**
+ * Writes a view of the triangles that are drawn and touched: those of the definition, or the boundary of its tetrahedra or cells, as cuts have
+ * changed them. Nothing is copied.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_body_get_triangles(const struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      struct sinew_triangle_view *out);
+
+/**
+ * Writes which piece each node belongs to, from 0 on, and how many there are: nodes hang together by springs, elements and the surface.
+ * `pieces` are `count` numbers, as many as the body has nodes; nullable, as `piece_count` is. All nodes are looked at.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `count` is not the body's), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `pieces` is NULL or as long as stated, `piece_count` NULL or writable.
+ */
+sinew_status sinew_body_get_pieces(const struct sinew_world *world,
+                                   struct sinew_body_id body,
+                                   uint32_t *pieces,
+                                   size_t count,
+                                   uint32_t *piece_count);
+
+/**
+ * Writes the mass of a node, kg: 0 of one that is pinned for good, or bound to others.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_body_get_node_mass(const struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      uint32_t node,
+                                      float *out);
 
 /**
  * Writes the strain L/L0 - 1 of `count` pairs of nodes, 0 where L0 is 0: `pairs` are 2 `count` indices, `rest_lengths` `count` floats,

@@ -25,7 +25,10 @@ mod terms;
 mod threads;
 mod world;
 
-pub use body::{Body, BodyDefinition, CutReport, Solver, SpringState, Storage, TopologyChanges, Values};
+pub use body::{
+    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Solver, SpringState, Storage, TopologyChanges,
+    Values,
+};
 pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};

@@ -196,7 +196,13 @@ impl World {
     /// the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no free place in a row of fixed
     /// length. [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
-        self.bodies.get_mut(body.0)?.cut(sweep)
+        let place = self.bodies.place(body.0)?;
+        let it = self.bodies.get_mut(body.0)?;
+        let report = it.cut(sweep)?;
+        if let Some(tissue) = self.tissue.as_mut().filter(|_| it.meets_tissue()) {
+            tissue.join(place, it)?;
+        }
+        Ok(report)
     }
 
     /// A body, to look at.

@@ -1,27 +1,50 @@
 //! What cuts have changed, in order, for renderers that follow.
 
-use crate::cutting::{RimEdge, Source};
+use crate::cutting::Changes;
 use crate::error::{Error, Result};
+
+/// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NewNodeSource {
+    /// The new node: one more than that of the entry before.
+    pub node: u32,
+    /// Those that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0. A copy has the
+    /// node that it was copied from alone.
+    pub sources: [u32; 3],
+    /// How much of each, at least 0, 1 in all.
+    pub weights: [f32; 3],
+}
+
+/// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NewRimEdge {
+    /// Its ends, in the order in which its triangle has them.
+    pub nodes: [u32; 2],
+    /// The triangle of the surface that it is a side of.
+    pub triangle: u32,
+}
 
 /// What has come, changed or gone since a version.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TopologyChanges<'a> {
-    /// What the body's topology is now; to be asked with next time.
+    /// What the body's topology has now; to be asked with next time.
     pub version: u64,
-    /// Of each new node that is drawn where it comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
-    pub sources: &'a [Source],
-    /// Triangles of [`Body::surface`](crate::Body::surface) that changed or are new; one may be named several times.
+    /// All new nodes, in the order of their numbers.
+    pub nodes: &'a [NewNodeSource],
+    /// Triangles of [`Body::surface`](crate::Body::surface) whose corners changed or that are new; one may be named several times.
     pub triangles: &'a [u32],
-    /// Springs that are gone, each with the number that it had among those.
+    /// Springs that are gone: taken away by a blade, or replaced by springs of copies.
     pub removed_springs: &'a [[u32; 2]],
-    /// New edges of the rim.
-    pub rim: &'a [RimEdge],
+    /// New edges of the rim, as they were when they came: later cuts may have split or renumbered them.
+    pub rim: &'a [NewRimEdge],
 }
 
 /// How long the lists were when a version came.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Lengths {
-    sources: usize,
+    nodes: usize,
     triangles: usize,
     removed_springs: usize,
     rim: usize,
@@ -30,11 +53,11 @@ struct Lengths {
 /// All that has changed since the body was made.
 #[derive(Debug, Default)]
 pub(super) struct ChangeLog {
-    sources: Vec<Source>,
+    nodes: Vec<NewNodeSource>,
     triangles: Vec<u32>,
     removed_springs: Vec<[u32; 2]>,
-    rim: Vec<RimEdge>,
-    /// For each version from the first on.
+    rim: Vec<NewRimEdge>,
+    /// For each version but the first.
     versions: Vec<Lengths>,
 }
 
@@ -43,67 +66,97 @@ impl ChangeLog {
         self.versions.len() as u64
     }
 
-    /// Makes room for a version with so much.
-    pub fn reserve(&mut self, sources: usize, triangles: usize, removed_springs: usize, rim: usize) -> Result<()> {
-        self.sources.try_reserve(sources)?;
-        self.triangles.try_reserve(triangles)?;
+    fn lengths(&self) -> Lengths {
+        Lengths {
+            nodes: self.nodes.len(),
+            triangles: self.triangles.len(),
+            removed_springs: self.removed_springs.len(),
+            rim: self.rim.len(),
+        }
+    }
+
+    /// Makes room for a version with these changes, and so many springs that are gone.
+    pub fn reserve(&mut self, changes: &Changes, removed_springs: usize) -> Result<()> {
+        self.nodes.try_reserve(changes.nodes.len() + changes.sources.len())?;
+        self.triangles.try_reserve(changes.triangles.len())?;
         self.removed_springs.try_reserve(removed_springs)?;
-        self.rim.try_reserve(rim)?;
+        self.rim.try_reserve(changes.rim.len())?;
         Ok(self.versions.try_reserve(1)?)
     }
 
     /// Begins a version with these changes, for which there is room.
-    pub fn add(&mut self, sources: &[Source], triangles: &[u32], removed_springs: &[[u32; 2]], rim: &[RimEdge]) {
-        self.versions.push(Lengths {
-            sources: self.sources.len(),
-            triangles: self.triangles.len(),
-            removed_springs: self.removed_springs.len(),
-            rim: self.rim.len(),
+    pub fn add(&mut self, changes: &Changes, removed_springs: &[[u32; 2]]) {
+        let before = self.lengths();
+        self.versions.push(before);
+        let drawn = changes.sources.iter().map(|source| NewNodeSource {
+            node: source.point,
+            sources: source.sources,
+            weights: source.weights.map(|weight| weight as f32),
         });
-        self.sources.extend_from_slice(sources);
-        self.triangles.extend_from_slice(triangles);
+        self.nodes.extend(drawn);
+        let is_undrawn = |node: &u32| changes.undrawn.binary_search(node).is_ok();
+        for piece in changes.nodes.iter().filter(|piece| is_undrawn(&piece.node)) {
+            self.nodes.push(NewNodeSource {
+                node: piece.node,
+                sources: [piece.source; 3],
+                weights: [1.0, 0.0, 0.0],
+            });
+        }
+        self.nodes[before.nodes..].sort_unstable_by_key(|source| source.node);
+        self.triangles.extend_from_slice(&changes.triangles);
         self.removed_springs.extend_from_slice(removed_springs);
-        self.rim.extend_from_slice(rim);
+        self.rim.extend(changes.rim.iter().map(|edge| NewRimEdge {
+            nodes: edge.points,
+            triangle: edge.triangle,
+        }));
+    }
+
+    /// Makes room for a spring that is removed by hand.
+    pub fn reserve_one(&mut self) -> Result<()> {
+        self.removed_springs.try_reserve(1)?;
+        Ok(self.versions.try_reserve(1)?)
+    }
+
+    /// Begins a version with a spring less, for which there is room.
+    pub fn add_removed_spring(&mut self, spring: [u32; 2]) {
+        self.versions.push(self.lengths());
+        self.removed_springs.push(spring);
     }
 
     /// What came after a version.
     pub fn since(&self, version: u64) -> Result<TopologyChanges<'_>> {
         let now = self.version();
         if version > now {
-            return Err(Error::invalid(format!(
-                "version is {version}: the body's topology has version {now}"
-            )));
+            return Err(to_come(version, now));
         }
-        let from = self.versions.get(version as usize).copied().unwrap_or(Lengths {
-            sources: self.sources.len(),
-            triangles: self.triangles.len(),
-            removed_springs: self.removed_springs.len(),
-            rim: self.rim.len(),
-        });
+        let from = usize::try_from(version)
+            .ok()
+            .and_then(|version| self.versions.get(version));
+        let from = from.copied().unwrap_or(self.lengths());
         Ok(TopologyChanges {
             version: now,
-            sources: &self.sources[from.sources..],
+            nodes: &self.nodes[from.nodes..],
             triangles: &self.triangles[from.triangles..],
             removed_springs: &self.removed_springs[from.removed_springs..],
             rim: &self.rim[from.rim..],
         })
     }
-
-    /// Bytes held from the allocator.
-    pub fn bytes(&self) -> usize {
-        self.sources.capacity() * size_of::<Source>()
-            + self.triangles.capacity() * size_of::<u32>()
-            + self.removed_springs.capacity() * size_of::<[u32; 2]>()
-            + self.rim.capacity() * size_of::<RimEdge>()
-            + self.versions.capacity() * size_of::<Lengths>()
-    }
 }
 
-/// A list of nothing, for bodies that cannot be cut.
-pub(super) const UNCHANGED: TopologyChanges<'static> = TopologyChanges {
-    version: 0,
-    sources: &[],
-    triangles: &[],
-    removed_springs: &[],
-    rim: &[],
-};
+/// What there is of a body that cannot be cut.
+pub(super) fn unchanged(version: u64) -> Result<TopologyChanges<'static>> {
+    if version > 0 {
+        return Err(to_come(version, 0));
+    }
+    Ok(TopologyChanges {
+        version,
+        nodes: &[],
+        triangles: &[],
+        removed_springs: &[],
+        rim: &[],
+    })
+}
+
+fn to_come(version: u64, now: u64) -> Error {
+    Error::invalid(format!("version is {version}: the body's topology has version {now}"))
+}

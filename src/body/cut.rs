@@ -2,7 +2,7 @@
 
 use glam::{BVec3, Vec3};
 
-use super::change_log::{TopologyChanges, UNCHANGED};
+use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::{Cuttable, passes};
 use super::{Body, Bound, NewNode, Spring};
 use crate::cutting::{Changes, Limits, PieceOfSpring, Sweep};
@@ -69,10 +69,7 @@ impl Body {
     pub fn changes_since(&self, version: u64) -> Result<TopologyChanges<'_>> {
         match &self.cuttable {
             Some(cuttable) => cuttable.log.since(version),
-            None if version == 0 => Ok(UNCHANGED),
-            None => Err(Error::invalid(format!(
-                "version is {version}: the body's topology has version 0"
-            ))),
+            None => unchanged(version),
         }
     }
 
@@ -126,12 +123,7 @@ impl Body {
                 .iter()
                 .map(|spring| spring.nodes.map(|node| self.order.caller(node))),
         );
-        cuttable.log.reserve(
-            changes.sources.len(),
-            changes.triangles.len(),
-            gone.len(),
-            changes.rim.len(),
-        )?;
+        cuttable.log.reserve(changes, gone.len())?;
         self.surface.try_reserve(new_triangles)?;
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
@@ -159,6 +151,7 @@ impl Body {
         }
         // From here on nothing fails.
         self.add_nodes(&nodes)?;
+        self.rebind(changes);
         self.share_masses(cuttable, changes)?;
         self.go_on(&touched, &changing);
         let surface = &cuttable.surface;
@@ -169,9 +162,7 @@ impl Body {
         cuttable.search.add_cells(copies.map(|piece| piece.source));
         cuttable.search.see(surface, &changes.triangles, first_triangle);
         if !changes.triangles.is_empty() || !gone.is_empty() {
-            cuttable
-                .log
-                .add(&changes.sources, &changes.triangles, &gone, &changes.rim);
+            cuttable.log.add(changes, &gone);
         }
         self.publish_new(known);
         self.remake_contacts()?;
@@ -293,6 +284,16 @@ impl Body {
         let mut new = memory::reserved(nodes.len())?;
         new.extend(nodes.into_iter().map(|(_, new)| new));
         Ok(new)
+    }
+
+    /// Binds points to the copies that move them now.
+    fn rebind(&mut self, changes: &Changes) {
+        for of in &changes.bound {
+            let bound = self.bound(of);
+            if let Some(known) = self.bindings.as_mut().and_then(|bindings| bindings.get_mut(of.point)) {
+                *known = bound;
+            }
+        }
     }
 
     fn bound(&self, bound: &crate::cutting::BoundPoint) -> Bound {

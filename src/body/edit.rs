@@ -254,7 +254,13 @@ impl Body {
         let link = self.link(nodes);
         // What may fail comes first.
         if let Some(link) = link {
+            if let Some(cuttable) = &mut self.cuttable {
+                cuttable.log.reserve_one()?;
+            }
             self.remove_link(nodes, link)?;
+            if let Some(cuttable) = &mut self.cuttable {
+                cuttable.log.add_removed_spring([a, b]);
+            }
         }
         let elements = self.elements.as_mut();
         let mut removed = elements.map_or(0, |elements| elements.remove_edge(own_a, own_b));

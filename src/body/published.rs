@@ -5,8 +5,8 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::{DVec3, Vec3};
 
-use super::{Bindings, Body};
 use super::origin::Bounds;
+use super::{Bindings, Body};
 use crate::error::Result;
 use crate::memory;
 use crate::solver::show_closed;

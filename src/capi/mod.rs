@@ -20,6 +20,8 @@ pub mod body;
 
 pub mod springs;
 
+pub mod cut;
+
 pub mod strain;
 
 pub mod report;

@@ -178,3 +178,175 @@ fn cuts_in_motion_keep_mass_momentum_and_energy() {
         }
     }
 }
+
+#[test]
+fn what_is_cut_off_falls_and_what_is_held_stays() {
+    for solver in SOLVERS {
+        for pinned_for_good in [false, true] {
+            let (rest, cells) = super::sheet::grid(12);
+            let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * vec3(place.x, 0.0, place.y)).collect();
+            let is_held = |node: usize| rest[node].y == 0.0;
+            let masses: Vec<f32> = (0..positions.len())
+                .map(|node| if pinned_for_good && is_held(node) { 0.0 } else { 1e-4 })
+                .collect();
+            let mut world = World::new(WorldDefinition::default()).unwrap();
+            let definition = BodyDefinition {
+                positions: &positions,
+                masses: Values::Each(&masses),
+                node_dampings: Values::Uniform(1e-3),
+                triangles: &cells,
+                stiffnesses: Values::Uniform(50.0),
+                spare_nodes: 400,
+                solver,
+                ..Default::default()
+            };
+            let body = world.create_body(&definition).unwrap();
+            for node in (0..positions.len()).filter(|&node| is_held(node)) {
+                world.body_mut(body).unwrap().pin(node as u32).unwrap();
+            }
+            for _ in 0..100 {
+                world.step(2e-3).unwrap();
+            }
+            // Within the first row of cells: nodes of both sides have copies beyond the cut.
+            let at = world.body(body).unwrap().positions();
+            let (low, high) = (at[0].lerp(at[13], 0.4), at[12].lerp(at[25], 0.4));
+            let (along, normal) = ((high - low).normalize(), Vec3::Y + Vec3::Z);
+            let edge = |point: Vec3| [point - 0.02 * normal, point + 0.02 * normal];
+            let sweep = Sweep {
+                start: edge(low - 0.01 * along),
+                end: edge(high + 0.01 * along),
+            };
+            let report = world.cut(body, &sweep).unwrap();
+            assert_eq!(report.pieces_parted, 1, "{solver:?}");
+            let it = world.body(body).unwrap();
+            let pieces = it.pieces().unwrap();
+            assert_eq!(pieces.count, 2, "{solver:?}");
+            let copies: Vec<u32> = it
+                .changes_since(0)
+                .unwrap()
+                .nodes
+                .iter()
+                .map(|new| new.node)
+                .filter(|&node| it.node_mass(node).unwrap() > 0.0)
+                .collect();
+            assert!(copies.len() >= 26, "{solver:?}: a copy for each node along the cut");
+            let centre = |world: &World| {
+                let it = world.body(body).unwrap();
+                let (mut sum, mut mass) = (DVec3::ZERO, 0.0);
+                for (node, place) in (0..).zip(it.positions()) {
+                    if pieces.of_nodes[node as usize] == pieces.of_nodes[30] {
+                        let of_node = f64::from(it.node_mass(node).unwrap());
+                        sum += of_node * place.as_dvec3();
+                        mass += of_node;
+                    }
+                }
+                (sum / mass, mass)
+            };
+            let still = vec![Vec3::ZERO; world.body(body).unwrap().node_count()];
+            world.body_mut(body).unwrap().set_velocities(&still).unwrap();
+            let (before, mass) = centre(&world);
+            let time = 50.0 * 2e-3;
+            for _ in 0..50 {
+                world.step(2e-3).unwrap();
+            }
+            // Free fall with the damping of its nodes: gamma of a copy goes with its mass.
+            let (after, _) = centre(&world);
+            let it = world.body(body).unwrap();
+            let fallen = before.y - after.y;
+            let free = 0.5 * 9.81 * time * time;
+            assert!(
+                fallen > 0.5 * free && fallen < free,
+                "{solver:?}: {fallen} of {free} m, {mass} kg"
+            );
+            for node in (0..positions.len()).filter(|&node| is_held(node)) {
+                assert_eq!(it.positions()[node], positions[node], "{solver:?}: node {node} is held");
+            }
+        }
+    }
+}
+
+#[test]
+fn refused_cuts_change_nothing() {
+    let sweep = Sweep {
+        start: [vec3(-0.02, 0.043, -1.0), vec3(-0.02, 0.043, 1.0)],
+        end: [vec3(0.3, 0.12, -1.0), vec3(0.3, 0.12, 1.0)],
+    };
+    let (rest, cells) = unstructured(20, 5);
+    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+    let definition = BodyDefinition {
+        positions: &positions,
+        masses: Values::Uniform(1e-4),
+        triangles: &cells,
+        stiffnesses: Values::Uniform(50.0),
+        ..Default::default()
+    };
+    let refused = |definition: &BodyDefinition, sweep: &Sweep| {
+        let mut world = World::new(WorldDefinition::default()).unwrap();
+        let body = world.create_body(definition).unwrap();
+        world.step(1e-3).unwrap();
+        let before = (world.state_hash(), format!("{:?}", world.body(body).unwrap().surface()));
+        let error = world.cut(body, sweep).unwrap_err();
+        let after = (world.state_hash(), format!("{:?}", world.body(body).unwrap().surface()));
+        assert!(before == after, "{error}");
+        assert_eq!(world.body(body).unwrap().changes_since(0).unwrap().version, 0);
+        world.step(1e-3).unwrap();
+        error
+    };
+    let error = refused(&definition, &sweep);
+    assert!(
+        matches!(error, sinew::Error::Unsupported(_)) && error.to_string().contains("spare_nodes is 0"),
+        "{error}"
+    );
+    let error = refused(
+        &BodyDefinition {
+            spare_nodes: 20,
+            ..definition
+        },
+        &sweep,
+    );
+    assert!(matches!(error, sinew::Error::Capacity(_)), "{error}");
+    let (rest, cells) = super::sheet::grid(20);
+    let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+    let full = BodyDefinition {
+        positions: &positions,
+        triangles: &cells,
+        spare_nodes: 500,
+        storage: Storage::FastLink,
+        springs_per_node: 0,
+        ..definition
+    };
+    let mut sweeps = 0;
+    for shift in 0..20 {
+        // Where a cut ends, the node ahead hangs on to both copies of one beside it: by one spring more than before.
+        let mut world = World::new(WorldDefinition::default()).unwrap();
+        let body = world.create_body(&full).unwrap();
+        let way = 0.007 * shift as f32 * Vec3::Y;
+        let shifted = Sweep {
+            start: sweep.start.map(|end| end + way),
+            end: sweep
+                .start
+                .map(|end| end + way + (0.1 + 0.003 * shift as f32) * Vec3::X),
+        };
+        if world.cut(body, &shifted).is_err() {
+            let error = refused(&full, &shifted);
+            assert!(
+                matches!(error, sinew::Error::Capacity(_)) && error.to_string().contains("springs_per_node"),
+                "{error}"
+            );
+            sweeps += 1;
+        }
+    }
+    assert!(sweeps > 0, "a row is too short for some cut");
+    let bad = Sweep {
+        start: [Vec3::NAN, Vec3::ZERO],
+        ..sweep
+    };
+    let error = refused(
+        &BodyDefinition {
+            spare_nodes: 500,
+            ..definition
+        },
+        &bad,
+    );
+    assert!(matches!(error, sinew::Error::InvalidArgument(_)), "{error}");
+}
