@@ -8,7 +8,7 @@ use super::{Body, Bound, NewNode, Spring};
 use crate::cutting::{Changes, Limits, PieceOfSpring, Sweep};
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::solver::{close, make_up_for};
+use crate::solver::{Candidate, Masses, close, make_up_for};
 use crate::springs::{Change, Link, Rewiring, pull};
 
 /// What a cut did.
@@ -131,6 +131,7 @@ impl Body {
         }
         let mut changing = memory::reserved(touched.len())?;
         changing.extend(touched.iter().map(|touched| touched.node));
+        let candidates = memory::reserved(touched.len())?;
         let reverse = rewiring.reverse()?;
         self.springs.resize(known + nodes.len())?;
         if let Err(error) = self.springs.rewire(&rewiring) {
@@ -153,7 +154,7 @@ impl Body {
         self.add_nodes(&nodes)?;
         self.rebind(changes);
         self.share_masses(cuttable, changes)?;
-        self.go_on(&touched, &changing);
+        self.go_on(&touched, &changing, candidates);
         let surface = &cuttable.surface;
         self.surface.resize(surface.triangles().len(), [0; 3]);
         for &triangle in &changes.triangles {
@@ -417,7 +418,7 @@ impl Body {
     }
 
     /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
-    fn go_on(&mut self, touched: &[Touched], nodes: &[u32]) {
+    fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
         self.forces_current = false;
         self.published.forget_velocities();
         self.scale_for_springs(nodes);
@@ -427,7 +428,16 @@ impl Body {
         }
         self.follow_nodes();
         self.forget_rates();
-        self.see_stability_of(nodes);
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        let watched = (&mut self.watched, candidates);
+        let positions = self.state.positions();
+        self.carry.stability = self
+            .carry
+            .stability
+            .cut(nodes, &*self.springs, masses, positions, watched);
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }

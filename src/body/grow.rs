@@ -47,6 +47,8 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.reserve_nodes(count)?;
         }
+        let triangles = self.surface.len() + 2 * more;
+        memory::reserve(&mut self.surface, triangles)?;
         self.published.reserve(count)?;
         self.node_room = count;
         self.bindings.get_or_insert_default().reserve(more)

@@ -27,4 +27,4 @@ pub(crate) use newton::rest_state;
 pub use newton::{RestStateDefinition, RestStateReport};
 pub(crate) use stability::{Masses, Rates, Stability};
 pub(crate) use substep::write_records;
-pub(crate) use watched::Watched;
+pub(crate) use watched::{Candidate, Watched};

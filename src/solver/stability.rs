@@ -9,7 +9,7 @@
 
 use glam::Vec3;
 
-use super::watched::Watched;
+use super::watched::{Candidate, Watched};
 use crate::body::Vectors;
 use crate::springs::{Springs, separation};
 
@@ -229,12 +229,39 @@ impl Stability {
             if is_few {
                 watched.insert(node, sums.anywhere.limit());
             }
-            if self.is_coarse() {
-                found.limit = found.limit.min(sums.anywhere.limit());
-            } else {
-                found.take(&sums);
+            found.take_changed(&sums, self.is_coarse());
+        }
+        self.with(&found, watched)
+    }
+
+    /// The same after a cut has changed these nodes, in one walk over those that are watched. There is room for a candidate of each.
+    pub fn cut(
+        self,
+        nodes: &[u32],
+        springs: &dyn Springs,
+        masses: Masses,
+        positions: &Vectors,
+        (watched, mut candidates): (&mut Watched, Vec<Candidate>),
+    ) -> Self {
+        let Some(now) = self.now else {
+            return self;
+        };
+        let mut found = Found {
+            limit: now,
+            shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
+        };
+        for &node in nodes {
+            if let Some(sums) = Sums::of(node as usize, springs, &masses, positions) {
+                let limit = sums.anywhere.limit();
+                candidates.push(Candidate { limit, node });
+                found.take_changed(&sums, self.is_coarse());
             }
         }
+        watched.take_all(candidates);
+        self.with(&found, watched)
+    }
+
+    fn with(self, found: &Found, watched: &Watched) -> Self {
         Self {
             now: Some(found.limit),
             found: self.found.min(found.limit),
@@ -258,6 +285,15 @@ struct Found {
 }
 
 impl Found {
+    /// Takes a node in that has changed; `is_coarse`: wherever it goes.
+    fn take_changed(&mut self, sums: &Sums, is_coarse: bool) {
+        if is_coarse {
+            self.limit = self.limit.min(sums.anywhere.limit());
+        } else {
+            self.take(sums);
+        }
+    }
+
     /// Takes a node in. Nothing that moves can make a node matter whose springs are too weak even together.
     fn take(&mut self, sums: &Sums) {
         if sums.anywhere.limit() < self.limit {

@@ -13,7 +13,7 @@ const SHARE: usize = 16;
 
 /// A node, and the longest substep that is stable for it wherever it and its neighbours are, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     pub limit: f32,
     pub node: u32,
 }
@@ -22,6 +22,29 @@ impl Candidate {
     fn before(&self, other: &Self) -> std::cmp::Ordering {
         let limits = self.limit.total_cmp(&other.limit);
         limits.then(self.node.cmp(&other.node))
+    }
+}
+
+/// For the order of candidates.
+struct Ordered(Candidate);
+
+impl PartialEq for Ordered {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Ordered {}
+
+impl PartialOrd for Ordered {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Ordered {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.before(&other.0)
     }
 }
 
@@ -101,6 +124,24 @@ impl Watched {
         }
         self.keep_first();
         self.candidates.sort_unstable_by(Candidate::before);
+    }
+
+    /// Takes in nodes whose springs or masses have changed, in any order, in one walk: what was known of one stays too, and may make the limit shorter
+    /// than it is.
+    pub(super) fn take_all(&mut self, mut changed: Vec<Candidate>) {
+        changed.retain(|candidate| candidate.limit < self.others);
+        changed.sort_unstable_by(Candidate::before);
+        changed.truncate(self.most);
+        let room = 2 * self.most - changed.len();
+        if self.candidates.len() > room {
+            self.others = self.others.min(self.candidates[room].limit);
+            self.candidates.truncate(room);
+        }
+        memory::merge(&mut self.candidates, &changed, |candidate| Ordered(*candidate));
+        if self.candidates.len() > self.most {
+            self.others = self.others.min(self.candidates[self.most].limit);
+            self.candidates.truncate(self.most);
+        }
     }
 
     /// Takes in a node that is not here.

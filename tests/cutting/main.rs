@@ -8,3 +8,4 @@ mod motion;
 mod random;
 mod refused;
 mod shapes;
+mod wounds;

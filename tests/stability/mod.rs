@@ -113,7 +113,7 @@ const SAG: &str = "error of the sag";
 const SHAPE: &str = "error of the rest shape over the size";
 const KINETIC: &str = "kinetic energy left over that at first";
 
-pub const KNOWN: [Known; 13] = [
+pub const KNOWN: [Known; 15] = [
     // 6.8e-6 of the size after 10 ms.
     known(LOST, "started rotated", &[(DIFFERENCE, 20.0)], |setup| {
         is_verlet_at(setup, 1e-5)
@@ -125,6 +125,10 @@ pub const KNOWN: [Known; 13] = [
     // 1e-3 of the sag.
     known(LOST, "stiffness 1 : 1e6 in a block", &[(SAG, 30.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
+    }),
+    // 1.01e-4 and 1.04e-4 of the sag with two of the storages.
+    jitter(LOST, "stiffness 1 : 1e6 in a block", &[(SAG, 1.1)], |setup| {
+        is_full(setup) && is_verlet_at(setup, 1e-4)
     }),
     // A strain of 2.2e-4.
     known(LOST, "a pin stretched and let go", &[("strain left", 5.0)], |setup| {
@@ -144,7 +148,7 @@ pub const KNOWN: [Known; 13] = [
     }),
     // 1.0e-5 and 1.5e-5 of the energy at first is still kinetic after 20 steps.
     known(JITTER, "scattered at random", &[(KINETIC, 50.0)], |setup| {
-        is_full(setup) && setup.solver != Solver::Verlet && setup.step == 0.1
+        is_full(setup) && setup.solver == Solver::Implicit && setup.step == 0.1
     }),
     // Up to 2.0e-3 of the stretch.
     jitter(JITTER, "stiffness 1 : 1e6 in a chain", &[(STRETCH, 30.0)], |setup| {
@@ -165,6 +169,17 @@ pub const KNOWN: [Known; 13] = [
         &[("momentum over that of its parts", 4.0)],
         |setup| setup.solver == Solver::Implicit && setup.step == 1.0,
     ),
+    Known {
+        case: "springs removed in motion",
+        applies: |setup| is_full(setup) && setup.solver == Solver::Newton && setup.step == 1.0,
+        figure: "implicit formulas keep momentum, and lose angular momentum",
+        // 4.35 times what the parts had: in a step of a second they turn several times.
+        fails: &[
+            ("momentum lost over that of the parts", 4.0),
+            ("angular momentum lost over that of the parts", 5e6),
+        ],
+        hangs_on_bits: false,
+    },
     Known {
         case: "springs removed in motion",
         applies: |setup| setup.solver != Solver::Verlet && setup.step > 5e-4,

@@ -1,0 +1,156 @@
+//! What a cut costs, and what a body pays for it that may be cut: sheets of 10K and of 1M nodes, cut across as many triangles, with caches cold.
+//!
+//! `cargo bench --bench cutting` writes `target/report/cutting.md`. Times are the processor's, the median of all cuts.
+#![allow(clippy::print_stderr)]
+
+use std::fmt::Write;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use glam::{Vec2, Vec3, vec2};
+use sinew::cutting::Sweep;
+use sinew::{BodyDefinition, BodyId, Solver, Storage, Values, World, WorldDefinition};
+
+/// Cells along a side of the small sheet and of the large one.
+const SIDES: [usize; 2] = [99, 999];
+
+const CUTS: usize = 40;
+
+/// The longest that the same cut may take on the large sheet, as a multiple of its time on the small one.
+const MOST: f64 = 3.0;
+
+/// More than any cache.
+const FLUSHED: usize = 128 << 20;
+
+const CELL: f32 = 0.01;
+
+fn main() -> ExitCode {
+    let mut report = String::from(
+        "# Cutting\n\nA cut across a sheet, from detection to the change list, caches cold: median, and nine of ten below.\n\n\
+         | springs in | nodes | triangles met | a cut, ms | 90 %, ms | on the large sheet over on the small |\n|---|---|---|---|---|---|\n",
+    );
+    let mut missed = 0;
+    for storage in [
+        Storage::Packed,
+        Storage::Efficient,
+        Storage::FastLink,
+        Storage::DynamicBulk,
+    ] {
+        let mut small = f64::NAN;
+        for side in SIDES {
+            let (mut world, body) = sheet(side, storage, 100_000);
+            let (triangles, times) = cuts(&mut world, body, side);
+            let (median, most) = (times[times.len() / 2], times[times.len() * 9 / 10]);
+            let ratio = median / small;
+            let shown = if small.is_nan() {
+                String::new()
+            } else {
+                format!("{ratio:.2}")
+            };
+            small = if small.is_nan() { median } else { small };
+            missed += usize::from(ratio > MOST);
+            let line = format!(
+                "| {storage:?} | {} | {triangles} | {:.3} | {:.3} | {shown} |",
+                (side + 1) * (side + 1),
+                1e3 * median,
+                1e3 * most
+            );
+            eprintln!("{line}");
+            let _ = writeln!(report, "{line}");
+        }
+    }
+    report.push_str(
+        "\nA step of VERLET of a sheet of 10K nodes that may be cut, and has not been, over that of one that may not: ",
+    );
+    let _ = writeln!(report, "{:.3}", paid());
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report");
+    let path = folder.join("cutting.md");
+    if let Err(error) = std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&path, &report)) {
+        eprintln!("{}: {error}", path.display());
+        return ExitCode::FAILURE;
+    }
+    eprintln!("{}: {missed} not as they should be", path.display());
+    if missed == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+fn sheet(side: usize, storage: Storage, spare_nodes: u32) -> (World, BodyId) {
+    let count = side + 1;
+    let at = |x: usize, y: usize| (y * count + x) as u32;
+    let positions: Vec<Vec3> = (0..count * count)
+        .map(|node| CELL * vec2((node % count) as f32, (node / count) as f32).extend(0.0))
+        .collect();
+    let mut triangles = Vec::new();
+    for y in 0..side {
+        for x in 0..side {
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+            triangles.extend(if (x + y) % 2 == 0 {
+                [[a, b, c], [a, c, d]]
+            } else {
+                [[a, b, d], [b, c, d]]
+            });
+        }
+    }
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let definition = BodyDefinition {
+        positions: &positions,
+        masses: Values::Uniform(1e-4),
+        triangles: &triangles,
+        stiffnesses: Values::Uniform(50.0),
+        springs_per_node: if storage == Storage::FastLink { 16 } else { 0 },
+        spare_nodes,
+        solver: Solver::Verlet,
+        storage,
+        ..Default::default()
+    };
+    let body = world.create_body(&definition).expect("a body");
+    world.step(1e-3).expect("a step");
+    (world, body)
+}
+
+/// Cuts of the same length all over a sheet: how many triangles they met in the mean, and how long they took, in order, s.
+fn cuts(world: &mut World, body: BodyId, side: usize) -> (usize, Vec<f64>) {
+    let mut flushed = vec![1_u8; FLUSHED];
+    let mut times = Vec::new();
+    let mut triangles = 0;
+    for cut in 0..CUTS {
+        // In rows and columns, so that no two meet, and turned by more each.
+        let place = vec2((cut % 8) as f32 + 0.5, (cut / 8) as f32 + 0.5) / vec2(8.0, 5.0);
+        let middle = CELL * side as f32 * place;
+        let way = 5.3 * CELL * Vec2::from_angle(0.7 * cut as f32);
+        let blade = |at: Vec2| [-0.1, 0.1].map(|z| at.extend(z));
+        let lowest = world.body(body).expect("a body").positions()[0].z;
+        let shift = |edge: [Vec3; 2]| edge.map(|end| end + Vec3::Z * lowest);
+        let sweep = Sweep {
+            start: shift(blade(middle - 0.5 * way)),
+            end: shift(blade(middle + 0.5 * way)),
+        };
+        flushed.iter_mut().for_each(|byte| *byte = byte.wrapping_add(1));
+        std::hint::black_box(&flushed);
+        let start = Instant::now();
+        let report = world.cut(body, &sweep).expect("a cut");
+        times.push(start.elapsed().as_secs_f64());
+        assert!(report.length > 0.03);
+        triangles += report.new_triangles as usize;
+    }
+    times.sort_by(f64::total_cmp);
+    (triangles / CUTS, times)
+}
+
+/// What a step takes of a body that may be cut, over that of one that may not.
+fn paid() -> f64 {
+    let mut worlds = [0, 10_000].map(|spare| sheet(SIDES[0], Storage::Packed, spare).0);
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..200 {
+        for (world, least) in worlds.iter_mut().zip(&mut least) {
+            let start = Instant::now();
+            world.step(1e-3).expect("a step");
+            *least = least.min(start.elapsed().as_secs_f64());
+        }
+    }
+    least[1] / least[0]
+}
