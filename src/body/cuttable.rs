@@ -40,6 +40,9 @@ impl Cuttable {
         };
         let mut surface = CutSurface::new(rest, definition.triangles).map_err(refused)?;
         surface.reserve(spare)?;
+        let mut search = Search::new(rest.len(), definition.triangles, order)?;
+        // Each copy of a cell brings copies of nodes.
+        search.home_of_cell.try_reserve_exact(spare as usize)?;
         let (mut mass, mut area) = (0.0, 0.0);
         for node in 0..rest.len() {
             let of_node = f64::from(definition.masses.get(node));
@@ -59,7 +62,7 @@ impl Cuttable {
             edges.binary_search(&nodes).is_ok()
         };
         Ok(Some(Box::new(Self {
-            search: Search::new(rest.len(), definition.triangles, order)?,
+            search,
             surface,
             density: if area > 0.0 { mass / area } else { 0.0 },
             log: ChangeLog::default(),
