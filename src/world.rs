@@ -2,6 +2,7 @@
 
 mod attachments;
 mod step;
+mod sutures;
 
 use glam::{Quat, Vec3};
 
@@ -16,6 +17,7 @@ use crate::threads::{RunTasks, Threads};
 use attachments::Attachment;
 pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 pub use step::StepReport;
+pub use sutures::{SutureDefinition, SutureReport};
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -126,7 +126,7 @@ impl Together<'_> {
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
         let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
         let gravity = request.gravity.as_dvec3();
-        tissue.bonds.begin();
+        tissue.bonds.begin(request.dt);
         each(bodies, walks, |_, body, walk| {
             walk.carry = walk.start;
             if body.implicit.is_some() {
