@@ -125,5 +125,5 @@ fn check_length(length: f32) -> Result<()> {
 }
 
 fn no_suture() -> Error {
-    Error::invalid("the attachment is no suture")
+    Error::invalid("suture is an attachment of another kind")
 }

@@ -411,3 +411,92 @@ fn forget(bodies: &mut Slots<Body>, place: usize) {
         implicit.forget_history();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::SurfacePoint;
+
+    fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
+        let mut all = [(0, 0.0); OF_POINT];
+        all[..nodes.len()].copy_from_slice(nodes);
+        let anchor = Anchor::Point(SurfacePoint {
+            triangle,
+            weights: [0.5, 0.25, 0.25],
+        });
+        Bound {
+            body,
+            anchor,
+            nodes: all,
+        }
+    }
+
+    fn ids(count: usize) -> Vec<SlotId> {
+        let mut slots = Slots::new("attachment");
+        (0..count).map(|_| slots.insert(()).expect("a place")).collect()
+    }
+
+    /// The corners of a bond in order, each found again by its end.
+    fn corners(bonds: &Bonds, index: usize) -> Vec<(usize, u32, f32)> {
+        let found = bonds.bonds[index].used().map(|corner| {
+            let end = &bonds.ends[corner.end];
+            assert_eq!((end.body, end.node), (corner.body, corner.node));
+            (corner.body, corner.node, corner.weight)
+        });
+        let mut corners: Vec<_> = found.collect();
+        corners.sort_by_key(|corner| (corner.0, corner.1));
+        corners
+    }
+
+    #[test]
+    fn points_of_triangles_that_were_cut_are_carried_over() {
+        let mut bonds = Bonds::default();
+        let on = |triangle, first| bound(2, triangle, &[(first, 0.5), (first + 1, 0.25), (first + 2, 0.25)]);
+        let other = bound(5, 7, &[(3, 1.0)]);
+        // Between two bodies, within one, and where nothing was cut.
+        let pairs = [[on(4, 10), other], [on(4, 10), on(9, 11)], [other, on(9, 11)]];
+        let thread = Some(Thread::new(1.0, 1.0, 0.0));
+        bonds.reserve(pairs.len()).expect("memory");
+        for ((id, pair), thread) in ids(3).into_iter().zip(pairs).zip([None, thread, thread]) {
+            bonds.add(id, pair, 0.0, thread).expect("memory");
+        }
+        bonds.settle();
+        assert_eq!(
+            corners(&bonds, 0),
+            [(2, 10, 0.5), (2, 11, 0.25), (2, 12, 0.25), (5, 3, -1.0)]
+        );
+        assert_eq!(corners(&bonds, 1), [(2, 10, 0.5), (2, 11, -0.25), (2, 13, -0.25)]);
+        // The cell of triangle 4 is a copy now, of which a triangle has another number; the point lies in a tetrahedron.
+        let cut = bound(2, 40, &[(30, 0.5), (11, 0.25), (31, 0.125), (1, 0.125)]);
+        let is_cut = |point: &Bound| matches!(point.anchor, Anchor::Point(SurfacePoint { triangle: 4, .. }));
+        let untouched = bonds.rebind(5, |point| is_cut(point).then_some(cut));
+        untouched.expect("memory");
+        assert_eq!(
+            corners(&bonds, 0),
+            [(2, 10, 0.5), (2, 11, 0.25), (2, 12, 0.25), (5, 3, -1.0)]
+        );
+        bonds.rebind(2, |point| is_cut(point).then_some(cut)).expect("memory");
+        let four = [(2, 1, 0.125), (2, 11, 0.25), (2, 30, 0.5), (2, 31, 0.125)];
+        assert_eq!(corners(&bonds, 0), [&four[..], &[(5, 3, -1.0)]].concat());
+        let both = [
+            (2, 1, 0.125),
+            (2, 11, -0.25),
+            (2, 12, -0.25),
+            (2, 13, -0.25),
+            (2, 30, 0.5),
+            (2, 31, 0.125),
+        ];
+        assert_eq!(corners(&bonds, 1), both);
+        assert_eq!(
+            corners(&bonds, 2),
+            [(2, 11, -0.5), (2, 12, -0.25), (2, 13, -0.25), (5, 3, 1.0)]
+        );
+        // No end is left where no bond is.
+        let ends: Vec<(usize, u32)> = bonds.ends.iter().map(|end| (end.body, end.node)).collect();
+        assert_eq!(ends, [(2, 1), (2, 11), (2, 12), (2, 13), (2, 30), (2, 31), (5, 3)]);
+        assert!(matches!(
+            bonds.bonds[0].points[0].anchor,
+            Anchor::Point(SurfacePoint { triangle: 40, .. })
+        ));
+    }
+}
