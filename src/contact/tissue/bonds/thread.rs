@@ -11,7 +11,7 @@ use super::super::Moment;
 use super::CLOSING_SPEED;
 
 /// Points that move against each other by no more than this part of their distance in a substep keep to their line.
-const RESOLVED: f64 = 0.125;
+const RESOLVED: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Thread {
