@@ -1270,6 +1270,54 @@ typedef struct sinew_attachment_id {
 } sinew_attachment_id;
 
 /**
+ * What a suture is like. Filled by sinew_suture_def_init.
+ */
+typedef struct sinew_suture_def {
+  /**
+   * Set by sinew_suture_def_init.
+   */
+  size_t struct_size;
+  /**
+   * How long the thread is between its points while nothing pulls, m, at least 0; -1, the default: as long as they are apart.
+   */
+  float length;
+  /**
+   * By what force it is longer, N/m, above 0; infinity, the default: it does not stretch.
+   */
+  float stiffness;
+  /**
+   * The force at which it is pulled through the tissue, N, at least 0; 0, the default, or infinity: it holds whatever comes.
+   */
+  float force_limit;
+  /**
+   * 0.
+   */
+  uint32_t reserved0;
+} sinew_suture_def;
+
+/**
+ * How a suture is now.
+ */
+typedef struct sinew_suture_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * How long its thread is while nothing pulls, m.
+   */
+  float length;
+  /**
+   * How far apart its points are, m: further than that where it pulls.
+   */
+  float distance;
+  /**
+   * What the thread stores, J; 0 where it does not stretch. That of bodies is without it.
+   */
+  double energy;
+} sinew_suture_report;
+
+/**
  * What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
  */
 typedef struct sinew_mesh_view {
@@ -2682,6 +2730,72 @@ sinew_status sinew_tools_get_wrench(const struct sinew_world *world,
                                     const float *point,
                                     float *force,
                                     float *torque);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_suture_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_suture_def_init(struct sinew_suture_def *def, size_t struct_size);
+
+/**
+ * Sutures a point of the surface of a body to one of another, or of the same: a thread between them, which pulls them together where
+ * they are further apart than it is long, and never pushes. Each may turn about its point as it likes. What the thread joins still
+ * touches. A point is a triangle's number, as to sinew_body_attach_points, and 3 parts of its corners, at least 0 and 1 in sum.
+ *
+ * It is one of the attachments, with the id written to `out`: sinew_attachment_release cuts it, sinew_attachment_get_force has
+ * the force on `body`, and one that is pulled through the tissue is among those of sinew_world_get_slipped: with the step in which
+ * its mean force was larger than the definition's force_limit. It ends with either body. The bodies take their substeps together,
+ * as with sinew_body_attach_points_to_points; no stiffness makes them shorter.
+ *
+ * A thread that is to be shorter than its points are apart is drawn in as with sinew_suture_set_length. No momentum is made; nor is
+ * any angular momentum, unless points of a thread of next to no length pass each other. Nor is energy, but by drawing it in; what takes up
+ * a thread that becomes taut within a substep is lost, as is some of what sways along a stiff one. `def` is nullable: the defaults.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the two are one point), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY;
+ * then nothing is sutured.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `weights` and `other_weights` are NULL or 3 floats; `def` is NULL or a definition of the
+ * size that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_body_suture_points(struct sinew_world *world,
+                                      struct sinew_body_id body,
+                                      uint32_t triangle,
+                                      const float *weights,
+                                      struct sinew_body_id other,
+                                      uint32_t other_triangle,
+                                      const float *other_weights,
+                                      const struct sinew_suture_def *def,
+                                      struct sinew_attachment_id *out);
+
+/**
+ * Tightens a suture, or gives it slack: its thread becomes so long, m, at least 0, evenly over the next step; where it is to become
+ * shorter no faster than by 0.25 m/s, over as many steps as that takes.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the attachment is no suture), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_suture_set_length(struct sinew_world *world,
+                                     struct sinew_attachment_id suture,
+                                     float length);
+
+/**
+ * Writes how a suture is now; `report->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the attachment is no suture), SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `report` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_suture_get_report(const struct sinew_world *world,
+                                     struct sinew_attachment_id suture,
+                                     struct sinew_suture_report *report);
 
 /**
  * Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements

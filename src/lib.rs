@@ -39,4 +39,7 @@ pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;
 pub use terms::SpringLaw;
 pub use threads::RunTasks;
-pub use world::{Anchor, AttachmentId, BodyId, StepReport, SurfacePoint, ToolId, World, WorldDefinition};
+pub use world::{
+    Anchor, AttachmentId, BodyId, StepReport, SurfacePoint, SutureDefinition, SutureReport, ToolId, World,
+    WorldDefinition,
+};

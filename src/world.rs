@@ -2,6 +2,7 @@
 
 mod attachments;
 mod step;
+mod sutures;
 
 use glam::{Quat, Vec3};
 
@@ -17,6 +18,7 @@ use crate::threads::{RunTasks, Threads};
 use attachments::Attachment;
 pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 pub use step::StepReport;
+pub use sutures::{SutureDefinition, SutureReport};
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -22,7 +22,7 @@ pub struct sinew_attachment_id {
 }
 
 impl sinew_attachment_id {
-    fn id(self) -> AttachmentId {
+    pub(super) fn id(self) -> AttachmentId {
         AttachmentId(SlotId {
             index1: self.index1,
             generation: self.generation,

@@ -36,6 +36,8 @@ pub mod contact;
 
 pub mod attachment;
 
+pub mod suture;
+
 pub mod mesh;
 
 pub mod picture;

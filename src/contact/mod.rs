@@ -32,6 +32,6 @@ pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
 pub(crate) use path::{Frame, ToolPath};
 pub use report::{Contact, ContactChange};
-pub(crate) use tissue::{Bonds, Corner, Moment, Tissue};
+pub(crate) use tissue::{Bonds, Bound, Moment, Thread, Tissue, are_one, distance};
 pub use tool::{Detection, Pose, Shape, ToolDefinition};
 pub(crate) use tool::{Form, Tool};

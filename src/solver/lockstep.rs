@@ -45,7 +45,7 @@ impl Together<'_> {
 
     fn attempt_group(&mut self, group: usize, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
         let request = self.request;
-        let mut substeps = self.set_out(group, bodies);
+        let [mut substeps, needed] = self.set_out(group, bodies, outcomes);
         if substeps == 0 {
             return;
         }
@@ -57,7 +57,11 @@ impl Together<'_> {
         let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
         let mut stable_substep = f32::INFINITY;
         let mut is_taken = false;
-        for attempt in 0..=allowed {
+        let is_beyond = request.substeps == 0 && needed > request.max_substeps;
+        if is_beyond {
+            stable_substep = request.dt / needed as f32;
+        }
+        for attempt in (0..=allowed).filter(|_| !is_beyond) {
             match self.go(group, bodies, substeps, attempt == allowed) {
                 Ok(()) => {
                     is_taken = true;
@@ -93,9 +97,9 @@ impl Together<'_> {
         }
     }
 
-    /// Makes a way for each body of a group: in how many substeps; 0: it has none.
-    fn set_out(&mut self, group: usize, bodies: &mut Slots<Body>) -> u32 {
-        let mut substeps = 0;
+    /// Makes a way for each body of a group: in how many substeps, 0: it has none, and how many of them VERLET needs.
+    fn set_out(&mut self, group: usize, bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>]) -> [u32; 2] {
+        let [mut substeps, mut needed] = [0; 2];
         for (place, walk) in self.walks.iter_mut().enumerate() {
             *walk = None;
             if let Some(body) = bodies.at_mut(place)
@@ -103,6 +107,12 @@ impl Together<'_> {
             {
                 let (begun, wanted) = Walk::of(body, self.request, self.team);
                 substeps = substeps.max(wanted);
+                match &mut body.implicit {
+                    None => needed = needed.max(wanted),
+                    // What it knew before the step must be known again where that is refused, tried once or more.
+                    Some(implicit) if outcomes[place].is_none() => implicit.attempt(),
+                    Some(implicit) => implicit.put_back(),
+                }
                 *walk = Some(begun);
             }
         }
@@ -111,7 +121,7 @@ impl Together<'_> {
             let wished = self.tissue.substeps_wished(group, bodies, self.request.dt);
             substeps = substeps.max(wished.min(self.request.max_substeps));
         }
-        substeps
+        [substeps, needed]
     }
 
     /// Takes it in so many substeps, the last time that it is tried or not.
@@ -126,7 +136,7 @@ impl Together<'_> {
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
         let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
         let gravity = request.gravity.as_dvec3();
-        tissue.bonds.begin();
+        tissue.bonds.begin(request.dt);
         each(bodies, walks, |_, body, walk| {
             walk.carry = walk.start;
             if body.implicit.is_some() {

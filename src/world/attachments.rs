@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{BodyId, ToolId, World, make_walks};
 use crate::body::Grip;
-use crate::contact::{Bonds, Corner};
+use crate::contact::{Bonds, Bound, Thread};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::slots::SlotId;
@@ -35,6 +35,22 @@ struct Lazy<F>(F);
 impl<F: Fn() -> String> std::fmt::Display for Lazy<F> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
         formatter.write_str(&(self.0)())
+    }
+}
+
+/// Which argument it is, in messages: one of an array, or the only one, with what its name begins with.
+#[derive(Clone, Copy)]
+pub(super) struct Which<'a> {
+    pub prefix: &'a str,
+    pub index: Option<usize>,
+}
+
+impl Which<'_> {
+    fn name(&self, one: &str, many: &str) -> String {
+        match self.index {
+            Some(index) => format!("{}{many}[{index}]", self.prefix),
+            None => format!("{}{one}", self.prefix),
+        }
     }
 }
 
@@ -112,7 +128,8 @@ impl World {
         let surface = self.bodies.get(body.0)?.surface();
         let mut grips = memory::reserved(points.len())?;
         for (index, point) in points.iter().enumerate() {
-            grips.push(grip_of(surface, "", index, point)?);
+            let index = Some(index);
+            grips.push(grip_of(surface, Which { prefix: "", index }, point)?);
         }
         for (index, grip) in grips.iter().enumerate() {
             let held = grip.corners.into_iter().zip(grip.weights);
@@ -213,90 +230,82 @@ impl World {
         other_anchors: &[Anchor],
         force_limit: f32,
     ) -> Result<Vec<AttachmentId>> {
-        let places = [self.bodies.place(body.0)?, self.bodies.place(other.0)?];
+        self.bodies.get(body.0)?;
+        self.bodies.get(other.0)?;
         crate::body::expect_count("other_anchors", other_anchors.len(), anchors.len())?;
         check_limit(force_limit)?;
-        let mut all = memory::reserved(anchors.len())?;
+        let mut pairs = memory::reserved(anchors.len())?;
         for (index, (first, second)) in anchors.iter().zip(other_anchors).enumerate() {
-            let mut corners = memory::reserved(6)?;
-            self.add_corners(body, places[0], ("", index, first), 1.0, &mut corners)?;
-            self.add_corners(other, places[1], ("other_", index, second), -1.0, &mut corners)?;
-            corners.retain(|corner| corner.weight != 0.0);
-            if corners.is_empty() {
-                let name = match first {
-                    Anchor::Node(_) => "nodes",
-                    Anchor::Point(_) => "triangles",
-                };
-                return Err(Error::invalid(format!(
-                    "{name}[{index}] and other_{name}[{index}] are one point of one body"
-                )));
-            }
-            all.push(corners);
+            let index = Some(index);
+            let [own, others] = ["", "other_"].map(|prefix| Which { prefix, index });
+            let pair = [self.bound(body, own, first)?, self.bound(other, others, second)?];
+            refuse_one_point(&pair, [own, others])?;
+            pairs.push(pair);
         }
-        let mut ids = memory::reserved(all.len())?;
-        if all.is_empty() {
+        self.bind([body, other], &pairs, force_limit, None)
+    }
+
+    /// Joins what was found fit for it, by threads like this one or else as one point.
+    pub(super) fn bind(
+        &mut self,
+        bodies: [BodyId; 2],
+        pairs: &[[Bound; 2]],
+        force_limit: f32,
+        thread: Option<Thread>,
+    ) -> Result<Vec<AttachmentId>> {
+        let places = [self.bodies.place(bodies[0].0)?, self.bodies.place(bodies[1].0)?];
+        let mut ids = memory::reserved(pairs.len())?;
+        if pairs.is_empty() {
             return Ok(ids);
         }
-        self.slipped.try_reserve(self.attachments.count() + all.len())?;
+        self.slipped.try_reserve(self.attachments.count() + pairs.len())?;
         for place in places {
             make_walks(&mut self.walks, place)?;
         }
-        self.tissue.get_or_insert_default().reserve_bonds(places, all.len())?;
-        for id in [body, other] {
+        self.tissue.get_or_insert_default().reserve_bonds(places, pairs.len())?;
+        for id in bodies {
             self.bodies.get_mut(id.0)?.reserve_bonds()?;
         }
+        let [body, other] = bodies;
         let holder = Holder::Body(other);
-        self.name(Attachment { body, holder }, all.len(), &mut ids)?;
-        for id in [body, other] {
+        self.name(Attachment { body, holder }, pairs.len(), &mut ids)?;
+        for id in bodies {
             self.bodies.get_mut(id.0)?.begin_bonds();
         }
-        for (&AttachmentId(id), corners) in ids.iter().zip(&all) {
-            if let Some(bonds) = self.bonds_mut() {
-                bonds.add(id, corners, force_limit)?;
+        if let Some(bonds) = self.bonds_mut() {
+            for (&AttachmentId(id), &pair) in ids.iter().zip(pairs) {
+                bonds.add(id, pair, force_limit, thread)?;
             }
+            bonds.settle();
         }
-        self.bonds_mut().into_iter().for_each(Bonds::name_ends);
         Ok(ids)
     }
 
-    /// Adds the corners of an anchor, with its prefix and number in messages, that have a part in it: what is known already counts double.
-    fn add_corners(
-        &self,
-        id: BodyId,
-        place: usize,
-        (prefix, index, anchor): (&str, usize, &Anchor),
-        sign: f32,
-        corners: &mut Vec<Corner>,
-    ) -> Result<()> {
+    /// A point of a body by what its corners are there.
+    pub(super) fn bound(&self, id: BodyId, which: Which, anchor: &Anchor) -> Result<Bound> {
         let body = self.bodies.get(id.0)?;
         let grip = match anchor {
             Anchor::Node(node) => {
-                body.check_node(&format_args!("{prefix}nodes[{index}]"), *node)?;
+                body.check_node(&Lazy(|| which.name("node", "nodes")), *node)?;
                 Grip::of_node(*node)
             }
-            Anchor::Point(point) => grip_of(body.surface(), prefix, index, point)?,
+            Anchor::Point(point) => grip_of(body.surface(), which, point)?,
         };
         let sum: f32 = grip.weights.iter().sum();
-        for (&node, weight) in grip.corners.iter().zip(grip.weights) {
-            if weight == 0.0 {
-                continue;
-            }
-            let (node, weight) = (body.own_node(node), sign * weight / sum);
-            let is_known = |corner: &&mut Corner| (corner.body, corner.node) == (place, node);
-            match corners.iter_mut().find(is_known) {
-                Some(corner) => corner.weight += weight,
-                None => corners.push(Corner {
-                    body: place,
-                    node,
-                    weight,
-                    ..Corner::default()
-                }),
+        let mut nodes = [(0, 0.0); 4];
+        for (place, (&node, weight)) in nodes.iter_mut().zip(grip.corners.iter().zip(grip.weights)) {
+            if weight != 0.0 {
+                *place = (body.own_node(node), weight / sum);
             }
         }
-        Ok(())
+        Ok(Bound {
+            body: self.bodies.place(id.0)?,
+            anchor: *anchor,
+            nodes,
+        })
     }
 
-    fn bonds_mut(&mut self) -> Option<&mut Bonds> {
+    pub(super) fn bonds_mut(&mut self) -> Option<&mut Bonds> {
         self.tissue.as_mut().map(|tissue| &mut tissue.bonds)
     }
 
@@ -412,7 +421,7 @@ impl World {
     }
 }
 
-fn check_limit(force_limit: f32) -> Result<()> {
+pub(super) fn check_limit(force_limit: f32) -> Result<()> {
     if force_limit.is_nan() || force_limit < 0.0 {
         return Err(Error::invalid(format!(
             "force_limit is {force_limit}: must be at least 0"
@@ -421,19 +430,37 @@ fn check_limit(force_limit: f32) -> Result<()> {
     Ok(())
 }
 
-/// A point of a surface, which messages name by this prefix and number.
-fn grip_of(surface: &[[u32; 3]], prefix: &str, index: usize, point: &SurfacePoint) -> Result<Grip> {
+/// Refuses two points of one body that are one.
+pub(super) fn refuse_one_point(pair: &[Bound; 2], [first, second]: [Which; 2]) -> Result<()> {
+    if !crate::contact::are_one(pair) {
+        return Ok(());
+    }
+    let [one, many] = match pair[0].anchor {
+        Anchor::Node(_) => ["node", "nodes"],
+        Anchor::Point(_) => ["triangle", "triangles"],
+    };
+    Err(Error::invalid(format!(
+        "{} and {} are one point of one body",
+        first.name(one, many),
+        second.name(one, many)
+    )))
+}
+
+/// A point of a surface.
+fn grip_of(surface: &[[u32; 3]], which: Which, point: &SurfacePoint) -> Result<Grip> {
     let SurfacePoint { triangle, weights } = *point;
     let Some(&corners) = surface.get(triangle as usize) else {
         return Err(Error::invalid(format!(
-            "{prefix}triangles[{index}] is {triangle}: the surface has {} triangles",
+            "{} is {triangle}: the surface has {} triangles",
+            which.name("triangle", "triangles"),
             surface.len()
         )));
     };
     let sum: f32 = weights.iter().sum();
     if !(weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_OFF) {
         return Err(Error::invalid(format!(
-            "{prefix}weights[{index}] are {weights:?}: must be at least 0, and 1 in sum"
+            "{} are {weights:?}: must be at least 0, and 1 in sum",
+            which.name("weights", "weights")
         )));
     }
     Ok(Grip { corners, weights })

@@ -53,6 +53,8 @@ static struct outputs {
     float numbers[2][9];
     sinew_strain strain;
     sinew_attachment_id attachments[2];
+    sinew_suture_def suture_def;
+    sinew_suture_report suture;
     sinew_contact contacts[2];
     sinew_contact_change changes[2];
     float position[3], orientation[4];
@@ -294,6 +296,7 @@ static inline void set_up(void)
     memset(&untouched, 0xA5, sizeof untouched);
     untouched.step.struct_size = sizeof untouched.step;
     untouched.energy.struct_size = sizeof untouched.energy;
+    untouched.suture.struct_size = sizeof untouched.suture;
     untouched.storage.struct_size = sizeof untouched.storage;
     untouched.solver.struct_size = sizeof untouched.solver;
     untouched.enclosed.struct_size = sizeof untouched.enclosed;

@@ -116,6 +116,62 @@ static void to_bodies(void)
     }
 }
 
+/* Between two points of the cloth. */
+static void sutures(void)
+{
+    static const float good[] = {0.5f, 0.25f, 0.25f}, off[] = {0.6f, 0.25f, 0.25f};
+    const sinew_body_id cloth = the.body;
+    sinew_attachment_id *to = out.attachments;
+    sinew_suture_def usual;
+    size_t i;
+    MUST(sinew_suture_def_init(&usual, sizeof usual));
+    CHECK(usual.length == -1 && isinf(usual.stiffness) && usual.force_limit == 0);
+    REFUSED(INVALID, "def", sinew_suture_def_init(NULL, sizeof usual));
+    REFUSES_SIZES(sinew_suture_def, sizeof(sinew_suture_def), (void)0, sinew_suture_def_init(&out.suture_def, size));
+    REFUSES_NO_BODY(sinew_body_suture_points(world, body, 7, good, cloth, 0, good, &usual, to));
+    REFUSES_NO_BODY(sinew_body_suture_points(world, cloth, 7, good, body, 0, good, NULL, to));
+    REFUSES_SIZES(sinew_suture_def, sizeof(sinew_suture_def), sinew_suture_def def = usual; def.struct_size = size,
+                  sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, good, &def, to));
+    REFUSED(INVALID, "triangle", sinew_body_suture_points(the.world, cloth, 8, good, cloth, 0, good, &usual, to));
+    REFUSED(INVALID, "other_triangle", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 8, good, &usual, to));
+    REFUSED(INVALID, "other_triangle", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 7, good, &usual, to));
+    REFUSED(INVALID, "weights", sinew_body_suture_points(the.world, cloth, 7, NULL, cloth, 0, good, &usual, to));
+    REFUSED(INVALID, "other_weights", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, NULL, &usual, to));
+    REFUSED(INVALID, "weights", sinew_body_suture_points(the.world, cloth, 7, off, cloth, 0, good, &usual, to));
+    REFUSED(INVALID, "out", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, good, &usual, NULL));
+    for (i = 0; i < OR_ZERO; i++) {
+        sinew_suture_def def = usual;
+        def.length = i == 3 ? -0.5f : bad[i];
+        if (i != 4) /* 0 is a length */
+            REFUSED(INVALID, "length", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, good, &def, to));
+        def = usual;
+        def.stiffness = bad[i];
+        if (i != 1) /* infinity: it does not stretch */
+            REFUSED(INVALID, "stiffness", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, good, &def, to));
+        def = usual;
+        def.force_limit = bad[i];
+        if (i != 1 && i != 4) /* infinity and 0: no limit */
+            REFUSED(INVALID, "force_limit", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, good, &def, to));
+        if (i != 4)
+            REFUSED(INVALID, "other_weights",
+                    sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, spoiled(good, 3, 1, bad[i]), &usual, to));
+    }
+    usual.reserved0 = 1;
+    REFUSED(INVALID, "reserved0", sinew_body_suture_points(the.world, cloth, 7, good, cloth, 0, good, &usual, to));
+    /* What is held by a tool is no suture. */
+    REFUSES_RESULT_SIZES(sinew_suture_report, sizeof(sinew_suture_report), suture,
+                         sinew_suture_get_report(the.world, held, &out.suture));
+    for (i = 0; i < BAD_IDS; i++) {
+        REFUSED(STALE, "attachment", sinew_suture_set_length(the.world, bad_attachments[i], 0));
+        REFUSED(STALE, "attachment", sinew_suture_get_report(the.world, bad_attachments[i], &out.suture));
+    }
+    REFUSED(INVALID, "suture", sinew_suture_set_length(the.world, held, 0));
+    REFUSED(INVALID, "suture", sinew_suture_get_report(the.world, held, &out.suture));
+    REFUSED(INVALID, "report", sinew_suture_get_report(the.world, held, NULL));
+    REFUSED(INVALID, "world", sinew_suture_set_length(NULL, held, 0));
+    REFUSED(INVALID, "world", sinew_suture_get_report(NULL, held, &out.suture));
+}
+
 static void attachments(void)
 {
     const float place[3] = {0, 0, 0};
@@ -201,6 +257,26 @@ static void use(void)
         CHECK(sinew_body_rest_state(the.world, the.body, NULL, NULL) == SINEW_STATUS_INVALID_ARGUMENT);
         MUST(sinew_attachment_release(the.world, weak));
     }
+    /* Two points of it are drawn together. */
+    {
+        const float first[] = {0.5f, 0.25f, 0.25f};
+        sinew_suture_def def;
+        sinew_suture_report report = {sizeof report, 0, 0, 0}, after = report;
+        MUST(sinew_suture_def_init(&def, sizeof def));
+        def.stiffness = 5;
+        MUST(sinew_body_suture_points(the.world, the.body, 7, first, the.body, 4, first, &def, &weak));
+        MUST(sinew_suture_get_report(the.world, weak, &report));
+        CHECK(report.length == report.distance && report.length > 0 && report.energy < 1e-9);
+        CHECK(sinew_suture_set_length(the.world, weak, -1) == SINEW_STATUS_INVALID_ARGUMENT);
+        MUST(sinew_suture_set_length(the.world, weak, report.length - 0.002f));
+        MUST(sinew_world_step(the.world, 0.01f, NULL));
+        MUST(sinew_suture_get_report(the.world, weak, &after));
+        CHECK(fabsf(after.length - (report.length - 0.002f)) < 1e-6f && after.distance < report.distance);
+        MUST(sinew_attachment_get_force(the.world, weak, force));
+        CHECK(force[0] * force[0] + force[1] * force[1] + force[2] * force[2] > 0);
+        MUST(sinew_attachment_release(the.world, weak));
+        CHECK(sinew_suture_get_report(the.world, weak, &after) == SINEW_STATUS_STALE_ID);
+    }
 }
 
 int main(void)
@@ -210,6 +286,7 @@ int main(void)
     nodes();
     points();
     to_bodies();
+    sutures();
     attachments();
     wrenches();
     use();

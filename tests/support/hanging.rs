@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{Anchor, AttachmentId, BodyContact, BodyDefinition, BodyId, Solver, Values, World};
+use sinew::{Anchor, AttachmentId, BodyContact, BodyDefinition, BodyId, Solver, Storage, Values, World};
 
 use super::tissue::{body, moved, pin_all, world};
 
@@ -22,6 +22,7 @@ pub struct Block {
     pub solver: Solver,
     pub contact: BodyContact,
     pub cells: [u32; 3],
+    pub storage: Storage,
 }
 
 impl Block {
@@ -38,6 +39,7 @@ impl Block {
         solver: Solver::Verlet,
         contact: BodyContact::NOTHING,
         cells: [4, 2, 4],
+        storage: Storage::Packed,
     };
 
     pub fn mesh(&self) -> Mesh {
@@ -56,6 +58,7 @@ impl Block {
                 triangles: &mesh.triangles,
                 tetrahedra: &mesh.tetrahedra,
                 solver: self.solver,
+                storage: self.storage,
                 contact: self.contact,
                 ..Default::default()
             })

@@ -13,7 +13,7 @@ mod link;
 mod search;
 mod skin;
 
-pub(crate) use self::bonds::{Bonds, Corner};
+pub(crate) use self::bonds::{Bonds, Bound, Thread, are_one, distance};
 use self::groups::Groups;
 use self::link::Link;
 use self::search::{Party, Search};
@@ -316,7 +316,7 @@ impl Tissue {
             } = self;
             first = Some(relax(SWEEPS, first, || {
                 let changes = links.iter_mut().map(|link| link.solve(skins));
-                changes.fold(0.0, f32::max).max(bonds.sweep(skins))
+                changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment))
             }));
         }
     }

@@ -8,8 +8,11 @@
 //! be fed by stiff tissue, and grow; there substeps are of order 1, and the impulses a projection of what was found (Chorin 1968). Such an
 //! equation does not know what the point is to carry, and leaves it off by `force time^2 / mass` until the projection: so substeps
 //! are short.
+//!
+//! Where there is a thread between the points the impulse is its own (`thread.rs`): one number along a line, never a push.
 
 mod substep;
+mod thread;
 
 use glam::{DVec3, Vec3};
 
@@ -19,9 +22,29 @@ use crate::error::Result;
 use crate::memory;
 use crate::slots::{SlotId, Slots};
 use crate::solver::Outcome;
+use crate::world::Anchor;
+
+pub(crate) use self::thread::Thread;
+
+/// Nodes of a point: corners of a triangle, or of a tetrahedron.
+const OF_POINT: usize = 4;
 
 /// Corners of both points of a bond.
-const CORNERS: usize = 6;
+const CORNERS: usize = 2 * OF_POINT;
+
+/// What is apart comes together no faster than this, m/s, so that bodies that are far apart follow their points.
+const CLOSING_SPEED: f64 = 0.25;
+
+/// One of the points of a bond, as the caller knows it and as the solvers do.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bound {
+    /// By the body's place in the world.
+    pub body: usize,
+    /// In the caller's numbers.
+    pub anchor: Anchor,
+    /// Nodes in the body's own numbers, with their parts in the point, 1 in sum; 0 where there is none.
+    pub nodes: [(u32, f32); OF_POINT],
+}
 
 /// A corner of one of the points of a bond.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,7 +63,11 @@ pub(crate) struct Corner {
 struct Bond {
     /// Its name among the world's attachments.
     id: SlotId,
+    /// The first point and the second.
+    points: [Bound; 2],
     corners: [Corner; CORNERS],
+    /// What is between them; else they are one.
+    thread: Option<Thread>,
     /// The mean force over a step with which it just holds, N.
     limit: f32,
     /// The force on the first point that the next step foresees, N.
@@ -106,8 +133,37 @@ impl Bond {
     }
 
     fn concerns(&self, body: usize) -> bool {
-        self.used().any(|corner| corner.body == body)
+        self.points.iter().any(|point| point.body == body)
     }
+}
+
+/// The corners of two points: a node that has a part in both has the difference.
+fn corners_of(points: &[Bound; 2]) -> [Corner; CORNERS] {
+    let mut corners = [Corner::default(); CORNERS];
+    let mut count = 0;
+    for (point, sign) in points.iter().zip([1.0, -1.0]) {
+        for &(node, weight) in point.nodes.iter().filter(|(_, weight)| *weight != 0.0) {
+            let is_known = |corner: &&mut Corner| (corner.body, corner.node) == (point.body, node);
+            match corners[..count].iter_mut().find(is_known) {
+                Some(corner) => corner.weight += sign * weight,
+                None => {
+                    corners[count] = Corner {
+                        body: point.body,
+                        node,
+                        weight: sign * weight,
+                        end: 0,
+                    };
+                    count += 1;
+                }
+            }
+        }
+    }
+    corners
+}
+
+/// Whether two points are one, of one body.
+pub(crate) fn are_one(points: &[Bound; 2]) -> bool {
+    corners_of(points).iter().all(|corner| corner.weight == 0.0)
 }
 
 impl Bonds {
@@ -131,13 +187,13 @@ impl Bonds {
         Ok(self.ends.try_reserve(count.saturating_mul(CORNERS))?)
     }
 
-    /// Keeps the two points of these corners together, for which there is room, once [`Self::name_ends`] has seen to all that were added.
-    pub fn add(&mut self, id: SlotId, corners: &[Corner], limit: f32) -> Result<()> {
-        let mut all = [Corner::default(); CORNERS];
-        all[..corners.len()].copy_from_slice(corners);
+    /// Keeps two points together, for which there is room, or a thread between them, once [`Self::settle`] has seen to all that were added.
+    pub fn add(&mut self, id: SlotId, points: [Bound; 2], limit: f32, thread: Option<Thread>) -> Result<()> {
         let bond = Bond {
             id,
-            corners: all,
+            points,
+            corners: corners_of(&points),
+            thread,
             limit: if limit > 0.0 { limit } else { f32::INFINITY },
             foreseen: Vec3::ZERO,
             mean: Vec3::ZERO,
@@ -151,13 +207,22 @@ impl Bonds {
             acts: false,
             is_implicit: false,
         };
-        memory::push(&mut self.bonds, bond)?;
-        for corner in bond.used() {
-            if let Err(place) = self.find(corner.body, corner.node) {
-                self.ends.try_reserve(1)?;
-                self.ends.insert(place, End::new(&corner));
+        memory::push(&mut self.bonds, bond)
+    }
+
+    /// Has points of a body that `carried` knows be bound to what it says from now on: their triangles were cut, or copied. No point
+    /// moves with that, as far as the new nodes are where they should be. Nothing has changed where there is no memory.
+    #[allow(dead_code, reason = "cutting calls it")]
+    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&Bound) -> Option<Bound>) -> Result<()> {
+        let count = self.bonds.iter().filter(|bond| bond.concerns(body)).count();
+        self.ends.try_reserve(count.saturating_mul(CORNERS))?;
+        for bond in &mut self.bonds {
+            for point in bond.points.iter_mut().filter(|point| point.body == body) {
+                *point = carried(point).unwrap_or(*point);
             }
+            bond.corners = corners_of(&bond.points);
         }
+        self.settle();
         Ok(())
     }
 
@@ -172,16 +237,25 @@ impl Bonds {
             }
             stays
         });
-        if self.bonds.len() == count {
-            return;
+        if self.bonds.len() != count {
+            self.settle();
         }
+    }
+
+    /// Has ends where bonds are and nowhere else, for which there is room, and tells corners which are theirs.
+    pub fn settle(&mut self) {
         let Self { bonds, ends, .. } = self;
         ends.iter_mut().for_each(|end| end.is_used = false);
         for corner in bonds.iter().flat_map(Bond::used) {
-            ends[corner.end].is_used = true;
+            match place_of(ends, corner.body, corner.node) {
+                Ok(place) => ends[place].is_used = true,
+                Err(place) => ends.insert(place, End::new(&corner)),
+            }
         }
         ends.retain(|end| end.is_used);
-        self.name_ends();
+        for corner in bonds.iter_mut().flat_map(|bond| &mut bond.corners) {
+            corner.end = place_of(ends, corner.body, corner.node).unwrap_or_default();
+        }
     }
 
     /// Ends a bond.
@@ -211,13 +285,25 @@ impl Bonds {
         bond.map_or(Vec3::ZERO, |bond| bond.mean)
     }
 
+    /// The thread of a bond.
+    pub fn thread_mut(&mut self, id: SlotId) -> Option<&mut Thread> {
+        let bond = self.bonds.iter_mut().find(|bond| bond.id == id);
+        bond.and_then(|bond| bond.thread.as_mut())
+    }
+
+    /// The thread of a bond, and how far its points are apart now, m.
+    pub fn thread(&self, bodies: &Slots<Body>, id: SlotId) -> Option<(&Thread, f64)> {
+        let bond = self.bonds.iter().find(|bond| bond.id == id)?;
+        Some((bond.thread.as_ref()?, distance(bodies, &bond.points)))
+    }
+
     /// Whether the body at this place has bonds.
     pub fn concern(&self, body: usize) -> bool {
         let first = self.ends.partition_point(|end| end.body < body);
         self.ends.get(first).is_some_and(|end| end.body == body)
     }
 
-    /// Whether a bond joins a node of one body with a node of the other, of these.
+    /// Whether a bond makes one point of nodes of both bodies, of these.
     pub(super) fn join(&self, bodies: [usize; 2], nodes: [&[u32]; 2]) -> bool {
         let is_at_end = |side: usize| nodes[side].iter().any(|&node| self.find(bodies[side], node).is_ok());
         if self.bonds.is_empty() || !(is_at_end(0) && is_at_end(1)) {
@@ -228,7 +314,8 @@ impl Bonds {
             corners.any(|corner| corner.body == bodies[side] && nodes[side].contains(&corner.node))
         };
         let joins = |bond: &Bond| has(bond, 0, 1.0) && has(bond, 1, -1.0) || has(bond, 0, -1.0) && has(bond, 1, 1.0);
-        self.bonds.iter().any(joins)
+        // What threads pull together is to meet.
+        self.bonds.iter().any(|bond| bond.thread.is_none() && joins(bond))
     }
 
     /// The box of all velocities of a body, given that of those before.
@@ -246,6 +333,11 @@ impl Bonds {
             }
             hasher.write_floats(&[bond.limit]);
             hasher.write_floats(&bond.foreseen.to_array());
+            if let Some(thread) = &bond.thread {
+                for value in [thread.length, thread.target, thread.compliance] {
+                    hasher.write_u64(value.to_bits());
+                }
+            }
         }
     }
 
@@ -256,6 +348,9 @@ impl Bonds {
             if bond.used().all(|corner| took(corner.body)) {
                 bond.foreseen = bond.load.clamp(Vec3::MIN, Vec3::MAX);
                 bond.mean = (bond.sum / f64::from(dt)).as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+                if let Some(thread) = &mut bond.thread {
+                    thread.length = thread.length_after(dt);
+                }
             } else {
                 bond.mean = Vec3::ZERO;
             }
@@ -263,18 +358,27 @@ impl Bonds {
     }
 
     fn find(&self, body: usize, node: u32) -> std::result::Result<usize, usize> {
-        self.ends
-            .binary_search_by_key(&(body, node), |end| (end.body, end.node))
+        place_of(&self.ends, body, node)
     }
+}
 
-    /// Tells corners where their ends are now.
-    pub fn name_ends(&mut self) {
-        let Self { bonds, ends, .. } = self;
-        for corner in bonds.iter_mut().flat_map(|bond| &mut bond.corners) {
-            let found = ends.binary_search_by_key(&(corner.body, corner.node), |end| (end.body, end.node));
-            corner.end = found.unwrap_or_default();
-        }
-    }
+/// How far two points are apart now, m.
+pub(crate) fn distance(bodies: &Slots<Body>, points: &[Bound; 2]) -> f64 {
+    let apart: DVec3 = corners_of(points)
+        .iter()
+        .filter(|corner| corner.weight != 0.0)
+        .filter_map(|corner| {
+            let body = bodies.at(corner.body)?;
+            let place = body.state.positions().get(corner.node as usize).as_dvec3() + body.origin;
+            Some(place * f64::from(corner.weight))
+        })
+        .sum();
+    apart.length()
+}
+
+/// Where a node is among ends, or would be.
+fn place_of(ends: &[End], body: usize, node: u32) -> std::result::Result<usize, usize> {
+    ends.binary_search_by_key(&(body, node), |end| (end.body, end.node))
 }
 
 impl End {
@@ -305,5 +409,94 @@ fn forget(bodies: &mut Slots<Body>, place: usize) {
     {
         implicit.is_attached = false;
         implicit.forget_history();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::SurfacePoint;
+
+    fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
+        let mut all = [(0, 0.0); OF_POINT];
+        all[..nodes.len()].copy_from_slice(nodes);
+        let anchor = Anchor::Point(SurfacePoint {
+            triangle,
+            weights: [0.5, 0.25, 0.25],
+        });
+        Bound {
+            body,
+            anchor,
+            nodes: all,
+        }
+    }
+
+    fn ids(count: usize) -> Vec<SlotId> {
+        let mut slots = Slots::new("attachment");
+        (0..count).map(|_| slots.insert(()).expect("a place")).collect()
+    }
+
+    /// The corners of a bond in order, each found again by its end.
+    fn corners(bonds: &Bonds, index: usize) -> Vec<(usize, u32, f32)> {
+        let found = bonds.bonds[index].used().map(|corner| {
+            let end = &bonds.ends[corner.end];
+            assert_eq!((end.body, end.node), (corner.body, corner.node));
+            (corner.body, corner.node, corner.weight)
+        });
+        let mut corners: Vec<_> = found.collect();
+        corners.sort_by_key(|corner| (corner.0, corner.1));
+        corners
+    }
+
+    #[test]
+    fn points_of_triangles_that_were_cut_are_carried_over() {
+        let mut bonds = Bonds::default();
+        let on = |triangle, first| bound(2, triangle, &[(first, 0.5), (first + 1, 0.25), (first + 2, 0.25)]);
+        let other = bound(5, 7, &[(3, 1.0)]);
+        // Between two bodies, within one, and where nothing was cut.
+        let pairs = [[on(4, 10), other], [on(4, 10), on(9, 11)], [other, on(9, 11)]];
+        let thread = Some(Thread::new(1.0, 1.0, 0.0));
+        bonds.reserve(pairs.len()).expect("memory");
+        for ((id, pair), thread) in ids(3).into_iter().zip(pairs).zip([None, thread, thread]) {
+            bonds.add(id, pair, 0.0, thread).expect("memory");
+        }
+        bonds.settle();
+        assert_eq!(
+            corners(&bonds, 0),
+            [(2, 10, 0.5), (2, 11, 0.25), (2, 12, 0.25), (5, 3, -1.0)]
+        );
+        assert_eq!(corners(&bonds, 1), [(2, 10, 0.5), (2, 11, -0.25), (2, 13, -0.25)]);
+        // The cell of triangle 4 is a copy now, of which a triangle has another number; the point lies in a tetrahedron.
+        let cut = bound(2, 40, &[(30, 0.5), (11, 0.25), (31, 0.125), (1, 0.125)]);
+        let is_cut = |point: &Bound| matches!(point.anchor, Anchor::Point(SurfacePoint { triangle: 4, .. }));
+        let untouched = bonds.rebind(5, |point| is_cut(point).then_some(cut));
+        untouched.expect("memory");
+        assert_eq!(
+            corners(&bonds, 0),
+            [(2, 10, 0.5), (2, 11, 0.25), (2, 12, 0.25), (5, 3, -1.0)]
+        );
+        bonds.rebind(2, |point| is_cut(point).then_some(cut)).expect("memory");
+        let four = [(2, 1, 0.125), (2, 11, 0.25), (2, 30, 0.5), (2, 31, 0.125)];
+        assert_eq!(corners(&bonds, 0), [&four[..], &[(5, 3, -1.0)]].concat());
+        let both = [
+            (2, 1, 0.125),
+            (2, 11, -0.25),
+            (2, 12, -0.25),
+            (2, 13, -0.25),
+            (2, 30, 0.5),
+            (2, 31, 0.125),
+        ];
+        assert_eq!(corners(&bonds, 1), both);
+        assert_eq!(
+            corners(&bonds, 2),
+            [(2, 11, -0.5), (2, 12, -0.25), (2, 13, -0.25), (5, 3, 1.0)]
+        );
+        // No end is left where no bond is.
+        let ends: Vec<(usize, u32)> = bonds.ends.iter().map(|end| (end.body, end.node)).collect();
+        assert_eq!(ends, [(2, 1), (2, 11), (2, 12), (2, 13), (2, 30), (2, 31), (5, 3)]);
+        assert!(matches!(
+            bonds.bonds[0].points[0].anchor,
+            Anchor::Point(SurfacePoint { triangle: 40, .. })
+        ));
     }
 }

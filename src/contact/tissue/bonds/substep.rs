@@ -4,15 +4,13 @@ use glam::{DVec3, Vec3};
 
 use super::super::Moment;
 use super::super::skin::Skin;
-use super::{Bond, Bonds, Corner, End};
+use super::{Bond, Bonds, CLOSING_SPEED, Corner, End};
 use crate::body::Body;
 use crate::slots::Slots;
 
-/// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep, and no faster than this,
-/// m/s, so that bodies that are far apart follow their points.
+/// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
 const CLOSING_TIME: f64 = 0.02;
 const LARGEST_PART: f64 = 0.2;
-const CLOSING_SPEED: f64 = 0.25;
 
 /// The part of the way by which points may miss where they are to be, after `SWEEPS`.
 const MISSED: f64 = 0.2;
@@ -53,12 +51,15 @@ impl Bonds {
         }
     }
 
-    /// Begins the step over, from what is current.
-    pub fn begin(&mut self) {
+    /// Begins the step over, of `dt` seconds, from what is current.
+    pub fn begin(&mut self, dt: f32) {
         self.is_opening = true;
         for bond in self.bonds.iter_mut().filter(|bond| bond.is_in_turn) {
             bond.load = bond.foreseen;
             bond.sum = DVec3::ZERO;
+            if let Some(thread) = &mut bond.thread {
+                thread.begin(dt);
+            }
         }
     }
 
@@ -115,6 +116,8 @@ impl Bonds {
                 moment.concerns(body) && skin.is_some_and(|skin| skin.nodes.binary_search(&end.node).is_ok());
             end.velocity = body.mean_velocity(end.node as usize);
             end.answer = body.answer_of(end.node) * body.left_by_damping(end.node, moment);
+            end.place = body.state.newest().0.get(end.node as usize).as_dvec3() + body.origin;
+            end.shift = DVec3::ZERO;
         }
         for bond in &mut self.bonds {
             bond.acts = bond.is_in_turn && (moment.drifts || !bond.is_implicit);
@@ -127,31 +130,52 @@ impl Bonds {
                 .map(|corner| self.ends[corner.end].answer * (corner.weight * corner.weight))
                 .sum();
             bond.masses = Vec3::select(whole.cmpgt(Vec3::ZERO), whole.recip(), Vec3::ZERO);
+            if bond.thread.is_some() {
+                let (apart, duration) = (bond.apart(&self.ends), bond.duration(moment, self.is_opening));
+                let [velocity, _] = bond.velocity(&self.ends, skins);
+                if let Some(thread) = &mut bond.thread {
+                    thread.follow(apart, velocity.as_dvec3(), whole.as_dvec3(), duration, moment);
+                }
+            }
         }
     }
 
-    /// Makes the velocities of the points of each bond equal, one after the other: the largest difference that there was, m/s.
-    pub(in crate::contact::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>]) -> f32 {
-        let Self { bonds, ends, .. } = self;
+    /// Makes the velocities of the points of each bond equal, or those that its thread asks for, one after the other: the largest difference
+    /// that there was, m/s.
+    pub(in crate::contact::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Moment) -> f32 {
+        let Self {
+            bonds,
+            ends,
+            is_opening,
+        } = self;
         let mut largest = 0.0_f32;
         for bond in bonds.iter_mut().filter(|bond| bond.acts) {
-            let (mut apart, mut size) = (Vec3::ZERO, Vec3::ZERO);
-            for corner in bond.used() {
-                let velocity = ends[corner.end].velocity(skins) * corner.weight;
-                apart += velocity;
-                size = size.max(velocity.abs());
-            }
-            let counts = apart.abs().cmpgt(size * ROUNDING) & bond.masses.cmpgt(Vec3::ZERO);
-            if !counts.any() {
+            let [velocity, size] = bond.velocity(ends, skins);
+            let (given, change) = match &bond.thread {
+                None => {
+                    let counts = velocity.abs().cmpgt(size * ROUNDING) & bond.masses.cmpgt(Vec3::ZERO);
+                    let change = Vec3::select(counts, velocity, Vec3::ZERO);
+                    (-change * bond.masses, change)
+                }
+                Some(thread) => {
+                    let before = bond.load * bond.duration(moment, *is_opening) + bond.impulse;
+                    let all = thread.impulse(velocity.as_dvec3(), before.as_dvec3());
+                    let given = all.as_vec3().clamp(Vec3::MIN, Vec3::MAX) - before;
+                    let answer = bond.masses.recip();
+                    let change = given * answer;
+                    let rounded = size.max(before.abs() * answer) * ROUNDING;
+                    let counts = bond.masses.cmpgt(Vec3::ZERO) & change.abs().cmpgt(rounded);
+                    (given, Vec3::select(counts, change, Vec3::ZERO))
+                }
+            };
+            if given == Vec3::ZERO {
                 continue;
             }
-            let apart = Vec3::select(counts, apart, Vec3::ZERO);
-            let given = -apart * bond.masses;
             bond.impulse += given;
             for corner in bond.used() {
                 ends[corner.end].quicken(given * corner.weight, skins);
             }
-            largest = largest.max(apart.length());
+            largest = largest.max(change.length());
         }
         largest
     }
@@ -179,6 +203,9 @@ impl Bonds {
                 ends[corner.end].given += all * corner.weight;
             }
             bond.sum += all.as_dvec3();
+            if let Some(thread) = &mut bond.thread {
+                thread.go_on(moment);
+            }
         }
         for end in ends.iter_mut().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at_mut(end.body)
@@ -203,7 +230,8 @@ impl Bonds {
         }
         let duration = f64::from(duration);
         let closed = (duration / CLOSING_TIME).min(LARGEST_PART);
-        for bond in bonds.iter_mut().filter(|bond| bond.is_in_turn) {
+        let holds = |bond: &Bond| bond.is_in_turn && bond.thread.is_none();
+        for bond in bonds.iter_mut().filter(|bond| holds(bond)) {
             let apart = bond.apart(ends);
             let way = (apart * closed).clamp_length_max(CLOSING_SPEED * duration);
             bond.gap = apart - way;
@@ -211,7 +239,7 @@ impl Bonds {
         }
         for _ in 0..SWEEPS {
             let mut is_done = true;
-            for bond in bonds.iter().filter(|bond| bond.is_in_turn) {
+            for bond in bonds.iter().filter(|bond| holds(bond)) {
                 let off = bond.apart(ends) - bond.gap;
                 is_done &= off.abs().max_element() <= bond.miss;
                 let off = off * bond.masses.as_dvec3();
@@ -243,6 +271,17 @@ impl Bond {
             .used()
             .map(|corner| place(&ends[corner.end]) * f64::from(corner.weight));
         parts.sum()
+    }
+
+    /// The velocity of its first point against the second, and the largest that a corner adds to it along each axis, m/s.
+    fn velocity(&self, ends: &[End], skins: &[Option<Skin>]) -> [Vec3; 2] {
+        let (mut velocity, mut size) = (Vec3::ZERO, Vec3::ZERO);
+        for corner in self.used() {
+            let part = ends[corner.end].velocity(skins) * corner.weight;
+            velocity += part;
+            size = size.max(part.abs());
+        }
+        [velocity, size]
     }
 
     /// How long forces act in this moment, s.

@@ -1,0 +1,129 @@
+//! The thread of a suture: it pulls its two points along the line between them where they are further apart than it is long.
+//!
+//! Its tension is that at the end of a substep (implicit Euler on a compliant constraint: Macklin, Müller, Chentanez 2016), so that no stiffness is too
+//! much for any substep, and what does not stretch is a compliance of 0. It acts along the line on which the points are as the substep begins,
+//! as a kick of leapfrog does, which keeps angular momentum; points that pass each other within a substep have no such line, and are pulled
+//! along the one on which they would end.
+
+use glam::DVec3;
+
+use super::super::Moment;
+use super::CLOSING_SPEED;
+
+/// Points that move against each other by no more than this part of their distance in a substep keep to their line.
+const RESOLVED: f64 = 0.5;
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Thread {
+    /// How long it is while nothing pulls, and what it is to become, m.
+    pub length: f64,
+    pub target: f64,
+    /// m/N; 0: it does not stretch.
+    pub compliance: f64,
+    // The step in progress.
+    /// How fast it becomes longer, m/s, and how long it is by now, m.
+    pace: f64,
+    current: f64,
+    /// How far apart its points may be at the end of the substep, m.
+    reach: f64,
+    /// From the second point to the first, m.
+    apart: DVec3,
+    /// The direction in which it acts; where there is none, that of the points as they would end.
+    line: Option<DVec3>,
+    /// How long velocities act on places in the substep, s.
+    drift: f64,
+    /// By how much it is longer for an impulse, m/(N s), and by how much its points become faster against each other, 1/kg.
+    give: f64,
+    answer: DVec3,
+}
+
+impl Thread {
+    pub fn new(length: f64, target: f64, compliance: f64) -> Self {
+        Self {
+            length,
+            target,
+            compliance,
+            pace: 0.0,
+            current: length,
+            reach: length,
+            apart: DVec3::ZERO,
+            line: None,
+            drift: 0.0,
+            give: 0.0,
+            answer: DVec3::ZERO,
+        }
+    }
+
+    /// How long it is at the end of a step of `dt` seconds: it becomes shorter no faster than points that are attached come together.
+    pub fn length_after(&self, dt: f32) -> f64 {
+        self.target.max(self.length - CLOSING_SPEED * f64::from(dt))
+    }
+
+    /// What it stores where its points are so far apart, J.
+    pub fn energy(&self, distance: f64) -> f64 {
+        let stretch = (distance - self.length).max(0.0);
+        if self.compliance > 0.0 {
+            0.5 * stretch * stretch / self.compliance
+        } else {
+            0.0
+        }
+    }
+
+    /// Begins a step of `dt` seconds.
+    pub fn begin(&mut self, dt: f32) {
+        self.pace = (self.length_after(dt) - self.length) / f64::from(dt);
+        self.current = self.length;
+    }
+
+    /// Takes a substep as it is to be: its points are `apart` as it begins and go at this velocity against each other; forces act for `duration`
+    /// seconds.
+    pub fn follow(&mut self, apart: DVec3, velocity: DVec3, answer: DVec3, duration: f32, moment: &Moment) {
+        // The half kick that closes a step is to leave velocities that go on as they should.
+        let part = if moment.drifts { 1.0 } else { 0.5 };
+        self.drift = part * f64::from(moment.duration);
+        self.give = self.compliance / f64::from(duration);
+        self.answer = answer;
+        self.apart = apart;
+        let distance = apart.length();
+        let is_resolved = velocity.length() * self.drift <= RESOLVED * distance && distance > 0.0;
+        self.line = is_resolved.then(|| apart / distance);
+        self.reach = (self.current + self.pace * self.drift).max(0.0);
+        if self.compliance == 0.0 {
+            // Points that were put further apart than it can be come back gently.
+            self.reach = self.reach.max(distance - CLOSING_SPEED * self.drift);
+        }
+    }
+
+    /// The substep is over.
+    pub fn go_on(&mut self, moment: &Moment) {
+        if moment.drifts {
+            self.current = (self.current + self.pace * self.drift).max(0.0);
+        }
+    }
+
+    /// The impulse on its first point that this substep takes in all, N s, where the points go at this velocity against each other with what was
+    /// `given` so far.
+    pub fn impulse(&self, velocity: DVec3, given: DVec3) -> DVec3 {
+        let free = self.apart + (velocity - self.answer * given) * self.drift;
+        let distance = free.length();
+        if !(distance > self.reach) {
+            return DVec3::ZERO;
+        }
+        let line = self.line.unwrap_or(free / distance);
+        // |free - pull way| = reach + pull give, of which the first solution counts.
+        let way = self.answer * line * self.drift;
+        let square = way.length_squared() - self.give * self.give;
+        let half = free.dot(way) + self.reach * self.give;
+        let excess = (distance - self.reach) * (distance + self.reach);
+        let pull = match half * half - square * excess {
+            root if root >= 0.0 => excess / (half + root.sqrt()),
+            // That far it does not come along this line: as near as it does.
+            _ => half / square,
+        };
+        if pull > 0.0 && pull.is_finite() {
+            -line * pull
+        } else {
+            DVec3::ZERO
+        }
+    }
+}
