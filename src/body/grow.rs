@@ -49,7 +49,8 @@ impl Body {
         }
         self.published.reserve(count)?;
         self.node_room = count;
-        self.bindings.get_or_insert_default().reserve(more)
+        let known = self.node_count();
+        self.bindings.get_or_insert_default().reserve(more, known)
     }
 
     /// A zero vector for each node, with room for those that may come.

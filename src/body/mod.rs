@@ -17,6 +17,7 @@ mod published;
 mod records;
 mod region;
 mod state;
+mod surface;
 mod tissue;
 mod tune;
 mod vectors;
@@ -470,8 +471,16 @@ impl Body {
                 self.contacts = Some(Contacts::new(self.node_count(), &surface, &self.contact, tools)?);
             }
         }
+        self.reserve_holds()
+    }
+
+    /// Makes room for contacts within equations, where it has such.
+    fn reserve_holds(&mut self) -> Result<()> {
         if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
             implicit.reserve_contacts(contacts.reserve_holds()?)?;
+            if self.node_room > 0 {
+                implicit.reserve_nodes(self.node_room)?;
+            }
         }
         Ok(())
     }
