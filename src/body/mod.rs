@@ -536,6 +536,7 @@ impl Body {
             pin.force = pin.held(held(pin.node as usize));
         }
         self.rest_grasps();
+        self.follow_nodes();
         self.relax();
         self.forget_motion();
         self.publish(&Team::alone());
@@ -567,11 +568,16 @@ impl Body {
             let own = self.order.own(node) as usize;
             local.set(own, (position.as_dvec3() - self.origin).as_vec3());
         }
+        self.follow_nodes();
         let (kernel, local) = (self.kernel, self.state.positions());
         for (tile, bounds) in self.boxes.iter_mut().enumerate() {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
         }
         self.published.positions_mut().copy_from_slice(positions);
+        for bound in self.bindings.iter().flat_map(|bindings| bindings.iter()) {
+            let place = local.get(bound.node as usize).as_dvec3() + self.origin;
+            self.published.positions_mut()[self.order.caller(bound.node) as usize] = place.as_vec3();
+        }
         self.grasp_anew();
         self.relax();
         self.forget_motion();
