@@ -1,6 +1,8 @@
 //! A body: nodes with mass, joined by springs.
 
 mod bindings;
+#[cfg(test)]
+mod bound_tests;
 mod coarse;
 mod damping;
 mod definition;

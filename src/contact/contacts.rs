@@ -525,9 +525,7 @@ impl Contacts {
             }
             // What an equation that was not solved to the end has let in.
             for index in 0..self.holds.len() {
-                let lacks = self
-                    .holds
-                    .lacks(index, |node| meeting.next_positions.get(node));
+                let lacks = self.holds.lacks(index, |node| meeting.next_positions.get(node));
                 if lacks > 0.0 {
                     self.constraints[index].push_out(meeting.next_positions, lacks as f32);
                 }
@@ -619,6 +617,10 @@ impl Meeting<'_> {
             return Bounds::of(self.positions.iter());
         };
         let nodes = (0..).zip(self.positions.iter());
-        Bounds::of(nodes.filter(|&(node, _)| bindings.get(node).is_none()).map(|(_, place)| place))
+        Bounds::of(
+            nodes
+                .filter(|&(node, _)| bindings.get(node).is_none())
+                .map(|(_, place)| place),
+        )
     }
 }

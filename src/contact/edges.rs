@@ -111,5 +111,8 @@ impl EdgeUses {
 /// The ends of a triangle's edges, the lower first.
 fn ends_of(face: [u32; 3]) -> impl Iterator<Item = [u32; 2]> {
     let edges = TRIANGLE_EDGES.map(|ends| ends.map(|corner| face[corner]));
-    edges.into_iter().filter(|[a, b]| a != b).map(|[a, b]| [a.min(b), a.max(b)])
+    edges
+        .into_iter()
+        .filter(|[a, b]| a != b)
+        .map(|[a, b]| [a.min(b), a.max(b)])
 }

@@ -127,3 +127,52 @@ impl Features {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// All edges and faces, in some order.
+    fn all(features: &Features) -> Vec<Feature> {
+        let mut all: Vec<Feature> = (0..features.count() as u32)
+            .filter_map(|index| features.get(index))
+            .collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// After any changes the features are those of the surface as it is, each once.
+    #[test]
+    fn a_changed_surface_has_its_features() {
+        let mut random = Random(7);
+        let count = 40;
+        let mut corner = |_| random.below(count) as u32;
+        let mut surface: Vec<[u32; 3]> = (0..60).map(|_| [0; 3].map(&mut corner)).collect();
+        let mut features = Features::new(count, &surface).expect("memory");
+        for round in 0..300 {
+            let index = corner(0) as usize;
+            let corners = [0; 3].map(&mut corner);
+            let added = (round % 3 == 0).then(|| [0; 3].map(&mut corner));
+            let edges = features.edges.clone();
+            features.reserve(1, added.iter().count()).expect("memory");
+            let mut new = Vec::new();
+            let gone = features.face(index);
+            features.set_face(index, corners, |edge| new.push(edge));
+            features.drop_edges_of(gone);
+            surface[index] = corners;
+            for corners in added {
+                features.set_face(surface.len(), corners, |edge| new.push(edge));
+                surface.push(corners);
+            }
+            let whole = Features::new(count, &surface).expect("memory");
+            assert_eq!(all(&features), all(&whole), "{round}");
+            for (number, edge) in (0..).zip(&features.edges) {
+                let is_new = *edge != HOLE && edges.get(number as usize) != Some(edge);
+                assert!(!is_new || new.contains(&number), "{round}: {edge:?}");
+            }
+        }
+        // Numbers are used again.
+        assert!(features.edges.len() < 3 * surface.len(), "{}", features.edges.len());
+    }
+}

@@ -339,7 +339,10 @@ impl Holds {
             // Where it pushes all along, nothing small is found as a difference of what is large.
             let growth = if before.force.min(after.force) > 0.0 {
                 let ways = hold.corner_vectors(&vector_of);
-                -hold.stiffness * hold.gauge.opening(&before.meets, &after.meets, &ways[..hold.corner_count])
+                -hold.stiffness
+                    * hold
+                        .gauge
+                        .opening(&before.meets, &after.meets, &ways[..hold.corner_count])
             } else {
                 after.force - before.force
             };

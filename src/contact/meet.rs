@@ -66,7 +66,9 @@ pub(super) fn meet_plane(
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
-    let closing = (surface_velocity - meeting.vector(meeting.velocities, node)).dot(normal).max(0.0);
+    let closing = (surface_velocity - meeting.vector(meeting.velocities, node))
+        .dot(normal)
+        .max(0.0);
     let ahead = if meeting.drifts {
         (closing + surface_velocity.length()) * slice.duration + meeting.slack
     } else {

@@ -1,7 +1,5 @@
 //! What instruments do to tissue, and tissue to them.
 
-#[cfg(test)]
-mod bound_tests;
 mod candidates;
 pub(crate) mod closest;
 mod constraint;

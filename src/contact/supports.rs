@@ -44,7 +44,10 @@ impl Supports {
             for (node, weight) in bindings.parts(corner) {
                 let known = self.nodes().iter().position(|&known| known == node);
                 let place = known.unwrap_or_else(|| {
-                    debug_assert!(self.count < MOST, "corners of one triangle are bound to more than one cell");
+                    debug_assert!(
+                        self.count < MOST,
+                        "corners of one triangle are bound to more than one cell"
+                    );
                     // No impulse is lost in any case.
                     let place = self.count.min(MOST - 1);
                     self.nodes[place] = node;
