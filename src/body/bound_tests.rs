@@ -339,6 +339,67 @@ fn nodes_receive_what_weights_say() {
 }
 
 #[test]
+fn what_nobody_draws_is_not_touched() {
+    let positions = [
+        Vec3::new(-0.05, 0.01, -0.04),
+        Vec3::new(0.06, -0.02, -0.03),
+        Vec3::new(0.0, 0.03, 0.07),
+        Vec3::new(0.01, -0.08, 0.0),
+    ];
+    let parts = [
+        [0.5, 0.25, 0.25, 0.0],
+        [0.125, 0.5, 0.125, 0.25],
+        [0.25, 0.0, 0.5, 0.25],
+    ];
+    let mut world = world(Vec3::ZERO, 1, 1);
+    let id = free_nodes(&mut world, &positions, &[0.001; 4], parts);
+    let plane = ToolDefinition {
+        pose: Pose {
+            position: Vec3::NEG_Y * 0.07,
+            orientation: Quat::IDENTITY,
+        },
+        ..ToolDefinition::new(Shape::Plane)
+    };
+    let tool = world.create_tool(&plane).expect("a tool");
+    // The lowest node is at -0.08, the lowest corner that is drawn at -0.025.
+    for (height, touches) in [(-0.06, false), (-0.04, false), (-0.02, true)] {
+        world.set_pose(tool, Vec3::Y * height, None).expect("a tool");
+        world.step(1e-3).expect("a step");
+        let force = world.wrench(tool).expect("a tool").0;
+        assert_eq!(force != Vec3::ZERO, touches, "{height}: {force}");
+    }
+}
+
+#[test]
+#[ignore]
+fn zz_times() {
+    for count in [100, 316, 1000] {
+        let mut world = world(Vec3::ZERO, 0, 1);
+        let id = sheet(&mut world, Solver::Verlet, Storage::Packed, count, 1.0);
+        let tool = sphere(&mut world, 0.004, Vec3::Y * 0.0039, 0.0);
+        world.step(1e-5).expect("a step");
+        let body = world.body_mut(id).expect("a body");
+        let from = (count * count + count) as usize;
+        for part in 0..4 {
+            let start = std::time::Instant::now();
+            body.reserve_surface(60, 20, 60).expect("room");
+            let reserved = start.elapsed();
+            body.reserve_nodes(60).expect("room");
+            let start = std::time::Instant::now();
+            divide(body, from + 20 * part..from + 20 * part + 20);
+            println!("{count}: reserved {reserved:?}, all {:?}", start.elapsed());
+        }
+        let start = std::time::Instant::now();
+        world.step(1e-5).expect("a step");
+        println!(
+            "{count}: step {:?}, {}",
+            start.elapsed(),
+            world.contacts(tool).expect("a tool").count()
+        );
+    }
+}
+
+#[test]
 fn what_holds_a_node_takes_its_share() {
     let positions = [
         Vec3::new(-0.05, 0.01, -0.04),
@@ -576,7 +637,8 @@ fn what_a_tool_holds_at_a_bound_point_it_does_not_touch() {
         draw(&mut world, id, drawn);
         let (start, triangles) = square(0.2, 4);
         let middle = start[triangles[0][0] as usize].midpoint(start[triangles[0][1] as usize]);
-        let tool = sphere(&mut world, 0.012, middle, 0.5);
+        // Beside it, where faces are met that are bound to what it holds.
+        let tool = sphere(&mut world, 0.012, middle + Vec3::new(0.006, -0.008, 0.002), 0.5);
         if drawn == Drawn::Plainly {
             let point = crate::world::SurfacePoint {
                 triangle: 0,

@@ -156,9 +156,8 @@ impl Contacts {
         let together = features.saturating_mul(tools);
         let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
         self.constraints
-            .try_reserve_exact(together.saturating_sub(self.constraints.len()))?;
-        self.touches
-            .try_reserve_exact(together.saturating_sub(self.touches.len()))?;
+            .try_reserve(together.saturating_sub(self.constraints.len()))?;
+        self.touches.try_reserve(together.saturating_sub(self.touches.len()))?;
         self.together = together;
         Ok(())
     }
