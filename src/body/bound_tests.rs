@@ -371,35 +371,6 @@ fn what_nobody_draws_is_not_touched() {
 }
 
 #[test]
-#[ignore]
-fn zz_times() {
-    for count in [100, 316, 1000] {
-        let mut world = world(Vec3::ZERO, 0, 1);
-        let id = sheet(&mut world, Solver::Verlet, Storage::Packed, count, 1.0);
-        let tool = sphere(&mut world, 0.004, Vec3::Y * 0.0039, 0.0);
-        world.step(1e-5).expect("a step");
-        let body = world.body_mut(id).expect("a body");
-        let from = (count * count + count) as usize;
-        for part in 0..4 {
-            let start = std::time::Instant::now();
-            body.reserve_surface(60, 20, 60).expect("room");
-            let reserved = start.elapsed();
-            body.reserve_nodes(60).expect("room");
-            let start = std::time::Instant::now();
-            divide(body, from + 20 * part..from + 20 * part + 20);
-            println!("{count}: reserved {reserved:?}, all {:?}", start.elapsed());
-        }
-        let start = std::time::Instant::now();
-        world.step(1e-5).expect("a step");
-        println!(
-            "{count}: step {:?}, {}",
-            start.elapsed(),
-            world.contacts(tool).expect("a tool").count()
-        );
-    }
-}
-
-#[test]
 fn what_holds_a_node_takes_its_share() {
     let positions = [
         Vec3::new(-0.05, 0.01, -0.04),
