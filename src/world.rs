@@ -6,7 +6,7 @@ mod sutures;
 
 use glam::{Quat, Vec3};
 
-use crate::body::{Body, BodyDefinition, CutReport, Needs, finite_vector, not_negative};
+use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, finite_vector, not_negative};
 use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::diagnostics::StateHasher;
@@ -15,8 +15,8 @@ use crate::slots::{SlotId, Slots};
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{RunTasks, Threads};
-use attachments::Attachment;
 pub use attachments::{Anchor, AttachmentId, SurfacePoint};
+use attachments::{Attachment, Which};
 pub use step::StepReport;
 pub use sutures::{SutureDefinition, SutureReport};
 
@@ -199,12 +199,54 @@ impl World {
     /// length. [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
         let place = self.bodies.place(body.0)?;
+        let carried = self.attached_points(body, place)?;
+        let mut moved = crate::memory::reserved(carried.len())?;
         let it = self.bodies.get_mut(body.0)?;
+        let before = it.topology_version();
         let report = it.cut(sweep)?;
         if let Some(tissue) = self.tissue.as_mut().filter(|_| it.meets_tissue()) {
             tissue.join(place, it)?;
         }
+        for (anchor, point) in carried {
+            if let Some(point) = self.bodies.get(body.0)?.surface_point(&point, before) {
+                moved.push((
+                    anchor,
+                    self.bound(
+                        body,
+                        Which {
+                            prefix: "",
+                            index: None,
+                        },
+                        &Anchor::Point(point),
+                    )?,
+                ));
+            }
+        }
+        if let Some(bonds) = self.bonds_mut() {
+            bonds.rebind(place, |bound| {
+                let of = moved.iter().find(|(anchor, _)| *anchor == bound.anchor);
+                of.map(|(_, now)| *now)
+            });
+        }
         Ok(report)
+    }
+
+    /// The points of a body at which others are attached, in its material; there is room to bind them anew.
+    fn attached_points(&mut self, body: BodyId, place: usize) -> Result<Vec<(Anchor, MaterialPoint)>> {
+        let mut points = Vec::new();
+        let it = self.bodies.get(body.0)?;
+        let Some(tissue) = &mut self.tissue else {
+            return Ok(points);
+        };
+        tissue.bonds.reserve_rebinding(place)?;
+        for bound in tissue.bonds.points_of(place) {
+            if let Anchor::Point(point) = &bound.anchor
+                && let Some(at) = it.material_point(point)
+            {
+                crate::memory::push(&mut points, (bound.anchor, at))?;
+            }
+        }
+        Ok(points)
     }
 
     /// A body, to look at.

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::vectors::Vectors;
 use crate::error::Result;
+use crate::memory;
 
 /// A point that is bound to nodes, which are not bound themselves. It has a number among the body's nodes, without mass or springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,10 @@ pub(crate) struct Bound {
 impl Bound {
     /// The nodes that count, with their weights.
     pub fn parts(&self) -> impl Iterator<Item = (u32, f32)> {
+        self.into_parts()
+    }
+
+    pub fn into_parts(self) -> impl Iterator<Item = (u32, f32)> {
         let parts = self.nodes.into_iter().zip(self.weights);
         parts.filter(|&(_, weight)| weight > 0.0)
     }
@@ -32,36 +37,97 @@ impl Bound {
 
 /// The bound points of a body, in the order of their numbers.
 #[derive(Debug, Default)]
-pub(crate) struct Bindings(Vec<Bound>);
+pub(crate) struct Bindings {
+    points: Vec<Bound>,
+    /// For each number from that of the first point on its place among them; [`NOT_BOUND`] where it has none.
+    places: Vec<u32>,
+    /// A bit for each of the body's numbers up to the last that nobody draws or touches.
+    hidden: Vec<u64>,
+}
+
+const NOT_BOUND: u32 = u32::MAX;
 
 impl Bindings {
-    /// Makes room for so many more.
-    pub fn reserve(&mut self, count: usize) -> Result<()> {
-        Ok(self.0.try_reserve(count)?)
+    /// Makes room for so many numbers more than the body has, of which any may be bound and any hidden.
+    pub fn reserve(&mut self, count: usize, node_count: usize) -> Result<()> {
+        self.points.try_reserve(count)?;
+        self.places.try_reserve(count)?;
+        memory::reserve(&mut self.hidden, (node_count + count).div_ceil(64))
     }
 
     /// Adds a point, for which there is room, of a higher number than those before.
     pub fn push(&mut self, bound: Bound) {
-        self.0.push(bound);
+        let first = self.points.first().map_or(bound.node, |bound| bound.node);
+        self.places.resize((bound.node - first) as usize, NOT_BOUND);
+        self.places.push(self.points.len() as u32);
+        self.points.push(bound);
     }
 
     pub fn iter(&self) -> impl Iterator<Item = &Bound> {
-        self.0.iter()
+        self.points.iter()
     }
 
     pub fn get(&self, node: u32) -> Option<&Bound> {
-        let place = self.0.binary_search_by_key(&node, |bound| bound.node);
-        place.ok().map(|place| &self.0[place])
+        self.points.get(self.place(node)?)
     }
 
     pub fn get_mut(&mut self, node: u32) -> Option<&mut Bound> {
-        let place = self.0.binary_search_by_key(&node, |bound| bound.node);
-        place.ok().map(|place| &mut self.0[place])
+        let place = self.place(node)?;
+        self.points.get_mut(place)
+    }
+
+    #[inline]
+    fn place(&self, node: u32) -> Option<usize> {
+        let place = node.checked_sub(self.points.first()?.node)?;
+        let &place = self.places.get(place as usize)?;
+        (place != NOT_BOUND).then_some(place as usize)
+    }
+
+    /// The nodes that a number stands for, with their weights: itself where it is not bound.
+    #[inline]
+    pub fn parts(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
+        let itself = Bound {
+            node,
+            nodes: [node; 4],
+            weights: [1.0, 0.0, 0.0, 0.0],
+        };
+        self.get(node).copied().unwrap_or(itself).into_parts()
+    }
+
+    /// The vector of a number, as its nodes make it.
+    #[inline]
+    pub fn vector(&self, vectors: &Vectors, node: usize) -> Vec3 {
+        match self.get(node as u32) {
+            Some(bound) => bound.of(|node| vectors.get(node)),
+            None => vectors.get(node),
+        }
+    }
+
+    /// Nobody draws or touches this number any more; there is room for it.
+    pub fn hide(&mut self, node: u32) {
+        let word = node as usize / 64;
+        if word >= self.hidden.len() {
+            self.hidden.resize(word + 1, 0);
+        }
+        self.hidden[word] |= 1 << (node % 64);
+    }
+
+    /// It is drawn again.
+    pub fn show(&mut self, node: u32) {
+        if let Some(word) = self.hidden.get_mut(node as usize / 64) {
+            *word &= !(1 << (node % 64));
+        }
+    }
+
+    #[inline]
+    pub fn is_hidden(&self, node: u32) -> bool {
+        let word = self.hidden.get(node as usize / 64);
+        word.is_some_and(|word| word >> (node % 64) & 1 == 1)
     }
 
     /// Makes the vectors of all points what those of their nodes make of them.
     pub fn follow(&self, vectors: &mut Vectors) {
-        for bound in &self.0 {
+        for bound in &self.points {
             let vector = bound.of(|node| vectors.get(node));
             vectors.set(bound.node as usize, vector);
         }

@@ -5,6 +5,7 @@ use glam::{BVec3, Vec3};
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::{Cuttable, passes};
 use super::{Body, Bound, NewNode, Spring};
+use crate::contact::SurfaceChange;
 use crate::cutting::{Changes, Limits, PieceOfSpring, Sweep};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -73,6 +74,11 @@ impl Body {
         }
     }
 
+    /// Which version its topology has: 0 when it was made.
+    pub fn topology_version(&self) -> u64 {
+        self.cuttable.as_ref().map_or(0, |cuttable| cuttable.log.version())
+    }
+
     fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
         let first_triangle = cuttable.surface.triangles().len() as u32;
         let near = self.triangles_near(cuttable, sweep)?;
@@ -124,7 +130,21 @@ impl Body {
                 .map(|spring| spring.nodes.map(|node| self.order.caller(node))),
         );
         cuttable.log.reserve(changes, gone.len())?;
-        self.surface.try_reserve(new_triangles)?;
+        let (known_triangles, new) = split_at(&changes.triangles, first_triangle);
+        let mut changed = memory::reserved(known_triangles.len())?;
+        changed.extend(
+            known_triangles
+                .iter()
+                .map(|&triangle| (triangle, surface.corner_points(triangle))),
+        );
+        let mut added = memory::reserved(new.len())?;
+        added.extend(new.iter().map(|&triangle| surface.corner_points(triangle)));
+        let change = SurfaceChange {
+            changed: &changed,
+            added: &added,
+            hidden: &changes.undrawn,
+        };
+        self.reserve_surface(nodes.len(), changed.len(), added.len())?;
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
             scaling.reserve(touched.len())?;
@@ -155,18 +175,14 @@ impl Body {
         self.rebind(changes);
         self.share_masses(cuttable, changes)?;
         self.go_on(&touched, &changing, candidates);
+        self.change_surface(&change);
         let surface = &cuttable.surface;
-        self.surface.resize(surface.triangles().len(), [0; 3]);
-        for &triangle in &changes.triangles {
-            self.surface[triangle as usize] = surface.corner_points(triangle);
-        }
         cuttable.search.add_cells(copies.map(|piece| piece.source));
         cuttable.search.see(surface, &changes.triangles, first_triangle);
         if !changes.triangles.is_empty() || !gone.is_empty() {
             cuttable.log.add(changes, &gone);
         }
         self.publish_new(known);
-        self.remake_contacts()?;
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
             new_triangles: new_triangles as u32,
@@ -442,6 +458,11 @@ impl Body {
             implicit.forget_matrix();
         }
     }
+}
+
+/// Those below a number, and the others, of numbers in order.
+fn split_at(numbers: &[u32], first: u32) -> (&[u32], &[u32]) {
+    numbers.split_at(numbers.partition_point(|&number| number < first))
 }
 
 /// A spring of the ends of a link, with a part of its stiffness and damping.

@@ -11,7 +11,7 @@ use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
     /// Adds `force`, in newtons, to what acts on `node` over the whole next step; nothing on a pinned node or one that a tool holds, nor
-    /// along an axis along which a node is held.
+    /// along an axis along which a node is held. A point that is bound to nodes, as cuts make them, hands it on to those by its weights.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: there is no such node, or the force is not finite.
@@ -39,22 +39,29 @@ impl Body {
         let Some(applied) = &mut self.applied else {
             return Ok(());
         };
-        for (&node, &force) in nodes.iter().zip(forces) {
-            let node = self.order.own(node) as usize;
-            if self.inverse_masses[node] == 0.0 {
-                continue;
+        let mut push = |node: u32, force: Vec3| {
+            if self.inverse_masses[node as usize] == 0.0 {
+                return;
             }
-            let held = self.pins.partial_axes_of(node as u32);
+            let held = self.pins.partial_axes_of(node);
             let force = Vec3::select(held, Vec3::ZERO, force);
             // Sums of finite forces stay finite.
-            let sum = (applied.get(node) + force).clamp(Vec3::MIN, Vec3::MAX);
-            applied.set(node, sum);
+            let sum = (applied.get(node as usize) + force).clamp(Vec3::MIN, Vec3::MAX);
+            applied.set(node as usize, sum);
             self.forces_applied = true;
+        };
+        for (&node, &force) in nodes.iter().zip(forces) {
+            let own = self.order.own(node);
+            match self.bindings.as_ref().and_then(|bindings| bindings.get(own)) {
+                Some(bound) => bound.parts().for_each(|(node, weight)| push(node, force * weight)),
+                None => push(own, force),
+            }
         }
         Ok(())
     }
 
     /// Puts all nodes, pinned ones too, at these places, in metres; velocities stay, and nothing is swept. What tools hold they hold there.
+    /// Points that are bound to nodes are where those are.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: not one position for each node, or one that is not finite.
@@ -82,6 +89,7 @@ impl Body {
                 self.set_velocity(node, Vec3::select(self.pins.partial_axes_of(own), kept, velocity));
             }
         }
+        self.follow_nodes();
         self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();
@@ -92,7 +100,7 @@ impl Body {
     /// Holds `node` where it is, from now on; nothing where it is held already.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, or a tool holds it.
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it is a point that is bound to nodes.
     pub fn pin(&mut self, node: u32) -> Result<()> {
         self.pin_axes(node, [true; 3])
     }
@@ -110,14 +118,15 @@ impl Body {
     /// pinned node.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass, and is pinned for good along all
-    /// axes.
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, it is a point that is bound to nodes, or it has no mass, and is
+    /// pinned for good along all axes.
     pub fn pin_axes(&mut self, node: u32, axes: [bool; 3]) -> Result<()> {
         let axes = BVec3::from(axes);
         if !axes.any() {
             return self.unpin(node);
         }
         self.check_node(&"node", node)?;
+        self.check_not_bound(&"node", node)?;
         self.check_not_held(&"node", node)?;
         let own = self.order.own(node);
         let before = self.pins.axes_of(own);
@@ -151,6 +160,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass and is pinned for good.
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
+        self.check_not_bound(&"node", node)?;
         self.check_not_held(&"node", node)?;
         let own = self.order.own(node);
         let mass = self.mass_of_unpinned(node)?;
@@ -171,6 +181,7 @@ impl Body {
     /// [`Error::InvalidArgument`]: there is no such node, it is not pinned or a tool holds it, or the position is not finite.
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
         self.check_node(&"node", node)?;
+        self.check_not_bound(&"node", node)?;
         self.check_not_held(&"node", node)?;
         finite_vector("position", position)?;
         match self.pins.get_mut(self.order.own(node)) {
@@ -199,11 +210,13 @@ impl Body {
     /// distance.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there is no such node, the nodes are one, they have a spring already, or a number is
-    /// negative or not finite. [`Error::Capacity`]: a node has no free place in a row of fixed length.
+    /// [`Error::InvalidArgument`]: there is no such node, the nodes are one, they have a spring already, one is a point that is bound to
+    /// nodes, or a number is negative or not finite. [`Error::Capacity`]: a node has no free place in a row of fixed length.
     /// [`Error::OutOfMemory`].
     pub fn add_spring(&mut self, a: u32, b: u32, stiffness: f32, rest_length: Option<f32>) -> Result<()> {
         let nodes = self.check_pair(a, b)?;
+        self.check_not_bound(&"a", a)?;
+        self.check_not_bound(&"b", b)?;
         not_negative("stiffness", stiffness)?;
         let rest_length = match rest_length {
             Some(length) => length,
@@ -443,6 +456,17 @@ impl Body {
             "{name} is {node}: the body has {} nodes",
             self.node_count()
         )))
+    }
+
+    /// Refuses a point that is bound to nodes: nothing holds or pulls it but those.
+    fn check_not_bound(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+        let bindings = self.bindings.as_ref();
+        if bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some()) {
+            return Err(Error::invalid(format!(
+                "{name} is {node}: a point of the surface that is bound to nodes, and goes where they go"
+            )));
+        }
+        Ok(())
     }
 
     /// The body's own numbers of two nodes that a spring may join.

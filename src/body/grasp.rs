@@ -1,5 +1,5 @@
 //! What tools hold of a body: nodes that a tool leads as if they were part of it, and what that takes. A point of the surface is
-//! held by the corners of its triangle.
+//! held by the corners of its triangle, and a corner that is bound to nodes by those.
 //!
 //! A node that is held is a pin, so every solver holds it exactly. What holds it is all that acts on the tool in return: what
 //! pins tell, and what it takes to move the node's own mass, and to move it against what damps it.
@@ -23,14 +23,17 @@ pub(crate) struct Grasp {
     pub id: SlotId,
     /// The holder's place among the world's tools.
     tool: usize,
-    corners: [u32; 3],
-    /// Its part in what holds each corner, beside those of other grasps; 0 for corners that it does not hold.
-    weights: [f32; 3],
+    nodes: [u32; MOST],
+    /// Its part in what holds each node, beside those of other grasps; 0 for nodes that it does not hold.
+    weights: [f32; MOST],
     /// The mean force over a step with which the tool just holds it, N.
     limit: f32,
     /// What the tool did to the tissue, mean over the last step, N.
     pub force: Vec3,
 }
+
+/// So many nodes a grasp holds at most: the corners of a triangle are bound to nodes of one cell.
+const MOST: usize = 4;
 
 /// A node that a tool holds.
 #[derive(Clone, Copy, Debug)]
@@ -146,7 +149,7 @@ impl Grasps {
             hasher.write_floats(&held.gain.to_array());
         }
         for grasp in &self.grasps {
-            grasp.corners.iter().for_each(|&corner| hasher.write_u64(corner.into()));
+            grasp.nodes.iter().for_each(|&node| hasher.write_u64(node.into()));
             hasher.write_floats(&grasp.weights);
             hasher.write_floats(&[grasp.limit]);
         }
@@ -165,8 +168,8 @@ impl Grasps {
         let Self { grasps, nodes } = self;
         for grasp in grasps {
             grasp.force = Vec3::ZERO;
-            for (corner, weight) in grasp.grip().held() {
-                if let Ok(place) = nodes.binary_search_by_key(&corner, |held| held.node) {
+            for (node, weight) in grasp.held() {
+                if let Ok(place) = nodes.binary_search_by_key(&node, |held| held.node) {
                     let share = parts(weight) as f64 / nodes[place].parts as f64;
                     grasp.force += nodes[place].force * share as f32;
                 }
@@ -176,11 +179,10 @@ impl Grasps {
 }
 
 impl Grasp {
-    fn grip(&self) -> Grip {
-        Grip {
-            corners: self.corners,
-            weights: self.weights,
-        }
+    /// The nodes that are held, with their weights.
+    fn held(&self) -> impl Iterator<Item = (u32, f32)> + use<> {
+        let nodes = self.nodes.into_iter().zip(self.weights);
+        nodes.filter(|(_, weight)| *weight > 0.0)
     }
 }
 
@@ -246,6 +248,17 @@ impl Body {
     /// Whether the tool in this place can hold a node, which is there.
     pub(crate) fn check_graspable(&self, name: &dyn Display, node: u32, tool: usize) -> Result<()> {
         let own = self.order.own(node);
+        match self.bindings.as_ref().and_then(|bindings| bindings.get(own)) {
+            Some(bound) => bound.parts().try_for_each(|(node, _)| {
+                let name = format_args!("{name} is bound to a node that");
+                self.check_node_graspable(&name, node, tool)
+            }),
+            None => self.check_node_graspable(name, own, tool),
+        }
+    }
+
+    fn check_node_graspable(&self, name: &dyn Display, own: u32, tool: usize) -> Result<()> {
+        let node = self.order.caller(own);
         match self.grasps.as_ref().and_then(|grasps| grasps.get_held(own)) {
             Some(held) if held.tool == tool => Ok(()),
             Some(_) => Err(Error::invalid(format!("{name} is {node}: another tool holds it"))),
@@ -272,19 +285,19 @@ impl Body {
 
     /// Makes room for so many grasps more.
     pub(crate) fn reserve_grasps(&mut self, count: usize) -> Result<()> {
-        let corners = count.saturating_mul(3).min(self.masses.len());
-        self.pins.reserve(corners, self.masses.len())?;
+        let nodes = count.saturating_mul(MOST).min(self.masses.len());
+        self.pins.reserve(nodes, self.masses.len())?;
         if let Some(contacts) = &mut self.contacts {
-            contacts.reserve_held(corners)?;
+            contacts.reserve_held(nodes)?;
         }
         if let Some(grasps) = &mut self.grasps {
             grasps.grasps.try_reserve(count)?;
-            grasps.nodes.try_reserve(corners)?;
+            grasps.nodes.try_reserve(nodes)?;
             return Ok(());
         }
         let grasps = Grasps {
             grasps: memory::reserved(count)?,
-            nodes: memory::reserved(corners)?,
+            nodes: memory::reserved(nodes)?,
         };
         self.grasps = Some(Box::new(grasps));
         Ok(())
@@ -298,17 +311,18 @@ impl Body {
         limit: f32,
     ) -> Result<()> {
         let mut more = memory::reserved(grips.len())?;
-        let mut nodes = memory::reserved(3 * grips.len())?;
+        let mut nodes = memory::reserved(MOST * grips.len())?;
         for (id, grip) in grips {
+            let (held, weights) = self.supports(grip);
             let grasp = Grasp {
                 id,
                 tool,
-                corners: grip.corners.map(|corner| self.order.own(corner)),
-                weights: grip.weights,
+                nodes: held,
+                weights,
                 limit: if limit > 0.0 { limit } else { f32::INFINITY },
                 force: Vec3::ZERO,
             };
-            nodes.extend(grasp.grip().held().map(|(node, _)| node));
+            nodes.extend(grasp.held().map(|(node, _)| node));
             more.push(grasp);
         }
         let Some(grasps) = &mut self.grasps else {
@@ -350,8 +364,8 @@ impl Body {
         }
         if let Some(grasps) = &mut self.grasps {
             memory::merge(&mut grasps.nodes, &held, |held| held.node);
-            for (corner, weight) in more.iter().flat_map(|grasp| grasp.grip().held()) {
-                if let Ok(place) = grasps.place_of(corner) {
+            for (node, weight) in more.iter().flat_map(Grasp::held) {
+                if let Ok(place) = grasps.place_of(node) {
                     grasps.nodes[place].parts += parts(weight);
                 }
             }
@@ -359,6 +373,28 @@ impl Body {
         }
         self.forget_held();
         Ok(())
+    }
+
+    /// The nodes, in the body's own numbers, that hold what a grip holds, with their parts in it.
+    fn supports(&self, grip: Grip) -> ([u32; MOST], [f32; MOST]) {
+        let own = |corner: u32| self.order.own(corner);
+        let Some(bindings) = &self.bindings else {
+            let [a, b, c] = grip.corners.map(own);
+            let [of_a, of_b, of_c] = grip.weights;
+            return ([a, b, c, a], [of_a, of_b, of_c, 0.0]);
+        };
+        let (mut nodes, mut weights) = ([own(grip.corners[0]); MOST], [0.0; MOST]);
+        let mut count = 0;
+        for (corner, weight) in grip.held() {
+            for (node, part) in bindings.parts(own(corner)) {
+                let known = nodes[..count].iter().position(|&known| known == node);
+                let place = known.unwrap_or(count.min(MOST - 1));
+                count = count.max(place + 1);
+                nodes[place] = node;
+                weights[place] += weight * part;
+            }
+        }
+        (nodes, weights)
     }
 
     /// Ends a grasp.
@@ -370,9 +406,8 @@ impl Body {
         let Some(grasps) = &mut self.grasps else {
             return;
         };
-        let grip = grasps.grasps.remove(place).grip();
-        for (corner, weight) in grip.held() {
-            let Ok(place) = grasps.place_of(corner) else {
+        for (node, weight) in grasps.grasps.remove(place).held() {
+            let Ok(place) = grasps.place_of(node) else {
                 continue;
             };
             grasps.nodes[place].parts -= parts(weight);
@@ -418,8 +453,8 @@ impl Body {
         grasps.retain(|grasp| {
             let stays = !ends(grasp);
             if !stays {
-                for (corner, weight) in grasp.grip().held() {
-                    if let Ok(place) = nodes.binary_search_by_key(&corner, |held| held.node) {
+                for (node, weight) in grasp.held() {
+                    if let Ok(place) = nodes.binary_search_by_key(&node, |held| held.node) {
                         nodes[place].parts -= parts(weight);
                     }
                 }

@@ -51,7 +51,8 @@ impl Body {
         memory::reserve(&mut self.surface, triangles)?;
         self.published.reserve(count)?;
         self.node_room = count;
-        self.bindings.get_or_insert_default().reserve(more)
+        let known = self.node_count();
+        self.bindings.get_or_insert_default().reserve(more, known)
     }
 
     /// A zero vector for each node, with room for those that may come.

@@ -1,6 +1,8 @@
 //! A body: nodes with mass, joined by springs.
 
 mod bindings;
+#[cfg(test)]
+mod bound_tests;
 mod change_log;
 mod coarse;
 mod cut;
@@ -11,6 +13,7 @@ mod edit;
 mod grasp;
 mod grow;
 mod hash;
+mod material_point;
 mod nodes;
 mod order;
 mod origin;
@@ -21,6 +24,7 @@ mod published;
 mod records;
 mod region;
 mod state;
+mod surface;
 mod tissue;
 mod tune;
 mod vectors;
@@ -38,7 +42,6 @@ pub(crate) use definition::{
     SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices, not_negative,
 };
 pub(crate) use grasp::{Grasps, Grip, Lapse};
-#[allow(unused_imports)]
 pub(crate) use grow::NewNode;
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
@@ -61,6 +64,7 @@ use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::Team;
 use crate::world::BodyId;
+pub(crate) use material_point::MaterialPoint;
 pub(crate) use order::NodeOrder;
 use origin::shift_towards;
 pub use pieces::Pieces;
@@ -492,14 +496,6 @@ impl Body {
         }
     }
 
-    /// Has contacts know the surface as it is now.
-    pub(crate) fn remake_contacts(&mut self) -> Result<()> {
-        if let Some(tools) = self.contacts.take().map(|contacts| contacts.tool_places()) {
-            self.make_contacts(tools)?;
-        }
-        Ok(())
-    }
-
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
         match &mut self.contacts {
             Some(contacts) => contacts.reserve(tools)?,
@@ -508,8 +504,16 @@ impl Body {
                 self.contacts = Some(Contacts::new(self.node_count(), &surface, &self.contact, tools)?);
             }
         }
+        self.reserve_holds()
+    }
+
+    /// Makes room for contacts within equations, where it has such.
+    fn reserve_holds(&mut self) -> Result<()> {
         if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
             implicit.reserve_contacts(contacts.reserve_holds()?)?;
+            if self.node_room > 0 {
+                implicit.reserve_nodes(self.node_room)?;
+            }
         }
         Ok(())
     }
@@ -565,6 +569,7 @@ impl Body {
             pin.force = pin.held(held(pin.node as usize));
         }
         self.rest_grasps();
+        self.follow_nodes();
         self.relax();
         self.forget_motion();
         self.publish(&Team::alone());
@@ -596,11 +601,16 @@ impl Body {
             let own = self.order.own(node) as usize;
             local.set(own, (position.as_dvec3() - self.origin).as_vec3());
         }
+        self.follow_nodes();
         let (kernel, local) = (self.kernel, self.state.positions());
         for (tile, bounds) in self.boxes.iter_mut().enumerate() {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
         }
         self.published.positions_mut().copy_from_slice(positions);
+        for bound in self.bindings.iter().flat_map(|bindings| bindings.iter()) {
+            let place = local.get(bound.node as usize).as_dvec3() + self.origin;
+            self.published.positions_mut()[self.order.caller(bound.node) as usize] = place.as_vec3();
+        }
         self.grasp_anew();
         self.relax();
         self.forget_motion();

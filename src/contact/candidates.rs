@@ -2,10 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::features::Features;
+use super::features::{Feature, Features};
 use super::filter::CollisionFilter;
 use super::path::{Placement, Solid, ToolPath};
-use crate::body::{Bounds, Vectors};
+use crate::body::{Bindings, Bounds, Vectors};
 use crate::error::Result;
 use crate::memory;
 
@@ -19,6 +19,8 @@ pub(super) struct Candidates {
     zones: Vec<Zone>,
     /// How far nodes may still move, m.
     slack: f32,
+    /// What is no further from a zone was gathered, m.
+    reach: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +46,13 @@ impl Candidates {
             near: memory::reserved(features.count())?,
             zones: Vec::new(),
             slack: -1.0,
+            reach: 0.0,
         })
+    }
+
+    /// Makes room for so many features.
+    pub fn reserve_features(&mut self, count: usize) -> Result<()> {
+        Ok(self.near.try_reserve(count.saturating_sub(self.near.len()))?)
     }
 
     /// Makes room for `tools` tools.
@@ -80,7 +88,7 @@ impl Candidates {
     pub fn gather<'a>(
         &mut self,
         features: &Features,
-        positions: &Vectors,
+        (positions, bindings): (&Vectors, Option<&Bindings>),
         tools: impl Iterator<Item = &'a ToolPath> + Clone,
         origin: DVec3,
         [margin, slack]: [f32; 2],
@@ -109,6 +117,7 @@ impl Candidates {
             });
         }
         let reach = margin + slack;
+        self.reach = reach;
         let everything = Bounds::of(positions.iter());
         if !self.zones.iter().any(|zone| zone.meets(&everything, reach)) {
             return;
@@ -121,19 +130,84 @@ impl Candidates {
             features.node_count as usize
         };
         for index in 0..count as u32 {
-            let feature = features.get(index);
-            let nodes = feature.nodes();
-            let bounds = Bounds::of(nodes.iter().map(|&node| positions.get(node as usize)));
+            let Some(feature) = features.get(index) else {
+                continue;
+            };
+            if is_hidden(feature, bindings) {
+                continue;
+            }
+            let corners = corners_of(feature, (positions, bindings));
+            let corners = &corners[..feature.nodes().len()];
+            let bounds = Bounds::of(corners.iter().copied());
             let meets = |(zone, tool): (&Zone, &ToolPath)| {
-                (nodes.len() == 1 || zone.is_bounded())
+                (corners.len() == 1 || zone.is_bounded())
                     && zone.meets(&bounds, reach)
-                    && zone.reaches(tool, nodes, positions, reach)
+                    && zone.reaches(tool, corners, reach)
             };
             if self.zones.iter().zip(tools.clone()).any(meets) {
                 self.near.push(index);
             }
         }
     }
+
+    /// The features have changed, of which there were so many nodes, edges and faces, and these are `fresh`: the list stays as good as it
+    /// was, and what has become hidden is not on it. There is room.
+    pub fn change(
+        &mut self,
+        features: &Features,
+        before: [u32; 3],
+        fresh: &mut Vec<u32>,
+        (positions, bindings): (&Vectors, &Bindings),
+    ) {
+        if self.slack < 0.0 {
+            return;
+        }
+        let [nodes, edges, _] = before;
+        let [more_nodes, more_edges] = [0, 1].map(|kind| features.counts()[kind] - before[kind]);
+        for index in &mut self.near {
+            if *index >= nodes + edges {
+                *index += more_nodes + more_edges;
+            } else if *index >= nodes {
+                *index += more_nodes;
+            }
+        }
+        let is_visible = |index: &u32| *index >= features.node_count || !bindings.is_hidden(*index);
+        self.near.retain(is_visible);
+        fresh.sort_unstable();
+        fresh.dedup();
+        fresh.retain(|&index| {
+            let Some(feature) = features.get(index) else {
+                return false;
+            };
+            let corners = corners_of(feature, (positions, Some(bindings)));
+            let corners = &corners[..feature.nodes().len()];
+            let bounds = Bounds::of(corners.iter().copied());
+            let meets = |zone: &Zone| (corners.len() == 1 || zone.is_bounded()) && zone.meets(&bounds, self.reach);
+            self.zones.iter().any(meets) && self.near.binary_search(&index).is_err()
+        });
+        memory::merge(&mut self.near, fresh, |&index| index);
+    }
+}
+
+/// Whether it is a node that nobody draws or touches.
+fn is_hidden(feature: Feature, bindings: Option<&Bindings>) -> bool {
+    match (feature.nodes(), bindings) {
+        (&[node], Some(bindings)) => bindings.is_hidden(node),
+        _ => false,
+    }
+}
+
+/// Where the corners of a feature are.
+#[inline]
+fn corners_of(feature: Feature, (positions, bindings): (&Vectors, Option<&Bindings>)) -> [Vec3; 3] {
+    let mut corners = [Vec3::ZERO; 3];
+    for (corner, &node) in corners.iter_mut().zip(feature.nodes()) {
+        *corner = match bindings {
+            None => positions.get(node as usize),
+            Some(bindings) => bindings.vector(positions, node as usize),
+        };
+    }
+    corners
 }
 
 /// Those of the tools that a body with this filter meets: the others are as if they were not there.
@@ -207,8 +281,8 @@ impl Zone {
         }
     }
 
-    /// Whether a feature of these nodes may come to the tool itself when it moves by `reach`.
-    fn reaches(&self, tool: &ToolPath, nodes: &[u32], positions: &Vectors, reach: f32) -> bool {
+    /// Whether a feature with these corners may come to the tool itself when it moves by `reach`.
+    fn reaches(&self, tool: &ToolPath, places: &[Vec3], reach: f32) -> bool {
         let (
             Zone::Mesh {
                 standing, allowance, ..
@@ -219,11 +293,11 @@ impl Zone {
             return true;
         };
         let mut corners = [Vec3::ZERO; 3];
-        for (corner, &node) in corners.iter_mut().zip(nodes) {
-            *corner = standing.own(positions.get(node as usize));
+        for (corner, &place) in corners.iter_mut().zip(places) {
+            *corner = standing.own(place);
         }
-        // No part of a feature is further from its nodes than they are from each other.
-        let corners = &corners[..nodes.len()];
+        // No part of a feature is further from its corners than they are from each other.
+        let corners = &corners[..places.len()];
         let spread = corners
             .iter()
             .fold(0.0_f32, |spread, corner| spread.max(corner.distance(corners[0])));

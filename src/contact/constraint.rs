@@ -5,6 +5,7 @@ use glam::{BVec3, DVec3, Vec3};
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::impulses::LEVERAGE;
+use super::supports::{MOST, Supports};
 use crate::body::{Mobility, Vectors};
 
 /// A contact over one slice of a substep.
@@ -14,12 +15,17 @@ use crate::body::{Mobility, Vectors};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Constraint {
     pub feature: Feature,
-    /// Where the feature's nodes are when the contact begins.
-    pub starts: [Vec3; 3],
-    /// Weights of the feature's nodes, 1 in sum.
+    /// Weights of the feature's corners, 1 in sum.
     pub weights: [f32; 3],
+    /// The nodes that move the feature.
+    nodes: [u32; MOST],
+    count: usize,
+    /// Where they are when the contact begins.
+    pub starts: [Vec3; MOST],
+    /// What of the contact's impulse each of them receives, 1 in sum.
+    pub shares: [f32; MOST],
     /// How much each node's velocity changes along each axis for an impulse at the contact, 1/kg.
-    answers: [Vec3; 3],
+    answers: [Vec3; MOST],
     /// Away from the tool, of unit length.
     pub normal: Vec3,
     least_speed: f32,
@@ -49,29 +55,32 @@ pub(super) struct Constraint {
 }
 
 impl Constraint {
-    /// A contact that has given nothing yet, of nodes that are held along these axes but have a mobility; `None` where none of them can
-    /// move along the normal.
+    /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility;
+    /// `None` where none of them can move along the normal.
     pub fn new(
-        feature: Feature,
-        starts: [Vec3; 3],
-        weights: [f32; 3],
+        (feature, weights): (Feature, [f32; 3]),
+        supports: &Supports,
+        starts: [Vec3; MOST],
         normal: Vec3,
         mobility: &Mobility,
-        held: [BVec3; 3],
+        held: [BVec3; MOST],
     ) -> Option<Self> {
-        let mut answers = [Vec3::ZERO; 3];
+        let shares = supports.shares(weights);
+        let mut nodes = [0; MOST];
+        let mut answers = [Vec3::ZERO; MOST];
         // Along the normal, and along a direction in which all nodes are free.
         let (mut rigid, mut free, mut leverage) = (0.0, 0.0, 0.0_f32);
-        for (corner, (&node, weight)) in feature.nodes().iter().zip(weights).enumerate() {
-            let answer = mobility.of(node as usize) * weight;
-            answers[corner] = Vec3::select(held[corner], Vec3::ZERO, Vec3::splat(answer));
-            let along = if held[corner].any() {
-                Vec3::select(held[corner], Vec3::ZERO, normal).length_squared()
+        for (place, (&node, share)) in supports.nodes().iter().zip(shares).enumerate() {
+            nodes[place] = node;
+            let answer = mobility.of(node as usize) * share;
+            answers[place] = Vec3::select(held[place], Vec3::ZERO, Vec3::splat(answer));
+            let along = if held[place].any() {
+                Vec3::select(held[place], Vec3::ZERO, normal).length_squared()
             } else {
                 1.0
             };
-            rigid += answer * along * weight;
-            free += answer * weight;
+            rigid += answer * along * share;
+            free += answer * share;
             leverage = leverage.max(answer / LEVERAGE);
         }
         let inverse_mass = leverage.max(rigid);
@@ -79,8 +88,11 @@ impl Constraint {
         let fading = (rigid / leverage.min(free)).min(1.0);
         (rigid > 0.0).then(|| Self {
             feature,
-            starts,
             weights,
+            nodes,
+            count: supports.nodes().len(),
+            starts,
+            shares,
             answers,
             normal,
             least_speed: 0.0,
@@ -99,6 +111,11 @@ impl Constraint {
         })
     }
 
+    /// The nodes that move the feature.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes[..self.count]
+    }
+
     /// Lets the nodes come closer to the tool's surface by `gap` within `duration` seconds, and no further; where they
     /// are inside, not deeper.
     pub fn allow_gap(&mut self, gap: f32, duration: f32) {
@@ -114,8 +131,8 @@ impl Constraint {
                 radius: f64::from(radius),
             };
         }
-        let starts = self.starts.iter().zip(self.weights);
-        let matter: DVec3 = starts.map(|(start, weight)| start.as_dvec3() * f64::from(weight)).sum();
+        let starts = self.starts.iter().zip(self.shares).take(self.count);
+        let matter: DVec3 = starts.map(|(start, share)| start.as_dvec3() * f64::from(share)).sum();
         let normal = self.normal.as_dvec3();
         Gauge::Flat {
             weights: self.weights.map(f64::from),
@@ -132,10 +149,10 @@ impl Constraint {
         (impulse, open): (f32, f32),
         duration: f32,
         velocities: &Vectors,
-        (mobility, held): (&Mobility, [BVec3; 3]),
+        (supports, mobility, held): (&Supports, &Mobility, [BVec3; MOST]),
     ) -> Self {
         let (weights, normal) = (meets.weights.map(|weight| weight as f32), meets.normal.as_vec3());
-        let found = Self::new(self.feature, self.starts, weights, normal, mobility, held);
+        let found = Self::new((self.feature, weights), supports, self.starts, normal, mobility, held);
         let mut after = Self {
             surface_velocity: self.surface_velocity,
             arm: self.arm,
@@ -173,7 +190,7 @@ impl Constraint {
             given += friction - self.friction_impulse;
             self.friction_impulse = friction;
         }
-        for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
+        for (&node, answer) in self.nodes().iter().zip(self.answers) {
             let node = node as usize;
             let velocity = velocities.get(node) + given * answer;
             velocities.set(node, velocity);
@@ -189,7 +206,7 @@ impl Constraint {
     /// Moves the nodes out of the tool by so much, m, without giving them speed.
     pub fn push_out(&self, positions: &mut Vectors, way: f32) {
         let push = self.normal * (way * self.effective_mass);
-        for (&node, answer) in self.feature.nodes().iter().zip(self.answers) {
+        for (&node, answer) in self.nodes().iter().zip(self.answers) {
             let node = node as usize;
             let position = positions.get(node) + push * answer;
             positions.set(node, position);
@@ -197,11 +214,10 @@ impl Constraint {
     }
 
     fn velocity(&self, velocities: &Vectors) -> Vec3 {
-        self.feature
-            .nodes()
+        self.nodes()
             .iter()
-            .zip(self.weights)
-            .map(|(&node, weight)| velocities.get(node as usize) * weight)
+            .zip(self.shares)
+            .map(|(&node, share)| velocities.get(node as usize) * share)
             .sum()
     }
 }

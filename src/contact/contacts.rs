@@ -15,7 +15,8 @@ use super::impulses::{PUSHED_OUT, SWEEPS, relax};
 use super::meet::{meet_mesh, meet_plane, meet_rounded};
 use super::path::{Motion, Solid, ToolPath};
 use super::report::Touch;
-use crate::body::{Bounds, Mobility, Pins, Vectors};
+use super::supports::{MOST, Supports};
+use crate::body::{Bindings, Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
 use crate::memory;
 
@@ -48,8 +49,8 @@ pub(crate) struct Contacts {
     pub thickness: f32,
     /// Which tools it meets.
     pub filter: CollisionFilter,
-    features: Features,
-    candidates: Candidates,
+    pub(super) features: Features,
+    pub(super) candidates: Candidates,
     constraints: Vec<Constraint>,
     /// How many of them are solved together.
     together: usize,
@@ -62,13 +63,15 @@ pub(crate) struct Contacts {
     /// What the last step that became current left, in the order of tools.
     touches: Vec<Touch>,
     /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
-    touched: Vec<[bool; 2]>,
+    pub(super) touched: Vec<[bool; 2]>,
     /// The box of all velocities that contacts gave in this substep.
     given: Bounds,
     /// Whether the step that was begun last became current.
     committed: bool,
     /// Nodes that tools hold, each with its tool's place among those of the world, in order.
     held: Vec<(u32, usize)>,
+    /// Features that a change of the surface brings.
+    pub(super) fresh: Vec<u32>,
 }
 
 /// One substep of a body near tools.
@@ -96,6 +99,8 @@ pub(crate) struct Meeting<'a> {
     pub velocities: &'a mut Vectors,
     pub next_positions: &'a mut Vectors,
     pub pins: &'a mut Pins,
+    /// Corners that are bound to nodes: their own vectors are not read.
+    pub bindings: Option<&'a Bindings>,
 }
 
 /// A part of a substep in which no tool moves further against the body than half its radius. Springs act once in a substep,
@@ -131,6 +136,7 @@ impl Contacts {
             given: Bounds::EMPTY,
             committed: true,
             held: Vec::new(),
+            fresh: Vec::new(),
         };
         contacts.reserve(tools)?;
         Ok(contacts)
@@ -139,16 +145,21 @@ impl Contacts {
     /// Makes room for `tools` tools, at so many places in the world.
     pub fn reserve(&mut self, tools: usize) -> Result<()> {
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
-        let together = self.features.count().saturating_mul(tools);
-        let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
-        self.constraints
-            .try_reserve_exact(together.saturating_sub(self.constraints.len()))?;
-        self.touches
-            .try_reserve_exact(together.saturating_sub(self.touches.len()))?;
+        self.reserve_together(self.features.count(), tools)?;
         self.touched.try_reserve(tools.saturating_sub(self.touched.len()))?;
         self.touched.resize(tools.max(self.touched.len()), [false; 2]);
-        self.together = together;
         self.candidates.reserve(tools)
+    }
+
+    /// Makes room for what so many features and tools may have in common.
+    pub(super) fn reserve_together(&mut self, features: usize, tools: usize) -> Result<()> {
+        let together = features.saturating_mul(tools);
+        let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
+        self.constraints
+            .try_reserve(together.saturating_sub(self.constraints.len()))?;
+        self.touches.try_reserve(together.saturating_sub(self.touches.len()))?;
+        self.together = together;
+        Ok(())
     }
 
     /// Starts a step over.
@@ -203,11 +214,6 @@ impl Contacts {
         for pair in &mut self.touched {
             *pair = [pair[0]; 2];
         }
-    }
-
-    /// How many tools there is room for.
-    pub fn tool_places(&self) -> usize {
-        self.touched.len()
     }
 
     /// What the last step that became current left of contacts with a tool at this place in the world.
@@ -266,9 +272,9 @@ impl Contacts {
 
     /// Whether the tool in this place holds a node of the feature. What it holds may lie within it, and edges and faces from there
     /// on pass its surface: so it does not touch those either.
-    fn is_held(&self, feature: Feature, slot: usize) -> bool {
+    fn is_held(&self, feature: Feature, slot: usize, bindings: Option<&Bindings>) -> bool {
         let held = |&node: &u32| self.held.binary_search(&(node, slot)).is_ok();
-        !self.held.is_empty() && feature.nodes().iter().any(held)
+        !self.held.is_empty() && Supports::of(feature, bindings).nodes().iter().any(held)
     }
 
     /// An equation with the contacts that were foreseen has been solved: its holds are what the next begins with.
@@ -290,7 +296,7 @@ impl Contacts {
     pub fn show_touched(&self, mut see: impl FnMut(usize, Option<Vec3>)) {
         for constraint in &self.constraints {
             if constraint.given() != Vec3::ZERO {
-                for &node in constraint.feature.nodes() {
+                for &node in constraint.nodes() {
                     see(node as usize, (constraint.friction == 0.0).then_some(constraint.normal));
                 }
             }
@@ -328,8 +334,8 @@ impl Contacts {
         self.constraints.truncate(HELD);
         let way = |node: usize| meeting.velocities.get(node) * meeting.substep;
         let slot = |place: usize| meeting.tools[place].slot;
-        self.holds
-            .begin(&self.constraints, slot, meeting.substep, stiffness_of, way);
+        let over = (meeting.substep, meeting.bindings);
+        self.holds.begin(&self.constraints, slot, over, stiffness_of, way);
     }
 
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.
@@ -380,7 +386,8 @@ impl Contacts {
         for (index, constraint) in self.constraints.iter_mut().enumerate() {
             let (meets, force, open) = self.holds.found(index);
             let given = force as f32 * meeting.substep;
-            let answering = (&meeting.mobility, meeting.held_axes(constraint.feature));
+            let supports = Supports::of(constraint.feature, meeting.bindings);
+            let answering = (&supports, &meeting.mobility, meeting.held_axes(&supports));
             *constraint = constraint.after(
                 &meets,
                 (given, if force > 0.0 { 0.0 } else { open as f32 }),
@@ -399,7 +406,9 @@ impl Contacts {
             }
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
             for candidate in 0..self.candidates.near().len() {
-                let feature = self.features.get(self.candidates.near()[candidate]);
+                let Some(feature) = self.features.get(self.candidates.near()[candidate]) else {
+                    continue;
+                };
                 if !slice.foresees && self.holds.know(place, feature) {
                     continue;
                 }
@@ -418,7 +427,7 @@ impl Contacts {
             let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
             let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
             if wanted > slices {
-                let reached = Bounds::of(meeting.positions.iter()).extended(meeting.fastest * meeting.substep);
+                let reached = meeting.bounds().extended(meeting.fastest * meeting.substep);
                 if reached.overlaps(&sweep.bounds) {
                     slices = wanted;
                 }
@@ -435,11 +444,11 @@ impl Contacts {
         if self.candidates.spend(travel) {
             return;
         }
-        let bounds = Bounds::of(meeting.positions.iter());
+        let bounds = meeting.bounds();
         let slack = (8.0 * travel).max(0.005 * (bounds.max - bounds.min).length());
         self.candidates.gather(
             &self.features,
-            meeting.positions,
+            (meeting.positions, meeting.bindings),
             tools,
             meeting.origin,
             [meeting.substep * tool_speed + meeting.slack + meeting.thickness, slack],
@@ -449,7 +458,7 @@ impl Contacts {
 
     /// Adds the contacts of one feature with one tool.
     fn touch(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, motion: &Motion, feature: Feature) {
-        if self.is_held(feature, meeting.tools[tool].slot) {
+        if self.is_held(feature, meeting.tools[tool].slot, meeting.bindings) {
             return;
         }
         match motion.from {
@@ -515,9 +524,7 @@ impl Contacts {
             }
             // What an equation that was not solved to the end has let in.
             for index in 0..self.holds.len() {
-                let lacks = self
-                    .holds
-                    .lacks(index, |node| meeting.next_positions.get(node as usize));
+                let lacks = self.holds.lacks(index, |node| meeting.next_positions.get(node));
                 if lacks > 0.0 {
                     self.constraints[index].push_out(meeting.next_positions, lacks as f32);
                 }
@@ -531,10 +538,10 @@ impl Contacts {
         let received = -constraint.given().as_dvec3();
         load.impulse += received;
         load.angular_impulse += constraint.arm.as_dvec3().cross(received);
-        let corners = constraint.starts.iter().zip(constraint.weights);
-        for (&node, (&start, weight)) in constraint.feature.nodes().iter().zip(corners) {
+        let supports = constraint.starts.iter().zip(constraint.shares);
+        for (&node, (&start, share)) in constraint.nodes().iter().zip(supports) {
             if let Some(pin) = meeting.pins.get_mut(node) {
-                pin.force_sum += received * f64::from(weight / meeting.substep);
+                pin.force_sum += received * f64::from(share / meeting.substep);
                 if !pin.is_partial() {
                     continue;
                 }
@@ -568,9 +575,9 @@ impl Slice {
 
 impl Meeting<'_> {
     /// The axes along which nodes of a feature are held that are free along others.
-    pub(super) fn held_axes(&self, feature: Feature) -> [BVec3; 3] {
-        let mut held = [BVec3::FALSE; 3];
-        for (held, &node) in held.iter_mut().zip(feature.nodes()) {
+    pub(super) fn held_axes(&self, supports: &Supports) -> [BVec3; MOST] {
+        let mut held = [BVec3::FALSE; MOST];
+        for (held, &node) in held.iter_mut().zip(supports.nodes()) {
             *held = self.pins.partial_axes_of(node);
         }
         held
@@ -585,12 +592,34 @@ impl Meeting<'_> {
         }
     }
 
-    /// Where a node is when the slice begins.
-    pub(super) fn position(&self, slice: &Slice, node: usize) -> Vec3 {
+    /// Where a corner is when the slice begins.
+    pub(super) fn position(&self, slice: &Slice, corner: usize) -> Vec3 {
         if slice.first {
-            self.positions.get(node)
+            self.vector(self.positions, corner)
         } else {
-            self.next_positions.get(node) - self.velocities.get(node) * slice.remains
+            self.vector(self.next_positions, corner) - self.vector(self.velocities, corner) * slice.remains
         }
+    }
+
+    /// That of these vectors which a corner has: its own, or what its nodes make of theirs.
+    #[inline]
+    pub(super) fn vector(&self, vectors: &Vectors, corner: usize) -> Vec3 {
+        match self.bindings {
+            None => vectors.get(corner),
+            Some(bindings) => bindings.vector(vectors, corner),
+        }
+    }
+
+    /// The box of all nodes, in which bound points are.
+    fn bounds(&self) -> Bounds {
+        let Some(bindings) = self.bindings else {
+            return Bounds::of(self.positions.iter());
+        };
+        let nodes = (0..).zip(self.positions.iter());
+        Bounds::of(
+            nodes
+                .filter(|&(node, _)| bindings.get(node).is_none())
+                .map(|(_, place)| place),
+        )
     }
 }

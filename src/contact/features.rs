@@ -1,5 +1,6 @@
 //! The parts of a body that a tool can meet: its nodes, and the edges and faces of its surface.
 
+use super::edges::EdgeUses;
 use crate::error::Result;
 use crate::memory;
 use crate::mesh;
@@ -9,9 +10,15 @@ use crate::mesh;
 #[derive(Debug)]
 pub(super) struct Features {
     pub node_count: u32,
-    pub edges: Vec<[u32; 2]>,
-    pub faces: Vec<[u32; 3]>,
+    /// One that is gone leaves a [`HOLE`] for another.
+    edges: Vec<[u32; 2]>,
+    faces: Vec<[u32; 3]>,
+    /// For surfaces that change.
+    uses: Option<Box<EdgeUses>>,
 }
+
+/// The corners of an edge that is none.
+pub(super) const HOLE: [u32; 2] = [u32::MAX; 2];
 
 /// One node, edge or face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,6 +57,7 @@ impl Features {
             node_count: node_count as u32,
             edges: mesh::edges(surface, &[])?,
             faces: memory::copied(surface)?,
+            uses: None,
         })
     }
 
@@ -58,23 +66,113 @@ impl Features {
         self.node_count as usize + self.edges.len() + self.faces.len()
     }
 
-    /// Feature number `index`.
-    pub fn get(&self, index: u32) -> Feature {
+    /// How many are nodes, edges and faces.
+    pub fn counts(&self) -> [u32; 3] {
+        [self.node_count, self.edges.len() as u32, self.faces.len() as u32]
+    }
+
+    /// Feature number `index`; `None` where that is none now.
+    #[inline]
+    pub fn get(&self, index: u32) -> Option<Feature> {
         let Some(edge) = index.checked_sub(self.node_count) else {
-            return Feature {
+            return Some(Feature {
                 nodes: [index, 0, 0],
                 count: 1,
-            };
+            });
         };
         match self.edges.get(edge as usize) {
-            Some(&[a, b]) => Feature {
+            Some(&HOLE) => None,
+            Some(&[a, b]) => Some(Feature {
                 nodes: [a, b, 0],
                 count: 2,
-            },
-            None => Feature {
+            }),
+            None => Some(Feature {
                 nodes: self.faces[edge as usize - self.edges.len()],
                 count: 3,
-            },
+            }),
         }
+    }
+
+    /// Makes room for a surface of which so many triangles change and to which so many are added.
+    pub fn reserve(&mut self, changed: usize, added: usize) -> Result<()> {
+        let uses = match &mut self.uses {
+            Some(uses) => uses,
+            none => none.insert(Box::new(EdgeUses::new(self.node_count, &self.edges, &self.faces)?)),
+        };
+        uses.reserve(3 * changed, 3 * (changed + added))?;
+        self.edges.try_reserve(3 * (changed + added))?;
+        Ok(self.faces.try_reserve(added)?)
+    }
+
+    /// Makes triangle number `index` one with these corners, or adds it behind the last, where there is room: shows which edges are new, by
+    /// their numbers among edges. What the surface does not have any more is dropped by [`Self::drop_edges_of`].
+    pub fn set_face(&mut self, index: usize, corners: [u32; 3], new: impl FnMut(u32)) {
+        match self.faces.get_mut(index) {
+            Some(face) => *face = corners,
+            None => self.faces.push(corners),
+        }
+        if let Some(uses) = &mut self.uses {
+            uses.add(corners, &mut self.edges, new);
+        }
+    }
+
+    pub fn face(&self, index: usize) -> [u32; 3] {
+        self.faces[index]
+    }
+
+    /// A triangle with these corners is not part of the surface any more.
+    pub fn drop_edges_of(&mut self, corners: [u32; 3]) {
+        if let Some(uses) = &mut self.uses {
+            uses.remove(corners, &mut self.edges);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// All edges and faces, in some order.
+    fn all(features: &Features) -> Vec<Feature> {
+        let mut all: Vec<Feature> = (0..features.count() as u32)
+            .filter_map(|index| features.get(index))
+            .collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// After any changes the features are those of the surface as it is, each once.
+    #[test]
+    fn a_changed_surface_has_its_features() {
+        let mut random = Random(7);
+        let count = 40;
+        let mut corner = |_| random.below(count) as u32;
+        let mut surface: Vec<[u32; 3]> = (0..60).map(|_| [0; 3].map(&mut corner)).collect();
+        let mut features = Features::new(count, &surface).expect("memory");
+        for round in 0..300 {
+            let index = corner(0) as usize;
+            let corners = [0; 3].map(&mut corner);
+            let added = (round % 3 == 0).then(|| [0; 3].map(&mut corner));
+            let edges = features.edges.clone();
+            features.reserve(1, added.iter().count()).expect("memory");
+            let mut new = Vec::new();
+            let gone = features.face(index);
+            features.set_face(index, corners, |edge| new.push(edge));
+            features.drop_edges_of(gone);
+            surface[index] = corners;
+            for corners in added {
+                features.set_face(surface.len(), corners, |edge| new.push(edge));
+                surface.push(corners);
+            }
+            let whole = Features::new(count, &surface).expect("memory");
+            assert_eq!(all(&features), all(&whole), "{round}");
+            for (number, edge) in (0..).zip(&features.edges) {
+                let is_new = *edge != HOLE && edges.get(number as usize) != Some(edge);
+                assert!(!is_new || new.contains(&number), "{round}: {edge:?}");
+            }
+        }
+        // Numbers are used again.
+        assert!(features.edges.len() < 3 * surface.len(), "{}", features.edges.len());
     }
 }

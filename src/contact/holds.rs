@@ -12,6 +12,8 @@ use glam::{DVec3, Vec3};
 use super::constraint::Constraint;
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
+use super::supports::{MOST, Supports, Ties};
+use crate::body::Bindings;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 
@@ -21,9 +23,12 @@ const STIFFER: f32 = 3.0;
 /// A contact as the equation sees it.
 #[derive(Clone, Copy, Debug)]
 struct Hold {
-    nodes: [u32; 3],
+    /// The nodes that move the feature.
+    nodes: [u32; MOST],
     count: usize,
-    /// Where its nodes are without a push, m.
+    corner_count: usize,
+    ties: Option<Ties>,
+    /// Where its corners are without a push, m.
     free: [DVec3; 3],
     gauge: Gauge,
     /// The gap is at least this, m: below 0 where it began inside.
@@ -49,8 +54,10 @@ struct Answer {
     meets: Meets,
     /// Along the normal, N.
     force: f64,
+    /// What of it acts on each node.
+    shares: [f64; MOST],
     /// How it falls as each node goes along the normal, for each that goes, N/m.
-    stiffness: [[f64; 3]; 3],
+    stiffness: [[f64; MOST]; MOST],
 }
 
 /// The part of a node in a hold.
@@ -59,7 +66,7 @@ struct Share {
     node: u32,
     hold: u32,
     /// Which of its nodes it is.
-    corner: usize,
+    place: usize,
 }
 
 /// What a contact did at the end of a step: where it is found again the next begins with it.
@@ -89,7 +96,7 @@ impl Holds {
     /// Makes room for so many contacts.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
         self.holds.try_reserve(count.saturating_sub(self.holds.len()))?;
-        let shares = 3 * count;
+        let shares = MOST * count;
         self.shares.try_reserve(shares.saturating_sub(self.shares.len()))?;
         self.order.try_reserve(count.saturating_sub(self.order.len()))?;
         for pushes in [&mut self.last, &mut self.settled] {
@@ -177,15 +184,18 @@ impl Holds {
         &mut self,
         constraints: &[Constraint],
         slot_of: impl Fn(usize) -> usize,
-        duration: f32,
+        (duration, bindings): (f32, Option<&Bindings>),
         stiffness_of: impl Fn(usize) -> f32,
         way_of: impl Fn(usize) -> Vec3,
     ) {
         self.clear();
         for constraint in constraints {
+            let supports = Supports::of(constraint.feature, bindings);
             let mut hold = Hold {
-                nodes: [0; 3],
-                count: constraint.feature.nodes().len(),
+                nodes: [0; MOST],
+                count: supports.nodes().len(),
+                corner_count: constraint.feature.nodes().len(),
+                ties: supports.ties,
                 free: [DVec3::ZERO; 3],
                 gauge: constraint.gauge(duration),
                 least: -f64::from(constraint.depth.max(0.0)),
@@ -197,17 +207,19 @@ impl Holds {
                 pushed: false,
             };
             let mut softness = 0.0;
-            for (corner, &node) in constraint.feature.nodes().iter().enumerate() {
-                let weight = constraint.weights[corner];
-                hold.nodes[corner] = node;
-                hold.free[corner] = constraint.starts[corner].as_dvec3() + way_of(node as usize).as_dvec3();
-                softness += weight * weight / stiffness_of(node as usize);
+            let mut free = [DVec3::ZERO; MOST];
+            for (place, &node) in supports.nodes().iter().enumerate() {
+                let share = constraint.shares[place];
+                hold.nodes[place] = node;
+                free[place] = constraint.starts[place].as_dvec3() + way_of(node as usize).as_dvec3();
+                softness += share * share / stiffness_of(node as usize);
                 self.shares.push(Share {
                     node,
                     hold: self.holds.len() as u32,
-                    corner,
+                    place,
                 });
             }
+            hold.free = hold.corners(free);
             let stiffness = STIFFER * constraint.firmness / softness;
             if stiffness.is_finite() {
                 hold.stiffness = f64::from(stiffness);
@@ -241,7 +253,7 @@ impl Holds {
             hold.holds_on = false;
             if hold.answer.force < 0.0 {
                 hold.answer.force = 0.0;
-                hold.answer.stiffness = [[0.0; 3]; 3];
+                hold.answer.stiffness = [[0.0; MOST]; MOST];
             }
         }
     }
@@ -326,8 +338,11 @@ impl Holds {
             let after = hold.answer_to(|node| push_of(node) + vector_of(node));
             // Where it pushes all along, nothing small is found as a difference of what is large.
             let growth = if before.force.min(after.force) > 0.0 {
-                let ways = hold.nodes.map(|node| vector_of(node as usize));
-                -hold.stiffness * hold.gauge.opening(&before.meets, &after.meets, &ways[..hold.count])
+                let ways = hold.corner_vectors(&vector_of);
+                -hold.stiffness
+                    * hold
+                        .gauge
+                        .opening(&before.meets, &after.meets, &ways[..hold.corner_count])
             } else {
                 after.force - before.force
             };
@@ -344,7 +359,7 @@ impl Holds {
             for share in shares {
                 let answer = &self.holds[share.hold as usize].answer;
                 let n = answer.meets.normal;
-                let more = n * answer.stiffness[share.corner][share.corner];
+                let more = n * answer.stiffness[share.place][share.place];
                 let entries = [
                     more.x * n.x,
                     more.y * n.y,
@@ -367,8 +382,10 @@ impl Holds {
     pub fn add_forces(&self, nodes: &Range<usize>, to: &mut [&mut [f32]; 3]) {
         for share in self.shares_of(nodes) {
             let hold = &self.holds[share.hold as usize];
-            let Answer { meets, force, .. } = hold.answer;
-            let force = meets.normal * (force * meets.weights[share.corner]);
+            let Answer {
+                meets, force, shares, ..
+            } = &hold.answer;
+            let force = meets.normal * (force * shares[share.place]);
             add(to, share.node as usize - nodes.start, force.as_vec3());
         }
     }
@@ -385,7 +402,7 @@ impl Holds {
             let hold = &self.holds[share.hold as usize];
             if hold.answer.force != 0.0 {
                 let products = hold.products(|node| vector_of(node).as_dvec3());
-                let product = (hold.answer.meets.normal * products[share.corner]).as_vec3();
+                let product = (hold.answer.meets.normal * products[share.place]).as_vec3();
                 add(to, share.node as usize - nodes.start, product);
                 sum += f64::from(product.dot(vector_of(share.node as usize)));
             }
@@ -413,13 +430,13 @@ impl Holds {
 
     /// How much deeper than it may be contact number `index` is with its nodes at these positions, m; 0 where it does not push, or gives
     /// way.
-    pub(super) fn lacks(&self, index: usize, position_of: impl Fn(u32) -> Vec3) -> f64 {
+    pub(super) fn lacks(&self, index: usize, position_of: impl Fn(usize) -> Vec3) -> f64 {
         let hold = &self.holds[index];
         if hold.answer.force <= 0.0 || hold.kept < 1.0 {
             return 0.0;
         }
-        let corners = hold.nodes.map(|node| position_of(node).as_dvec3());
-        let meets = hold.gauge.meet(&corners[..hold.count]);
+        let corners = hold.corner_vectors(|node| position_of(node).as_dvec3());
+        let meets = hold.gauge.meet(&corners[..hold.corner_count]);
         (hold.least - meets.gap).max(0.0)
     }
 
@@ -446,55 +463,110 @@ impl Hold {
     /// What it does with these pushes of the nodes, m.
     fn answer_to(&self, push_of: impl Fn(usize) -> DVec3) -> Answer {
         let mut corners = self.free;
-        for (corner, &node) in corners.iter_mut().zip(&self.nodes).take(self.count) {
-            *corner += push_of(node as usize);
+        for (corner, push) in corners.iter_mut().zip(self.corner_vectors(push_of)) {
+            *corner += push;
         }
-        let meets = self.gauge.meet(&corners[..self.count]);
+        let meets = self.gauge.meet(&corners[..self.corner_count]);
         let mut force = self.multiplier + self.stiffness * (self.least - meets.gap);
         if !self.holds_on {
             force = force.max(0.0);
         }
-        let mut stiffness = [[0.0; 3]; 3];
+        let shares = self.shared(meets.weights);
+        let mut stiffness = [[0.0; MOST]; MOST];
         if force != 0.0 {
-            let Meets { weights, tilts, .. } = &meets;
+            let tilts = self.shared(meets.tilts.map(|row| self.shared(row)));
             for (row, entries) in stiffness.iter_mut().enumerate() {
                 for (column, entry) in entries.iter_mut().enumerate() {
-                    *entry = self.stiffness * weights[row] * weights[column] + force.max(0.0) * tilts[row][column];
+                    *entry = self.stiffness * shares[row] * shares[column] + force.max(0.0) * tilts[row][column];
                 }
             }
         }
         Answer {
             meets,
             force,
+            shares,
             stiffness,
         }
     }
 
+    /// The vectors of its corners, which those of its nodes make.
+    fn corners(&self, vectors: [DVec3; MOST]) -> [DVec3; 3] {
+        let [a, b, c, _] = vectors;
+        let Some(ties) = &self.ties else {
+            return [a, b, c];
+        };
+        ties.map(|tie| {
+            let parts = vectors.iter().zip(tie);
+            parts.map(|(&vector, part)| vector * f64::from(part)).sum()
+        })
+    }
+
+    fn corner_vectors(&self, vector_of: impl Fn(usize) -> DVec3) -> [DVec3; 3] {
+        let mut vectors = [DVec3::ZERO; MOST];
+        for (vector, &node) in vectors.iter_mut().zip(&self.nodes).take(self.count) {
+            *vector = vector_of(node as usize);
+        }
+        self.corners(vectors)
+    }
+
+    /// What its nodes have of what its corners have.
+    fn shared<T: Shared>(&self, of_corners: [T; 3]) -> [T; MOST] {
+        let Some(ties) = &self.ties else {
+            let [a, b, c] = of_corners;
+            return [a, b, c, T::default()];
+        };
+        let mut shared = [T::default(); MOST];
+        for (tie, of_corner) in ties.iter().zip(of_corners) {
+            for (sum, &part) in shared.iter_mut().zip(tie) {
+                sum.add(of_corner, f64::from(part));
+            }
+        }
+        shared
+    }
+
     /// The matter's part along the normal.
     fn weighted(&self, vector_of: impl Fn(usize) -> DVec3) -> f64 {
-        let meets = &self.answer.meets;
-        let corners = self.nodes.iter().zip(meets.weights).take(self.count);
-        let sum: DVec3 = corners.map(|(&node, weight)| vector_of(node as usize) * weight).sum();
-        sum.dot(meets.normal)
+        let nodes = self.nodes.iter().zip(self.answer.shares).take(self.count);
+        let sum: DVec3 = nodes.map(|(&node, share)| vector_of(node as usize) * share).sum();
+        sum.dot(self.answer.meets.normal)
     }
 
     /// The product of its stiffness with the vectors, for each of its nodes along the normal.
-    fn products(&self, vector_of: impl Fn(usize) -> DVec3) -> [f64; 3] {
-        let mut products = [0.0; 3];
-        for (corner, &node) in self.nodes.iter().enumerate().take(self.count) {
+    fn products(&self, vector_of: impl Fn(usize) -> DVec3) -> [f64; MOST] {
+        let mut products = [0.0; MOST];
+        for (place, &node) in self.nodes.iter().enumerate().take(self.count) {
             let along = vector_of(node as usize).dot(self.answer.meets.normal);
             for (product, row) in products.iter_mut().zip(&self.answer.stiffness) {
-                *product += row[corner] * along;
+                *product += row[place] * along;
             }
         }
         products
     }
 
     fn share_out(&self, answer: &Answer, force: f64, add: &mut impl FnMut(usize, DVec3)) {
-        for (&node, weight) in self.nodes.iter().zip(answer.meets.weights).take(self.count) {
-            if weight > 0.0 && force != 0.0 {
-                add(node as usize, answer.meets.normal * (force * weight));
+        for (&node, share) in self.nodes.iter().zip(answer.shares).take(self.count) {
+            if share > 0.0 && force != 0.0 {
+                add(node as usize, answer.meets.normal * (force * share));
             }
+        }
+    }
+}
+
+/// What corners share out to their nodes.
+trait Shared: Copy + Default {
+    fn add(&mut self, other: Self, part: f64);
+}
+
+impl Shared for f64 {
+    fn add(&mut self, other: Self, part: f64) {
+        *self += other * part;
+    }
+}
+
+impl Shared for [f64; MOST] {
+    fn add(&mut self, other: Self, part: f64) {
+        for (sum, other) in self.iter_mut().zip(other) {
+            *sum += other * part;
         }
     }
 }

@@ -6,6 +6,7 @@ use super::constraint::Constraint;
 use super::contacts::{Meeting, Slice};
 use super::features::Feature;
 use super::path::{Motion, Placement, Solid};
+use super::supports::{MOST, Supports};
 use super::sweep::{Corners, Segment};
 
 /// What contacts that are solved together may leave open between a node and a plane that touch, as a part of the way
@@ -65,7 +66,9 @@ pub(super) fn meet_plane(
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
     let surface_velocity = motion.velocity_at(foot);
-    let closing = (surface_velocity - meeting.velocities.get(node)).dot(normal).max(0.0);
+    let closing = (surface_velocity - meeting.vector(meeting.velocities, node))
+        .dot(normal)
+        .max(0.0);
     let ahead = if meeting.drifts {
         (closing + surface_velocity.length()) * slice.duration + meeting.slack
     } else {
@@ -74,9 +77,7 @@ pub(super) fn meet_plane(
     if !(gap <= meeting.thickness + ahead) {
         return None;
     }
-    let starts = [position, Vec3::ZERO, Vec3::ZERO];
-    let held = meeting.held_axes(feature);
-    let mut constraint = Constraint::new(feature, starts, [1.0, 0.0, 0.0], normal, &meeting.mobility, held)?;
+    let mut constraint = meeting.constraint(slice, feature, [1.0, 0.0, 0.0], normal)?;
     constraint.surface_velocity = surface_velocity;
     constraint.arm = foot - motion.centre;
     constraint.friction = motion.friction;
@@ -115,8 +116,7 @@ pub(super) fn meet_rounded(
         .or_else(|| axis_velocity.try_normalize())
         .unwrap_or(Vec3::Y);
     let weights = separation.weights;
-    let held = meeting.held_axes(feature);
-    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility, held)?;
+    let mut constraint = meeting.constraint(slice, feature, weights, normal)?;
     let points = corners.points.iter().zip(weights);
     let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
     let surface = normal * segment.radius;
@@ -152,10 +152,9 @@ pub(super) fn meet_mesh(
             own.steps[corner] = to.own(point + step) - own.points[corner];
         }
     }
-    let is_pinned = feature
-        .nodes()
-        .iter()
-        .any(|&node| meeting.mobility.of(node as usize) == 0.0);
+    let supports = Supports::of(feature, meeting.bindings);
+    let mut nodes = supports.nodes().iter();
+    let is_pinned = nodes.any(|&node| meeting.mobility.of(node as usize) == 0.0);
     let (closest, time) = own.approach_mesh(solid, meeting.thickness, travel + meeting.slack, is_pinned)?;
     if !closest.inside {
         return None;
@@ -173,8 +172,7 @@ pub(super) fn meet_mesh(
         from.orientation
     };
     let normal = orientation * closest.normal;
-    let held = meeting.held_axes(feature);
-    let mut constraint = Constraint::new(feature, corners.points, weights, normal, &meeting.mobility, held)?;
+    let mut constraint = meeting.constraint(slice, feature, weights, normal)?;
     let [start, end] = [from, to].map(|placement| placement.placed(surface));
     if meeting.drifts {
         constraint.surface_velocity = (end - start) / slice.duration;
@@ -186,6 +184,19 @@ pub(super) fn meet_mesh(
     constraint.friction = motion.friction;
     constraint.allow_gap(gap - meeting.thickness, slice.duration);
     Some(constraint)
+}
+
+impl Meeting<'_> {
+    /// A contact of a feature at the point of these weights; `None` where none of its nodes can move along the normal.
+    fn constraint(&self, slice: &Slice, feature: Feature, weights: [f32; 3], normal: Vec3) -> Option<Constraint> {
+        let supports = Supports::of(feature, self.bindings);
+        let mut starts = [Vec3::ZERO; MOST];
+        for (start, &node) in starts.iter_mut().zip(supports.nodes()) {
+            *start = self.position(slice, node as usize);
+        }
+        let held = self.held_axes(&supports);
+        Constraint::new((feature, weights), &supports, starts, normal, &self.mobility, held)
+    }
 }
 
 impl Corners {
@@ -200,7 +211,7 @@ impl Corners {
         for (corner, &node) in feature.nodes().iter().enumerate() {
             corners.points[corner] = meeting.position(slice, node as usize);
             if meeting.drifts {
-                corners.steps[corner] = meeting.velocities.get(node as usize) * slice.duration;
+                corners.steps[corner] = meeting.vector(meeting.velocities, node as usize) * slice.duration;
             }
         }
         corners

@@ -315,6 +315,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         velocities: state.velocities,
         next_positions: state.next_positions,
         pins: &mut body.pins,
+        bindings: body.bindings.as_ref(),
     });
     contacts.velocities(velocities)
 }

@@ -292,10 +292,16 @@ impl World {
             Anchor::Point(point) => grip_of(body.surface(), which, point)?,
         };
         let sum: f32 = grip.weights.iter().sum();
+        // All corners of a triangle are bound to nodes of one cell.
         let mut nodes = [(0, 0.0); 4];
-        for (place, (&node, weight)) in nodes.iter_mut().zip(grip.corners.iter().zip(grip.weights)) {
-            if weight != 0.0 {
-                *place = (body.own_node(node), weight / sum);
+        for (&corner, weight) in grip.corners.iter().zip(grip.weights) {
+            for (node, part) in body.parts_of(corner) {
+                let is_its = |(known, share): &&mut (u32, f32)| *known == node || *share == 0.0;
+                if weight * part != 0.0
+                    && let Some(place) = nodes.iter_mut().find(is_its)
+                {
+                    *place = (node, place.1 + weight / sum * part);
+                }
             }
         }
         Ok(Bound {

@@ -8,4 +8,5 @@ mod motion;
 mod random;
 mod refused;
 mod shapes;
+mod touch;
 mod wounds;

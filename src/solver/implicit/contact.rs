@@ -125,6 +125,7 @@ impl Substep<'_> {
             velocities,
             next_positions: state.next_positions,
             pins: &mut body.pins,
+            bindings: body.bindings.as_ref(),
         };
         let (springs, elements, masses) = (&body.springs, &body.elements, &body.masses);
         act(contacts, meeting, &|node, per_mass| {

@@ -383,7 +383,8 @@ impl Implicit {
         if self.means.is_none() {
             self.means = Some(Vectors::zeros(self.pushes.len())?);
         }
-        let nodes = (3 * count).min(self.inertia.len());
+        // Up to four nodes move what a contact presses.
+        let nodes = (4 * count).min(self.inertia.len());
         Ok(self.stiffened.try_reserve(nodes)?)
     }
 

@@ -210,12 +210,21 @@ impl Bonds {
         memory::push(&mut self.bonds, bond)
     }
 
-    /// Has points of a body that `carried` knows be bound to what it says from now on: their triangles were cut, or copied. No point
-    /// moves with that, as far as the new nodes are where they should be. Nothing has changed where there is no memory.
-    #[allow(dead_code, reason = "cutting calls it")]
-    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&Bound) -> Option<Bound>) -> Result<()> {
+    /// Makes room for points of a body to be bound to others.
+    pub fn reserve_rebinding(&mut self, body: usize) -> Result<()> {
         let count = self.bonds.iter().filter(|bond| bond.concerns(body)).count();
-        self.ends.try_reserve(count.saturating_mul(CORNERS))?;
+        Ok(self.ends.try_reserve(count.saturating_mul(CORNERS))?)
+    }
+
+    /// The points of a body.
+    pub fn points_of(&self, body: usize) -> impl Iterator<Item = &Bound> {
+        let points = self.bonds.iter().flat_map(|bond| &bond.points);
+        points.filter(move |point| point.body == body)
+    }
+
+    /// Has points of a body that `carried` knows be bound to what it says from now on: their triangles were cut, or copied. No point
+    /// moves with that, as far as the new nodes are where they should be. There is room for it.
+    pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&Bound) -> Option<Bound>) {
         for bond in &mut self.bonds {
             for point in bond.points.iter_mut().filter(|point| point.body == body) {
                 *point = carried(point).unwrap_or(*point);
@@ -223,7 +232,6 @@ impl Bonds {
             bond.corners = corners_of(&bond.points);
         }
         self.settle();
-        Ok(())
     }
 
     /// Ends some bonds. Needs no memory.
@@ -469,13 +477,13 @@ mod tests {
         // The cell of triangle 4 is a copy now, of which a triangle has another number; the point lies in a tetrahedron.
         let cut = bound(2, 40, &[(30, 0.5), (11, 0.25), (31, 0.125), (1, 0.125)]);
         let is_cut = |point: &Bound| matches!(point.anchor, Anchor::Point(SurfacePoint { triangle: 4, .. }));
-        let untouched = bonds.rebind(5, |point| is_cut(point).then_some(cut));
-        untouched.expect("memory");
+        bonds.reserve_rebinding(2).expect("memory");
+        bonds.rebind(5, |point| is_cut(point).then_some(cut));
         assert_eq!(
             corners(&bonds, 0),
             [(2, 10, 0.5), (2, 11, 0.25), (2, 12, 0.25), (5, 3, -1.0)]
         );
-        bonds.rebind(2, |point| is_cut(point).then_some(cut)).expect("memory");
+        bonds.rebind(2, |point| is_cut(point).then_some(cut));
         let four = [(2, 1, 0.125), (2, 11, 0.25), (2, 30, 0.5), (2, 31, 0.125)];
         assert_eq!(corners(&bonds, 0), [&four[..], &[(5, 3, -1.0)]].concat());
         let both = [

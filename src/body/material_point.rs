@@ -1,0 +1,87 @@
+//! Points of the material, which keep their places in it whatever is cut.
+
+use glam::DVec3;
+
+use super::Body;
+use crate::cutting::CutSurface;
+use crate::world::SurfacePoint;
+
+/// A point of the surface, where it is in the rest shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaterialPoint {
+    triangle: u32,
+    rest: DVec3,
+}
+
+impl Body {
+    /// Where a point is in the material; `None`: the body cannot be cut.
+    pub(crate) fn material_point(&self, point: &SurfacePoint) -> Option<MaterialPoint> {
+        let surface = &self.cuttable.as_ref()?.surface;
+        let corners = corners_at_rest(surface, point.triangle);
+        let sum: f64 = point.weights.iter().map(|&weight| f64::from(weight)).sum();
+        let parts = corners.into_iter().zip(point.weights);
+        let rest = parts.map(|(corner, weight)| corner * (f64::from(weight) / sum)).sum();
+        Some(MaterialPoint {
+            triangle: point.triangle,
+            rest,
+        })
+    }
+
+    /// The point of the surface that it is after cuts since a version of the topology.
+    pub(crate) fn surface_point(&self, point: &MaterialPoint, since: u64) -> Option<SurfacePoint> {
+        let cuttable = self.cuttable.as_ref()?;
+        let changed = cuttable.log.since(since).ok()?.triangles;
+        let mut nearest: Option<(f64, SurfacePoint)> = None;
+        for triangle in std::iter::once(point.triangle).chain(changed.iter().copied()) {
+            let corners = corners_at_rest(&cuttable.surface, triangle);
+            let weights = weights_of_nearest(point.rest, corners);
+            let place: DVec3 = corners
+                .iter()
+                .zip(weights)
+                .map(|(&corner, weight)| corner * weight)
+                .sum();
+            let off = place.distance_squared(point.rest);
+            if nearest.is_none_or(|(least, _)| off < least) {
+                let weights = weights.map(|weight| weight as f32);
+                nearest = Some((off, SurfacePoint { triangle, weights }));
+            }
+        }
+        nearest.map(|(_, point)| point)
+    }
+}
+
+fn corners_at_rest(surface: &CutSurface, triangle: u32) -> [DVec3; 3] {
+    let corners = surface.triangles()[triangle as usize].corners;
+    corners.map(|corner| surface.rest_place(corner))
+}
+
+/// The weights of a triangle's corners in its point next to another (Ericson 2005, section 5.1.5).
+fn weights_of_nearest(point: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
+    let (ab, ac) = (b - a, c - a);
+    let along = |from: DVec3| (ab.dot(point - from), ac.dot(point - from));
+    let ((a1, a2), (b1, b2), (c1, c2)) = (along(a), along(b), along(c));
+    if a1 <= 0.0 && a2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    if b1 >= 0.0 && b2 <= b1 {
+        return [0.0, 1.0, 0.0];
+    }
+    if c2 >= 0.0 && c1 <= c2 {
+        return [0.0, 0.0, 1.0];
+    }
+    let (of_a, of_b, of_c) = (b1 * c2 - c1 * b2, c1 * a2 - a1 * c2, a1 * b2 - b1 * a2);
+    if of_c <= 0.0 && a1 >= 0.0 && b1 <= 0.0 {
+        let part = a1 / (a1 - b1);
+        return [1.0 - part, part, 0.0];
+    }
+    if of_b <= 0.0 && a2 >= 0.0 && c2 <= 0.0 {
+        let part = a2 / (a2 - c2);
+        return [1.0 - part, 0.0, part];
+    }
+    if of_a <= 0.0 && b2 - b1 >= 0.0 && c1 - c2 >= 0.0 {
+        let part = (b2 - b1) / ((b2 - b1) + (c1 - c2));
+        return [0.0, 1.0 - part, part];
+    }
+    let sum = of_a + of_b + of_c;
+    [of_a / sum, of_b / sum, of_c / sum]
+}

@@ -1,0 +1,43 @@
+//! A surface that changes: where it is drawn and touched it is not what it was made as.
+
+use super::Body;
+use crate::contact::SurfaceChange;
+use crate::error::Result;
+
+impl Body {
+    /// Makes room for a change of its surface with which so many nodes come, and so many triangles change and are added.
+    pub(crate) fn reserve_surface(&mut self, nodes: usize, changed: usize, added: usize) -> Result<()> {
+        self.surface.try_reserve(added)?;
+        let node_count = self.node_count() + nodes;
+        self.bindings.get_or_insert_default().reserve(0, node_count)?;
+        if let Some(contacts) = &mut self.contacts {
+            contacts.reserve_surface(nodes, changed, added)?;
+        }
+        self.reserve_holds()
+    }
+
+    /// Changes its surface, for which there is room; all that is named is there, and nodes that have come since the surface last changed
+    /// are touched unless they are hidden.
+    pub(crate) fn change_surface(&mut self, change: &SurfaceChange) {
+        for &(index, corners) in change.changed {
+            self.surface[index as usize] = corners;
+        }
+        self.surface.extend_from_slice(change.added);
+        let bindings = self.bindings.get_or_insert_default();
+        let order = &self.order;
+        let own = |node: u32| order.own(node);
+        change.hidden.iter().for_each(|&node| bindings.hide(own(node)));
+        let changed = change.changed.iter().map(|(_, corners)| corners);
+        let corners = changed.chain(change.added).flatten();
+        for &corner in corners.clone() {
+            bindings.show(own(corner));
+            if let Some(word) = self.corners.get_mut(corner as usize / 64) {
+                *word |= 1 << (corner % 64);
+            }
+        }
+        if let Some(contacts) = &mut self.contacts {
+            let places = (self.state.positions(), &*bindings);
+            contacts.change_surface(change, corners.map(|&corner| own(corner)), own, places);
+        }
+    }
+}
