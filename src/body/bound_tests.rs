@@ -352,7 +352,7 @@ fn what_nobody_draws_is_not_touched() {
         [0.25, 0.0, 0.5, 0.25],
     ];
     let mut world = world(Vec3::ZERO, 1, 1);
-    let id = free_nodes(&mut world, &positions, &[0.001; 4], parts);
+    free_nodes(&mut world, &positions, &[0.001; 4], parts);
     let plane = ToolDefinition {
         pose: Pose {
             position: Vec3::NEG_Y * 0.07,

@@ -161,7 +161,7 @@ mod tests {
             features.set_face(index, corners, |edge| new.push(edge));
             features.drop_edges_of(gone);
             surface[index] = corners;
-            for corners in added {
+            if let Some(corners) = added {
                 features.set_face(surface.len(), corners, |edge| new.push(edge));
                 surface.push(corners);
             }
