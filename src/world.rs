@@ -204,9 +204,6 @@ impl World {
         let it = self.bodies.get_mut(body.0)?;
         let before = it.topology_version();
         let report = it.cut(sweep)?;
-        if let Some(tissue) = self.tissue.as_mut().filter(|_| it.meets_tissue()) {
-            tissue.join(place, it)?;
-        }
         for (anchor, point) in carried {
             if let Some(point) = self.bodies.get(body.0)?.surface_point(&point, before) {
                 moved.push((

@@ -91,6 +91,9 @@ fn check_offered(definition: &BodyDefinition) -> Result<()> {
     if definition.enclosed_stiffness > 0.0 || definition.pressure != 0.0 {
         return lacking("an enclosed_stiffness or a pressure");
     }
+    if definition.contact.with_bodies || definition.contact.with_itself {
+        return lacking("contact with other tissue or with themselves");
+    }
     Ok(())
 }
 

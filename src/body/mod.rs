@@ -504,6 +504,10 @@ impl Body {
                 self.contacts = Some(Contacts::new(self.node_count(), &surface, &self.contact, tools)?);
             }
         }
+        if self.cuttable.is_some() {
+            // What finds edges is made now, not with the first cut.
+            return self.reserve_surface(0, 0, 0);
+        }
         self.reserve_holds()
     }
 

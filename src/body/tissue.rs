@@ -65,11 +65,6 @@ impl Body {
         }
     }
 
-    /// Its own number of a node.
-    pub(crate) fn own_node(&self, node: u32) -> u32 {
-        self.order.own(node)
-    }
-
     /// Its own numbers of the nodes that move one of the caller's, with their parts: itself where it is bound to none.
     pub(crate) fn parts_of(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
         let own = self.order.own(node);

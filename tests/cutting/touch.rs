@@ -3,13 +3,13 @@
 use glam::{Vec2, Vec3, vec2, vec3};
 use sinew::cutting::Sweep;
 use sinew::{
-    Anchor, Body, BodyDefinition, BodyId, Pose, Shape, Solver, SurfacePoint, SutureDefinition, ToolDefinition, ToolId,
+    Anchor, Body, BodyDefinition, BodyId, Shape, Solver, SurfacePoint, SutureDefinition, ToolDefinition, ToolId,
     Values, World, WorldDefinition,
 };
 
 use super::sheet::unstructured;
 
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
+const SOLVERS: [Solver; 2] = [Solver::Verlet, Solver::Implicit];
 
 /// A level sheet of 20 x 20 cells of 1 cm, 1 g a node, held at its rim or free.
 fn level(solver: Solver, is_held: bool) -> (World, BodyId) {
@@ -37,17 +37,11 @@ fn level(solver: Solver, is_held: bool) -> (World, BodyId) {
     (world, body)
 }
 
-fn sphere(world: &mut World, radius: f32, position: Vec3) -> ToolId {
-    world
-        .create_tool(&ToolDefinition {
-            shape: Shape::Sphere { radius },
-            pose: Pose {
-                position,
-                ..Default::default()
-            },
-            ..Default::default()
-        })
-        .unwrap()
+fn tool(world: &mut World, shape: Shape, position: Vec3) -> ToolId {
+    let mut definition = ToolDefinition::new(shape);
+    definition.pose.position = position;
+    definition.friction = 0.1;
+    world.create_tool(&definition).unwrap()
 }
 
 /// A blade that stands upright, along a line of the plane that the sheet was made in.
@@ -71,20 +65,12 @@ fn a_sphere_carries_a_sheet_that_is_cut_beneath_it_and_none_of_it_goes_through()
         let (mut world, body) = level(solver, true);
         let radius = 0.03;
         let centre = vec3(0.1, 0.028, -0.1);
-        let tool = sphere(&mut world, radius, centre + 0.01 * Vec3::Y);
-        world
-            .set_tool_pose(
-                tool,
-                Pose {
-                    position: centre,
-                    ..Default::default()
-                },
-            )
-            .unwrap();
+        let tool = tool(&mut world, Shape::Sphere { radius }, centre + 0.01 * Vec3::Y);
+        world.set_pose(tool, centre, None).unwrap();
         for _ in 0..100 {
             world.step(2e-3).unwrap();
         }
-        let held = world.tool_wrench(tool).unwrap().0;
+        let held = world.wrench(tool).unwrap().0;
         let cuts = [
             sweep(vec2(0.05, 0.05), vec2(0.1, 0.1)),
             sweep(vec2(0.1, 0.1), vec2(0.15, 0.152)),
@@ -93,9 +79,9 @@ fn a_sphere_carries_a_sheet_that_is_cut_beneath_it_and_none_of_it_goes_through()
         let mut last = held;
         for cut in &cuts {
             world.cut(body, cut).unwrap();
-            for step in 0..60 {
+            for step in 0..30 {
                 world.step(1e-3).unwrap();
-                let force = world.tool_wrench(tool).unwrap().0;
+                let force = world.wrench(tool).unwrap().0;
                 assert!(force.is_finite());
                 if step == 0 {
                     assert!(
@@ -121,18 +107,9 @@ fn a_sphere_carries_a_sheet_that_is_cut_beneath_it_and_none_of_it_goes_through()
 
 #[test]
 fn a_plane_bears_what_was_cut_to_pieces() {
-    for solver in [Solver::Verlet, Solver::Implicit] {
+    for solver in SOLVERS {
         let (mut world, body) = level(solver, false);
-        let plane = ToolDefinition {
-            shape: Shape::Plane,
-            pose: Pose {
-                position: -0.005 * Vec3::Y,
-                ..Default::default()
-            },
-            friction: 0.3,
-            ..Default::default()
-        };
-        let floor = world.create_tool(&plane).unwrap();
+        let floor = tool(&mut world, Shape::Plane, -0.005 * Vec3::Y);
         let mut pieces = 1;
         for line in 1..5 {
             let at = 0.041 * line as f32;
@@ -146,13 +123,13 @@ fn a_plane_bears_what_was_cut_to_pieces() {
                 .pieces_parted;
         }
         assert_eq!(pieces, 25, "{solver:?}");
-        for _ in 0..400 {
+        for _ in 0..250 {
             world.step(2e-3).unwrap();
         }
         let mut sum = Vec3::ZERO;
         for _ in 0..20 {
             world.step(2e-3).unwrap();
-            sum += world.tool_wrench(floor).unwrap().0 / 20.0;
+            sum += world.wrench(floor).unwrap().0 / 20.0;
         }
         let it = world.body(body).unwrap();
         assert!(
