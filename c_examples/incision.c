@@ -1,0 +1,236 @@
+/* A scalpel opens a sheet of skin that is stretched as skin is; the wound gapes, and two sutures pull it together.
+ *
+ *   incision [-o DIRECTORY] [-n FRAMES]
+ *
+ * What is drawn here is a mesh of the program's own, which follows the list of changes alone: each new node gets its texture coordinates from
+ * what it lies between. Leaves incision_open.png, incision_sutured.png and incision.csv in the directory. */
+#include "example.h"
+
+#define SIZE 0.12        /* m: a square */
+#define CELLS 36         /* along a side */
+#define STRETCH 1.08     /* of its length at rest, across the cut */
+#define DENSITY 1.0      /* kg/m^2: a millimetre of tissue */
+#define STIFFNESS 80.0   /* N/m per spring */
+#define DAMPING 15.0     /* 1/s: how fast a free node loses its speed */
+#define LENGTH 0.06      /* m: the cut */
+#define BITE 0.006       /* m: how far from the cut a suture holds */
+#define CUT 1.0          /* s: the scalpel goes along, */
+#define GAPE 0.5         /* s: the wound gapes, */
+#define CLOSE 1.0        /* s: the sutures are tightened, */
+#define HOLD 0.5         /* s: and hold */
+#define SPARE 2000       /* nodes that cuts may add */
+
+static const double node_mass = DENSITY * (SIZE / CELLS) * (SIZE / CELLS);
+
+/* What a renderer keeps. */
+typedef struct drawing {
+  uint64_t version;
+  float *textures; /* u and v of each node */
+  size_t node_count;
+  uint32_t *triangles;
+  size_t triangle_count;
+} drawing;
+
+/* Held at its rim, wider along z than at rest. */
+static sinew_body_id create_skin(sinew_world *world, const sinew_mesh_view *shape) {
+  const float inside = (float)(0.499 * SIZE);
+  float *masses = (float *)allocate(shape->node_count, sizeof *masses);
+  float *stretched = (float *)allocate(3 * shape->node_count, sizeof *stretched);
+  sinew_body_def def;
+  sinew_body_id skin;
+  size_t i;
+  for (i = 0; i < shape->node_count; i++) {
+    const float *p = shape->positions + 3 * i;
+    memcpy(stretched + 3 * i, p, 3 * sizeof *p);
+    stretched[3 * i + 2] *= (float)STRETCH;
+    if (fabsf(p[0]) < inside && fabsf(p[2]) < inside) masses[i] = (float)node_mass; /* 0 is pinned for good */
+  }
+  CHECK(sinew_body_def_init(&def, sizeof def));
+  def.positions = stretched;
+  def.rest_positions = shape->positions;
+  def.node_count = shape->node_count;
+  def.triangles = shape->triangles;
+  def.triangle_count = shape->triangle_count;
+  def.masses = masses;
+  def.node_damping = (float)(DAMPING * node_mass);
+  def.stiffness = (float)STIFFNESS;
+  def.spare_nodes = SPARE;
+  CHECK(sinew_body_create(world, &def, &skin));
+  free(masses), free(stretched);
+  return skin;
+}
+
+static drawing create_drawing(const sinew_mesh_view *shape) {
+  drawing made;
+  size_t i;
+  made.version = 0;
+  made.node_count = shape->node_count;
+  made.textures = (float *)allocate(2 * (shape->node_count + SPARE), sizeof *made.textures);
+  for (i = 0; i < shape->node_count; i++) {
+    made.textures[2 * i] = (float)(shape->positions[3 * i] / SIZE + 0.5);
+    made.textures[2 * i + 1] = (float)(shape->positions[3 * i + 2] / SIZE + 0.5);
+  }
+  made.triangle_count = shape->triangle_count;
+  made.triangles = (uint32_t *)allocate(3 * (shape->triangle_count + 4 * SPARE), sizeof *made.triangles);
+  memcpy(made.triangles, shape->triangles, 3 * shape->triangle_count * sizeof *made.triangles);
+  return made;
+}
+
+/* Takes over what has changed since the last time. */
+static void follow(drawing *mine, const sinew_world *world, sinew_body_id skin) {
+  sinew_topology_changes changes;
+  sinew_triangle_view triangles;
+  size_t i, j;
+  changes.struct_size = sizeof changes;
+  CHECK(sinew_body_get_topology_changes(world, skin, mine->version, &changes));
+  CHECK(sinew_body_get_triangles(world, skin, &triangles));
+  for (i = 0; i < changes.node_count; i++) {
+    const sinew_new_node *added = changes.nodes + i;
+    float *texture = mine->textures + 2 * added->node;
+    for (j = 0; j < 3; j++) {
+      texture[0] += added->weights[j] * mine->textures[2 * added->sources[j]];
+      texture[1] += added->weights[j] * mine->textures[2 * added->sources[j] + 1];
+    }
+  }
+  for (i = 0; i < changes.triangle_count; i++) {
+    memcpy(mine->triangles + 3 * changes.triangles[i], triangles.data + 3 * changes.triangles[i], 3 * sizeof *mine->triangles);
+  }
+  mine->version = changes.version;
+  mine->node_count += changes.node_count;
+  mine->triangle_count = triangles.count;
+}
+
+/* How much of the texture is drawn: all of it, whatever was cut. */
+static double texture_area(const drawing *mine) {
+  double sum = 0;
+  size_t i;
+  for (i = 0; i < mine->triangle_count; i++) {
+    const uint32_t *corner = mine->triangles + 3 * i;
+    const float *a = mine->textures + 2 * corner[0], *b = mine->textures + 2 * corner[1], *c = mine->textures + 2 * corner[2];
+    sum += fabs(((double)b[0] - a[0]) * ((double)c[1] - a[1]) - ((double)b[1] - a[1]) * ((double)c[0] - a[0])) / 2;
+  }
+  return sum;
+}
+
+/* Cuts from where the blade's edge was to where it is: upright, at this place along the cut, which is a little curved. */
+static void cut(sinew_world *world, sinew_body_id skin, double from, double to, sinew_cut_report *report) {
+  const double ends[2] = {from, to};
+  float edges[2][6];
+  int i;
+  for (i = 0; i < 2; i++) {
+    const float x = (float)(LENGTH * (ends[i] - 0.5)), z = (float)(0.004 * sin(3 * ends[i]));
+    edges[i][0] = edges[i][3] = x;
+    edges[i][2] = edges[i][5] = z;
+    edges[i][1] = -0.05f, edges[i][4] = 0.05f;
+  }
+  CHECK(sinew_body_cut(world, skin, edges[0], edges[1], report));
+}
+
+/* The triangle that is drawn at a place of the sheet at rest, by the texture, and its point there. */
+static uint32_t point_at(const drawing *mine, double u, double v, float weights[3]) {
+  size_t i;
+  for (i = 0; i < mine->triangle_count; i++) {
+    const uint32_t *corner = mine->triangles + 3 * i;
+    double parts[3], whole = 0;
+    int j;
+    for (j = 0; j < 3; j++) {
+      const float *a = mine->textures + 2 * corner[(j + 1) % 3], *b = mine->textures + 2 * corner[(j + 2) % 3];
+      parts[j] = (a[0] - u) * (b[1] - v) - (a[1] - v) * (b[0] - u);
+      whole += parts[j];
+    }
+    for (j = 0; j < 3; j++) weights[j] = (float)(parts[j] / whole);
+    if (weights[0] >= 0 && weights[1] >= 0 && weights[2] >= 0) return (uint32_t)i;
+  }
+  fail("no triangle", "at a suture");
+  return 0;
+}
+
+static sinew_attachment_id suture(sinew_world *world, sinew_body_id skin, const drawing *mine, double along) {
+  const double x = LENGTH * (along - 0.5), z = 0.004 * sin(3 * along) / STRETCH;
+  float weights[2][3];
+  const uint32_t above = point_at(mine, x / SIZE + 0.5, (z + BITE) / SIZE + 0.5, weights[0]);
+  const uint32_t below = point_at(mine, x / SIZE + 0.5, (z - BITE) / SIZE + 0.5, weights[1]);
+  sinew_attachment_id made;
+  CHECK(sinew_body_suture_points(world, skin, above, weights[0], skin, below, weights[1], NULL, &made));
+  return made;
+}
+
+int main(int argc, char **argv) {
+  const float size[2] = {SIZE, SIZE};
+  const uint32_t cells[2] = {CELLS, CELLS};
+  const float low[3] = {-SIZE / 2, -0.01f, -SIZE / 2}, high[3] = {SIZE / 2, 0.01f, SIZE / 2};
+  const options chosen = read_options(argc, argv, 0);
+  const int all_frames = (int)lround((CUT + GAPE + CLOSE + HOLD) / FRAME);
+  const int frame_count = chosen.frame_count > 0 ? chosen.frame_count : all_frames;
+  sinew_world *world = create_world(9.81f);
+  sinew_attachment_id sutures[2];
+  double wide[2] = {0, 0}, length = 0, whole;
+  int frame, suture_count = 0, i;
+  sinew_mesh_view shape;
+  sinew_mesh *mesh;
+  sinew_body_id skin;
+  sinew_picture_def picture;
+  drawing mine;
+  FILE *table;
+
+  CHECK(sinew_mesh_create_cloth(size, cells, &mesh));
+  shape.struct_size = sizeof shape;
+  CHECK(sinew_mesh_get_view(mesh, &shape));
+  skin = create_skin(world, &shape);
+  mine = create_drawing(&shape);
+  whole = texture_area(&mine);
+  picture = camera(low, high, 1);
+  table = create_file(chosen.directory, "incision.csv");
+  fprintf(table, "time s,cut mm,nodes,triangles,width 1 mm,width 2 mm,force 1 N,force 2 N\n");
+
+  printf("skin of %d x %d cells, %.0f mm wide, stretched by %.0f %% across the cut\n\n", CELLS, CELLS, 1e3 * SIZE,
+         100 * (STRETCH - 1));
+  printf("width: how far apart the points of the two sutures are; drawn: of the texture, by a mesh that follows the list of changes\n\n");
+  printf("  time s   cut mm   nodes  triangles   width mm            force N             drawn\n");
+  for (frame = 1; frame <= frame_count; frame++) {
+    const double time = frame * FRAME, before = smooth((time - FRAME) / CUT), now = smooth(time / CUT);
+    float forces[2] = {0, 0};
+    sinew_cut_report report;
+    report.struct_size = sizeof report;
+    if (now > before) {
+      cut(world, skin, before, now, &report);
+      length += report.length;
+      follow(&mine, world, skin);
+    }
+    if (suture_count == 0 && time > CUT + GAPE) {
+      save_picture(world, &picture, chosen.directory, "incision_open.png");
+      for (i = 0; i < 2; i++) sutures[i] = suture(world, skin, &mine, i == 0 ? 0.35 : 0.65);
+      suture_count = 2;
+    }
+    for (i = 0; i < suture_count; i++) {
+      /* A little shorter than the points were apart at rest: the edges of the wound lie on each other. */
+      sinew_suture_report how;
+      float force[3];
+      how.struct_size = sizeof how;
+      CHECK(sinew_suture_get_report(world, sutures[i], &how));
+      wide[i] = how.distance;
+      CHECK(sinew_suture_set_length(world, sutures[i],
+                                    (float)(how.length + (1.9 * BITE - how.length) * smooth((time - CUT - GAPE) / CLOSE))));
+      CHECK(sinew_attachment_get_force(world, sutures[i], force));
+      forces[i] = sqrtf(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+    }
+    CHECK(sinew_world_step(world, (float)FRAME, NULL));
+    clear_progress();
+    fprintf(table, "%.4f,%.3f,%zu,%zu,%.3f,%.3f,%.4f,%.4f\n", time, 1e3 * length, mine.node_count, mine.triangle_count, 1e3 * wide[0],
+            1e3 * wide[1], (double)forces[0], (double)forces[1]);
+    if (frame % 10 == 0) {
+      printf("%8.2f%9.1f%8zu%11zu%10.2f%8.2f%10.4f%10.4f%10.6f\n", time, 1e3 * length, mine.node_count, mine.triangle_count,
+             1e3 * wide[0], 1e3 * wide[1], (double)forces[0], (double)forces[1], texture_area(&mine) / whole);
+    }
+    show_progress(frame, frame_count);
+  }
+  clear_progress();
+  save_picture(world, &picture, chosen.directory, "incision_sutured.png");
+  fclose(table);
+  printf("\nat the end the mesh that follows the list draws %.6f of its texture\n", texture_area(&mine) / whole);
+
+  free(mine.textures), free(mine.triangles);
+  sinew_mesh_destroy(mesh);
+  sinew_world_destroy(world);
+  return 0;
+}
