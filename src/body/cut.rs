@@ -81,6 +81,7 @@ impl Body {
 
     fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
         let first_triangle = cuttable.surface.triangles().len() as u32;
+        let sweep = &cuttable.stroke.carried(sweep, &cuttable.surface, self.positions());
         let near = self.triangles_near(cuttable, sweep)?;
         let limits = Limits {
             nodes: self.node_room as u32,
@@ -144,6 +145,7 @@ impl Body {
             added: &added,
             hidden: &changes.undrawn,
         };
+        cuttable.stroke.reserve(changes.ends.len())?;
         self.reserve_surface(nodes.len(), changed.len(), added.len())?;
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
@@ -183,6 +185,9 @@ impl Body {
             cuttable.log.add(changes, &gone);
         }
         self.publish_new(known);
+        cuttable
+            .stroke
+            .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
             new_triangles: new_triangles as u32,

@@ -9,6 +9,7 @@ use crate::memory;
 use crate::springs::{TILE, tile_count};
 
 use super::change_log::ChangeLog;
+use super::stroke::Stroke;
 
 /// What a body that may be cut keeps.
 #[derive(Debug)]
@@ -17,6 +18,7 @@ pub(super) struct Cuttable {
     pub surface: CutSurface,
     pub search: Search,
     pub log: ChangeLog,
+    pub stroke: Stroke,
     /// Mass by area in the mean, kg/m², of nodes that have mass.
     pub density: f64,
     /// Whether every spring lies along an edge of a cell.
@@ -66,6 +68,7 @@ impl Cuttable {
             surface,
             density: if area > 0.0 { mass / area } else { 0.0 },
             log: ChangeLog::default(),
+            stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
         })))
     }

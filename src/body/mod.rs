@@ -24,6 +24,7 @@ mod published;
 mod records;
 mod region;
 mod state;
+mod stroke;
 mod surface;
 mod tissue;
 mod tune;

@@ -350,3 +350,79 @@ fn refused_cuts_change_nothing() {
     );
     assert!(matches!(error, sinew::Error::InvalidArgument(_)), "{error}");
 }
+
+#[test]
+fn a_stroke_goes_on_in_tissue_that_gapes() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let (rest, cells) = super::sheet::grid(24);
+        let at_rest: Vec<Vec3> = rest.iter().map(|place| 0.005 * *place).collect();
+        // Stretched across the cut by a fifth, and held on all sides: it gapes as fast as it is cut.
+        let positions: Vec<Vec3> = at_rest.iter().map(|place| *place * vec3(1.0, 1.2, 1.0)).collect();
+        let is_rim = |place: &Vec3| [place.x, place.y].iter().any(|&along| along == 0.0 || along == 24.0);
+        let masses: Vec<f32> = rest
+            .iter()
+            .map(|place| if is_rim(place) { 0.0 } else { 2.5e-5 })
+            .collect();
+        let mut world = World::new(WorldDefinition {
+            gravity: Vec3::ZERO,
+            ..Default::default()
+        })
+        .unwrap();
+        let definition = BodyDefinition {
+            positions: &positions,
+            rest_positions: Some(&at_rest),
+            masses: Values::Each(&masses),
+            node_dampings: Values::Uniform(5e-4),
+            triangles: &cells,
+            stiffnesses: Values::Uniform(80.0),
+            spare_nodes: 1000,
+            solver,
+            ..Default::default()
+        };
+        let body = world.create_body(&definition).unwrap();
+        let edge = |x: f32, y: f32| [vec3(x, y, -0.05), vec3(x, y, 0.05)];
+        // In small steps from within to within, with a pause, aslant so that what gapes carries the end aside.
+        let place = |step: u32| (0.02 + 0.0021 * step as f32, 0.062 + 0.0006 * step as f32);
+        let mut length = 0.0;
+        for step in 0..40 {
+            let ((x, y), (u, v)) = (place(step), place(step + 1));
+            let (start, end) = (edge(x, y), edge(u, v));
+            length += world.cut(body, &Sweep { start, end }).unwrap().length;
+            world.step(2e-3).unwrap();
+            if step == 20 {
+                for _ in 0..50 {
+                    // The tissue goes on over a blade that stands still.
+                    let still = Sweep { start: end, end };
+                    length += world.cut(body, &still).unwrap().length;
+                    world.step(2e-3).unwrap();
+                }
+            }
+        }
+        assert!(length > 0.07, "{length} m were cut");
+        // One rim: from any of its edges to any other it goes on, with no bridge between.
+        let it = world.body(body).unwrap();
+        let surface = it.surface();
+        let mut next = std::collections::BTreeMap::new();
+        let sides = |triangle: &[u32; 3]| [0, 1, 2].map(|k| (triangle[k], triangle[(k + 1) % 3]));
+        let all: std::collections::BTreeSet<(u32, u32)> = surface.iter().flat_map(sides).collect();
+        let is_outer = |node: u32| (node as usize) < rest.len() && is_rim(&rest[node as usize]);
+        for &(from, to) in &all {
+            if !all.contains(&(to, from)) && !(is_outer(from) && is_outer(to)) {
+                assert!(
+                    next.insert(from, to).is_none(),
+                    "{solver:?}: two sides of the rim begin at {from}"
+                );
+            }
+        }
+        let (&first, _) = next.iter().next().unwrap();
+        let (mut at, mut count) = (first, 0);
+        loop {
+            at = next[&at];
+            count += 1;
+            if at == first {
+                break;
+            }
+        }
+        assert_eq!(count, next.len(), "{solver:?}: the rim is in several parts");
+    }
+}
