@@ -2162,6 +2162,9 @@ sinew_status sinew_body_scale_region(struct sinew_world *world,
  * stiffnesses; copies share nodes where their material hangs together (Molino, Bao, Fedkiw 2004). Springs along no edge of a triangle are taken
  * away where the blade passed through them.
  *
+ * A sweep that begins just where the last of the body ended goes on with it: it begins where the tissue that the blade stood in has gone
+ * meanwhile. A blade that stays in tissue that moves so leaves no bridges.
+ *
  * Nodes keep their numbers, and new ones are numbered on: copies, which move as what they copied moved, and points of the surface between nodes,
  * which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where it is
  * drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none. It takes as long as the cut is

@@ -154,23 +154,11 @@ impl Body {
         let mut changing = memory::reserved(touched.len())?;
         changing.extend(touched.iter().map(|touched| touched.node));
         let candidates = memory::reserved(touched.len())?;
-        let reverse = rewiring.reverse()?;
         self.springs.resize(known + nodes.len())?;
-        if let Err(error) = self.springs.rewire(&rewiring) {
+        let rewired = self.rewire(&rewiring);
+        if rewired.is_err() {
             self.springs.resize(known)?;
-            return Err(error);
-        }
-        if let Some(implicit) = &mut self.implicit {
-            // NEWTON allocates for what it is told; where it cannot, springs are put back.
-            let (elements, beside) = (
-                self.elements.as_deref(),
-                (self.terms.as_deref(), self.enclosed.as_deref()),
-            );
-            if let Err(error) = implicit.rebuild(known + nodes.len(), &*self.springs, elements, beside) {
-                self.springs.rewire(&reverse)?;
-                self.springs.resize(known)?;
-                return Err(error);
-            }
+            return rewired.map(|()| CutReport::default());
         }
         // From here on nothing fails.
         self.add_nodes(&nodes)?;
@@ -195,6 +183,22 @@ impl Body {
             pieces_parted,
             length: 0.5 * changes.rim.iter().map(|edge| edge.length).sum::<f64>(),
         })
+    }
+
+    /// Changes springs, of which there are nodes already, and what a solver knows of them. Changes nothing where it fails.
+    fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
+        let beside = (self.terms.as_deref(), self.enclosed.as_deref());
+        let roomier = match &self.implicit {
+            Some(implicit) => {
+                implicit.roomier(&*self.springs, rewiring.added.len(), self.elements.as_deref(), beside)?
+            }
+            None => None,
+        };
+        self.springs.rewire(rewiring)?;
+        if let (Some(implicit), Some(roomier)) = (&mut self.implicit, roomier) {
+            implicit.adopt(roomier);
+        }
+        Ok(())
     }
 
     /// What becomes of springs along edges of cells.

@@ -74,10 +74,11 @@ impl Body {
         if let Some(records) = &mut self.records {
             records.grow(count);
         }
-        for vectors in [&mut self.predicted_velocities, &mut self.applied] {
-            if let Some(vectors) = vectors {
-                vectors.grow(count);
-            }
+        for vectors in [&mut self.predicted_velocities, &mut self.applied]
+            .into_iter()
+            .flatten()
+        {
+            vectors.grow(count);
         }
         if let Some(coarse) = &mut self.coarse {
             coarse.grow(count);

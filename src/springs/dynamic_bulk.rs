@@ -205,6 +205,10 @@ impl<L: KeptLink> Springs for DynamicBulk<L> {
         L::DAMPED
     }
 
+    fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
     fn spring_count(&self) -> usize {
         self.spring_count
     }

@@ -91,6 +91,10 @@ impl Springs for Efficient {
         self.damped
     }
 
+    fn node_count(&self) -> usize {
+        self.lists.len()
+    }
+
     fn spring_count(&self) -> usize {
         self.spring_count
     }

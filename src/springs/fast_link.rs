@@ -123,6 +123,10 @@ impl<L: KeptLink> Springs for FastLink<L> {
         L::DAMPED
     }
 
+    fn node_count(&self) -> usize {
+        self.node_count
+    }
+
     fn spring_count(&self) -> usize {
         self.spring_count
     }

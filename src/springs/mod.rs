@@ -27,7 +27,6 @@ pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
 use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
 use crate::error::{Error, Result};
-use crate::memory;
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
 use fast_link::FastLink;
@@ -89,23 +88,6 @@ pub(crate) struct Rewiring {
     pub added: Vec<Spring>,
 }
 
-impl Rewiring {
-    /// What undoes it.
-    pub fn reverse(&self) -> Result<Self> {
-        let mut changed = memory::reserved(self.changed.len())?;
-        changed.extend(self.changed.iter().map(|change| Change {
-            node: change.node,
-            before: change.after,
-            after: change.before,
-        }));
-        Ok(Self {
-            removed: memory::copied(&self.added)?,
-            changed,
-            added: memory::copied(&self.removed)?,
-        })
-    }
-}
-
 /// What spring forces depend on, and what is wanted next.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion<'a> {
@@ -140,6 +122,8 @@ pub(crate) struct Course<'a> {
 pub(crate) trait Springs: Debug + Send + Sync {
     /// Whether springs may have damping: fixed when the body is made.
     fn damped(&self) -> bool;
+
+    fn node_count(&self) -> usize;
 
     fn spring_count(&self) -> usize;
 

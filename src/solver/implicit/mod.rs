@@ -266,12 +266,13 @@ impl Implicit {
         memory::reserve(&mut self.partials, tile_count(count))
     }
 
-    /// Adds nodes, for which there is room, up to so many in all; NEWTON is to be told its springs anew.
+    /// Adds nodes, for which there is room, up to so many in all; NEWTON has been made roomier.
     pub fn grow(&mut self, count: usize) {
         for history in &mut self.histories {
             history.ways.grow(count);
             history.gains.grow(count);
         }
+        self.prepared = 0.0;
         self.pushes.grow(count);
         if let Some(means) = &mut self.means {
             means.grow(count);
@@ -319,19 +320,21 @@ impl Implicit {
         }
     }
 
-    /// Springs, elements or nodes have changed so that what is kept of them is to be made anew; it fails before anything is changed.
-    pub fn rebuild(
-        &mut self,
-        node_count: usize,
+    /// Where the equations are solved exactly, what that needs with the nodes that these springs have, and so many springs more.
+    pub fn roomier(
+        &self,
         springs: &dyn Springs,
+        more: usize,
         elements: Option<&Elements>,
         beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<()> {
-        self.prepared = 0.0;
-        if let Some(newton) = &mut self.newton {
-            newton.rebuild(node_count, springs, elements, beside)?;
-        }
-        Ok(())
+    ) -> Result<Option<Newton>> {
+        let roomier = |newton: &Newton| newton.roomier(springs, more, elements, beside);
+        self.newton.as_ref().map(roomier).transpose()
+    }
+
+    /// Goes on with that.
+    pub fn adopt(&mut self, newton: Newton) {
+        self.newton = Some(newton);
     }
 
     /// Makes room for what elements change by.

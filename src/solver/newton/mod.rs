@@ -56,22 +56,22 @@ impl Newton {
         })
     }
 
-    /// Makes it that of a body whose springs and nodes have changed; positions keep what they lack. Changes nothing where it fails.
-    pub fn rebuild(
-        &mut self,
-        node_count: usize,
+    /// The same for the nodes that these springs have now, with room for so many springs more; positions keep what they lack.
+    pub fn roomier(
+        &self,
         springs: &dyn Springs,
+        more: usize,
         elements: Option<&Elements>,
         beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<()> {
-        let mut rebuilt = Self::new(node_count, springs, elements, beside)?;
-        for (vectors, before) in rebuilt.remainders.iter_mut().zip(&self.remainders) {
+    ) -> Result<Self> {
+        let mut roomier = Self::new(springs.node_count(), springs, elements, beside)?;
+        roomier.make_room(springs.spring_count() + more)?;
+        for (vectors, before) in roomier.remainders.iter_mut().zip(&self.remainders) {
             for (node, vector) in before.iter().enumerate() {
                 vectors.set(node, vector);
             }
         }
-        *self = rebuilt;
-        Ok(())
+        Ok(roomier)
     }
 
     /// Makes room for so many springs in all, so that a step needs no memory.

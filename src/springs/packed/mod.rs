@@ -193,6 +193,10 @@ impl Springs for Packed {
         self.damped
     }
 
+    fn node_count(&self) -> usize {
+        self.node_count
+    }
+
     fn spring_count(&self) -> usize {
         self.spring_count
     }
