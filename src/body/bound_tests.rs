@@ -6,6 +6,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::{Body, BodyDefinition, Bound, NewNode, Solver, Storage, Values};
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
+use crate::springs::Rewiring;
 use crate::world::{BodyId, ToolId, World, WorldDefinition};
 
 const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
@@ -97,14 +98,9 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
     body.reserve_surface(bound.len(), change.changed.len(), change.added.len())
         .expect("room");
     let new: Vec<NewNode> = bound.iter().map(|&bound| NewNode::Bound(bound)).collect();
+    body.springs.resize(body.node_count() + new.len()).expect("memory");
+    body.rewire(&Rewiring::default()).expect("memory");
     body.add_nodes(&new).expect("room");
-    let count = body.node_count();
-    if let Some(implicit) = &mut body.implicit {
-        let beside = (body.terms.as_deref(), body.enclosed.as_deref());
-        implicit
-            .rebuild(count, &*body.springs, body.elements.as_deref(), beside)
-            .expect("memory");
-    }
     body.change_surface(change);
 }
 

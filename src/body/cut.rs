@@ -186,7 +186,7 @@ impl Body {
     }
 
     /// Changes springs, of which there are nodes already, and what a solver knows of them. Changes nothing where it fails.
-    fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
+    pub(super) fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
         let beside = (self.terms.as_deref(), self.enclosed.as_deref());
         let roomier = match &self.implicit {
             Some(implicit) => {
