@@ -207,19 +207,17 @@ impl World {
         let it = self.bodies.get_mut(body.0)?;
         let before = it.topology_version();
         let report = it.cut(sweep)?;
+        let which = Which {
+            prefix: "",
+            index: None,
+        };
         for (anchor, point) in carried {
-            if let Some(point) = self.bodies.get(body.0)?.surface_point(&point, before) {
-                moved.push((
-                    anchor,
-                    self.bound(
-                        body,
-                        Which {
-                            prefix: "",
-                            index: None,
-                        },
-                        &Anchor::Point(point),
-                    )?,
-                ));
+            let it = self.bodies.get(body.0)?;
+            let now = point.and_then(|point| it.surface_point(&point, before));
+            let now = now.map_or(anchor, Anchor::Point);
+            // What cannot be bound anew stays bound as it was.
+            if let Ok(bound) = self.bound(body, which, &now) {
+                moved.push((anchor, bound));
             }
         }
         if let Some(bonds) = self.bonds_mut() {
@@ -231,8 +229,8 @@ impl World {
         Ok(report)
     }
 
-    /// The points of a body at which others are attached, in its material; there is room to bind them anew.
-    fn attached_points(&mut self, body: BodyId, place: usize) -> Result<Vec<(Anchor, MaterialPoint)>> {
+    /// What others are attached to of a body, points with their places in its material; there is room to bind them anew.
+    fn attached_points(&mut self, body: BodyId, place: usize) -> Result<Vec<(Anchor, Option<MaterialPoint>)>> {
         let mut points = Vec::new();
         let it = self.bodies.get(body.0)?;
         let Some(tissue) = &mut self.tissue else {
@@ -240,11 +238,11 @@ impl World {
         };
         tissue.bonds.reserve_rebinding(place)?;
         for bound in tissue.bonds.points_of(place) {
-            if let Anchor::Point(point) = &bound.anchor
-                && let Some(at) = it.material_point(point)
-            {
-                crate::memory::push(&mut points, (bound.anchor, at))?;
-            }
+            let at = match &bound.anchor {
+                Anchor::Point(point) => it.material_point(point),
+                Anchor::Node(_) => None,
+            };
+            crate::memory::push(&mut points, (bound.anchor, at))?;
         }
         Ok(points)
     }

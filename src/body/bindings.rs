@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::vectors::Vectors;
+use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 
@@ -123,6 +124,16 @@ impl Bindings {
     pub fn is_hidden(&self, node: u32) -> bool {
         let word = self.hidden.get(node as usize / 64);
         word.is_some_and(|word| word >> (node % 64) & 1 == 1)
+    }
+
+    /// What contact depends on.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for bound in &self.points {
+            hasher.write_u64(u64::from(bound.node));
+            bound.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
+            hasher.write_floats(&bound.weights);
+        }
+        self.hidden.iter().for_each(|&word| hasher.write_u64(word));
     }
 
     /// Makes the vectors of all points what those of their nodes make of them.

@@ -35,7 +35,7 @@ pub struct TopologyChanges<'a> {
     pub nodes: &'a [NewNodeSource],
     /// Triangles of [`Body::surface`](crate::Body::surface) whose corners changed or that are new; one may be named several times.
     pub triangles: &'a [u32],
-    /// Springs that are gone: taken away by a blade, or replaced by springs of copies.
+    /// Springs that are gone: taken away by a blade or by hand, or replaced by springs of copies.
     pub removed_springs: &'a [[u32; 2]],
     /// New edges of the rim, as they were when they came: later cuts may have split or renumbered them.
     pub rim: &'a [NewRimEdge],

@@ -4,7 +4,7 @@ use glam::{BVec3, Vec3};
 
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::{Cuttable, passes};
-use super::{Body, Bound, NewNode, Spring};
+use super::{Body, Bound, NewNode, SMALLEST_MASS, Spring};
 use crate::contact::SurfaceChange;
 use crate::cutting::{Changes, Limits, PieceOfSpring, Sweep};
 use crate::error::{Error, Result};
@@ -104,10 +104,6 @@ impl Body {
         changes: &Changes,
         first_triangle: u32,
     ) -> Result<CutReport> {
-        if self.carry.masses_for > 0.0 {
-            // What closes the last step is made with the masses that it was taken with.
-            close(self);
-        }
         let surface = &cuttable.surface;
         let known = self.node_count();
         let new_triangles = surface.triangles().len() - first_triangle as usize;
@@ -116,6 +112,18 @@ impl Body {
         let mut rewiring = self.rewiring(changes)?;
         if !cuttable.springs_are_edges {
             self.take_away(surface, sweep, near, changes, &mut rewiring)?;
+        }
+        if changes.triangles.is_empty() && changes.nodes.is_empty() && rewiring.is_empty() {
+            cuttable.stroke.reserve(changes.ends.len())?;
+            cuttable
+                .stroke
+                .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
+            return Ok(CutReport::default());
+        }
+        let is_held = |source: u32| self.inverse_masses[self.order.own(source) as usize] == 0.0;
+        if self.carry.masses_for > 0.0 || changes.nodes.iter().any(|piece| is_held(piece.source)) {
+            // What closes the last step is made with the masses that it was taken with, and gives nothing to copies of what was held.
+            close(self);
         }
         let nodes = self.new_nodes(changes)?;
         let touched = self.touched(changes, &rewiring)?;
@@ -160,7 +168,8 @@ impl Body {
             self.springs.resize(known)?;
             return rewired.map(|()| CutReport::default());
         }
-        // From here on nothing fails.
+        // From here on nothing fails. Damping is to be that of masses as they are.
+        self.scale_masses(0.0);
         self.add_nodes(&nodes)?;
         self.rebind(changes);
         self.share_masses(cuttable, changes)?;
@@ -426,8 +435,15 @@ impl Body {
                 } else {
                     cuttable.density * cuttable.surface.area_at(piece.node)
                 } as f32;
+                let mass = if mass > 0.0 { mass.max(SMALLEST_MASS) } else { mass };
                 if is_copy && is_drawn && axes.any() {
+                    let target = self.pins.get(source).and_then(|pin| pin.target);
                     self.pins.hold(node, axes)?;
+                    if let Some(pin) = self.pins.get_mut(node) {
+                        pin.target = target;
+                    }
+                } else if mass == 0.0 {
+                    self.pins.hold(node, BVec3::TRUE)?;
                 }
                 let stays_held = mass == 0.0
                     || if is_copy {

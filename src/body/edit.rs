@@ -243,6 +243,9 @@ impl Body {
             Error::InvalidArgument(_) => already_joined(a, b),
             error => error,
         })?;
+        if let Some(cuttable) = &mut self.cuttable {
+            cuttable.springs_are_edges &= cuttable.surface.has_edge([a, b]);
+        }
         self.forces_current = false;
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();

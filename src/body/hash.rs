@@ -55,6 +55,9 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
+        if let Some(bindings) = &self.bindings {
+            bindings.hash(hasher);
+        }
         if let Some(grasps) = &self.grasps {
             grasps.hash(hasher);
         }

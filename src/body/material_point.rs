@@ -41,8 +41,8 @@ impl Body {
                 .map(|(&corner, weight)| corner * weight)
                 .sum();
             let off = place.distance_squared(point.rest);
-            if nearest.is_none_or(|(least, _)| off < least) {
-                let weights = weights.map(|weight| weight as f32);
+            if off.is_finite() && nearest.is_none_or(|(least, _)| off < least) {
+                let weights = weights.map(|weight| weight.max(0.0) as f32);
                 nearest = Some((off, SurfacePoint { triangle, weights }));
             }
         }

@@ -131,7 +131,10 @@ impl Watched {
     pub(super) fn take_all(&mut self, mut changed: Vec<Candidate>) {
         changed.retain(|candidate| candidate.limit < self.others);
         changed.sort_unstable_by(Candidate::before);
-        changed.truncate(self.most);
+        if let Some(next) = changed.get(self.most) {
+            self.others = self.others.min(next.limit);
+            changed.truncate(self.most);
+        }
         let room = 2 * self.most - changed.len();
         if self.candidates.len() > room {
             self.others = self.others.min(self.candidates[room].limit);

@@ -57,12 +57,12 @@ impl Link {
     }
 }
 
-/// A spring that is to have another stiffness and rest length, as its node with the lower number sees it.
+/// A spring that is to have another stiffness, rest length or damping, as one of its nodes sees it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Change {
     pub node: u32,
     pub before: Link,
-    /// To the same neighbour, with the same damping.
+    /// To the same neighbour.
     pub after: Link,
 }
 
@@ -86,6 +86,12 @@ pub(crate) struct Rewiring {
     pub changed: Vec<Change>,
     /// Between nodes that have none.
     pub added: Vec<Spring>,
+}
+
+impl Rewiring {
+    pub fn is_empty(&self) -> bool {
+        self.removed.is_empty() && self.changed.is_empty() && self.added.is_empty()
+    }
 }
 
 /// What spring forces depend on, and what is wanted next.
@@ -194,7 +200,7 @@ pub(crate) trait Springs: Debug + Send + Sync {
     /// Removes the spring between `a` and `b`; refused where there is none.
     fn remove(&mut self, a: u32, b: u32) -> Result<()>;
 
-    /// Gives springs that there are, each once, other stiffnesses and rest lengths. Changes nothing where it fails.
+    /// Gives springs that there are, each once, other parameters. Changes nothing where it fails.
     fn set(&mut self, changes: &[Change]) -> Result<()>;
 
     /// Changes springs as a cut does. Changes nothing where it fails.

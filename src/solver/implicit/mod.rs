@@ -318,6 +318,9 @@ impl Implicit {
                 vectors.set(node, vectors.get(source));
             }
         }
+        if let Some(newton) = &mut self.newton {
+            newton.copy_remainder(self.settled, source, node);
+        }
     }
 
     /// Where the equations are solved exactly, what that needs with the nodes that these springs have, and so many springs more.

@@ -74,6 +74,12 @@ impl Newton {
         Ok(roomier)
     }
 
+    /// A new node lacks what another does.
+    pub fn copy_remainder(&mut self, place: usize, source: usize, node: usize) {
+        let remainders = &mut self.remainders[place];
+        remainders.set(node, remainders.get(source));
+    }
+
     /// Makes room for so many springs in all, so that a step needs no memory.
     pub fn make_room(&mut self, spring_count: usize) -> Result<()> {
         self.descent.make_room(spring_count)

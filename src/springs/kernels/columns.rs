@@ -469,7 +469,7 @@ impl Columns {
         Ok(())
     }
 
-    /// Gives links of a node, in the order of their neighbours, other stiffnesses and rest lengths, for which there is room; those that
+    /// Gives links of a node, in the order of their neighbours, other parameters, for which there is room; those that
     /// share their parameters go beside the columns: how many.
     pub fn set(&mut self, links: &[(u32, Link)]) -> usize {
         let mut left = 0;
@@ -483,6 +483,9 @@ impl Columns {
                         self.own_rest_lengths[own].0[lane] = link.rest_length;
                         if let Some(line) = self.own_stiffnesses.get_mut(own) {
                             line.0[lane] = link.stiffness;
+                        }
+                        if let Some(line) = self.own_dampings.get_mut(own) {
+                            line.0[lane] = link.damping;
                         }
                     }
                     Some(None) => {

@@ -88,11 +88,14 @@ impl Strays {
         }
     }
 
-    /// Gives the link from `node` another stiffness and rest length, where it is here.
+    /// Gives the link from `node` other parameters, where it is here.
     pub fn set(&mut self, node: usize, link: &Link) {
         if let Some(index) = self.find(node, link.neighbour as usize) {
             self.stiffnesses[index] = link.stiffness;
             self.rest_lengths[index] = link.rest_length;
+            if self.damped {
+                self.dampings[index] = link.damping;
+            }
         }
     }
 

@@ -22,7 +22,8 @@ pub(crate) use split::{Costs, Row, Split, cheapest};
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
 use super::{
-    Change, Course, Link, Motion, Springs, TILE, TileForces, already_joined, not_joined, tile_count, tile_nodes,
+    Change, Course, Link, Motion, Rewiring, Springs, TILE, TileForces, already_joined, not_joined, tile_count,
+    tile_nodes,
 };
 use crate::body::{Spring, View};
 use crate::error::Result;
@@ -140,6 +141,36 @@ impl Packed {
 
     fn tile_mut(&mut self, node: u32) -> &mut Tile {
         &mut self.tiles[node as usize / TILE]
+    }
+
+    /// Puts a spring beside the columns.
+    fn insert(&mut self, spring: &Spring) -> Result<()> {
+        let [a, b] = spring.nodes;
+        if self.has(a, b) {
+            return Err(already_joined(a, b));
+        }
+        for node in [a, b] {
+            let node_count = self.node_count;
+            let columns = &mut self.tile_mut(node).columns;
+            columns.reach(node_count);
+            // Both ends may be in one tile.
+            columns.reserve_strays(2)?;
+        }
+        for (node, link) in spring.nodes.into_iter().zip(Link::ends(spring)) {
+            self.tile_mut(node).columns.insert_stray(node as usize, &link);
+        }
+        self.spring_count += 1;
+        Ok(())
+    }
+
+    /// Takes out a spring that is there.
+    fn take_out(&mut self, [a, b]: [u32; 2]) {
+        for (node, neighbour) in [(a, b), (b, a)] {
+            let tile = self.tile_mut(node);
+            tile.columns.remove(node as usize, neighbour as usize);
+            tile.removed += 1;
+        }
+        self.spring_count -= 1;
     }
 
     /// Takes away the last nodes, which have no springs.
@@ -270,24 +301,33 @@ impl Springs for Packed {
         Ok(())
     }
 
+    fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
+        let Rewiring {
+            removed,
+            changed,
+            added,
+        } = rewiring;
+        // No tile is packed again before all is done: columns that lead to new nodes could not be taken back.
+        for (done, spring) in added.iter().enumerate() {
+            if let Err(error) = self.insert(spring) {
+                added[..done].iter().for_each(|spring| self.take_out(spring.nodes));
+                return Err(error);
+            }
+        }
+        if let Err(error) = self.set(changed) {
+            added.iter().for_each(|spring| self.take_out(spring.nodes));
+            return Err(error);
+        }
+        removed.iter().for_each(|spring| self.take_out(spring.nodes));
+        for node in removed.iter().chain(added).flat_map(|spring| spring.nodes) {
+            self.mend(node);
+        }
+        Ok(())
+    }
+
     fn add(&mut self, spring: &Spring) -> Result<()> {
-        let [a, b] = spring.nodes;
-        if self.has(a, b) {
-            return Err(already_joined(a, b));
-        }
-        for node in [a, b] {
-            // Both ends may be in one tile.
-            let node_count = self.node_count;
-            let columns = &mut self.tile_mut(node).columns;
-            columns.reach(node_count);
-            columns.reserve_strays(2)?;
-        }
-        for (node, link) in spring.nodes.into_iter().zip(Link::ends(spring)) {
-            self.tile_mut(node).columns.insert_stray(node as usize, &link);
-        }
-        self.spring_count += 1;
-        self.mend(a);
-        self.mend(b);
+        self.insert(spring)?;
+        spring.nodes.into_iter().for_each(|node| self.mend(node));
         Ok(())
     }
 
@@ -295,12 +335,7 @@ impl Springs for Packed {
         if !self.has(a, b) {
             return Err(not_joined(a, b));
         }
-        for (node, neighbour) in [(a, b), (b, a)] {
-            let tile = self.tile_mut(node);
-            tile.columns.remove(node as usize, neighbour as usize);
-            tile.removed += 1;
-        }
-        self.spring_count -= 1;
+        self.take_out([a, b]);
         self.mend(a);
         self.mend(b);
         Ok(())
