@@ -427,3 +427,63 @@ fn a_stroke_goes_on_in_tissue_that_gapes() {
         assert_eq!(count, next.len(), "{solver:?}: the rim is in several parts");
     }
 }
+
+#[test]
+fn no_spring_along_no_edge_stays_across_a_cut() {
+    for is_given in [true, false] {
+        let (rest, cells) = super::sheet::grid(12);
+        let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
+        let at = |x: u32, y: u32| y * 13 + x;
+        let mut edges: Vec<[u32; 2]> = cells
+            .iter()
+            .flat_map(|cell| [0, 1, 2].map(|k| [cell[k].min(cell[(k + 1) % 3]), cell[k].max(cell[(k + 1) % 3])]))
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        // Over two cells each: they keep the sheet from folding.
+        let over: Vec<[u32; 2]> = (0..13)
+            .flat_map(|a| (0..11).flat_map(move |b| [[at(b, a), at(b + 2, a)], [at(a, b), at(a, b + 2)]]))
+            .collect();
+        let all = [&edges[..], &over[..]].concat();
+        let mut world = World::new(WorldDefinition {
+            gravity: Vec3::ZERO,
+            ..Default::default()
+        })
+        .unwrap();
+        let definition = BodyDefinition {
+            positions: &positions,
+            masses: Values::Uniform(1e-4),
+            triangles: &cells,
+            springs: Some(if is_given { &all } else { &edges }),
+            stiffnesses: Values::Uniform(50.0),
+            spare_nodes: 400,
+            mass_scaling: 0.0,
+            ..Default::default()
+        };
+        let body = world.create_body(&definition).unwrap();
+        if !is_given {
+            for &[a, b] in &over {
+                world.body_mut(body).unwrap().add_spring(a, b, 50.0, None).unwrap();
+            }
+        }
+        let stretched: Vec<Vec3> = positions.iter().map(|place| *place * vec3(1.1, 1.05, 1.0)).collect();
+        world.body_mut(body).unwrap().set_positions(&stretched).unwrap();
+        world.step(1e-3).unwrap();
+        let before = kept(&world, body);
+        let edge = |x: f32, y: f32| [vec3(x, y, -0.05), vec3(x, y, 0.05)];
+        let sweep = Sweep {
+            start: edge(-0.01, 0.058),
+            end: edge(0.15, 0.067),
+        };
+        assert_eq!(world.cut(body, &sweep).unwrap().pieces_parted, 1);
+        // Springs count here, too.
+        assert_eq!(
+            world.body(body).unwrap().pieces().unwrap().count,
+            2,
+            "given at first: {is_given}"
+        );
+        let after = kept(&world, body);
+        assert!(after.energy < before.energy, "springs that are gone pulled");
+        assert!(after.momentum.distance(before.momentum) < 1e-9);
+    }
+}
