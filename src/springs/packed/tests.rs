@@ -6,7 +6,9 @@ use glam::{DVec3, Vec3};
 use super::{Packed, Rounding};
 use crate::body::{Records, Spring, Vectors, WriteRecords};
 use crate::random::Random;
-use crate::springs::{Course, Kernel, Link, Motion, Springs, Tangent, TileForces, tile_count, tile_nodes};
+use crate::springs::{
+    Change, Course, Kernel, Link, Motion, Rewiring, Springs, Tangent, TileForces, tile_count, tile_nodes,
+};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
 
@@ -397,5 +399,103 @@ fn rest_lengths_that_differ_by_rounding_are_one() {
                 spring.rest_length
             );
         });
+    }
+}
+
+#[test]
+fn springs_that_are_changed_have_what_they_were_given_at_both_ends() {
+    let mut random = Random(8);
+    for damped in [false, true] {
+        for (name, count, mut pairs) in bodies(damped) {
+            let mut packed = packed(Kernel::Best, count, &pairs).expect("a kernel");
+            for _ in 0..3 {
+                let mut changes = Vec::new();
+                for (&[a, b], spring) in &mut pairs {
+                    if random.below(3) > 0 {
+                        continue;
+                    }
+                    let before = Link::ends(spring)[0];
+                    spring.stiffness *= 0.5;
+                    spring.rest_length *= 1.5;
+                    spring.damping *= 0.25;
+                    let after = Link::ends(spring)[0];
+                    assert_eq!([a, b], spring.nodes);
+                    changes.push(Change { node: a, before, after });
+                }
+                packed.set(&changes).expect("memory");
+                assert_eq!(links(&packed, count), pairs, "{name}");
+            }
+        }
+    }
+}
+
+/// From positions as they are, without records: with those the last places of a sum may differ.
+fn plain_forces(packed: &dyn Springs, positions: &Vectors, velocities: Option<&Vectors>) -> Vec<Vec3> {
+    let mut all = Vec::new();
+    for tile in 0..tile_count(positions.len()) {
+        let mut forces = TileForces::ZERO;
+        packed.forces(tile, &Motion::at(positions, velocities), &mut forces);
+        all.extend((0..tile_nodes(tile, positions.len()).len()).map(|place| forces.get(place)));
+    }
+    all
+}
+
+#[test]
+fn nodes_that_come_later_have_their_springs() {
+    const MORE: usize = 700;
+    for damped in [false, true] {
+        for kernel in [Kernel::Best, Kernel::Portable] {
+            for (name, count, mut pairs) in bodies(damped) {
+                let mut random = Random(4);
+                let mut packed = packed(kernel, count, &pairs).expect("a kernel");
+                packed.reserve_nodes(count + MORE).expect("memory");
+                packed.resize(count + MORE).expect("memory");
+                let mut rewiring = Rewiring::default();
+                for node in count..count + MORE {
+                    // To one that was there, and to one that came too.
+                    for other in [random.below(count), count + random.below(node + 1 - count)] {
+                        let nodes = [other as u32, node as u32];
+                        let spring = Spring {
+                            nodes,
+                            stiffness: random.unit(),
+                            rest_length: 0.1,
+                            damping: if packed.damped() { random.unit() } else { 0.0 },
+                        };
+                        if other != node && pairs.insert(nodes, spring).is_none() {
+                            rewiring.added.push(spring);
+                        }
+                    }
+                }
+                packed.rewire(&rewiring).expect("memory");
+                assert_eq!(links(&packed, count + MORE), pairs, "{name}");
+                let positions = vectors(count + MORE, &mut random);
+                let velocities = packed.damped().then(|| vectors(count + MORE, &mut random));
+                let expected = reference(&pairs, &positions, velocities.as_ref());
+                let found = plain_forces(&packed, &positions, velocities.as_ref());
+                assert_eq!(found.len(), count + MORE);
+                for (node, (found, (expected, size))) in found.iter().zip(expected).enumerate() {
+                    assert!(
+                        (found.as_dvec3() - expected).length() <= 2e-6 * size,
+                        "{name}, node {node}"
+                    );
+                }
+                // And as it was, without them.
+                rewiring.removed = std::mem::take(&mut rewiring.added);
+                packed.rewire(&rewiring).expect("memory");
+                packed.resize(count).expect("memory");
+                pairs.retain(|nodes, _| nodes.iter().all(|&node| (node as usize) < count));
+                assert_eq!(links(&packed, count), pairs, "{name}");
+                let positions = vectors(count, &mut random);
+                let expected = reference(&pairs, &positions, None);
+                if !packed.damped() {
+                    for (found, (expected, size)) in plain_forces(&packed, &positions, None).iter().zip(expected) {
+                        assert!(
+                            (found.as_dvec3() - expected).length() <= 2e-6 * size,
+                            "{name}, as it was"
+                        );
+                    }
+                }
+            }
+        }
     }
 }
