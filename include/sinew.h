@@ -859,7 +859,7 @@ typedef struct sinew_topology_changes {
    */
   size_t triangle_count;
   /**
-   * Springs that are gone, 2 removed_spring_count nodes: taken away by a blade, or replaced by springs of copies.
+   * Springs that are gone, 2 removed_spring_count nodes: taken away by a blade or by hand, or replaced by springs of copies.
    */
   const uint32_t *removed_springs;
   /**
@@ -2168,7 +2168,7 @@ sinew_status sinew_body_scale_region(struct sinew_world *world,
  * Nodes keep their numbers, and new ones are numbered on: copies, which move as what they copied moved, and points of the surface between nodes,
  * which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where it is
  * drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none. It takes as long as the cut is
- * large. Positions and triangles that were lent before are stale; sinew_body_get_topology_changes tells what has changed.
+ * large, but with NEWTON, which is made anew. Positions and triangles that were lent before are stale; sinew_body_get_topology_changes tells what has changed.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (spare_nodes was 0), SINEW_STATUS_CAPACITY (there are
  * not as many spare nodes left, or FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY; then nothing has changed.

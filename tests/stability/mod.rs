@@ -111,9 +111,8 @@ const DIFFERENCE: &str = "difference over the size";
 const STRETCH: &str = "error of the stretch";
 const SAG: &str = "error of the sag";
 const SHAPE: &str = "error of the rest shape over the size";
-const KINETIC: &str = "kinetic energy left over that at first";
 
-pub const KNOWN: [Known; 15] = [
+pub const KNOWN: [Known; 14] = [
     // 6.8e-6 of the size after 10 ms.
     known(LOST, "started rotated", &[(DIFFERENCE, 20.0)], |setup| {
         is_verlet_at(setup, 1e-5)
@@ -146,12 +145,8 @@ pub const KNOWN: [Known; 15] = [
     known(LOST, "a million steps", &[(SHAPE, 10.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-4)
     }),
-    // 1.0e-5 and 1.5e-5 of the energy at first is still kinetic after 20 steps.
-    known(JITTER, "scattered at random", &[(KINETIC, 50.0)], |setup| {
-        is_full(setup) && setup.solver == Solver::Implicit && setup.step == 0.1
-    }),
-    // Up to 2.0e-3 of the stretch.
-    jitter(JITTER, "stiffness 1 : 1e6 in a chain", &[(STRETCH, 30.0)], |setup| {
+    // Up to 3.9e-3 of the stretch.
+    jitter(JITTER, "stiffness 1 : 1e6 in a chain", &[(STRETCH, 40.0)], |setup| {
         setup.solver == Solver::Implicit && setup.step <= FRAME
     }),
     // Up to 1.2e-3 of the sag.
