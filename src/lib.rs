@@ -17,6 +17,7 @@ mod query;
 #[cfg(test)]
 mod random;
 pub mod raster;
+mod signs;
 mod slots;
 mod solver;
 mod springs;

@@ -18,12 +18,21 @@ pub(crate) struct Bound {
 }
 
 impl Bound {
+    /// A node that is bound to none: to itself.
+    fn itself(node: u32) -> Self {
+        Self {
+            node,
+            nodes: [node; 4],
+            weights: [1.0, 0.0, 0.0, 0.0],
+        }
+    }
+
     /// The nodes that count, with their weights.
     pub fn parts(&self) -> impl Iterator<Item = (u32, f32)> {
         self.into_parts()
     }
 
-    pub fn into_parts(self) -> impl Iterator<Item = (u32, f32)> {
+    fn into_parts(self) -> impl Iterator<Item = (u32, f32)> {
         let parts = self.nodes.into_iter().zip(self.weights);
         parts.filter(|&(_, weight)| weight > 0.0)
     }
@@ -44,6 +53,13 @@ pub(crate) struct Bindings {
     places: Vec<u32>,
     /// A bit for each of the body's numbers up to the last that nobody draws or touches.
     hidden: Vec<u64>,
+}
+
+/// The nodes that a number stands for, with their weights: itself where it is not bound, as where nothing is.
+#[inline]
+pub(super) fn parts(bindings: Option<&Bindings>, node: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
+    let bound = bindings.and_then(|bindings| bindings.get(node)).copied();
+    bound.unwrap_or_else(|| Bound::itself(node)).into_parts()
 }
 
 const NOT_BOUND: u32 = u32::MAX;
@@ -87,12 +103,7 @@ impl Bindings {
     /// The nodes that a number stands for, with their weights: itself where it is not bound.
     #[inline]
     pub fn parts(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
-        let itself = Bound {
-            node,
-            nodes: [node; 4],
-            weights: [1.0, 0.0, 0.0, 0.0],
-        };
-        self.get(node).copied().unwrap_or(itself).into_parts()
+        parts(Some(self), node)
     }
 
     /// The vector of a number, as its nodes make it.

@@ -6,7 +6,7 @@ use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::{Cuttable, passes};
 use super::{Body, Bound, NewNode, SMALLEST_MASS, Spring};
 use crate::contact::SurfaceChange;
-use crate::cutting::{Changes, Limits, PieceOfSpring, Sweep};
+use crate::cutting::{BoundPoint, Changes, CutSurface, Limits, PieceOfSpring, Sweep};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::solver::{Candidate, Masses, close, make_up_for};
@@ -106,7 +106,6 @@ impl Body {
     ) -> Result<CutReport> {
         let surface = &cuttable.surface;
         let known = self.node_count();
-        let new_triangles = surface.triangles().len() - first_triangle as usize;
         // What may fail comes first.
         let pieces_parted = surface.parted(&changes.rim, usize::MAX)?.unwrap_or(0);
         let mut rewiring = self.rewiring(changes)?;
@@ -187,7 +186,7 @@ impl Body {
             .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
-            new_triangles: new_triangles as u32,
+            new_triangles: added.len() as u32,
             springs_removed: gone.len() as u32,
             pieces_parted,
             length: 0.5 * changes.rim.iter().map(|edge| edge.length).sum::<f64>(),
@@ -235,7 +234,7 @@ impl Body {
     /// the lighter of their nodes becomes lighter.
     fn take_away(
         &self,
-        surface: &crate::cutting::CutSurface,
+        surface: &CutSurface,
         sweep: &Sweep,
         near: &[u32],
         changes: &Changes,
@@ -331,14 +330,8 @@ impl Body {
         }
     }
 
-    fn bound(&self, bound: &crate::cutting::BoundPoint) -> Bound {
-        let own = |node: u32| {
-            if (node as usize) < self.node_count() {
-                self.order.own(node)
-            } else {
-                node
-            }
-        };
+    fn bound(&self, bound: &BoundPoint) -> Bound {
+        let own = |node: u32| self.order.own(node);
         let [a, b, c] = bound.nodes.map(own);
         let [u, v, w] = bound.weights.map(|weight| weight as f32);
         Bound {
@@ -356,11 +349,7 @@ impl Body {
             memory::push(
                 &mut touched,
                 Touched {
-                    node: if piece.node < known {
-                        self.order.own(piece.node)
-                    } else {
-                        piece.node
-                    },
+                    node: self.order.own(piece.node),
                     source: self.order.own(piece.source),
                     part: piece.part as f32,
                     before: Vec3::ZERO,

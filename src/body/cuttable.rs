@@ -149,18 +149,17 @@ impl Search {
         let origin = body.origin.as_vec3();
         // What was rounded is in the box all the same.
         let slack = 4.0 * f32::EPSILON * (origin.abs().max_element() + body.reach());
-        let local = Bounds {
-            min: swept.min - origin - slack,
-            max: swept.max - origin + slack,
-        };
         let mut near = Vec::new();
         for home in &self.homes {
             let tiles = home.tiles.iter().map(|&tile| body.boxes[tile as usize]);
-            let is_met = tiles.fold(Bounds::EMPTY, |all, tile| all.and(&tile)).overlaps(&local) || {
-                let later = home.later.iter().map(|&point| positions[point as usize]);
-                Bounds::of(later).overlaps(swept)
+            let tiles = tiles.fold(Bounds::EMPTY, |all, tile| all.and(&tile)).extended(slack);
+            let tiles = Bounds {
+                min: tiles.min + origin,
+                max: tiles.max + origin,
             };
-            if !is_met && home.later.is_empty() {
+            let later = Bounds::of(home.later.iter().map(|&point| positions[point as usize]));
+            // A triangle may lie between nodes of both.
+            if !tiles.and(&later).overlaps(swept) {
                 continue;
             }
             for &triangle in &home.triangles {

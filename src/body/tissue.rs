@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Body, Bound};
+use super::Body;
+use super::bindings::parts;
 use crate::contact::{CollisionFilter, Moment};
 use crate::error::Result;
 use crate::solver::close;
@@ -67,14 +68,7 @@ impl Body {
 
     /// Its own numbers of the nodes that move one of the caller's, with their parts: itself where it is bound to none.
     pub(crate) fn parts_of(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
-        let own = self.order.own(node);
-        let itself = Bound {
-            node: own,
-            nodes: [own; 4],
-            weights: [1.0, 0.0, 0.0, 0.0],
-        };
-        let bound = self.bindings.as_ref().and_then(|bindings| bindings.get(own));
-        bound.copied().unwrap_or(itself).into_parts()
+        parts(self.bindings.as_ref(), self.order.own(node))
     }
 
     /// How much faster a node becomes for an impulse, along each axis, 1/kg.

@@ -2,55 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-/// What rounding may make of a triple product, as a part of the sum of its products' sizes.
-const ROUNDING: f64 = 1e-15;
-
-/// `a . (b x c)`, of which the sign is exact; of coordinates rounded to `f32` differences are exact too.
-fn triple(a: DVec3, b: DVec3, c: DVec3) -> f64 {
-    let rounded = a.dot(b.cross(c));
-    let (x, y, z) = (b.abs(), c.abs(), a.abs());
-    let size = z.x * (x.y * y.z + x.z * y.y) + z.y * (x.z * y.x + x.x * y.z) + z.z * (x.x * y.y + x.y * y.x);
-    if rounded.abs() > ROUNDING * size {
-        return rounded;
-    }
-    let mut terms = [0.0; 24];
-    let products = [
-        (a.x, b.y, c.z),
-        (-a.x, b.z, c.y),
-        (a.y, b.z, c.x),
-        (-a.y, b.x, c.z),
-        (a.z, b.x, c.y),
-        (-a.z, b.y, c.x),
-    ];
-    for (four, (a, b, c)) in terms.chunks_exact_mut(4).zip(products) {
-        let (high, low) = two_product(a, b);
-        (four[0], four[1]) = two_product(high, c);
-        (four[2], four[3]) = two_product(low, c);
-    }
-    // Each is taken into a sum of numbers that do not overlap, of which the last that is not 0 has its sign (Shewchuk 1997).
-    let mut sum = [0.0; 24];
-    for (count, &term) in terms.iter().enumerate() {
-        let mut carried = term;
-        for part in &mut sum[..count] {
-            (carried, *part) = two_sum(carried, *part);
-        }
-        sum[count] = carried;
-    }
-    sum.into_iter().rev().find(|&part| part != 0.0).unwrap_or(0.0)
-}
-
-/// The product, and what rounding took from it.
-fn two_product(a: f64, b: f64) -> (f64, f64) {
-    let product = a * b;
-    (product, a.mul_add(b, -product))
-}
-
-/// The sum, and what rounding took from it.
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
-    let sum = a + b;
-    let taken = sum - a;
-    (sum, (a - (sum - taken)) + (b - taken))
-}
+use crate::signs::{is_above, triple};
 
 /// Whether the segment from `p` to `q` passes through a triangle from one side to the other, further than `depth` on both and from its
 /// border; what only touches, or lies in its plane, does not.
@@ -79,13 +31,6 @@ pub(crate) fn pierce(p: DVec3, q: DVec3, corners: [DVec3; 3], nodes: [u32; 3]) -
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a);
     let (height_p, height_q) = (normal.dot(p - a), normal.dot(q - a));
-    // The shift goes along x, by far less along y, and by far less again along z.
-    let is_above = |height: f64, shifted: DVec3| {
-        [height, shifted.x, shifted.y, shifted.z]
-            .into_iter()
-            .find(|&term| term != 0.0)
-            .is_some_and(|term| term > 0.0)
-    };
     let (ab, ac) = (b - a, c - a);
     let enters = is_above(triple(p - a, ab, ac), normal);
     if enters == is_above(triple(q - a, ab, ac), normal) {

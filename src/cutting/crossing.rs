@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::predicates::triple;
+use crate::signs::{is_above, triple};
 
 /// An end of the segment in which two triangles meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,14 +14,6 @@ pub(crate) enum End {
     Side(usize, f64),
     /// Inside the drawn triangle, by weights of its corners, where the swept triangle's side from this corner to the next passes through.
     Inside(usize, [f64; 3]),
-}
-
-/// Whether a value is above 0 once what is drawn is shifted along x, by far less along y and by far less again along z.
-fn is_above(value: f64, slope: DVec3) -> bool {
-    [value, slope.x, slope.y, slope.z]
-        .into_iter()
-        .find(|&term| term != 0.0)
-        .is_some_and(|term| term > 0.0)
 }
 
 /// The ends of the segment in which a swept triangle meets a drawn one with the given corners and their numbers; differences of places have to be

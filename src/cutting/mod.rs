@@ -21,7 +21,6 @@ mod open;
 mod parted;
 mod pieces;
 mod points;
-mod predicates;
 mod snap;
 mod split;
 mod surface;

@@ -25,29 +25,6 @@ impl Candidate {
     }
 }
 
-/// For the order of candidates.
-struct Ordered(Candidate);
-
-impl PartialEq for Ordered {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Ordered {}
-
-impl PartialOrd for Ordered {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Ordered {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.before(&other.0)
-    }
-}
-
 /// The nodes of a body that come first if one of them becomes unstable.
 #[derive(Debug)]
 pub(crate) struct Watched {
@@ -140,7 +117,10 @@ impl Watched {
             self.others = self.others.min(self.candidates[room].limit);
             self.candidates.truncate(room);
         }
-        memory::merge(&mut self.candidates, &changed, |candidate| Ordered(*candidate));
+        memory::merge(&mut self.candidates, &changed, |candidate| {
+            // Limits are above 0: their bits are in their order.
+            (candidate.limit.to_bits(), candidate.node)
+        });
         if self.candidates.len() > self.most {
             self.others = self.others.min(self.candidates[self.most].limit);
             self.candidates.truncate(self.most);

@@ -205,22 +205,7 @@ pub(crate) trait Springs: Debug + Send + Sync {
 
     /// Changes springs as a cut does. Changes nothing where it fails.
     fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
-        let Rewiring {
-            removed,
-            changed,
-            added,
-        } = rewiring;
-        for (done, spring) in added.iter().enumerate() {
-            if let Err(error) = self.add(spring) {
-                take_back(self, &added[..done])?;
-                return Err(error);
-            }
-        }
-        if let Err(error) = self.set(changed) {
-            take_back(self, added)?;
-            return Err(error);
-        }
-        take_back(self, removed)
+        rewire_by(self, rewiring, Self::add, |springs, [a, b]| springs.remove(a, b))
     }
 }
 
@@ -241,13 +226,29 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     })
 }
 
-/// Removes springs that there are.
-fn take_back<S: Springs + ?Sized>(springs: &mut S, removed: &[Spring]) -> Result<()> {
-    for spring in removed {
-        let [a, b] = spring.nodes;
-        springs.remove(a, b)?;
+/// Changes springs as a cut does, with these ways to add one and to remove one that is there. Changes nothing where it fails.
+fn rewire_by<S: Springs + ?Sized>(
+    springs: &mut S,
+    Rewiring {
+        removed,
+        changed,
+        added,
+    }: &Rewiring,
+    add: fn(&mut S, &Spring) -> Result<()>,
+    remove: fn(&mut S, [u32; 2]) -> Result<()>,
+) -> Result<()> {
+    let take_out = |springs: &mut S, all: &[Spring]| all.iter().try_for_each(|spring| remove(springs, spring.nodes));
+    for (done, spring) in added.iter().enumerate() {
+        if let Err(error) = add(springs, spring) {
+            take_out(springs, &added[..done])?;
+            return Err(error);
+        }
     }
-    Ok(())
+    if let Err(error) = springs.set(changed) {
+        take_out(springs, added)?;
+        return Err(error);
+    }
+    take_out(springs, removed)
 }
 
 /// Why a spring is not added.

@@ -200,9 +200,7 @@ impl Coarse {
             let cluster = |node: u32| usize::from(self.clusters[node as usize / BLOCK]);
             let clusters = nodes.iter().map(|&node| cluster(node));
             // Nodes of one cluster share its functions: their blocks are added up first.
-            let is_together = clusters
-                .clone()
-                .all(|cluster| cluster == self.clusters[nodes[0] as usize / BLOCK].into());
+            let is_together = clusters.clone().all(|other| other == cluster(nodes[0]));
             let parts: [[f32; FUNCTIONS]; 4] = std::array::from_fn(|place| {
                 nodes
                     .get(place)

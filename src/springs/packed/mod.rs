@@ -22,8 +22,8 @@ pub(crate) use split::{Costs, Row, Split, cheapest};
 use super::ends::Ends;
 use super::kernels::{ChosenKernel, Columns, Material};
 use super::{
-    Change, Course, Link, Motion, Rewiring, Springs, TILE, TileForces, already_joined, not_joined, tile_count,
-    tile_nodes,
+    Change, Course, Link, Motion, Rewiring, Springs, TILE, TileForces, already_joined, not_joined, rewire_by,
+    tile_count, tile_nodes,
 };
 use crate::body::{Spring, View};
 use crate::error::Result;
@@ -302,23 +302,12 @@ impl Springs for Packed {
     }
 
     fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
-        let Rewiring {
-            removed,
-            changed,
-            added,
-        } = rewiring;
         // No tile is packed again before all is done: columns that lead to new nodes could not be taken back.
-        for (done, spring) in added.iter().enumerate() {
-            if let Err(error) = self.insert(spring) {
-                added[..done].iter().for_each(|spring| self.take_out(spring.nodes));
-                return Err(error);
-            }
-        }
-        if let Err(error) = self.set(changed) {
-            added.iter().for_each(|spring| self.take_out(spring.nodes));
-            return Err(error);
-        }
-        removed.iter().for_each(|spring| self.take_out(spring.nodes));
+        rewire_by(self, rewiring, Self::insert, |packed, nodes| {
+            packed.take_out(nodes);
+            Ok(())
+        })?;
+        let Rewiring { removed, added, .. } = rewiring;
         for node in removed.iter().chain(added).flat_map(|spring| spring.nodes) {
             self.mend(node);
         }

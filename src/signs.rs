@@ -1,4 +1,4 @@
-//! The sign of a triple product, where rounding would decide.
+//! Signs that rounding does not decide, of a triple product and of what is shifted by next to nothing.
 
 use glam::DVec3;
 
@@ -50,4 +50,13 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let taken = sum - a;
     (sum, (a - (sum - taken)) + (b - taken))
+}
+
+/// Whether a value is above 0 once its matter is shifted along x, by far less along y and by far less again along z, with which it grows like this
+/// (Edelsbrunner, Muecke 1990).
+pub(crate) fn is_above(value: f64, slope: DVec3) -> bool {
+    [value, slope.x, slope.y, slope.z]
+        .into_iter()
+        .find(|&term| term != 0.0)
+        .is_some_and(|term| term > 0.0)
 }
