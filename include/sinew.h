@@ -723,9 +723,10 @@ typedef struct sinew_body_def {
    */
   uint32_t collision_mask;
   /**
-   * How many nodes cuts may add, of which room is made: some five for each triangle that a blade passes through. 0, the default: the body
-   * cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
-   * have an edge and those about a node hang together. See sinew_body_cut.
+   * How many nodes cuts may add, of which room is made: some five for each triangle or tetrahedron that a blade passes through. 0, the default:
+   * the body cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
+   * have an edge and those about a node hang together; a solid is one of tetrahedra of which those about a node hang together by faces at it,
+   * and triangles are its boundary, if there are any. See sinew_body_cut.
    */
   uint32_t spare_nodes;
   /**
@@ -792,9 +793,13 @@ typedef struct sinew_cut_report {
    */
   uint32_t pieces_parted;
   /**
-   * How long the cut is, in the rest shape, m.
+   * How long the cut is, in the rest shape, m; of tetrahedra on their skin.
    */
   double length;
+  /**
+   * Of tetrahedra: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
+   */
+  double area;
 } sinew_cut_report;
 
 /**

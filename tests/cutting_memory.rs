@@ -4,13 +4,18 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+#[path = "cutting_solids/block.rs"]
+mod block;
 #[path = "cutting/sheet.rs"]
 mod sheet;
 
 use glam::{Vec3, vec2, vec3};
 use sheet::{Body, unstructured, wavy};
 use sinew::cutting::{Limits, Sweep};
-use sinew::{BodyDefinition, Error, Shape, Solver, Storage, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{
+    BodyDefinition, Error, Material, Model, Shape, Solver, Storage, ToolDefinition, Values, Viscosity, World,
+    WorldDefinition,
+};
 
 thread_local! {
     /// How many more times this thread gets memory; none: as often as it likes.
@@ -86,6 +91,46 @@ fn a_cut_without_memory_changes_nothing() {
     }
 }
 
+/// Cuts a body without memory after any number of allocations, and then with it; a step of it after that needs none.
+fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, what: &str) {
+    let mut world = World::new(WorldDefinition::default()).unwrap();
+    let body = world.create_body(definition).unwrap();
+    let mut tool = ToolDefinition::new(Shape::Sphere { radius: 1.0 });
+    tool.pose.position = 1.5 * Vec3::Z;
+    world.create_tool(&tool).unwrap();
+    world.step(1e-3).unwrap();
+    let before = world.state_hash();
+    let mut times = 0;
+    loop {
+        LEFT.with(|left| left.set(Some(times)));
+        let answer = world.cut(body, sweep);
+        LEFT.with(|left| left.set(None));
+        match answer {
+            Ok(report) => {
+                assert!(times > 100, "it needs memory {times} times");
+                assert!(report.new_nodes > 0);
+                break;
+            }
+            Err(error) => assert_eq!(error, Error::OutOfMemory),
+        }
+        assert_eq!(world.state_hash(), before, "{what}: without memory after {times} times");
+        assert_eq!(world.body(body).unwrap().changes_since(0).unwrap().version, 0);
+        // Nearly all of the ways that it may run out.
+        times += 1 + times / 200;
+    }
+    world.step(1e-3).unwrap();
+    LEFT.with(|left| left.set(Some(0)));
+    let steps = (0..20).try_for_each(|_| world.step(1e-3).map(|_| ()));
+    LEFT.with(|left| left.set(None));
+    steps.unwrap();
+    let it = world.body(body).unwrap();
+    assert!(it.positions().iter().all(|place| place.is_finite()));
+}
+
+fn blade(x: f32, y: f32) -> [Vec3; 2] {
+    [vec3(x, y, -9.0), vec3(x, y, 9.0)]
+}
+
 #[test]
 fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
     let (rest, cells) = unstructured(8, 3);
@@ -95,7 +140,6 @@ fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
         (Solver::Implicit, Storage::DynamicBulk),
         (Solver::Newton, Storage::FastLink),
     ] {
-        let mut world = World::new(WorldDefinition::default()).unwrap();
         let definition = BodyDefinition {
             positions: &rest,
             masses: Values::Uniform(1.0),
@@ -107,49 +151,48 @@ fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
             storage,
             ..Default::default()
         };
-        let body = world.create_body(&definition).unwrap();
-        let mut tool = ToolDefinition::new(Shape::Sphere { radius: 1.0 });
-        tool.pose.position = 1.5 * Vec3::Z;
-        world.create_tool(&tool).unwrap();
-        world.step(1e-3).unwrap();
-        let blade = |x: f32, y: f32| [vec3(x, y, -9.0), vec3(x, y, 9.0)];
         let sweep = Sweep {
             start: blade(2.0, 6.6),
             end: blade(5.1, -1.0),
         };
-        let before = world.state_hash();
-        for times in 0.. {
-            LEFT.with(|left| left.set(Some(times)));
-            let answer = world.cut(body, &sweep);
-            LEFT.with(|left| left.set(None));
-            match answer {
-                Ok(report) => {
-                    assert!(times > 100, "it needs memory {times} times");
-                    assert!(report.new_nodes > 0);
-                    break;
-                }
-                Err(error) => assert_eq!(error, Error::OutOfMemory),
-            }
-            assert_eq!(
-                world.state_hash(),
-                before,
-                "{solver:?}, {storage:?}: without memory after {times} times"
-            );
-            assert_eq!(world.body(body).unwrap().changes_since(0).unwrap().version, 0);
-        }
-        // A step of what was cut needs none.
-        world.step(1e-3).unwrap();
-        LEFT.with(|left| left.set(Some(0)));
-        let steps = (0..20).try_for_each(|_| world.step(1e-3).map(|_| ()));
-        LEFT.with(|left| left.set(None));
-        steps.unwrap();
-        assert!(
-            world
-                .body(body)
-                .unwrap()
-                .positions()
-                .iter()
-                .all(|place| place.is_finite())
-        );
+        cut_while_memory_is_scarce(&definition, &sweep, &format!("{solver:?}, {storage:?}"));
+    }
+}
+
+#[test]
+fn a_solid_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
+    let (rest, cells) = block::shaken([4, 4, 2], 3);
+    let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| block::upright(&rest, cell)).collect();
+    for (solver, has_springs) in [
+        (Solver::Verlet, true),
+        (Solver::Verlet, false),
+        (Solver::Implicit, false),
+        (Solver::Newton, false),
+    ] {
+        let elements = Material {
+            model: Model::Tetrahedra,
+            young_modulus: 100.0,
+            poisson_ratio: 0.3,
+            ..Default::default()
+        };
+        let definition = BodyDefinition {
+            positions: &rest,
+            masses: Values::Uniform(1.0),
+            tetrahedra: &cells,
+            stiffnesses: Values::Uniform(if has_springs { 100.0 } else { 0.0 }),
+            material: (!has_springs).then_some(elements),
+            viscosity: Viscosity {
+                retardation_time: if has_springs { 0.0 } else { 0.1 },
+                relaxation_time: if has_springs { 0.0 } else { 0.1 },
+            },
+            spare_nodes: 400,
+            solver,
+            ..Default::default()
+        };
+        let sweep = Sweep {
+            start: blade(1.2, 4.6),
+            end: blade(2.9, -0.6),
+        };
+        cut_while_memory_is_scarce(&definition, &sweep, &format!("{solver:?}, springs: {has_springs}"));
     }
 }

@@ -99,7 +99,7 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
         .expect("room");
     let new: Vec<NewNode> = bound.iter().map(|&bound| NewNode::Bound(bound)).collect();
     body.springs.resize(body.node_count() + new.len()).expect("memory");
-    body.rewire(&Rewiring::default()).expect("memory");
+    body.rewire(&Rewiring::default(), 0).expect("memory");
     body.add_nodes(&new).expect("room");
     body.change_surface(change);
 }

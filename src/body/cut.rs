@@ -1,12 +1,13 @@
 //! A cut: what the blade parted falls apart in everything that a body is moved with.
 
-use glam::{BVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3};
 
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::{Cuttable, passes};
 use super::{Body, Bound, NewNode, SMALLEST_MASS, Spring};
 use crate::contact::SurfaceChange;
-use crate::cutting::{BoundPoint, Changes, CutSurface, Limits, PieceOfSpring, Sweep};
+use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, PieceOfSpring, Sweep};
+use crate::elements::PieceOfElement;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::solver::{Candidate, Masses, close, make_up_for};
@@ -23,8 +24,10 @@ pub struct CutReport {
     pub springs_removed: u32,
     /// How many more pieces the surface has.
     pub pieces_parted: u32,
-    /// How long the cut is, in the rest shape, m.
+    /// How long the cut is, in the rest shape, m; of solids on their skin.
     pub length: f64,
+    /// Of solids: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
+    pub area: f64,
 }
 
 /// A node whose springs or mass a cut changes.
@@ -80,43 +83,45 @@ impl Body {
     }
 
     fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
-        let first_triangle = cuttable.surface.triangles().len() as u32;
-        let sweep = &cuttable.stroke.carried(sweep, &cuttable.surface, self.positions());
-        let near = self.triangles_near(cuttable, sweep)?;
+        let mut sweep = *sweep;
+        if let Some(start) = cuttable.stroke.carried(&sweep, self.positions()) {
+            sweep.start = start;
+            cuttable.material.carry(start);
+        }
+        let near = self.items_near(cuttable, &sweep)?;
         let limits = Limits {
             nodes: self.node_room as u32,
             ..Limits::NONE
         };
-        let changes = cuttable.surface.cut(sweep, self.positions(), &near, limits)?;
-        let applied = self.apply(cuttable, sweep, &near, &changes, first_triangle);
+        let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
+        let changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
+        let applied = self.apply(cuttable, &sweep, &near, &changes, counts);
         if applied.is_err() {
-            cuttable.surface.undo();
+            cuttable.material.undo();
         }
         applied
     }
 
-    /// Makes the body what the changes say. Changes nothing where it fails.
+    /// Makes the body what the changes say, of so many triangles and items that there were before. Changes nothing where it fails.
     fn apply(
         &mut self,
         cuttable: &mut Cuttable,
         sweep: &Sweep,
         near: &[u32],
         changes: &Changes,
-        first_triangle: u32,
+        [first_triangle, first_item]: [u32; 2],
     ) -> Result<CutReport> {
-        let surface = &cuttable.surface;
+        let material = &cuttable.material;
         let known = self.node_count();
         // What may fail comes first.
-        let pieces_parted = surface.parted(&changes.rim, usize::MAX)?.unwrap_or(0);
+        let pieces_parted = material.parted(changes, usize::MAX)?.unwrap_or(0);
         let mut rewiring = self.rewiring(changes)?;
         if !cuttable.springs_are_edges {
-            self.take_away(surface, sweep, near, changes, &mut rewiring)?;
+            self.take_away(material, sweep, near, changes, &mut rewiring)?;
         }
-        if changes.triangles.is_empty() && changes.nodes.is_empty() && rewiring.is_empty() {
-            cuttable.stroke.reserve(changes.ends.len())?;
-            cuttable
-                .stroke
-                .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
+        if changes.is_empty() && rewiring.is_empty() {
+            cuttable.stroke.reserve(material.most_ends(changes, near))?;
+            self.stop(cuttable, sweep, near, changes);
             return Ok(CutReport::default());
         }
         let is_held = |source: u32| self.inverse_masses[self.order.own(source) as usize] == 0.0;
@@ -125,11 +130,11 @@ impl Body {
             close(self);
         }
         let nodes = self.new_nodes(changes)?;
+        let pieces = self.pieces_of_elements(material, changes)?;
         let touched = self.touched(changes, &rewiring)?;
         let copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
-        cuttable
-            .search
-            .reserve(surface, copies.clone().count(), &changes.triangles)?;
+        let items = material.items_changed(changes)?;
+        cuttable.search.reserve(material, copies.clone().count(), &items)?;
         let mut gone = memory::reserved(rewiring.removed.len())?;
         gone.extend(
             rewiring
@@ -143,16 +148,16 @@ impl Body {
         changed.extend(
             known_triangles
                 .iter()
-                .map(|&triangle| (triangle, surface.corner_points(triangle))),
+                .map(|&triangle| (triangle, material.corner_points(triangle))),
         );
         let mut added = memory::reserved(new.len())?;
-        added.extend(new.iter().map(|&triangle| surface.corner_points(triangle)));
+        added.extend(new.iter().map(|&triangle| material.corner_points(triangle)));
         let change = SurfaceChange {
             changed: &changed,
             added: &added,
             hidden: &changes.undrawn,
         };
-        cuttable.stroke.reserve(changes.ends.len())?;
+        cuttable.stroke.reserve(material.most_ends(changes, near))?;
         self.reserve_surface(nodes.len(), changed.len(), added.len())?;
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
@@ -161,8 +166,18 @@ impl Body {
         let mut changing = memory::reserved(touched.len())?;
         changing.extend(touched.iter().map(|touched| touched.node));
         let candidates = memory::reserved(touched.len())?;
+        let of_pieces = pieces.iter().flat_map(|piece| piece.nodes);
+        let mut at_pieces = memory::reserved(4 * pieces.len() + touched.len())?;
+        if self.elements.is_some() {
+            at_pieces.extend(of_pieces.chain(changing.iter().copied()));
+            memory::sort_once(&mut at_pieces);
+        }
+        if let Some(elements) = &mut self.elements {
+            let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
+            elements.reserve_pieces(&pieces, known + nodes.len(), sums)?;
+        }
         self.springs.resize(known + nodes.len())?;
-        let rewired = self.rewire(&rewiring);
+        let rewired = self.rewire(&rewiring, 6 * pieces.len());
         if rewired.is_err() {
             self.springs.resize(known)?;
             return rewired.map(|()| CutReport::default());
@@ -170,35 +185,49 @@ impl Body {
         // From here on nothing fails. Damping is to be that of masses as they are.
         self.scale_masses(0.0);
         self.add_nodes(&nodes)?;
+        if let Some(elements) = &mut self.elements {
+            let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
+            elements.rewire(&pieces, known + nodes.len(), sums);
+        }
         self.rebind(changes);
         self.share_masses(cuttable, changes)?;
+        self.follow_elements(&cuttable.material, changes, &at_pieces);
         self.go_on(&touched, &changing, candidates);
         self.change_surface(&change);
-        let surface = &cuttable.surface;
         cuttable.search.add_cells(copies.map(|piece| piece.source));
-        cuttable.search.see(surface, &changes.triangles, first_triangle);
-        if !changes.triangles.is_empty() || !gone.is_empty() {
+        cuttable.search.see(&cuttable.material, &items, first_item);
+        if !changes.is_empty() || !gone.is_empty() {
             cuttable.log.add(changes, &gone);
         }
         self.publish_new(known);
-        cuttable
-            .stroke
-            .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
+        self.stop(cuttable, sweep, near, changes);
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
             new_triangles: added.len() as u32,
             springs_removed: gone.len() as u32,
             pieces_parted,
             length: 0.5 * changes.rim.iter().map(|edge| edge.length).sum::<f64>(),
+            area: changes.faces.iter().map(|face| face.area).sum(),
         })
     }
 
-    /// Changes springs, of which there are nodes already, and what a solver knows of them. Changes nothing where it fails.
-    pub(super) fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
+    /// Remembers where the blade stands in the material.
+    fn stop(&self, cuttable: &mut Cuttable, sweep: &Sweep, near: &[u32], changes: &Changes) {
+        let Cuttable { stroke, material, .. } = cuttable;
+        if stroke.stop(sweep) {
+            let positions = self.positions();
+            material.ends(changes, sweep, positions, near, |end| stroke.stands_at(end, positions));
+        }
+    }
+
+    /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
+    /// nothing where it fails.
+    pub(super) fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
         let beside = (self.terms.as_deref(), self.enclosed.as_deref());
         let roomier = match &self.implicit {
             Some(implicit) => {
-                implicit.roomier(&*self.springs, rewiring.added.len(), self.elements.as_deref(), beside)?
+                let more = rewiring.added.len() + pairs;
+                implicit.roomier(&*self.springs, more, self.elements.as_deref(), beside)?
             }
             None => None,
         };
@@ -234,16 +263,15 @@ impl Body {
     /// the lighter of their nodes becomes lighter.
     fn take_away(
         &self,
-        surface: &CutSurface,
+        material: &CutMaterial,
         sweep: &Sweep,
         near: &[u32],
         changes: &Changes,
         rewiring: &mut Rewiring,
     ) -> Result<()> {
-        let mut nodes = memory::reserved(3 * near.len())?;
-        for &triangle in near {
-            let cell = surface.triangles()[triangle as usize].cell;
-            nodes.extend(surface.cells()[cell as usize].nodes.map(|node| self.order.own(node)));
+        let mut nodes = memory::reserved(4 * near.len())?;
+        for &item in near {
+            nodes.extend(material.nodes_of(item).map(|node| self.order.own(node)));
         }
         // New ones have no springs yet.
         let known = self.node_count() as u32;
@@ -286,7 +314,7 @@ impl Body {
         for (node, link) in found {
             let ends = [node, link.neighbour];
             let callers = ends.map(|node| self.order.caller(node));
-            if surface.has_edge(callers) {
+            if material.has_edge(callers) {
                 continue;
             }
             let segment = callers.map(|node| positions[node as usize]);
@@ -298,6 +326,21 @@ impl Body {
             }
         }
         Ok(())
+    }
+
+    /// What becomes of tetrahedra that are elements.
+    fn pieces_of_elements(&self, material: &CutMaterial, changes: &Changes) -> Result<Vec<PieceOfElement>> {
+        if self.elements.is_none() {
+            return Ok(Vec::new());
+        }
+        let mut pieces = memory::reserved(changes.cells.len())?;
+        pieces.extend(changes.cells.iter().map(|piece| PieceOfElement {
+            cell: piece.cell,
+            source: piece.source,
+            nodes: material.nodes_of(piece.cell).map(|node| self.order.own(node)),
+            part: piece.part as f32,
+        }));
+        Ok(pieces)
     }
 
     /// The new nodes in the order of their numbers.
@@ -332,12 +375,10 @@ impl Body {
 
     fn bound(&self, bound: &BoundPoint) -> Bound {
         let own = |node: u32| self.order.own(node);
-        let [a, b, c] = bound.nodes.map(own);
-        let [u, v, w] = bound.weights.map(|weight| weight as f32);
         Bound {
             node: bound.point,
-            nodes: [a, b, c, a],
-            weights: [u, v, w, 0.0],
+            nodes: bound.nodes.map(own),
+            weights: bound.weights.map(|weight| weight as f32),
         }
     }
 
@@ -422,7 +463,7 @@ impl Body {
                 } else if is_drawn {
                     0.0
                 } else {
-                    cuttable.density * cuttable.surface.area_at(piece.node)
+                    cuttable.density * cuttable.material.share_at(piece.node)
                 } as f32;
                 let mass = if mass > 0.0 { mass.max(SMALLEST_MASS) } else { mass };
                 if is_copy && is_drawn && axes.any() {
@@ -447,6 +488,37 @@ impl Body {
         Ok(())
     }
 
+    /// The same for elements, at all nodes of pieces and all others of which masses or springs have changed.
+    fn follow_elements(&mut self, material: &CutMaterial, changes: &Changes, nodes: &[u32]) {
+        let Some(elements) = &mut self.elements else {
+            return;
+        };
+        let order = &self.order;
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+        };
+        let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
+        elements.find_rates_at(nodes, cells_at, &*self.springs, &masses);
+        if self.carry.closing.is_none() {
+            return;
+        }
+        for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
+            let force_on = |body: &Self, node: u32| {
+                let cells = material.tetrahedra_at(node);
+                let elements = body.elements.as_ref();
+                elements.map_or(DVec3::ZERO, |elements| {
+                    elements.force_at(body.order.own(node), cells, body.state.positions())
+                })
+            };
+            let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
+            for piece in pieces {
+                let more = whole * piece.part - force_on(self, piece.node);
+                make_up_for(self, self.order.own(piece.node), more.as_vec3());
+            }
+        }
+    }
+
     /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
     fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
         self.forces_current = false;
@@ -457,7 +529,6 @@ impl Body {
             make_up_for(self, touched.node, touched.before * touched.part - force);
         }
         self.follow_nodes();
-        self.forget_rates();
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Body, BodyDefinition, Bounds, NodeOrder, Spring};
-use crate::cutting::{CutSurface, Sweep};
+use crate::cutting::{CutMaterial, CutSolid, CutSurface, Sweep};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::springs::{TILE, tile_count};
@@ -15,45 +15,64 @@ use super::stroke::Stroke;
 #[derive(Debug)]
 pub(super) struct Cuttable {
     /// In the caller's numbers.
-    pub surface: CutSurface,
+    pub material: CutMaterial,
     pub search: Search,
     pub log: ChangeLog,
     pub stroke: Stroke,
-    /// Mass by area in the mean, kg/m², of nodes that have mass.
+    /// Mass by material in the mean, kg/m² or kg/m³, of nodes that have mass.
     pub density: f64,
     /// Whether every spring lies along an edge of a cell.
     pub springs_are_edges: bool,
 }
 
 impl Cuttable {
-    /// With springs in the caller's numbers; `None`: the body is not to be cut.
-    pub fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<Self>>> {
+    /// With springs and the triangles that are drawn in the caller's numbers; `None`: the body is not to be cut.
+    pub fn new(
+        definition: &BodyDefinition,
+        springs: &[Spring],
+        drawn: &[[u32; 3]],
+        order: &NodeOrder,
+    ) -> Result<Option<Box<Self>>> {
         let spare = definition.spare_nodes;
         if spare == 0 {
             return Ok(None);
         }
         check_offered(definition)?;
         let rest = definition.rest_positions.unwrap_or(definition.positions);
+        let tetrahedra = definition.tetrahedra;
+        let what = if tetrahedra.is_empty() {
+            "triangles"
+        } else {
+            "tetrahedra"
+        };
         let refused = |error| match error {
             Error::InvalidArgument(why) => {
-                Error::invalid(format!("spare_nodes is {spare}, and triangles cannot be cut: {why}"))
+                Error::invalid(format!("spare_nodes is {spare}, and {what} cannot be cut: {why}"))
             }
             error => error,
         };
-        let mut surface = CutSurface::new(rest, definition.triangles).map_err(refused)?;
-        surface.reserve(spare)?;
-        let mut search = Search::new(rest.len(), definition.triangles, order)?;
+        let mut material = if tetrahedra.is_empty() {
+            CutMaterial::Surface(CutSurface::new(rest, drawn).map_err(refused)?)
+        } else {
+            CutMaterial::Solid(CutSolid::new(rest, tetrahedra, drawn).map_err(refused)?)
+        };
+        material.reserve(spare)?;
+        let mut search = Search::new(rest.len(), &material, order)?;
         // Each copy of a cell brings copies of nodes.
         search.home_of_cell.try_reserve_exact(spare as usize)?;
-        let (mut mass, mut area) = (0.0, 0.0);
+        let (mut mass, mut size) = (0.0, 0.0);
         for node in 0..rest.len() {
             let of_node = f64::from(definition.masses.get(node));
             if of_node > 0.0 {
                 mass += of_node;
-                area += surface.area_at(node as u32);
+                size += material.share_at(node as u32);
             }
         }
-        let mut edges = crate::mesh::edges(definition.triangles, &[])?;
+        let mut edges = if tetrahedra.is_empty() {
+            crate::mesh::edges(drawn, &[])?
+        } else {
+            crate::mesh::edges(&[], tetrahedra)?
+        };
         for edge in &mut edges {
             edge.sort_unstable();
         }
@@ -65,8 +84,8 @@ impl Cuttable {
         };
         Ok(Some(Box::new(Self {
             search,
-            surface,
-            density: if area > 0.0 { mass / area } else { 0.0 },
+            material,
+            density: if size > 0.0 { mass / size } else { 0.0 },
             log: ChangeLog::default(),
             stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
@@ -82,17 +101,20 @@ fn check_offered(definition: &BodyDefinition) -> Result<()> {
             "spare_nodes is {spare}: bodies with {what} cannot be cut"
         )))
     };
-    if !definition.tetrahedra.is_empty() {
-        return lacking("tetrahedra");
-    }
     if !definition.cells.is_empty() {
         return lacking("cells");
     }
-    if definition.triangles.is_empty() {
-        return lacking("no triangles");
+    if definition.triangles.is_empty() && definition.tetrahedra.is_empty() {
+        return lacking("neither triangles nor tetrahedra");
     }
     if definition.enclosed_stiffness > 0.0 || definition.pressure != 0.0 {
         return lacking("an enclosed_stiffness or a pressure");
+    }
+    if definition
+        .material
+        .is_some_and(|material| material.keeps_volume_by_rings())
+    {
+        return lacking("tetrahedra of a poisson_ratio of 0.4 or more");
     }
     if definition.contact.with_bodies || definition.contact.with_itself {
         return lacking("contact with other tissue or with themselves");
@@ -110,10 +132,10 @@ pub(super) struct Search {
     first_count: u32,
 }
 
-/// The triangles that are listed at one tile.
+/// The items that are listed at one tile.
 #[derive(Clone, Debug, Default)]
 struct Home {
-    triangles: Vec<u32>,
+    items: Vec<u32>,
     /// The tiles that nodes which they were made of lie in.
     tiles: Vec<u32>,
     /// Their corners that came later, in the caller's numbers.
@@ -121,15 +143,15 @@ struct Home {
 }
 
 impl Search {
-    fn new(node_count: usize, triangles: &[[u32; 3]], order: &NodeOrder) -> Result<Self> {
+    fn new(node_count: usize, material: &CutMaterial, order: &NodeOrder) -> Result<Self> {
         let mut homes = memory::filled(Home::default(), tile_count(node_count))?;
-        let mut home_of_cell = memory::reserved(triangles.len())?;
-        for (number, corners) in (0..).zip(triangles) {
-            let tiles = corners.map(|corner| order.own(corner) / TILE as u32);
+        let mut home_of_cell = memory::reserved(material.item_count() as usize)?;
+        for item in 0..material.item_count() {
+            let tiles = material.corners_of(item).map(|corner| order.own(corner) / TILE as u32);
             let home = tiles.into_iter().min().unwrap_or(0);
             home_of_cell.push(home);
             let home = &mut homes[home as usize];
-            memory::push(&mut home.triangles, number)?;
+            memory::push(&mut home.items, item)?;
             for tile in tiles {
                 if !home.tiles.contains(&tile) {
                     memory::push(&mut home.tiles, tile)?;
@@ -143,8 +165,8 @@ impl Search {
         })
     }
 
-    /// The triangles that a blade may have met, given the boxes of tiles and where those began.
-    fn near(&self, body: &Body, surface: &CutSurface, swept: &Bounds) -> Result<Vec<u32>> {
+    /// The items that a blade may have met, given the boxes of tiles and where those began.
+    fn near(&self, body: &Body, material: &CutMaterial, swept: &Bounds) -> Result<Vec<u32>> {
         let positions = body.positions();
         let origin = body.origin.as_vec3();
         // What was rounded is in the box all the same.
@@ -158,31 +180,29 @@ impl Search {
                 max: tiles.max + origin,
             };
             let later = Bounds::of(home.later.iter().map(|&point| positions[point as usize]));
-            // A triangle may lie between nodes of both.
+            // An item may lie between nodes of both.
             if !tiles.and(&later).overlaps(swept) {
                 continue;
             }
-            for &triangle in &home.triangles {
-                let corners = surface.corner_points(triangle);
-                let places = corners.map(|corner| positions[corner as usize]);
+            for &item in &home.items {
+                let places = material.corners_of(item).map(|corner| positions[corner as usize]);
                 if Bounds::of(places.into_iter()).overlaps(swept) {
-                    memory::push(&mut near, triangle)?;
+                    memory::push(&mut near, item)?;
                 }
             }
         }
         Ok(near)
     }
 
-    /// Makes room for what a cut adds, so that listing it cannot fail.
-    pub fn reserve(&mut self, surface: &CutSurface, cells: usize, triangles: &[u32]) -> Result<()> {
+    /// Makes room for what a cut adds, so many cells and of these items, so that listing it cannot fail.
+    pub fn reserve(&mut self, material: &CutMaterial, cells: usize, items: &[u32]) -> Result<()> {
         self.home_of_cell.try_reserve(cells)?;
-        // Each of them may come to any home, and with three corners.
-        for &triangle in triangles {
-            let cell = surface.triangles()[triangle as usize].cell;
-            if let Some(&home) = self.home_of_cell.get(cell as usize) {
+        // Each of them may come to any home, and with all corners.
+        for &item in items {
+            if let Some(&home) = self.home_of_cell.get(material.cell_of(item) as usize) {
                 let home = &mut self.homes[home as usize];
-                home.triangles.try_reserve(triangles.len())?;
-                home.later.try_reserve(3 * triangles.len())?;
+                home.items.try_reserve(items.len())?;
+                home.later.try_reserve(4 * items.len())?;
             }
         }
         Ok(())
@@ -195,15 +215,14 @@ impl Search {
         }
     }
 
-    /// Sees triangles that changed, and those that are new from this one on, for which there is room.
-    pub fn see(&mut self, surface: &CutSurface, triangles: &[u32], first_new: u32) {
-        for &triangle in triangles {
-            let cell = surface.triangles()[triangle as usize].cell;
-            let home = &mut self.homes[self.home_of_cell[cell as usize] as usize];
-            if triangle >= first_new {
-                home.triangles.push(triangle);
+    /// Sees items that changed, and those that are new from this one on, for which there is room.
+    pub fn see(&mut self, material: &CutMaterial, items: &[u32], first_new: u32) {
+        for &item in items {
+            let home = &mut self.homes[self.home_of_cell[material.cell_of(item) as usize] as usize];
+            if item >= first_new {
+                home.items.push(item);
             }
-            for corner in surface.corner_points(triangle) {
+            for corner in material.corners_of(item) {
                 if corner >= self.first_count && !home.later.contains(&corner) {
                     home.later.push(corner);
                 }
@@ -213,10 +232,10 @@ impl Search {
 }
 
 impl Body {
-    /// The triangles whose box a sweep's meets.
-    pub(super) fn triangles_near(&self, cuttable: &Cuttable, sweep: &Sweep) -> Result<Vec<u32>> {
+    /// The items of its material whose box a sweep's meets.
+    pub(super) fn items_near(&self, cuttable: &Cuttable, sweep: &Sweep) -> Result<Vec<u32>> {
         let ends = sweep.start.into_iter().chain(sweep.end);
-        cuttable.search.near(self, &cuttable.surface, &Bounds::of(ends))
+        cuttable.search.near(self, &cuttable.material, &Bounds::of(ends))
     }
 
     /// How far it reaches from where its coordinates begin, m.

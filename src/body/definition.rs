@@ -175,11 +175,12 @@ pub struct BodyDefinition<'a> {
     /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay
     /// as they are. See [`SolverReport::added_mass`](crate::SolverReport::added_mass).
     pub mass_scaling: f32,
-    /// How many nodes cuts may add, of which room is made: copies of nodes, and points of the surface between them. Some five for each triangle that
-    /// a blade passes through. 0: the body cannot be cut, and pays nothing for it.
+    /// How many nodes cuts may add, of which room is made: copies of nodes, and points of the surface between them. Some five for each triangle or
+    /// tetrahedron that a blade passes through. 0: the body cannot be cut, and pays nothing for it.
     ///
     /// A surface that is to be cut is one of triangles turned one way all over, of which two at most have an edge and those about a node hang
-    /// together.
+    /// together; a solid is one of tetrahedra of which those about a node hang together by faces at it, and `triangles` are its boundary, if there
+    /// are any.
     pub spare_nodes: u32,
 }
 

@@ -244,7 +244,7 @@ impl Body {
             error => error,
         })?;
         if let Some(cuttable) = &mut self.cuttable {
-            cuttable.springs_are_edges &= cuttable.surface.has_edge([a, b]);
+            cuttable.springs_are_edges &= cuttable.material.has_edge([a, b]);
         }
         self.forces_current = false;
         if let Some(implicit) = &mut self.implicit {

@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::Body;
-use crate::cutting::CutSurface;
 use crate::world::SurfacePoint;
 
 /// A point of the surface, where it is in the rest shape.
@@ -16,8 +15,7 @@ pub(crate) struct MaterialPoint {
 impl Body {
     /// Where a point is in the material; `None`: the body cannot be cut.
     pub(crate) fn material_point(&self, point: &SurfacePoint) -> Option<MaterialPoint> {
-        let surface = &self.cuttable.as_ref()?.surface;
-        let corners = corners_at_rest(surface, point.triangle);
+        let corners = self.cuttable.as_ref()?.material.corners_at_rest(point.triangle);
         let sum: f64 = point.weights.iter().map(|&weight| f64::from(weight)).sum();
         let parts = corners.into_iter().zip(point.weights);
         let rest = parts.map(|(corner, weight)| corner * (f64::from(weight) / sum)).sum();
@@ -33,7 +31,7 @@ impl Body {
         let changed = cuttable.log.since(since).ok()?.triangles;
         let mut nearest: Option<(f64, SurfacePoint)> = None;
         for triangle in std::iter::once(point.triangle).chain(changed.iter().copied()) {
-            let corners = corners_at_rest(&cuttable.surface, triangle);
+            let corners = cuttable.material.corners_at_rest(triangle);
             let weights = weights_of_nearest(point.rest, corners);
             let place: DVec3 = corners
                 .iter()
@@ -48,11 +46,6 @@ impl Body {
         }
         nearest.map(|(_, point)| point)
     }
-}
-
-fn corners_at_rest(surface: &CutSurface, triangle: u32) -> [DVec3; 3] {
-    let corners = surface.triangles()[triangle as usize].corners;
-    corners.map(|corner| surface.rest_place(corner))
 }
 
 /// The weights of a triangle's corners in its point next to another (Ericson 2005, section 5.1.5).

@@ -190,7 +190,12 @@ impl Body {
             }
         }
         let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
-        let cuttable = Cuttable::new(definition, &springs, &order)?;
+        let surface = match (definition.triangles, definition.tetrahedra) {
+            ([], []) => crate::mesh::cell_boundary(definition.cells)?,
+            ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,
+            (triangles, _) => memory::copied(triangles)?,
+        };
+        let cuttable = Cuttable::new(definition, &springs, &surface, &order)?;
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
@@ -213,11 +218,6 @@ impl Body {
             let damping = |node: usize| definition.node_dampings.get(order.caller(node as u32) as usize);
             rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
             Some(NodeDamping::new(rates)?)
-        };
-        let surface = match (definition.triangles, definition.tetrahedra) {
-            ([], []) => crate::mesh::cell_boundary(definition.cells)?,
-            ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,
-            (triangles, _) => memory::copied(triangles)?,
         };
         let enclosed = Enclosed::new(definition, &surface, &order)?;
         let mut body = Self {
@@ -722,5 +722,9 @@ fn elements_of(law: Law, definition: &BodyDefinition, order: &NodeOrder) -> Resu
     let at_rest = |own: u32| rest[order.caller(own) as usize].as_dvec3();
     let node_count = definition.positions.len();
     let past = (definition.viscosity, definition.yielding);
-    Elements::new(law, past, &tetrahedra, at_rest, node_count)
+    let mut elements = Elements::new(law, past, &tetrahedra, at_rest, node_count)?;
+    if definition.spare_nodes > 0 {
+        elements.follow_cells(&tetrahedra)?;
+    }
+    Ok(elements)
 }

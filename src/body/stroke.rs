@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::cutting::{CutSurface, Sweep};
+use crate::cutting::{CutEnd, Sweep};
 use crate::error::Result;
 use crate::memory;
 
@@ -11,23 +11,23 @@ use crate::memory;
 pub(super) struct Stroke {
     /// The blade's edge.
     edge: Option<[Vec3; 2]>,
-    /// The vertices where it stood in the surface, which may lie a little beside it, and its points next to them.
-    ends: Vec<(u32, Vec3)>,
+    /// Points of the tissue where it stood, which may lie a little beside it, and its points next to them.
+    ends: Vec<(CutEnd, Vec3)>,
 }
 
 impl Stroke {
-    /// The sweep as it is in the tissue now: where it begins just where the last ended it begins where those vertices are now.
-    pub fn carried(&self, sweep: &Sweep, surface: &CutSurface, positions: &[Vec3]) -> Sweep {
+    /// Where the edge that a sweep begins with is in the tissue now, if the sweep begins just where the last ended.
+    pub fn carried(&self, sweep: &Sweep, positions: &[Vec3]) -> Option<[Vec3; 2]> {
         if self.edge != Some(sweep.start) || self.ends.is_empty() {
-            return *sweep;
+            return None;
         }
-        let place = |vertex: u32| positions[surface.vertices()[vertex as usize].point as usize];
-        let gone: Vec3 = self.ends.iter().map(|&(vertex, before)| place(vertex) - before).sum();
+        let gone: Vec3 = self
+            .ends
+            .iter()
+            .map(|(end, before)| end.place(positions) - before)
+            .sum();
         let gone = gone / self.ends.len() as f32;
-        Sweep {
-            start: sweep.start.map(|end| end + gone),
-            ..*sweep
-        }
+        Some(sweep.start.map(|end| end + gone))
     }
 
     /// Makes room for so many ends.
@@ -35,25 +35,28 @@ impl Stroke {
         memory::reserve(&mut self.ends, count)
     }
 
-    /// The blade has come to its end, where it stands in the surface at these vertices, for which there is room; one that stood still is where
-    /// it was.
-    pub fn stop(&mut self, sweep: &Sweep, ends: &[u32], surface: &CutSurface, positions: &[Vec3]) {
-        if sweep.start == sweep.end && self.edge == Some(sweep.end) {
-            return;
+    /// The blade has come to its end; answers whether it moved: one that stood still is where it was.
+    pub fn stop(&mut self, sweep: &Sweep) -> bool {
+        let has_moved = sweep.start != sweep.end || self.edge != Some(sweep.end);
+        if has_moved {
+            self.edge = Some(sweep.end);
+            self.ends.clear();
         }
-        self.edge = Some(sweep.end);
-        self.ends.clear();
-        let place = |vertex: u32| positions[surface.vertices()[vertex as usize].point as usize];
-        let [from, to] = sweep.end;
-        let nearest = |point: Vec3| {
-            let along = (point - from).dot(to - from) / from.distance_squared(to);
-            if along.is_finite() {
-                from.lerp(to, along.clamp(0.0, 1.0))
-            } else {
-                from
-            }
+        has_moved
+    }
+
+    /// It stands in the tissue at this point.
+    pub fn stands_at(&mut self, end: CutEnd, positions: &[Vec3]) {
+        let Some([from, to]) = self.edge else {
+            return;
         };
-        self.ends
-            .extend(ends.iter().map(|&vertex| (vertex, nearest(place(vertex)))));
+        let place = end.place(positions);
+        let along = (place - from).dot(to - from) / from.distance_squared(to);
+        let nearest = if along.is_finite() {
+            from.lerp(to, along.clamp(0.0, 1.0))
+        } else {
+            from
+        };
+        self.ends.push((end, nearest));
     }
 }

@@ -23,8 +23,10 @@ pub struct sinew_cut_report {
     pub springs_removed: u32,
     /// How many more pieces the surface has.
     pub pieces_parted: u32,
-    /// How long the cut is, in the rest shape, m.
+    /// How long the cut is, in the rest shape, m; of tetrahedra on their skin.
     pub length: f64,
+    /// Of tetrahedra: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
+    pub area: f64,
 }
 
 /// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
@@ -154,6 +156,7 @@ pub unsafe extern "C" fn sinew_body_cut(
                     springs_removed: done.springs_removed,
                     pieces_parted: done.pieces_parted,
                     length: done.length,
+                    area: done.area,
                 });
             }
             Ok(())

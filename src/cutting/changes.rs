@@ -1,5 +1,8 @@
 //! What a cut has changed, for the solver and for a renderer.
 
+use crate::error::Result;
+use crate::memory;
+
 /// A part of what a node was before the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PieceOfNode {
@@ -29,8 +32,6 @@ pub struct PieceOfCell {
     pub cell: u32,
     /// The cell that it was.
     pub source: u32,
-    /// Its nodes.
-    pub nodes: [u32; 3],
     /// Its part of the source's material as it was, above 0; those of one source add up to 1.
     pub part: f64,
 }
@@ -41,9 +42,9 @@ pub struct BoundPoint {
     /// Its number among nodes.
     pub point: u32,
     /// The nodes that it is bound to; those beyond the first may repeat it with weight 0.
-    pub nodes: [u32; 3],
+    pub nodes: [u32; 4],
     /// How much of each, at least 0, 1 in all.
-    pub weights: [f64; 3],
+    pub weights: [f64; 4],
 }
 
 /// Where a new node or point that is drawn comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
@@ -65,21 +66,31 @@ pub(crate) struct NewVertex {
     pub weights: [f64; 3],
 }
 
-/// A new edge of the rim. Each edge that was cut is two of them, one on either side.
+/// A new edge of the rim: of surfaces each edge that was cut is two of them, one on either side; of solids those where the inside that was bared
+/// meets the skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RimEdge {
     /// Its ends, by their numbers among nodes, in the order in which its triangle has them.
     pub points: [u32; 2],
     /// The triangle that it is a side of.
     pub triangle: u32,
-    /// The triangle that lay across.
+    /// The triangle that lay across; of solids that of the skin, `triangle` being of the inside.
     pub across: u32,
     /// How long it is in the rest shape, m.
     pub length: f64,
 }
 
+/// A face of a solid's material that has opened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutFace {
+    /// The triangles that are drawn on its two sides.
+    pub triangles: [u32; 2],
+    /// Its area in the rest shape, m².
+    pub area: f64,
+}
+
 /// What a cut has changed. New nodes and points, cells and triangles are numbered from their count before the cut on. The order of all lists
-/// depends on the surface and the blade alone.
+/// depends on what is cut and the blade alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Changes {
     /// All parts of each node that fell apart; new ones in ascending order.
@@ -92,18 +103,47 @@ pub struct Changes {
     pub cells: Vec<PieceOfCell>,
     /// Points that are bound to nodes: new ones, in ascending order, and others whose nodes changed.
     pub bound: Vec<BoundPoint>,
-    /// The new nodes that are not drawn.
+    /// The new nodes that no vertex is at: they lie beyond the cut.
     pub undrawn: Vec<u32>,
-    /// Where what is drawn and new comes from, in the order of numbers.
+    /// Where what is new and drawn, or inside a solid, comes from, in the order of numbers.
     pub sources: Vec<Source>,
     /// The number of the first new triangle.
     pub first_triangle: u32,
     /// The triangles whose corners or cell changed, and the new ones.
     pub triangles: Vec<u32>,
-    /// The vertices where the blade's edge stands at the end of the step, in the surface or on its border: where it goes on from if the
-    /// surface moves before the next step.
+    /// Of surfaces: the vertices where the blade's edge stands at the end of the step, in the surface or on its border: where it goes on from
+    /// if the surface moves before the next step.
     pub ends: Vec<u32>,
     /// The new edges of the rim.
     pub rim: Vec<RimEdge>,
+    /// Of solids: the faces that have opened.
+    pub faces: Vec<CutFace>,
     pub(crate) vertices: Vec<NewVertex>,
+}
+
+impl Changes {
+    /// Whether nothing is other than it was.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.triangles.is_empty() && self.nodes.is_empty() && self.bound.is_empty()
+    }
+
+    /// Tells of the copies of nodes which have a vertex at them, of which these are all: those come from their sources.
+    pub(crate) fn list_copies(&mut self, at_vertices: &[u32]) -> Result<()> {
+        for &PieceOfNode { node, source, .. } in &self.nodes {
+            if node == source {
+                continue;
+            }
+            if at_vertices.binary_search(&node).is_err() {
+                memory::push(&mut self.undrawn, node)?;
+                continue;
+            }
+            let source = Source {
+                point: node,
+                sources: [source; 3],
+                weights: [1.0, 0.0, 0.0],
+            };
+            memory::push(&mut self.sources, source)?;
+        }
+        Ok(())
+    }
 }

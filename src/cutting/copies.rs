@@ -216,7 +216,7 @@ impl Cut<'_> {
         self.list_cells(&cells)
     }
 
-    /// Adds to the list of pieces the cells whose nodes changed alone, and names the nodes that they have now.
+    /// Adds to the list of pieces the cells whose nodes changed alone.
     fn list_cells(&mut self, cells: &[u32]) -> Result<()> {
         let first = self.surface.nodes.count_before();
         self.changes.cells.sort_unstable_by_key(|piece| piece.cell);
@@ -232,14 +232,10 @@ impl Cut<'_> {
                     PieceOfCell {
                         cell,
                         source: cell,
-                        nodes,
                         part: 1.0,
                     },
                 )?;
             }
-        }
-        for piece in &mut self.changes.cells {
-            piece.nodes = self.surface.cells[piece.cell].nodes;
         }
         self.changes.cells.sort_unstable_by_key(|piece| piece.cell);
         Ok(())

@@ -189,7 +189,7 @@ impl Cut<'_> {
     }
 }
 
-fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
+pub(crate) fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
     points
         .iter()
         .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &point| {

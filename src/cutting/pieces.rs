@@ -81,7 +81,6 @@ impl Cut<'_> {
                 PieceOfCell {
                     cell: piece,
                     source: cell,
-                    nodes: whole.nodes,
                     part: part / sum,
                 },
             )?;

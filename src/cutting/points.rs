@@ -1,6 +1,6 @@
 //! Numbers for what is drawn: a vertex at a node has that of the node, any other one of its own among nodes.
 
-use super::changes::{BoundPoint, PieceOfNode, Source};
+use super::changes::{BoundPoint, Source};
 use super::cut::Cut;
 use super::surface::{NONE, Node};
 use crate::error::Result;
@@ -32,35 +32,20 @@ impl Cut<'_> {
             if is_at_node {
                 drawn.push(point);
             } else {
-                let (nodes, weights) = (it.nodes, it.weights);
-                memory::push(&mut self.changes.bound, BoundPoint { point, nodes, weights })?;
+                let ([a, b, c], [u, v, w]) = (it.nodes, it.weights);
+                let bound = BoundPoint {
+                    point,
+                    nodes: [a, b, c, a],
+                    weights: [u, v, w, 0.0],
+                };
+                memory::push(&mut self.changes.bound, bound)?;
             }
         }
         memory::sort_once(&mut self.changes.triangles);
         self.changes.bound.sort_unstable_by_key(|bound| bound.point);
         memory::sort_once(&mut drawn);
-        self.list_copies(&drawn)?;
+        self.changes.list_copies(&drawn)?;
         self.list_sources()
-    }
-
-    /// Copies of nodes: those that are drawn come from their sources.
-    fn list_copies(&mut self, drawn: &[u32]) -> Result<()> {
-        for &PieceOfNode { node, source, .. } in &self.changes.nodes {
-            if node == source {
-                continue;
-            }
-            if drawn.binary_search(&node).is_err() {
-                memory::push(&mut self.changes.undrawn, node)?;
-                continue;
-            }
-            let source = Source {
-                point: node,
-                sources: [source; 3],
-                weights: [1.0, 0.0, 0.0],
-            };
-            memory::push(&mut self.changes.sources, source)?;
-        }
-        Ok(())
     }
 
     fn list_sources(&mut self) -> Result<()> {

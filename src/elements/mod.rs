@@ -4,6 +4,7 @@
 //! and the tiles of nodes then add up the copies, in the order of parts. So nothing is worked out twice, and results are the same for
 //! any number of threads.
 
+mod cut;
 mod law;
 mod parts;
 mod past;
@@ -21,7 +22,8 @@ use crate::material::{Course, Viscosity, Yielding};
 use crate::memory;
 use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
-pub(crate) use law::{Deformed, Law, Load, Rest};
+pub(crate) use cut::PieceOfElement;
+pub(crate) use law::{Deformed, Law, Load, RINGS_FROM, Rest};
 use parts::{Copies, Part};
 use past::Memory;
 use rings::{Pressures, Rings};
@@ -32,6 +34,8 @@ pub(crate) struct Elements {
     law: Law,
     count: usize,
     parts: Vec<Part>,
+    /// Of bodies that may be cut.
+    cells: Option<Box<cut::Cells>>,
     /// Where the copies of each part's nodes begin.
     starts: Vec<usize>,
     copies: Copies,
@@ -75,6 +79,24 @@ impl Sums {
             of_parts: memory::filled(0.0, parts)?,
             pressures: Pressures::new(ring_count)?,
         })
+    }
+
+    /// Makes room for more copies and parts.
+    fn reserve(&mut self, copies: usize, parts: usize) -> Result<()> {
+        for records in [&mut self.positions, &mut self.sums, &mut self.ways] {
+            records.try_reserve(copies)?;
+        }
+        Ok(self.of_parts.try_reserve(parts)?)
+    }
+
+    /// Becomes one of so many copies and parts, for which there is room.
+    fn grow(&mut self, copies: usize, parts: usize) {
+        if !self.ways.is_empty() {
+            self.ways.resize(copies, Record::default());
+        }
+        self.positions.resize(copies, Record::default());
+        self.sums.resize(copies, Record::default());
+        self.of_parts.resize(parts, 0.0);
     }
 }
 
@@ -130,6 +152,7 @@ impl Elements {
         let ring_count = if law.rings { node_count } else { 0 };
         let mut elements = Self {
             law,
+            cells: None,
             count: tetrahedra.len(),
             memory: Memory::new(law, viscosity, yielding, &parts, ring_count)?,
             copies: Copies::new(&parts, node_count)?,
@@ -368,7 +391,7 @@ impl Elements {
         self.stiffnesses[node]
     }
 
-    /// How many there were when the body was made.
+    /// How many there are at most.
     pub fn count(&self) -> usize {
         self.count
     }

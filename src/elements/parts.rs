@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::cut::{PieceOfElement, Place};
 use super::law::Rest;
 use crate::body::Record;
 use crate::error::{Error, Result};
@@ -14,9 +15,11 @@ pub(super) const PART: usize = 4096;
 /// Some tetrahedra, and their nodes.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// In order.
+    /// In order, but for a part that came later.
     pub nodes: Vec<u32>,
     pub groups: Groups,
+    /// Whether a cut has added it.
+    pub is_later: bool,
 }
 
 /// What is shown the nodes of a tetrahedron, the way it is at rest, and its group and lane.
@@ -24,15 +27,44 @@ pub(super) type See<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
 
 /// Cuts tetrahedra into parts.
 pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<Part>> {
-    let mut order: Vec<u32> = memory::reserved(tetrahedra.len())?;
-    order.extend(0..tetrahedra.len() as u32);
-    let lowest = |index: u32| tetrahedra[index as usize].into_iter().min();
-    order.sort_unstable_by_key(|&index| (lowest(index), index));
-    let mut parts = memory::reserved(tetrahedra.len().div_ceil(PART))?;
+    let order = in_order(tetrahedra)?;
+    let mut parts = memory::reserved(order.len().div_ceil(PART))?;
     for of_part in order.chunks(PART) {
         parts.push(Part::new(tetrahedra, of_part, &rest)?);
     }
     Ok(parts)
+}
+
+/// Where each tetrahedron is in the parts.
+pub(super) fn places(tetrahedra: &[[u32; 4]]) -> Result<Vec<Place>> {
+    let mut places = memory::filled(Place::NONE, tetrahedra.len())?;
+    for (part, of_part) in (0..).zip(in_order(tetrahedra)?.chunks(PART)) {
+        let group_count = of_part.len().div_ceil(GROUP);
+        for (place, &index) in of_part.iter().enumerate() {
+            let [group, lane] = in_group(place, group_count);
+            places[index as usize] = Place {
+                part,
+                group: group as u16,
+                lane: lane as u16,
+            };
+        }
+    }
+    Ok(places)
+}
+
+/// Tetrahedra in the order in which they fill parts.
+fn in_order(tetrahedra: &[[u32; 4]]) -> Result<Vec<u32>> {
+    let mut order: Vec<u32> = memory::reserved(tetrahedra.len())?;
+    order.extend(0..tetrahedra.len() as u32);
+    let lowest = |index: u32| tetrahedra[index as usize].into_iter().min();
+    order.sort_unstable_by_key(|&index| (lowest(index), index));
+    Ok(order)
+}
+
+/// The group and the lane of a tetrahedron of a part. Those that follow each other have nodes in common: they lie in different groups, so that no
+/// sum waits for the last.
+pub(super) fn in_group(place: usize, group_count: usize) -> [usize; 2] {
+    [place % group_count, place / group_count]
 }
 
 impl Part {
@@ -44,8 +76,8 @@ impl Part {
         let group_count = of_part.len().div_ceil(GROUP);
         let mut groups = memory::filled(Group::EMPTY, group_count)?;
         for (place, &index) in of_part.iter().enumerate() {
-            // Those that follow each other have nodes in common: they lie in different groups, so that no sum waits for the last.
-            let (group, lane) = (&mut groups[place % group_count], place / group_count);
+            let [group, lane] = in_group(place, group_count);
+            let group = &mut groups[group];
             let corners = tetrahedra[index as usize];
             let [a, b, c, d] = corners.map(&rest);
             let at_rest = Rest::of(DMat3::from_cols(b - a, c - a, d - a));
@@ -67,6 +99,7 @@ impl Part {
         Ok(Self {
             groups: Groups::new(groups, nodes.len()),
             nodes,
+            is_later: false,
         })
     }
 
@@ -81,15 +114,26 @@ impl Part {
     pub fn visit(&self, see: &mut See) {
         for (index, group) in self.groups.as_slice().iter().enumerate() {
             for lane in (0..GROUP).filter(|&lane| group.volumes[lane] > 0.0) {
-                let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
-                let rest = Rest {
-                    inverse: DMat3::from_cols_array(&[xx, 0.0, 0.0, xy, yy, 0.0, xz, yz, zz]),
-                    volume: f64::from(group.volumes[lane]),
-                };
-                let corners = group.corners.map(|corners| self.nodes[usize::from(corners[lane] / 2)]);
-                see(corners, &rest, [index, lane]);
+                let rest = self.rest_of(index, lane);
+                see(self.nodes_of(index, lane), &rest, [index, lane]);
             }
         }
+    }
+
+    /// The way a tetrahedron is at rest.
+    pub fn rest_of(&self, group: usize, lane: usize) -> Rest {
+        let group = &self.groups.as_slice()[group];
+        let [xx, xy, xz, yy, yz, zz] = group.inverse.map(|entry| f64::from(entry[lane]));
+        Rest {
+            inverse: DMat3::from_cols_array(&[xx, 0.0, 0.0, xy, yy, 0.0, xz, yz, zz]),
+            volume: f64::from(group.volumes[lane]),
+        }
+    }
+
+    /// The nodes of a tetrahedron.
+    pub fn nodes_of(&self, group: usize, lane: usize) -> [u32; 4] {
+        let group = &self.groups.as_slice()[group];
+        group.corners.map(|corners| self.nodes[usize::from(corners[lane] / 2)])
     }
 
     /// Sets what bounds the squared frequencies of each tetrahedron's nodes at rest to the highest of its nodes', 1/s².
@@ -123,7 +167,14 @@ impl Part {
     }
 
     fn find_edge(&self, a: u32, b: u32) -> Option<(usize, usize)> {
-        let number = |node| self.nodes.binary_search(&node).ok().map(|number| 2 * number as u16);
+        let place = |node| {
+            if self.is_later {
+                self.nodes.iter().position(|&other| other == node)
+            } else {
+                self.nodes.binary_search(&node).ok()
+            }
+        };
+        let number = |node| place(node).map(|number| 2 * number as u16);
         let (a, b) = (number(a)?, number(b)?);
         let groups = self.groups.as_slice();
         groups.iter().enumerate().find_map(|(index, group)| {
@@ -154,6 +205,8 @@ pub(super) struct Copy {
 pub(super) struct Copies {
     copies: Vec<Copy>,
     starts: Vec<u32>,
+    /// Those that came later, by tiles; of no tiles where none did.
+    later: Vec<Vec<Copy>>,
 }
 
 impl Copies {
@@ -175,11 +228,33 @@ impl Copies {
             };
             *to += 1;
         }
-        Ok(Self { copies, starts })
+        Ok(Self {
+            copies,
+            starts,
+            later: Vec::new(),
+        })
     }
 
     /// In the order of parts.
-    pub fn of_tile(&self, tile: usize) -> &[Copy] {
-        &self.copies[self.starts[tile] as usize..self.starts[tile + 1] as usize]
+    pub fn of_tile(&self, tile: usize) -> impl Iterator<Item = &Copy> {
+        let start = |tile: usize| *self.starts.get(tile).unwrap_or(&(self.copies.len() as u32)) as usize;
+        let first = &self.copies[start(tile)..start(tile + 1)];
+        first.iter().chain(self.later.get(tile).into_iter().flatten())
+    }
+
+    /// Makes room for those of these pieces, of so many tiles.
+    pub fn reserve(&mut self, tiles: usize, pieces: &[PieceOfElement]) -> Result<()> {
+        let more = tiles.saturating_sub(self.later.len());
+        self.later.try_reserve(more)?;
+        self.later.resize_with(self.later.len() + more, Vec::new);
+        for node in pieces.iter().flat_map(|piece| piece.nodes) {
+            self.later[node as usize / TILE].try_reserve(4 * pieces.len())?;
+        }
+        Ok(())
+    }
+
+    /// Adds one, for which there is room.
+    pub fn push(&mut self, tile: usize, copy: Copy) {
+        self.later[tile].push(copy);
     }
 }

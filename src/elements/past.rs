@@ -5,6 +5,7 @@
 //! two substeps. An implicit one has `a q - g S` as a load, and g times what is elastic on top of the latter, so that forces are those at
 //! the end of the step. Pressures of rings have arms of their own.
 
+use super::cut::Place;
 use super::law::{Law, Load};
 use super::parts::Part;
 use super::set::{Bounds, Set};
@@ -22,6 +23,8 @@ pub(super) struct Memory {
     /// Where they yield.
     pub bounds: Option<Bounds>,
     pub parts: Vec<OfPart>,
+    /// Of parts that are to come.
+    spare: Vec<OfPart>,
     pub rings: Past<f32>,
 }
 
@@ -149,6 +152,30 @@ impl OfPart {
             .is_some_and(|set| set.yields(bounds, place, elastic.stress))
     }
 
+    /// All that is remembered; nothing where it is not.
+    fn fields_mut(&mut self) -> [&mut [Stresses]; 9] {
+        let Self { past, set, newest } = self;
+        let [stresses, kept, loads] = set.as_mut().map_or([&mut [][..], &mut [], &mut []], Set::fields_mut);
+        let Past {
+            arms,
+            elastic,
+            loads: of_arms,
+            kept_arms,
+            kept_elastic,
+        } = past;
+        [
+            arms,
+            elastic,
+            of_arms,
+            kept_arms,
+            kept_elastic,
+            newest,
+            stresses,
+            kept,
+            loads,
+        ]
+    }
+
     fn combine(&mut self) {
         if let Some(set) = &mut self.set {
             set.combine(&self.past.loads);
@@ -184,8 +211,45 @@ impl Memory {
             gain: 0.0,
             bounds: yields.then(|| Bounds::new(law, yielding)),
             parts: of_parts,
+            spare: Vec::new(),
             rings: Past::new(if viscosity.is_none() { 0 } else { ring_count })?,
         })))
+    }
+
+    /// Makes room for more parts of so many groups.
+    pub fn reserve_parts(&mut self, more: usize, groups: usize) -> Result<()> {
+        self.parts.try_reserve(more)?;
+        while self.spare.len() < more {
+            let yields = self.bounds.is_some();
+            let part = OfPart {
+                past: Past::new(if self.viscosity.is_none() { 0 } else { groups })?,
+                set: if yields { Some(Set::new(groups)?) } else { None },
+                newest: memory::filled(Stresses::ZERO, groups)?,
+            };
+            memory::push(&mut self.spare, part)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a part, for which there is room.
+    pub fn add_part(&mut self) {
+        self.parts.extend(self.spare.pop());
+    }
+
+    /// Gives a tetrahedron what another remembers.
+    pub fn copy(&mut self, from: Place, to: Place) {
+        let read = self.parts[from.part as usize].fields_mut().map(|stresses| {
+            let Stresses(numbers) = stresses.get(usize::from(from.group))?;
+            Some(numbers.map(|lanes| lanes[usize::from(from.lane)]))
+        });
+        let written = self.parts[to.part as usize].fields_mut();
+        for (stresses, numbers) in written.into_iter().zip(read) {
+            if let (Some(Stresses(to_numbers)), Some(numbers)) = (stresses.get_mut(usize::from(to.group)), numbers) {
+                for (lanes, number) in to_numbers.iter_mut().zip(numbers) {
+                    lanes[usize::from(to.lane)] = number;
+                }
+            }
+        }
     }
 
     /// An equation is to be solved for the end of so many seconds.

@@ -20,6 +20,15 @@ impl Inside {
     fn of(part: &Part, region: &Region) -> Option<Self> {
         let mut bits = [0; 4 * PART / 64];
         let mut any = false;
+        if part.is_later {
+            for (place, node) in part.nodes.iter().enumerate() {
+                if region.nodes().binary_search(node).is_ok() {
+                    bits[place / 64] |= 1 << (place % 64);
+                    any = true;
+                }
+            }
+            return any.then_some(Self(bits));
+        }
         let (&first, &last) = (part.nodes.first()?, part.nodes.last()?);
         let nodes = region.nodes();
         let start = nodes.partition_point(|&node| node < first);

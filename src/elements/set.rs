@@ -51,6 +51,11 @@ impl Set {
         })
     }
 
+    /// All that is left.
+    pub fn fields_mut(&mut self) -> [&mut [Stresses]; 3] {
+        [&mut self.stresses, &mut self.kept, &mut self.loads]
+    }
+
     /// What is elastic has become this without anything left.
     pub fn flow(&mut self, kernel: ChosenKernel, bounds: Bounds, elastic: &[Stresses]) {
         let left = &mut self.stresses;

@@ -94,7 +94,7 @@ pub struct Body {
     pub triangles: Vec<[u32; 3]>,
     /// Something that what is drawn carries: where it is in the rest shape.
     pub carried: Vec<DVec3>,
-    pub bound: BTreeMap<u32, ([u32; 3], [f64; 3])>,
+    pub bound: BTreeMap<u32, ([u32; 4], [f64; 4])>,
     pub cell_sources: Vec<u32>,
     pub first_areas: Vec<f64>,
     pub deformation: fn(Vec3) -> Vec3,
@@ -393,7 +393,11 @@ impl Body {
         for (point, vertex) in self.surface.vertices().iter().map(|vertex| (vertex.point, vertex)) {
             match self.bound.get(&point) {
                 None => assert_eq!((vertex.nodes[0], vertex.weights[0]), (point, 1.0)),
-                Some(of) => assert_eq!(*of, (vertex.nodes, vertex.weights), "point {point} as lists tell it"),
+                Some((nodes, weights)) => {
+                    let told = ([nodes[0], nodes[1], nodes[2]], [weights[0], weights[1], weights[2]]);
+                    assert_eq!(told, (vertex.nodes, vertex.weights), "point {point} as lists tell it");
+                    assert_eq!(weights[3], 0.0);
+                }
             }
         }
         for (node, (mass, &source)) in (0..).zip(self.masses.iter().zip(&self.sources)) {

@@ -340,6 +340,11 @@ impl Implicit {
         self.newton = Some(newton);
     }
 
+    /// What elements change by.
+    pub fn changes_mut(&mut self) -> Option<&mut Sums> {
+        self.changes.as_mut()
+    }
+
     /// Makes room for what elements change by.
     pub fn join(&mut self, elements: &Elements) -> Result<()> {
         if self.newton.is_none() {

@@ -108,6 +108,33 @@ impl Groups {
         }
     }
 
+    /// Puts a tetrahedron of these corners, twice the numbers of nodes, into a lane of a group where there is none.
+    ///
+    /// # Panics
+    /// Where a corner is not below the number of nodes.
+    pub fn put(&mut self, [group, lane]: [usize; 2], corners: [u16; 4], inverse: [f32; 6], volume: f32) {
+        let is_node = |&corner: &u16| usize::from(corner / 2) < self.node_count && corner % 2 == 0;
+        assert!(corners.iter().all(is_node));
+        let group = &mut self.groups[group];
+        for (to, corner) in group.corners.iter_mut().zip(corners) {
+            to[lane] = corner;
+        }
+        for (to, entry) in group.inverse.iter_mut().zip(inverse) {
+            to[lane] = entry;
+        }
+        group.volumes[lane] = volume;
+    }
+
+    /// Sets the bound on frequencies of a tetrahedron.
+    pub fn set_rate(&mut self, [group, lane]: [usize; 2], rate: f32) {
+        self.groups[group].rates[lane] = rate;
+    }
+
+    /// Gives a tetrahedron another volume.
+    pub fn set_volume(&mut self, [group, lane]: [usize; 2], volume: f32) {
+        self.groups[group].volumes[lane] = volume;
+    }
+
     /// Takes away a tetrahedron: what is left of it has no volume.
     pub fn remove(&mut self, group: usize, lane: usize) {
         let group = &mut self.groups[group];

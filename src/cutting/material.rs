@@ -1,0 +1,213 @@
+//! What a body's material is made of where it can be cut: triangles or tetrahedra.
+
+use glam::{DVec3, Vec3};
+
+use super::changes::Changes;
+use super::cut::{Limits, Sweep};
+use super::solid::CutSolid;
+use super::surface::CutSurface;
+use crate::error::Result;
+use crate::memory;
+
+/// The material of a body. It is looked for by *items*: the triangles of a surface, the cells of a solid.
+#[derive(Debug)]
+pub(crate) enum CutMaterial {
+    Surface(CutSurface),
+    Solid(CutSolid),
+}
+
+impl CutMaterial {
+    pub fn reserve(&mut self, nodes: u32) -> Result<()> {
+        match self {
+            Self::Surface(surface) => surface.reserve(nodes),
+            Self::Solid(solid) => solid.reserve(nodes),
+        }
+    }
+
+    /// See [`CutSurface::cut`] and [`CutSolid::cut`], with items as candidates.
+    pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], near: &[u32], limits: Limits) -> Result<Changes> {
+        match self {
+            Self::Surface(surface) => surface.cut(sweep, positions, near, limits),
+            Self::Solid(solid) => solid.cut(sweep, positions, near, limits),
+        }
+    }
+
+    /// Takes back the last cut.
+    pub fn undo(&mut self) {
+        match self {
+            Self::Surface(surface) => surface.undo(),
+            Self::Solid(solid) => solid.undo(),
+        }
+    }
+
+    /// How many more pieces it has after the last cut; `None` if that takes more than `most` triangles or tetrahedra to find out.
+    pub fn parted(&self, changes: &Changes, most: usize) -> Result<Option<u32>> {
+        match self {
+            Self::Surface(surface) => surface.parted(&changes.rim, most),
+            Self::Solid(solid) => solid.parted(&changes.faces, most),
+        }
+    }
+
+    pub fn triangle_count(&self) -> u32 {
+        match self {
+            Self::Surface(surface) => surface.triangles().len() as u32,
+            Self::Solid(solid) => solid.triangles().len() as u32,
+        }
+    }
+
+    /// The corners of a triangle, by their numbers among nodes.
+    pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
+        match self {
+            Self::Surface(surface) => surface.corner_points(triangle),
+            Self::Solid(solid) => solid.corner_points(triangle),
+        }
+    }
+
+    /// Where the corners of a triangle are in the rest shape.
+    pub fn corners_at_rest(&self, triangle: u32) -> [DVec3; 3] {
+        match self {
+            Self::Surface(surface) => {
+                let corners = surface.triangles()[triangle as usize].corners;
+                corners.map(|corner| surface.rest_place(corner))
+            }
+            Self::Solid(solid) => {
+                let corners = solid.triangles()[triangle as usize].corners;
+                corners.map(|corner| solid.rest_place(corner))
+            }
+        }
+    }
+
+    /// A node's part of the material of its cells, m² or m³.
+    pub fn share_at(&self, node: u32) -> f64 {
+        match self {
+            Self::Surface(surface) => surface.area_at(node),
+            Self::Solid(solid) => solid.volume_at(node),
+        }
+    }
+
+    /// Whether two nodes are corners of one cell.
+    pub fn has_edge(&self, nodes: [u32; 2]) -> bool {
+        match self {
+            Self::Surface(surface) => surface.has_edge(nodes),
+            Self::Solid(solid) => solid.has_edge(nodes),
+        }
+    }
+
+    /// The tetrahedra at a node; of surfaces none.
+    pub fn tetrahedra_at(&self, node: u32) -> impl Iterator<Item = u32> {
+        let solid = match self {
+            Self::Surface(_) => None,
+            Self::Solid(solid) => Some(solid),
+        };
+        solid.into_iter().flat_map(move |solid| solid.cells_at(node))
+    }
+
+    /// The cell that an item lies in.
+    pub fn cell_of(&self, item: u32) -> u32 {
+        match self {
+            Self::Surface(surface) => surface.triangles()[item as usize].cell,
+            Self::Solid(_) => item,
+        }
+    }
+
+    /// The nodes of the cell that an item lies in; those beyond the third may repeat the first.
+    pub fn nodes_of(&self, item: u32) -> [u32; 4] {
+        let cell = self.cell_of(item) as usize;
+        match self {
+            Self::Surface(surface) => {
+                let [a, b, c] = surface.cells()[cell].nodes;
+                [a, b, c, a]
+            }
+            Self::Solid(solid) => solid.cells()[cell].nodes,
+        }
+    }
+
+    /// What an item lies between, by numbers among nodes.
+    pub fn corners_of(&self, item: u32) -> [u32; 4] {
+        match self {
+            Self::Surface(surface) => {
+                let [a, b, c] = surface.corner_points(item);
+                [a, b, c, a]
+            }
+            Self::Solid(solid) => solid.cells()[item as usize].nodes,
+        }
+    }
+
+    /// How many items there are.
+    pub fn item_count(&self) -> u32 {
+        match self {
+            Self::Surface(_) => self.triangle_count(),
+            Self::Solid(solid) => solid.cells().len() as u32,
+        }
+    }
+
+    /// The items that a cut has changed or added, in order.
+    pub fn items_changed(&self, changes: &Changes) -> Result<Vec<u32>> {
+        match self {
+            Self::Surface(_) => memory::copied(&changes.triangles),
+            Self::Solid(_) => {
+                let mut items = memory::reserved(changes.cells.len())?;
+                items.extend(changes.cells.iter().map(|piece| piece.cell));
+                Ok(items)
+            }
+        }
+    }
+
+    /// How many ends there are at most, of items that were near.
+    pub fn most_ends(&self, changes: &Changes, near: &[u32]) -> usize {
+        match self {
+            Self::Surface(_) => changes.ends.len(),
+            Self::Solid(_) => near.len(),
+        }
+    }
+
+    /// Shows points of the material where a cut's edge stands at its end, with nodes at `positions`, given the items that were near it.
+    pub fn ends(
+        &self,
+        changes: &Changes,
+        sweep: &Sweep,
+        positions: &[Vec3],
+        near: &[u32],
+        mut see: impl FnMut(CutEnd),
+    ) {
+        match self {
+            Self::Surface(surface) => {
+                for &vertex in &changes.ends {
+                    let vertex = &surface.vertices()[vertex as usize];
+                    let ([a, b, c], [u, v, w]) = (vertex.nodes, vertex.weights);
+                    see(CutEnd {
+                        nodes: [a, b, c, a],
+                        weights: [u, v, w, 0.0],
+                    });
+                }
+            }
+            Self::Solid(solid) => {
+                let ends = near.iter().filter_map(|&cell| solid.end_in(cell, sweep, positions));
+                ends.for_each(see);
+            }
+        }
+    }
+
+    /// The material has moved since the last cut: the blade's edge, which stopped there, is here in it now.
+    pub fn carry(&mut self, edge: [Vec3; 2]) {
+        if let Self::Solid(solid) = self {
+            solid.carry(edge);
+        }
+    }
+}
+
+/// A point of the material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CutEnd {
+    pub nodes: [u32; 4],
+    pub weights: [f64; 4],
+}
+
+impl CutEnd {
+    /// Where it is if nodes are at `positions`.
+    pub fn place(&self, positions: &[Vec3]) -> Vec3 {
+        let parts = self.nodes.iter().zip(self.weights);
+        let places = parts.map(|(&node, weight)| weight * positions[node as usize].as_dvec3());
+        places.sum::<DVec3>().as_vec3()
+    }
+}

@@ -1,0 +1,324 @@
+//! The solid that is cut: cells of material, the tetrahedra that fill them, the triangles that are drawn, and the vertices bound to nodes.
+
+use glam::{DVec3, Vec3};
+
+use super::sever::{Mark, Stroke};
+use crate::cutting::tracked::Tracked;
+use crate::error::Result;
+use crate::memory;
+
+/// No tetrahedron, no triangle, or no corner.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// What is snapped lies within this part of a cell's shortest edge.
+pub(crate) const SNAP: f64 = 0.05;
+
+/// The corners of the face opposite each corner, counterclockwise seen from outside.
+pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// A tetrahedron that is simulated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidCell {
+    /// Its nodes, in the order in which they were given.
+    pub nodes: [u32; 4],
+    /// The volume of its material in the rest shape, m³.
+    pub volume: f64,
+    /// How far what is snapped in it may be moved, in the rest shape, m.
+    pub snap: f64,
+    /// The first of the tetrahedra of its material.
+    pub(crate) first: u32,
+    /// For each of its nodes the next corner at the node; corner k of cell c has the number 4 c + k.
+    pub(crate) next: [u32; 4],
+}
+
+/// Whether a face of the material with a tetrahedron across was cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Face {
+    /// It was not.
+    Whole,
+    /// The blade has passed through all of it, but it cannot open yet.
+    Severed,
+    /// It is being opened.
+    Opening,
+}
+
+/// A tetrahedron of the material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tetrahedron {
+    /// Its vertices; seen from the first the others are clockwise, that is, their triple product is above 0.
+    pub corners: [u32; 4],
+    /// The cell that it lies in.
+    pub cell: u32,
+    /// Its volume in the rest shape, m³, above 0.
+    pub volume: f64,
+    /// The tetrahedron across the face opposite each corner.
+    pub(crate) neighbours: [u32; 4],
+    /// What became of the face opposite each corner.
+    pub(crate) faces: [Face; 4],
+    /// The triangle drawn on the face opposite each corner, if nothing lies across.
+    pub(crate) drawn: [u32; 4],
+    /// The stroke that it counts as on the other side of than the planes of its corners tell, which are all on the blade.
+    pub(crate) turned: u32,
+    /// The next tetrahedron of the same cell.
+    pub(crate) next: u32,
+}
+
+/// A triangle that is drawn and touched: a face of the material with nothing across.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidTriangle {
+    /// Its vertices, counterclockwise seen from outside.
+    pub corners: [u32; 3],
+    /// The cell that it lies in.
+    pub cell: u32,
+    /// Whether a cut has bared it; else it is skin.
+    pub is_inner: bool,
+    /// The tetrahedron of which it is a face.
+    pub(crate) tetrahedron: u32,
+}
+
+/// A corner of the material. Those that triangles have are drawn; others lie inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidVertex {
+    /// The nodes that it is bound to; unused ones repeat the first with weight 0.
+    pub nodes: [u32; 4],
+    /// How much of each, at least 0, 1 in all.
+    pub weights: [f64; 4],
+    /// Its number among nodes: that of the node that it is at, or one of its own, which no other node or point has.
+    pub point: u32,
+    /// One of the tetrahedra about it.
+    pub(crate) around: u32,
+    /// Where the blade passed through it.
+    pub(crate) mark: Mark,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Node {
+    /// Of a point that is bound to others nothing is said here.
+    pub(crate) rest: Vec3,
+    /// The first of the cells' corners at it.
+    pub(crate) first: u32,
+}
+
+impl Node {
+    /// A point that is bound to others.
+    pub(crate) const BOUND: Self = Self {
+        rest: Vec3::ZERO,
+        first: NONE,
+    };
+}
+
+/// A solid that can be cut.
+#[derive(Clone, Debug)]
+pub struct CutSolid {
+    pub(crate) nodes: Tracked<Node>,
+    pub(crate) cells: Tracked<SolidCell>,
+    pub(crate) tetrahedra: Tracked<Tetrahedron>,
+    pub(crate) triangles: Tracked<SolidTriangle>,
+    pub(crate) vertices: Tracked<SolidVertex>,
+    pub(crate) stroke: Stroke,
+    pub(crate) stroke_before: Stroke,
+}
+
+impl CutSolid {
+    /// Reserves room for so many more nodes, and for as much of all else as cuts that make them need in general, so that cuts do not have to
+    /// move what is there.
+    pub fn reserve(&mut self, nodes: u32) -> Result<()> {
+        let nodes = nodes as usize;
+        self.nodes.reserve(nodes)?;
+        self.cells.reserve(4 * nodes)?;
+        self.tetrahedra.reserve(16 * nodes)?;
+        self.triangles.reserve(6 * nodes)?;
+        self.vertices.reserve(4 * nodes)
+    }
+
+    /// How many nodes there are: those of the body, and copies and bound points, which are numbered on.
+    pub fn node_count(&self) -> u32 {
+        self.nodes.count()
+    }
+
+    /// Where a node is in the rest shape.
+    pub fn rest(&self, node: u32) -> Vec3 {
+        self.nodes[node].rest
+    }
+
+    /// The cells; those made by cuts follow the first ones.
+    pub fn cells(&self) -> &[SolidCell] {
+        self.cells.values()
+    }
+
+    /// The tetrahedra of the material; none is ever taken away.
+    pub fn tetrahedra(&self) -> &[Tetrahedron] {
+        self.tetrahedra.values()
+    }
+
+    /// The triangles that are drawn; none is ever taken away.
+    pub fn triangles(&self) -> &[SolidTriangle] {
+        self.triangles.values()
+    }
+
+    /// The vertices of the material, drawn or not; none is ever taken away. At first there is one for each node, with its number.
+    pub fn vertices(&self) -> &[SolidVertex] {
+        self.vertices.values()
+    }
+
+    /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
+    pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
+        let vertex = &self.vertices[vertex];
+        if vertex.weights[0] == 1.0 {
+            return positions[vertex.nodes[0] as usize];
+        }
+        weighed(vertex, |node| positions[node as usize]).as_vec3()
+    }
+
+    /// Where a vertex is in the rest shape.
+    pub fn rest_place(&self, vertex: u32) -> DVec3 {
+        weighed(&self.vertices[vertex], |node| self.nodes[node].rest)
+    }
+
+    /// The weights of a vertex, by the corners of a cell that it lies in.
+    pub fn weights_in(&self, vertex: u32, cell: u32) -> [f64; 4] {
+        let vertex = &self.vertices[vertex];
+        self.cells[cell].nodes.map(|node| {
+            (0..4)
+                .filter(|&k| vertex.nodes[k] == node)
+                .map(|k| vertex.weights[k])
+                .sum()
+        })
+    }
+
+    /// A quarter of the material of the cells at a node, m³.
+    pub fn volume_at(&self, node: u32) -> f64 {
+        self.corners_at(node)
+            .map(|corner| self.cells[corner / 4].volume / 4.0)
+            .sum()
+    }
+
+    /// Whether two nodes are corners of one cell.
+    pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
+        self.corners_at(a)
+            .any(|corner| self.cells[corner / 4].nodes.contains(&b))
+    }
+
+    /// The corners of a triangle, by their numbers among nodes.
+    pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
+        let corners = self.triangles[triangle].corners;
+        corners.map(|corner| self.vertices[corner].point)
+    }
+
+    /// The cells at a node.
+    pub(crate) fn cells_at(&self, node: u32) -> impl Iterator<Item = u32> {
+        self.corners_at(node).map(|corner| corner / 4)
+    }
+
+    /// The cells' corners at a node.
+    pub(crate) fn corners_at(&self, node: u32) -> impl Iterator<Item = u32> {
+        let next = |&corner: &u32| Some(self.cells[corner / 4].next[corner as usize % 4]).filter(|&next| next != NONE);
+        let first = Some(self.nodes[node].first).filter(|&corner| corner != NONE);
+        std::iter::successors(first, next)
+    }
+
+    /// The tetrahedra that fill a cell, in ascending order.
+    pub fn tetrahedra_in(&self, cell: u32, inside: &mut Vec<u32>) -> Result<()> {
+        inside.clear();
+        let mut tetrahedron = self.cells[cell].first;
+        while tetrahedron != NONE {
+            memory::push(inside, tetrahedron)?;
+            tetrahedron = self.tetrahedra[tetrahedron].next;
+        }
+        inside.sort_unstable();
+        Ok(())
+    }
+
+    /// The tetrahedra about a vertex, as far as they hang together by faces at it, each with the vertex's number in it.
+    pub(crate) fn star(&self, vertex: u32, star: &mut Vec<(u32, usize)>) -> Result<()> {
+        star.clear();
+        let start = self.vertices[vertex].around;
+        if start == NONE {
+            return Ok(());
+        }
+        memory::push(star, (start, self.corner(start, vertex)))?;
+        let mut at = 0;
+        while let Some(&(tetrahedron, corner)) = star.get(at) {
+            at += 1;
+            for (face, &across) in self.tetrahedra[tetrahedron].neighbours.iter().enumerate() {
+                if face != corner && across != NONE && !star.iter().any(|&(seen, _)| seen == across) {
+                    memory::push(star, (across, self.corner(across, vertex)))?;
+                }
+            }
+        }
+        star.sort_unstable();
+        Ok(())
+    }
+
+    /// The tetrahedra about an edge between two corners of one, as far as they hang together by faces at it.
+    pub(crate) fn ring(&self, tetrahedron: u32, edge: [u32; 2], ring: &mut Vec<u32>) -> Result<()> {
+        ring.clear();
+        let [a, b] = self.others(tetrahedron, edge);
+        for (mut at, mut left) in [(tetrahedron, a), self.round(tetrahedron, edge, b)] {
+            while at != NONE {
+                memory::push(ring, at)?;
+                (at, left) = self.round(at, edge, left);
+                if at == tetrahedron {
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on round an edge through the face opposite a corner: the tetrahedron across, and its corner to go on through.
+    pub(crate) fn round(&self, tetrahedron: u32, edge: [u32; 2], left: u32) -> (u32, u32) {
+        let across = self.tetrahedra[tetrahedron].neighbours[self.corner(tetrahedron, left)];
+        if across == NONE {
+            return (NONE, NONE);
+        }
+        let [a, b] = self.others(tetrahedron, edge);
+        let shared = if a == left { b } else { a };
+        (across, shared)
+    }
+
+    /// The corners of a tetrahedron that are not on an edge of it.
+    pub(crate) fn others(&self, tetrahedron: u32, edge: [u32; 2]) -> [u32; 2] {
+        let mut others = [NONE; 2];
+        let mut count = 0;
+        for corner in self.tetrahedra[tetrahedron].corners {
+            if !edge.contains(&corner) && count < 2 {
+                others[count] = corner;
+                count += 1;
+            }
+        }
+        others
+    }
+
+    /// Which corner of a tetrahedron a vertex is.
+    pub(crate) fn corner(&self, tetrahedron: u32, vertex: u32) -> usize {
+        let corners = self.tetrahedra[tetrahedron].corners;
+        (0..3).find(|&k| corners[k] == vertex).unwrap_or(3)
+    }
+
+    /// The corners of a tetrahedron's face, counterclockwise seen from outside.
+    pub(crate) fn face(&self, tetrahedron: u32, face: usize) -> [u32; 3] {
+        FACES[face].map(|k| self.tetrahedra[tetrahedron].corners[k])
+    }
+
+    /// The area of a face in the rest shape.
+    pub(crate) fn rest_area(&self, tetrahedron: u32, face: usize) -> f64 {
+        let [a, b, c] = self.face(tetrahedron, face).map(|corner| self.rest_place(corner));
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Which face of the tetrahedron across a face that is.
+    pub(crate) fn back(&self, tetrahedron: u32, face: usize) -> usize {
+        let across = self.tetrahedra[tetrahedron].neighbours[face];
+        let corners = self.face(tetrahedron, face);
+        let other = self.tetrahedra[across].corners;
+        (0..3).find(|&k| !corners.contains(&other[k])).unwrap_or(3)
+    }
+}
+
+fn weighed(vertex: &SolidVertex, place: impl Fn(u32) -> Vec3) -> DVec3 {
+    (0..4)
+        .filter(|&k| vertex.weights[k] != 0.0)
+        .map(|k| vertex.weights[k] * place(vertex.nodes[k]).as_dvec3())
+        .sum()
+}

@@ -1,0 +1,152 @@
+//! A cut from its beginning to its end.
+
+use glam::Vec3;
+
+use super::body::CutSolid;
+use super::crossing::Swept;
+use crate::cutting::changes::Changes;
+use crate::cutting::cut::{Limits, Sweep, bounds};
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// A cut that is being made.
+pub(crate) struct Cut<'a> {
+    pub(crate) solid: &'a mut CutSolid,
+    pub(crate) limits: Limits,
+    pub(crate) changes: Changes,
+    /// The vertices that this step has found on the blade.
+    pub(crate) marked: Vec<u32>,
+    /// The vertices of which this step has told the side anew.
+    pub(crate) beside: Vec<u32>,
+}
+
+impl CutSolid {
+    /// Cuts what a blade passes through while nodes are at `positions`. Of the cells `candidates` alone, in any order, it finds those that are met:
+    /// all whose box meets the sweep's.
+    ///
+    /// Where the blade crosses an edge of the material there is a vertex from then on: an end of the edge, if it lies within 5 % of the shortest
+    /// edge of the cells about it, in the rest shape, or a new one, which divides the tetrahedra about the edge. A face between three of them is
+    /// cut. It opens once a corner of it parts, so that what is drawn stays manifold; that of a tetrahedron cut in part when its last edge is
+    /// crossed, by the same stroke or a later one in the same plane. Steps of which each starts where the last ended are one stroke.
+    ///
+    /// A cell whose material falls apart is copied for each piece; copies share nodes where their material hangs together across a face that the
+    /// node moves (Molino, Bao, Fedkiw 2004). Of the copies of a node that keeps its number which has a vertex of the
+    /// material at it; of several that with the most material.
+    ///
+    /// The cost is that of what is met. [`CutSolid::undo`] takes it back until the next cut.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::InvalidArgument`] if there is not one position for each node, if one that is needed or the blade is not finite, or if a
+    /// candidate is unknown; [`Error::Capacity`] beyond the limits; [`Error::OutOfMemory`]. Then nothing has changed.
+    pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
+        self.check(sweep, positions, candidates)?;
+        self.begin();
+        let cut = Cut {
+            limits,
+            changes: Changes {
+                first_triangle: self.triangles.count(),
+                ..Changes::default()
+            },
+            marked: Vec::new(),
+            beside: Vec::new(),
+            solid: self,
+        };
+        let changes = cut.make(sweep, positions, candidates);
+        if changes.is_err() {
+            self.undo();
+        }
+        changes
+    }
+
+    /// Takes back the last cut; a second time, nothing.
+    pub fn undo(&mut self) {
+        self.nodes.undo();
+        self.cells.undo();
+        self.tetrahedra.undo();
+        self.triangles.undo();
+        self.vertices.undo();
+        self.stroke = self.stroke_before;
+    }
+
+    fn begin(&mut self) {
+        self.nodes.begin();
+        self.cells.begin();
+        self.tetrahedra.begin();
+        self.triangles.begin();
+        self.vertices.begin();
+        self.stroke_before = self.stroke;
+    }
+
+    /// The cells whose box meets the sweep's if nodes are at `positions`, found by going through all.
+    pub fn near(&self, sweep: &Sweep, positions: &[Vec3]) -> Result<Vec<u32>> {
+        let corners = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
+        let (low, high) = bounds(&corners);
+        let mut near = Vec::new();
+        for (number, cell) in self.cells().iter().enumerate() {
+            let (from, to) = bounds(&cell.nodes.map(|node| positions[node as usize]));
+            if from.cmple(high).all() && low.cmple(to).all() {
+                memory::push(&mut near, number as u32)?;
+            }
+        }
+        Ok(near)
+    }
+
+    fn check(&self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<()> {
+        if positions.len() != self.node_count() as usize {
+            return Err(Error::invalid(format!(
+                "{} positions for {} nodes",
+                positions.len(),
+                self.node_count()
+            )));
+        }
+        let ends = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
+        if let Some(end) = ends.iter().find(|end| !end.is_finite()) {
+            return Err(Error::invalid(format!("an end of the blade is at {end}")));
+        }
+        for &cell in candidates {
+            let Some(cell) = self.cells().get(cell as usize) else {
+                return Err(Error::invalid(format!(
+                    "candidate {cell} of {} cells",
+                    self.cells.count()
+                )));
+            };
+            for node in cell.nodes {
+                let place = positions[node as usize];
+                if !place.is_finite() {
+                    return Err(Error::invalid(format!("node {node} is at {place}")));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Cut<'_> {
+    fn make(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
+        let mut candidates = memory::copied(candidates)?;
+        memory::sort_once(&mut candidates);
+        self.solid.stroke.go_on(sweep);
+        for triangle in sweep.triangles() {
+            let swept = Swept::new(triangle.map(|corner| corner.as_dvec3()));
+            let sign = self.solid.stroke.turn(swept.normal);
+            self.carve(&swept, sign, positions, &candidates)?;
+        }
+        self.sever()?;
+        let faces = self.ready()?;
+        let cells = self.open(&faces)?;
+        let nodes = self.part_cells(&cells)?;
+        self.part_nodes(&nodes)?;
+        self.finish()
+    }
+
+    /// The lists that only the end can tell.
+    fn finish(mut self) -> Result<Changes> {
+        self.changes.triangles = self.solid.triangles.touched()?;
+        self.number_points()?;
+        for edge in &mut self.changes.rim {
+            edge.points = edge.points.map(|vertex| self.solid.vertices[vertex].point);
+        }
+        Ok(self.changes)
+    }
+}

@@ -1,0 +1,101 @@
+//! How many pieces a cut has parted, found from the faces that have opened.
+
+use std::collections::HashMap;
+
+use super::body::{CutSolid, NONE};
+use crate::cutting::changes::CutFace;
+use crate::cutting::union::Union;
+use crate::error::Result;
+use crate::memory;
+
+impl CutSolid {
+    /// How many more pieces the material has after the last cut, which has opened `faces`.
+    ///
+    /// From both sides of the faces at once it goes on from tetrahedron to tetrahedron until all meet round the ends of the cut, or have been all
+    /// over their piece but for one: the cost is that of the smaller pieces, or of the way round. None if that is more than `most` tetrahedra.
+    pub fn parted(&self, faces: &[CutFace], most: usize) -> Result<Option<u32>> {
+        let sides_of = |face: &CutFace| face.triangles.map(|triangle| self.triangles[triangle].tetrahedron);
+        let mut floods = Floods::default();
+        for side in faces.iter().flat_map(sides_of) {
+            floods.start(side)?;
+        }
+        floods.met.reset(floods.open.len())?;
+        while floods.live() > 1 {
+            for flood in 0..floods.open.len() {
+                if floods.reached.len() > most {
+                    return Ok(None);
+                }
+                let Some(tetrahedron) = floods.open[flood].pop() else {
+                    continue;
+                };
+                for across in self.tetrahedra[tetrahedron].neighbours {
+                    if across != NONE {
+                        floods.reach(across, flood)?;
+                    }
+                }
+            }
+        }
+        let after = floods.count();
+        for [one, other] in faces.iter().map(sides_of) {
+            floods.unite(floods.reached[&one], floods.reached[&other])?;
+        }
+        Ok(Some(after - floods.count()))
+    }
+}
+
+/// Sets of tetrahedra that hang together, each growing.
+#[derive(Default)]
+struct Floods {
+    /// The flood that has reached a tetrahedron first.
+    reached: HashMap<u32, usize>,
+    /// Those that a flood has reached, but not looked beyond; of floods that have met, the lowest has all.
+    open: Vec<Vec<u32>>,
+    met: Union,
+}
+
+impl Floods {
+    /// Starts one from a tetrahedron, if none has yet.
+    fn start(&mut self, tetrahedron: u32) -> Result<()> {
+        if self.reached.contains_key(&tetrahedron) {
+            return Ok(());
+        }
+        let mut open = memory::reserved(4)?;
+        open.push(tetrahedron);
+        self.reached.try_reserve(1)?;
+        self.reached.insert(tetrahedron, self.open.len());
+        memory::push(&mut self.open, open)
+    }
+
+    /// How many floods have not been all over their piece.
+    fn live(&self) -> usize {
+        self.open.iter().filter(|open| !open.is_empty()).count()
+    }
+
+    fn count(&mut self) -> u32 {
+        (0..self.open.len())
+            .filter(|&flood| self.met.lowest(flood) == flood)
+            .count() as u32
+    }
+
+    fn reach(&mut self, tetrahedron: u32, flood: usize) -> Result<()> {
+        if let Some(&other) = self.reached.get(&tetrahedron) {
+            return self.unite(flood, other);
+        }
+        let flood = self.met.lowest(flood);
+        self.reached.try_reserve(1)?;
+        self.reached.insert(tetrahedron, flood);
+        memory::push(&mut self.open[flood], tetrahedron)
+    }
+
+    fn unite(&mut self, a: usize, b: usize) -> Result<()> {
+        let (a, b) = (self.met.lowest(a), self.met.lowest(b));
+        if a != b {
+            let mut more = std::mem::take(&mut self.open[a.max(b)]);
+            let open = &mut self.open[a.min(b)];
+            open.try_reserve(more.len())?;
+            open.append(&mut more);
+            self.met.unite(a, b);
+        }
+        Ok(())
+    }
+}

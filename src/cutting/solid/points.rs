@@ -1,0 +1,74 @@
+//! Numbers for the material's vertices, drawn or not: a vertex at a node has that of the node, any other one of its own among nodes.
+
+use super::body::{NONE, Node};
+use super::cut::Cut;
+use crate::cutting::changes::{BoundPoint, Source};
+use crate::error::Result;
+use crate::memory;
+
+impl Cut<'_> {
+    /// Numbers what is new, and lists it.
+    pub(crate) fn number_points(&mut self) -> Result<()> {
+        let before = self.solid.vertices.before()?;
+        let touched = self.solid.vertices.touched()?;
+        let mut at_nodes = memory::reserved(touched.len())?;
+        let mut star = Vec::new();
+        for vertex in touched {
+            let it = self.solid.vertices[vertex];
+            let is_at_node = it.weights[0] == 1.0;
+            let point = if is_at_node {
+                it.nodes[0]
+            } else if it.point == NONE {
+                self.limits
+                    .check("nodes", self.solid.nodes.count(), self.limits.nodes)?;
+                self.solid.nodes.push(Node::BOUND)?
+            } else {
+                it.point
+            };
+            if point != it.point {
+                self.solid.vertices.edit(vertex, |vertex| vertex.point = point)?;
+                self.solid.star(vertex, &mut star)?;
+                let drawn = star.iter().flat_map(|&(at, _)| self.solid.tetrahedra[at].drawn);
+                for triangle in drawn.filter(|&triangle| triangle != NONE) {
+                    if self.solid.triangles[triangle].corners.contains(&vertex) {
+                        memory::push(&mut self.changes.triangles, triangle)?;
+                    }
+                }
+            }
+            if is_at_node {
+                at_nodes.push(point);
+                continue;
+            }
+            let known = before.binary_search_by_key(&vertex, |&(at, _)| at);
+            let nodes_before = known.ok().map(|place| before[place].1.nodes);
+            if nodes_before != Some(it.nodes) {
+                let (nodes, weights) = (it.nodes, it.weights);
+                memory::push(&mut self.changes.bound, BoundPoint { point, nodes, weights })?;
+            }
+        }
+        memory::sort_once(&mut self.changes.triangles);
+        self.changes.bound.sort_unstable_by_key(|bound| bound.point);
+        memory::sort_once(&mut at_nodes);
+        self.changes.list_copies(&at_nodes)?;
+        let first = self.solid.vertices.count_before();
+        for (vertex, new) in (first..).zip(&self.changes.vertices) {
+            let it = self.solid.vertices[vertex];
+            if it.weights[0] == 1.0 {
+                continue;
+            }
+            // Of a vertex that is at a copy now what it was at has the lower number.
+            let point_of = |vertex: u32| match before.binary_search_by_key(&vertex, |&(at, _)| at) {
+                Ok(place) => before[place].1.point,
+                Err(_) => self.solid.vertices[vertex].point,
+            };
+            let source = Source {
+                point: it.point,
+                sources: new.sources.map(point_of),
+                weights: new.weights,
+            };
+            memory::push(&mut self.changes.sources, source)?;
+        }
+        self.changes.sources.sort_unstable_by_key(|source| source.point);
+        Ok(())
+    }
+}

@@ -1,0 +1,136 @@
+//! Splitting an edge of the material: each tetrahedron about it is halved.
+
+use super::body::{Face, NONE, SolidTriangle, SolidVertex, Tetrahedron};
+use super::cut::Cut;
+use super::sever::Mark;
+use crate::cutting::changes::NewVertex;
+use crate::error::Result;
+use crate::memory;
+
+impl Cut<'_> {
+    /// Splits an edge of a tetrahedron `along` of the way from its first end to its second. Each tetrahedron about it keeps the half at the first.
+    pub(crate) fn split_edge(&mut self, tetrahedron: u32, edge: [u32; 2], along: f64) -> Result<u32> {
+        let [from, to] = edge;
+        let mut ring = Vec::new();
+        self.solid.ring(tetrahedron, edge, &mut ring)?;
+        ring.sort_unstable();
+        let middle = self.vertex_between(edge, along, tetrahedron)?;
+        let first = self.solid.tetrahedra.count();
+        let far_of = |near: u32| ring.binary_search(&near).map_or(NONE, |at| first + at as u32);
+        for &near in &ring {
+            let old = self.solid.tetrahedra[near];
+            let [at_from, at_to] = edge.map(|end| self.solid.corner(near, end));
+            let far_volume = old.volume * (1.0 - along);
+            let mut far = Tetrahedron {
+                volume: far_volume,
+                ..old
+            };
+            far.corners[at_from] = middle;
+            far.neighbours = old.neighbours.map(far_of);
+            far.neighbours[at_from] = old.neighbours[at_from];
+            far.neighbours[at_to] = near;
+            far.faces[at_to] = Face::Whole;
+            far.drawn[at_to] = NONE;
+            let number = self.add_tetrahedron(far)?;
+            let beyond = old.neighbours[at_from];
+            if beyond != NONE {
+                let back = self.solid.back(near, at_from);
+                self.solid
+                    .tetrahedra
+                    .edit(beyond, |beyond| beyond.neighbours[back] = number)?;
+            }
+            self.solid.tetrahedra.edit(near, |near| {
+                near.corners[at_to] = middle;
+                near.volume = old.volume - far_volume;
+                near.neighbours[at_from] = number;
+                near.faces[at_from] = Face::Whole;
+                near.drawn[at_from] = NONE;
+            })?;
+            for (face, &triangle) in old.drawn.iter().enumerate().filter(|&(_, &drawn)| drawn != NONE) {
+                if face == at_from {
+                    self.solid
+                        .triangles
+                        .edit(triangle, |triangle| triangle.tetrahedron = number)?;
+                } else if face != at_to {
+                    self.halve_triangle(triangle, edge, middle, number, face)?;
+                }
+            }
+        }
+        self.solid.vertices.edit(to, |vertex| vertex.around = far_of(ring[0]))?;
+        debug_assert!(self.solid.tetrahedra[tetrahedron].corners.contains(&from));
+        Ok(middle)
+    }
+
+    fn halve_triangle(
+        &mut self,
+        triangle: u32,
+        [from, to]: [u32; 2],
+        middle: u32,
+        far: u32,
+        face: usize,
+    ) -> Result<()> {
+        let old = self.solid.triangles[triangle];
+        let swap = |of: u32| old.corners.map(|corner| if corner == of { middle } else { corner });
+        self.limits
+            .check("triangles", self.solid.triangles.count(), self.limits.triangles)?;
+        let number = self.solid.triangles.push(SolidTriangle {
+            corners: swap(from),
+            tetrahedron: far,
+            ..old
+        })?;
+        self.solid.triangles.edit(triangle, |near| near.corners = swap(to))?;
+        self.solid.tetrahedra.edit(far, |far| far.drawn[face] = number)
+    }
+
+    /// A vertex on an edge.
+    fn vertex_between(&mut self, edge: [u32; 2], along: f64, around: u32) -> Result<u32> {
+        let mut vertex = SolidVertex {
+            nodes: [NONE; 4],
+            weights: [0.0; 4],
+            point: NONE,
+            around,
+            mark: Mark::NONE,
+        };
+        let shares = [1.0 - along, along];
+        for (source, share) in edge.into_iter().zip(shares) {
+            let source = &self.solid.vertices[source];
+            for (&node, &weight) in source.nodes.iter().zip(&source.weights) {
+                if weight == 0.0 {
+                    continue;
+                }
+                // Both ends lie in one cell: there is room for its nodes.
+                if let Some(k) = (0..4).find(|&k| vertex.nodes[k] == node || vertex.nodes[k] == NONE) {
+                    vertex.nodes[k] = node;
+                    vertex.weights[k] += weight * share;
+                }
+            }
+        }
+        for k in 1..4 {
+            if vertex.nodes[k] == NONE {
+                vertex.nodes[k] = vertex.nodes[0];
+            }
+        }
+        let from = NewVertex {
+            sources: [edge[0], edge[1], edge[0]],
+            weights: [shares[0], shares[1], 0.0],
+        };
+        self.add_vertex(vertex, from)
+    }
+
+    pub(crate) fn add_vertex(&mut self, vertex: SolidVertex, from: NewVertex) -> Result<u32> {
+        self.limits
+            .check("vertices", self.solid.vertices.count(), self.limits.vertices)?;
+        memory::push(&mut self.changes.vertices, from)?;
+        self.solid.vertices.push(vertex)
+    }
+
+    /// Adds a tetrahedron to the cell that it names.
+    fn add_tetrahedron(&mut self, tetrahedron: Tetrahedron) -> Result<u32> {
+        let number = self.solid.tetrahedra.count();
+        self.limits.check("tetrahedra", number, u32::MAX)?;
+        let next = self.solid.cells[tetrahedron.cell].first;
+        self.solid.tetrahedra.push(Tetrahedron { next, ..tetrahedron })?;
+        self.solid.cells.edit(tetrahedron.cell, |cell| cell.first = number)?;
+        Ok(number)
+    }
+}

@@ -1,0 +1,347 @@
+//! Solids that are cut while they move: what is kept, whatever they are made of, keeps their springs and moves them.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, Vec3, vec3};
+use sinew::cutting::Sweep;
+use sinew::{
+    Body, BodyDefinition, BodyId, Material, Model, Solver, Storage, Values, Viscosity, World, WorldDefinition,
+};
+
+use super::block::{Mesh, Random, shaken, upright};
+
+/// What a body is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Matter {
+    Springs,
+    Elements,
+    Viscous,
+    Both,
+}
+
+const MATTER: [Matter; 4] = [Matter::Springs, Matter::Elements, Matter::Viscous, Matter::Both];
+
+const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
+
+/// Sides of 6, 5 and 4 cm.
+fn mesh() -> Mesh {
+    let (rest, cells) = shaken([6, 5, 4], 3);
+    let cells = cells.iter().map(|&cell| upright(&rest, cell)).collect();
+    (rest.iter().map(|&place| 0.01 * place).collect(), cells)
+}
+
+fn edges_of(cells: &[[u32; 4]]) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = cells
+        .iter()
+        .flat_map(|cell| (0..4).flat_map(move |a| (0..a).map(move |b| [cell[a].min(cell[b]), cell[a].max(cell[b])])))
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+fn made(matter: Matter, solver: Solver, storage: Storage, gravity: Vec3) -> (World, BodyId) {
+    let (positions, cells) = mesh();
+    let masses = vec![1e-3; positions.len()];
+    let edges = edges_of(&cells);
+    let mut world = World::new(WorldDefinition {
+        gravity,
+        ..Default::default()
+    })
+    .unwrap();
+    let elements = Material {
+        model: Model::Tetrahedra,
+        young_modulus: 3000.0,
+        poisson_ratio: 0.3,
+        ..Default::default()
+    };
+    let definition = BodyDefinition {
+        positions: &positions,
+        masses: Values::Each(&masses),
+        tetrahedra: &cells,
+        springs_per_node: if storage == Storage::FastLink { 40 } else { 0 },
+        spare_nodes: 3000,
+        mass_scaling: 0.0,
+        solver,
+        storage,
+        ..Default::default()
+    };
+    let definition = match matter {
+        Matter::Springs => BodyDefinition {
+            stiffnesses: Values::Uniform(20.0),
+            ..definition
+        },
+        Matter::Elements => BodyDefinition {
+            material: Some(elements),
+            ..definition
+        },
+        Matter::Viscous => BodyDefinition {
+            material: Some(elements),
+            viscosity: Viscosity {
+                retardation_time: 0.05,
+                relaxation_time: 0.05,
+            },
+            ..definition
+        },
+        Matter::Both => BodyDefinition {
+            material: Some(elements),
+            springs: Some(&edges),
+            stiffnesses: Values::Uniform(5.0),
+            ..definition
+        },
+    };
+    let body = world.create_body(&definition).unwrap();
+    (world, body)
+}
+
+/// In flight without gravity, spinning and swinging.
+fn in_flight(matter: Matter, solver: Solver, storage: Storage) -> (World, BodyId) {
+    let (mut world, body) = made(matter, solver, storage, Vec3::ZERO);
+    let positions = world.body(body).unwrap().positions().to_vec();
+    let mut random = Random(3);
+    let centre = positions.iter().sum::<Vec3>() / positions.len() as f32;
+    let velocities: Vec<Vec3> = positions
+        .iter()
+        .map(|&place| vec3(0.3, -0.2, 0.1) + vec3(3.0, 2.0, 6.0).cross(place - centre) + random.point(-0.1, 0.1))
+        .collect();
+    world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
+    (world, body)
+}
+
+/// Mass, momentum, angular momentum about the origin, energy, in `f64`.
+struct Kept {
+    mass: f64,
+    momentum: DVec3,
+    spin: DVec3,
+    energy: f64,
+}
+
+fn kept(world: &World, body: BodyId) -> Kept {
+    let it = world.body(body).unwrap();
+    let energy = it.energy(Vec3::ZERO);
+    let mut kept = Kept {
+        mass: 0.0,
+        momentum: DVec3::ZERO,
+        spin: DVec3::ZERO,
+        energy: energy.kinetic + energy.elastic,
+    };
+    for (node, (place, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
+        let mass = f64::from(it.node_mass(node).unwrap());
+        let (place, velocity) = (place.as_dvec3(), velocity.as_dvec3());
+        kept.mass += mass;
+        kept.momentum += mass * velocity;
+        kept.spin += mass * place.cross(velocity);
+    }
+    kept
+}
+
+/// A blade's edge along z through a point of the rest shape, in m, where the block is now.
+fn edge(body: &Body, [x, y]: [f32; 2], depth: [f32; 2]) -> [Vec3; 2] {
+    let positions = body.positions();
+    // Corners of the block, far from each other.
+    let at = |i: usize, j: usize, k: usize| positions[(k * 6 + j) * 7 + i];
+    let (origin, x_axis, y_axis, z_axis) = (at(0, 0, 0), at(6, 0, 0), at(0, 5, 0), at(0, 0, 4));
+    depth.map(|z| {
+        origin + (x_axis - origin) * (x / 0.06) + (y_axis - origin) * (y / 0.05) + (z_axis - origin) * (z / 0.04)
+    })
+}
+
+const CUTS: [[[f32; 2]; 3]; 4] = [
+    [[-0.02, 0.023], [0.032, 0.026], [-0.02, 0.06]],
+    [[0.032, 0.026], [0.08, 0.029], [-0.02, 0.06]],
+    [[0.022, -0.02], [0.026, 0.07], [-0.02, 0.06]],
+    [[0.04, 0.012], [0.052, 0.037], [0.015, 0.06]],
+];
+
+#[test]
+fn cuts_in_motion_keep_mass_momentum_and_energy() {
+    for matter in MATTER {
+        for solver in SOLVERS {
+            for storage in [Storage::Packed, Storage::FastLink, Storage::DynamicBulk] {
+                if storage != Storage::Packed && (solver == Solver::Newton || matter == Matter::Elements) {
+                    continue;
+                }
+                let what = format!("{matter:?}, {solver:?}, {storage:?}");
+                let (mut world, body) = in_flight(matter, solver, storage);
+                let (mut pieces, mut last) = (1, None);
+                for [from, to, depth] in CUTS {
+                    for _ in 0..5 {
+                        world.step(1e-3).unwrap();
+                    }
+                    let before = kept(&world, body);
+                    let it = world.body(body).unwrap();
+                    // A blade that goes on waits where it stopped while the block moves on.
+                    let start = last.filter(|&(at, _)| at == from).map(|(_, edge)| edge);
+                    let sweep = Sweep {
+                        start: start.unwrap_or(edge(it, from, depth)),
+                        end: edge(it, to, depth),
+                    };
+                    last = Some((to, sweep.end));
+                    let report = world.cut(body, &sweep).unwrap();
+                    pieces += report.pieces_parted;
+                    let after = kept(&world, body);
+                    assert!(report.new_nodes > 0 && report.new_triangles > 0, "{what}: {report:?}");
+                    assert!(report.area > 1e-4 && report.length > 0.0, "{what}: {report:?}");
+                    assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
+                    let size = before.momentum.length();
+                    let off = before.momentum.distance(after.momentum);
+                    assert!(off < 1e-6 * size, "{what}: momentum {off} of {size}");
+                    let off = before.spin.distance(after.spin);
+                    assert!(
+                        off < 1e-6 * before.spin.length().max(0.1 * size),
+                        "{what}: angular momentum {off} of {}",
+                        before.spin.length()
+                    );
+                    let gained = after.energy - before.energy;
+                    assert!(
+                        gained.abs() < 1e-6 * before.energy,
+                        "{what}: energy {} {}",
+                        before.energy,
+                        after.energy
+                    );
+                }
+                assert_eq!(world.body(body).unwrap().pieces().unwrap().count, pieces, "{what}");
+                assert_eq!(pieces, 4, "{what}");
+
+                let at_last = kept(&world, body);
+                for _ in 0..100 {
+                    world.step(1e-3).unwrap();
+                }
+                let later = kept(&world, body);
+                assert!(
+                    later.energy < 1.02 * at_last.energy,
+                    "{what}: {} {}",
+                    at_last.energy,
+                    later.energy
+                );
+                assert!(later.momentum.distance(at_last.momentum) < 1e-4 * at_last.momentum.length());
+            }
+        }
+    }
+}
+
+/// What is drawn is closed, turned outward, and has this volume with nodes at these places.
+fn enclosed(surface: &[[u32; 3]], place: impl Fn(u32) -> DVec3) -> f64 {
+    let mut sides = BTreeMap::new();
+    let mut volume = 0.0;
+    let origin = place(surface[0][0]);
+    for corners in surface {
+        let [a, b, c] = corners.map(|corner| place(corner) - origin);
+        volume += a.dot(b.cross(c)) / 6.0;
+        for k in 0..3 {
+            *sides.entry((corners[k], corners[(k + 1) % 3])).or_insert(0) += 1;
+        }
+    }
+    for (&(from, to), count) in &sides {
+        assert_eq!(sides.get(&(to, from)), Some(count), "what lies across {from} and {to}");
+    }
+    volume
+}
+
+#[test]
+fn a_mesh_of_its_own_follows_the_list() {
+    let (mut world, body) = in_flight(Matter::Elements, Solver::Verlet, Storage::Packed);
+    let it = world.body(body).unwrap();
+    let mut triangles = it.surface().to_vec();
+    let mut carried: Vec<DVec3> = it.positions().iter().map(|place| place.as_dvec3()).collect();
+    let whole = enclosed(&triangles, |node| carried[node as usize]);
+    assert!((whole / 1.2e-4 - 1.0).abs() < 1e-6, "{whole}");
+    let mut version = 0;
+    for [from, to, depth] in CUTS {
+        for step in 0..8 {
+            world.step(1e-3).unwrap();
+            let it = world.body(body).unwrap();
+            let at = |part: f32| {
+                let [x, y] = [0, 1].map(|k| from[k] + (to[k] - from[k]) * part);
+                edge(it, [x, y], depth)
+            };
+            let sweep = Sweep {
+                start: at(step as f32 / 8.0),
+                end: at((step + 1) as f32 / 8.0),
+            };
+            world.cut(body, &sweep).unwrap();
+            let it = world.body(body).unwrap();
+            let changes = it.changes_since(version).unwrap();
+            version = changes.version;
+            for new in changes.nodes {
+                assert_eq!(new.node as usize, carried.len());
+                let place = (0..3)
+                    .map(|k| f64::from(new.weights[k]) * carried[new.sources[k] as usize])
+                    .sum();
+                carried.push(place);
+            }
+            triangles.resize(it.surface().len(), [0; 3]);
+            for &triangle in changes.triangles {
+                triangles[triangle as usize] = it.surface()[triangle as usize];
+            }
+            assert_eq!(triangles, it.surface());
+            let now = enclosed(&triangles, |node| carried[node as usize]);
+            assert!((now / whole - 1.0).abs() < 1e-6, "{now} of {whole} m³ is drawn");
+        }
+    }
+}
+
+#[test]
+fn what_is_cut_off_falls_and_what_is_held_stays() {
+    for matter in MATTER {
+        for solver in SOLVERS {
+            let (mut world, body) = made(matter, solver, Storage::Packed, vec3(0.0, -9.81, 0.0));
+            let (rest, _) = mesh();
+            for node in (0..rest.len()).filter(|&node| rest[node].y > 0.049) {
+                world.body_mut(body).unwrap().pin(node as u32).unwrap();
+            }
+            for _ in 0..20 {
+                world.step(2e-3).unwrap();
+            }
+            let it = world.body(body).unwrap();
+            // Within a layer of cells: nodes of both sides have copies beyond the cut.
+            let sweep = Sweep {
+                start: edge(it, [-0.02, 0.0255], [-0.02, 0.06]),
+                end: edge(it, [0.08, 0.0245], [-0.02, 0.06]),
+            };
+            let report = world.cut(body, &sweep).unwrap();
+            assert_eq!(report.pieces_parted, 1, "{matter:?}, {solver:?}");
+            assert!(
+                (report.area / 0.0024 - 1.0).abs() < 0.15,
+                "{matter:?}, {solver:?}: {report:?}"
+            );
+            let it = world.body(body).unwrap();
+            let pieces = it.pieces().unwrap();
+            assert_eq!(pieces.count, 2);
+            let centre = |world: &World| {
+                let it = world.body(body).unwrap();
+                let (mut sum, mut mass) = (DVec3::ZERO, 0.0);
+                for (node, place) in (0..).zip(it.positions()) {
+                    if pieces.of_nodes[node as usize] == pieces.of_nodes[0] {
+                        let of_node = f64::from(it.node_mass(node).unwrap());
+                        sum += of_node * place.as_dvec3();
+                        mass += of_node;
+                    }
+                }
+                sum / mass
+            };
+            let still = vec![Vec3::ZERO; it.node_count()];
+            world.body_mut(body).unwrap().set_velocities(&still).unwrap();
+            let start = centre(&world);
+            let time = 30.0 * 2e-3;
+            for _ in 0..30 {
+                world.step(2e-3).unwrap();
+            }
+            // Nothing holds it any more. Implicit steps of first order fall by a step more.
+            let fallen = start.y - centre(&world).y;
+            let free = 0.5 * 9.81 * time * time;
+            assert!(
+                (fallen / free - 1.0).abs() < 0.04,
+                "{matter:?}, {solver:?}: {fallen} of {free} m"
+            );
+            let it = world.body(body).unwrap();
+            for node in (0..rest.len()).filter(|&node| rest[node].y > 0.049) {
+                assert_eq!(
+                    it.positions()[node],
+                    rest[node],
+                    "{matter:?}, {solver:?}: node {node} is held"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
+
+use super::block::{Body, Random, bent, block, far, flat, shaken};
+use glam::{Vec3, vec3};
+use sinew::cutting::{Limits, Sweep};
+
+/// Upright, or leaning a little.
+fn edge(x: f32, y: f32, lean: [f32; 2]) -> [Vec3; 2] {
+    let lean = vec3(lean[0], lean[1], 0.0);
+    [vec3(x, y, -4.0) - 3.0 * lean, vec3(x, y, 8.0) + 3.0 * lean]
+}
+
+#[test]
+fn loops_of_any_size_and_pace_cut_a_piece_out() {
+    let blocks = [block([6, 6, 3]), shaken([6, 6, 3], 6), shaken([6, 6, 3], 7)];
+    // Bends are no tighter than the elements: 0.65 edges.
+    for round in 0..90 {
+        let mut random = Random(100_000 + round as u64);
+        let (x, y) = (random.between(2.5, 3.5), random.between(2.5, 3.5));
+        let (wide, high) = (random.between(1.2, 2.2), random.between(1.2, 2.2));
+        let steps = (4.0 * 100f64.powf(random.next())) as usize;
+        let lean = [random.between(-0.1, 0.1), random.between(-0.1, 0.1)];
+        let ellipse: Vec<[Vec3; 2]> = (0..=steps)
+            .map(|at| (at % steps) as f32 / steps as f32 * std::f32::consts::TAU)
+            .map(|angle| edge(x + wide * angle.cos(), y + high * angle.sin(), lean))
+            .collect();
+        let mut body = Body::new(blocks[round % 3].clone(), [flat, bent, far][round / 3 % 3]);
+        body.cut_along(&ellipse);
+        let volumes = body.piece_volumes();
+        assert_eq!(
+            body.check(),
+            2,
+            "round {round}: {steps} steps about {x} {y}, {wide} x {high}: {volumes:?}"
+        );
+    }
+}
+
+#[test]
+fn wild_strokes_from_side_to_side_part_a_block() {
+    let blocks = [block([6, 6, 3]), shaken([6, 6, 3], 8), shaken([6, 6, 3], 9)];
+    for round in 0..90 {
+        let mut random = Random(200_000 + round as u64);
+        let steps = (4.0 * 100f64.powf(random.next())) as usize;
+        let [a, b, c] = [0; 3].map(|_| random.between(-0.5, 0.5));
+        let lean = [random.between(-0.1, 0.1), random.between(-0.1, 0.1)];
+        let line: Vec<[Vec3; 2]> = (0..=steps)
+            .map(|at| 10.0 * at as f32 / steps as f32 - 2.0)
+            .map(|x| {
+                edge(
+                    x,
+                    3.0 + a * (0.5 * x).sin() + b * (1.3 * x).cos() + c * (2.1 * x).sin(),
+                    lean,
+                )
+            })
+            .collect();
+        let mut body = Body::new(blocks[round % 3].clone(), [flat, bent, far][round / 3 % 3]);
+        body.cut_along(&line);
+        let volumes = body.piece_volumes();
+        assert_eq!(
+            body.check(),
+            2,
+            "round {round}: {steps} steps, {a} {b} {c}: {volumes:?}"
+        );
+    }
+}
+
+#[test]
+fn a_thousand_cuts_in_a_row() {
+    for (mesh, cuts, seed) in [(shaken([8, 8, 6], 5), 1000, 2), (block([8, 8, 6]), 300, 1)] {
+        let mut body = Body::new(mesh, bent);
+        let (nodes, tetrahedra, triangles) = (
+            body.positions.len(),
+            body.solid.tetrahedra().len(),
+            body.triangles.len(),
+        );
+        let before = body.worst_ratio();
+        let mut random = Random(seed);
+        let mut worst = 0.0f64;
+        for cut in 0..cuts {
+            let start = random.point(-1.0, 9.0);
+            let (edge, way, turn) = (
+                random.point(-2.0, 2.0),
+                random.point(-1.5, 1.5),
+                random.point(-0.5, 0.5),
+            );
+            // The wounds gape, and nodes go where they like.
+            for (place, &rest) in body.positions.iter_mut().zip(&body.rest) {
+                *place = bent(rest) + random.point(-0.1, 0.1);
+            }
+            let sweep = Sweep {
+                start: [start, start + edge],
+                end: [start + way, start + way + edge + turn],
+            };
+            let near = body.solid.near(&sweep, &body.positions).unwrap();
+            let changes = body.solid.cut(&sweep, &body.positions, &near, Limits::NONE).unwrap();
+            body.apply(&changes);
+            if cut % 100 == 99 {
+                body.check();
+                worst = worst.max(body.worst_ratio() / before);
+            }
+        }
+        let more = [
+            body.positions.len() - body.bound.len() - nodes,
+            body.solid.tetrahedra().len() - tetrahedra,
+            body.solid.triangles().len() - triangles,
+        ];
+        assert!(worst < 2.0, "stiffness by mass {worst} times what it was");
+        // A cut crosses some 20 edges, with five tetrahedra about each, and again those that earlier cuts have made of them.
+        assert!(
+            more[0] < 2 * cuts && more[1] < 120 * cuts && more[2] < 80 * cuts,
+            "more nodes, tetrahedra, triangles: {more:?}"
+        );
+    }
+}
