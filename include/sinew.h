@@ -726,7 +726,8 @@ typedef struct sinew_body_def {
    * How many nodes cuts may add, of which room is made: some five for each triangle or tetrahedron that a blade passes through. 0, the default:
    * the body cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
    * have an edge and those about a node hang together; a solid is one of tetrahedra of which those about a node hang together by faces at it,
-   * and triangles are its boundary, if there are any. See sinew_body_cut.
+   * and triangles are its boundary, if there are any. A body of springs alone loses those that a blade passes through, and needs no room: 1
+   * will do. See sinew_body_cut.
    */
   uint32_t spare_nodes;
   /**

@@ -51,10 +51,14 @@ impl Cuttable {
             }
             error => error,
         };
-        let mut material = if tetrahedra.is_empty() {
-            CutMaterial::Surface(CutSurface::new(rest, drawn).map_err(refused)?)
-        } else {
-            CutMaterial::Solid(CutSolid::new(rest, tetrahedra, drawn).map_err(refused)?)
+        let mut material = match (drawn, tetrahedra) {
+            ([], []) => {
+                let mut pairs = memory::reserved(springs.len())?;
+                pairs.extend(springs.iter().map(|spring| spring.nodes));
+                CutMaterial::Springs(pairs)
+            }
+            (_, []) => CutMaterial::Surface(CutSurface::new(rest, drawn).map_err(refused)?),
+            _ => CutMaterial::Solid(CutSolid::new(rest, tetrahedra, drawn).map_err(refused)?),
         };
         material.reserve(spare)?;
         let mut search = Search::new(rest.len(), &material, order)?;
@@ -93,6 +97,26 @@ impl Cuttable {
     }
 }
 
+impl Cuttable {
+    /// Makes room for a spring that is added by hand.
+    pub fn reserve_spring(&mut self, nodes: [u32; 2], order: &NodeOrder) -> Result<()> {
+        if let CutMaterial::Springs(springs) = &mut self.material {
+            springs.try_reserve(1)?;
+            self.search.reserve_item(nodes, order)?;
+        }
+        Ok(())
+    }
+
+    /// Follows a spring that was added by hand, for which there is room.
+    pub fn add_spring(&mut self, nodes: [u32; 2], order: &NodeOrder) {
+        if let CutMaterial::Springs(springs) = &mut self.material {
+            springs.push(nodes);
+            self.search.add_item(springs.len() as u32 - 1, nodes, order);
+        }
+        self.springs_are_edges &= self.material.has_edge(nodes);
+    }
+}
+
 /// Refuses what cannot be cut yet.
 fn check_offered(definition: &BodyDefinition) -> Result<()> {
     let spare = definition.spare_nodes;
@@ -103,9 +127,6 @@ fn check_offered(definition: &BodyDefinition) -> Result<()> {
     };
     if !definition.cells.is_empty() {
         return lacking("cells");
-    }
-    if definition.triangles.is_empty() && definition.tetrahedra.is_empty() {
-        return lacking("neither triangles nor tetrahedra");
     }
     if definition.enclosed_stiffness > 0.0 || definition.pressure != 0.0 {
         return lacking("an enclosed_stiffness or a pressure");
@@ -142,13 +163,20 @@ struct Home {
     later: Vec<u32>,
 }
 
+/// The tile at which what lies between these is listed.
+fn home_of<const CORNERS: usize>(corners: [u32; CORNERS], order: &NodeOrder) -> u32 {
+    let tiles = corners.into_iter().map(|corner| order.own(corner) / TILE as u32);
+    tiles.min().unwrap_or(0)
+}
+
 impl Search {
     fn new(node_count: usize, material: &CutMaterial, order: &NodeOrder) -> Result<Self> {
         let mut homes = memory::filled(Home::default(), tile_count(node_count))?;
         let mut home_of_cell = memory::reserved(material.item_count() as usize)?;
         for item in 0..material.item_count() {
-            let tiles = material.corners_of(item).map(|corner| order.own(corner) / TILE as u32);
-            let home = tiles.into_iter().min().unwrap_or(0);
+            let corners = material.corners_of(item);
+            let tiles = corners.map(|corner| order.own(corner) / TILE as u32);
+            let home = home_of(corners, order);
             home_of_cell.push(home);
             let home = &mut homes[home as usize];
             memory::push(&mut home.items, item)?;
@@ -206,6 +234,27 @@ impl Search {
             }
         }
         Ok(())
+    }
+
+    /// Makes room for an item between these.
+    fn reserve_item(&mut self, corners: [u32; 2], order: &NodeOrder) -> Result<()> {
+        self.home_of_cell.try_reserve(1)?;
+        let home = &mut self.homes[home_of(corners, order) as usize];
+        home.items.try_reserve(1)?;
+        Ok(home.tiles.try_reserve(corners.len())?)
+    }
+
+    /// Lists the next item, between these, for which there is room.
+    fn add_item(&mut self, item: u32, corners: [u32; 2], order: &NodeOrder) {
+        let home = home_of(corners, order);
+        self.home_of_cell.push(home);
+        let home = &mut self.homes[home as usize];
+        home.items.push(item);
+        for tile in corners.map(|corner| order.own(corner) / TILE as u32) {
+            if !home.tiles.contains(&tile) {
+                home.tiles.push(tile);
+            }
+        }
     }
 
     /// Lists cells that are copies, given with what they were copied from in the order of their numbers.

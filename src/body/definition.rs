@@ -180,7 +180,7 @@ pub struct BodyDefinition<'a> {
     ///
     /// A surface that is to be cut is one of triangles turned one way all over, of which two at most have an edge and those about a node hang
     /// together; a solid is one of tetrahedra of which those about a node hang together by faces at it, and `triangles` are its boundary, if there
-    /// are any.
+    /// are any. A body of springs alone loses those that a blade passes through, and needs no room: 1 will do.
     pub spare_nodes: u32,
 }
 

@@ -238,13 +238,16 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.make_room(self.springs.spring_count() + 1)?;
         }
+        if let Some(cuttable) = &mut self.cuttable {
+            cuttable.reserve_spring([a, b], &self.order)?;
+        }
         // What is invalid is told in the caller's numbers.
         self.springs.add(&spring).map_err(|error| match error {
             Error::InvalidArgument(_) => already_joined(a, b),
             error => error,
         })?;
         if let Some(cuttable) = &mut self.cuttable {
-            cuttable.springs_are_edges &= cuttable.material.has_edge([a, b]);
+            cuttable.add_spring([a, b], &self.order);
         }
         self.forces_current = false;
         if let Some(implicit) = &mut self.implicit {

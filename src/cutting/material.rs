@@ -1,4 +1,4 @@
-//! What a body's material is made of where it can be cut: triangles or tetrahedra.
+//! What a body's material is made of where it can be cut: triangles, tetrahedra, or springs alone.
 
 use glam::{DVec3, Vec3};
 
@@ -9,9 +9,11 @@ use super::surface::CutSurface;
 use crate::error::Result;
 use crate::memory;
 
-/// The material of a body. It is looked for by *items*: the triangles of a surface, the cells of a solid.
+/// The material of a body. It is looked for by *items*: the triangles of a surface, the cells of a solid, springs.
 #[derive(Debug)]
 pub(crate) enum CutMaterial {
+    /// Those that a blade passes through go; nothing else changes.
+    Springs(Vec<[u32; 2]>),
     Surface(CutSurface),
     Solid(CutSolid),
 }
@@ -19,6 +21,7 @@ pub(crate) enum CutMaterial {
 impl CutMaterial {
     pub fn reserve(&mut self, nodes: u32) -> Result<()> {
         match self {
+            Self::Springs(_) => Ok(()),
             Self::Surface(surface) => surface.reserve(nodes),
             Self::Solid(solid) => solid.reserve(nodes),
         }
@@ -27,6 +30,7 @@ impl CutMaterial {
     /// See [`CutSurface::cut`] and [`CutSolid::cut`], with items as candidates.
     pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], near: &[u32], limits: Limits) -> Result<Changes> {
         match self {
+            Self::Springs(_) => Ok(Changes::default()),
             Self::Surface(surface) => surface.cut(sweep, positions, near, limits),
             Self::Solid(solid) => solid.cut(sweep, positions, near, limits),
         }
@@ -35,6 +39,7 @@ impl CutMaterial {
     /// Takes back the last cut.
     pub fn undo(&mut self) {
         match self {
+            Self::Springs(_) => {}
             Self::Surface(surface) => surface.undo(),
             Self::Solid(solid) => solid.undo(),
         }
@@ -43,6 +48,7 @@ impl CutMaterial {
     /// How many more pieces it has after the last cut; `None` if that takes more than `most` triangles or tetrahedra to find out.
     pub fn parted(&self, changes: &Changes, most: usize) -> Result<Option<u32>> {
         match self {
+            Self::Springs(_) => Ok(Some(0)),
             Self::Surface(surface) => surface.parted(&changes.rim, most),
             Self::Solid(solid) => solid.parted(&changes.faces, most),
         }
@@ -50,6 +56,7 @@ impl CutMaterial {
 
     pub fn triangle_count(&self) -> u32 {
         match self {
+            Self::Springs(_) => 0,
             Self::Surface(surface) => surface.triangles().len() as u32,
             Self::Solid(solid) => solid.triangles().len() as u32,
         }
@@ -58,6 +65,7 @@ impl CutMaterial {
     /// The corners of a triangle, by their numbers among nodes.
     pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
         match self {
+            Self::Springs(_) => [0; 3],
             Self::Surface(surface) => surface.corner_points(triangle),
             Self::Solid(solid) => solid.corner_points(triangle),
         }
@@ -66,6 +74,7 @@ impl CutMaterial {
     /// Where the corners of a triangle are in the rest shape.
     pub fn corners_at_rest(&self, triangle: u32) -> [DVec3; 3] {
         match self {
+            Self::Springs(_) => [DVec3::NAN; 3],
             Self::Surface(surface) => {
                 let corners = surface.triangles()[triangle as usize].corners;
                 corners.map(|corner| surface.rest_place(corner))
@@ -80,6 +89,7 @@ impl CutMaterial {
     /// A node's part of the material of its cells, m² or m³.
     pub fn share_at(&self, node: u32) -> f64 {
         match self {
+            Self::Springs(_) => 0.0,
             Self::Surface(surface) => surface.area_at(node),
             Self::Solid(solid) => solid.volume_at(node),
         }
@@ -88,15 +98,16 @@ impl CutMaterial {
     /// Whether two nodes are corners of one cell.
     pub fn has_edge(&self, nodes: [u32; 2]) -> bool {
         match self {
+            Self::Springs(_) => false,
             Self::Surface(surface) => surface.has_edge(nodes),
             Self::Solid(solid) => solid.has_edge(nodes),
         }
     }
 
-    /// The tetrahedra at a node; of surfaces none.
+    /// The tetrahedra at a node, if there are any.
     pub fn tetrahedra_at(&self, node: u32) -> impl Iterator<Item = u32> {
         let solid = match self {
-            Self::Surface(_) => None,
+            Self::Springs(_) | Self::Surface(_) => None,
             Self::Solid(solid) => Some(solid),
         };
         solid.into_iter().flat_map(move |solid| solid.cells_at(node))
@@ -106,7 +117,7 @@ impl CutMaterial {
     pub fn cell_of(&self, item: u32) -> u32 {
         match self {
             Self::Surface(surface) => surface.triangles()[item as usize].cell,
-            Self::Solid(_) => item,
+            Self::Springs(_) | Self::Solid(_) => item,
         }
     }
 
@@ -114,6 +125,7 @@ impl CutMaterial {
     pub fn nodes_of(&self, item: u32) -> [u32; 4] {
         let cell = self.cell_of(item) as usize;
         match self {
+            Self::Springs(springs) => with_first(springs[cell]),
             Self::Surface(surface) => {
                 let [a, b, c] = surface.cells()[cell].nodes;
                 [a, b, c, a]
@@ -125,6 +137,7 @@ impl CutMaterial {
     /// What an item lies between, by numbers among nodes.
     pub fn corners_of(&self, item: u32) -> [u32; 4] {
         match self {
+            Self::Springs(springs) => with_first(springs[item as usize]),
             Self::Surface(surface) => {
                 let [a, b, c] = surface.corner_points(item);
                 [a, b, c, a]
@@ -136,6 +149,7 @@ impl CutMaterial {
     /// How many items there are.
     pub fn item_count(&self) -> u32 {
         match self {
+            Self::Springs(springs) => springs.len() as u32,
             Self::Surface(_) => self.triangle_count(),
             Self::Solid(solid) => solid.cells().len() as u32,
         }
@@ -144,6 +158,7 @@ impl CutMaterial {
     /// The items that a cut has changed or added, in order.
     pub fn items_changed(&self, changes: &Changes) -> Result<Vec<u32>> {
         match self {
+            Self::Springs(_) => Ok(Vec::new()),
             Self::Surface(_) => memory::copied(&changes.triangles),
             Self::Solid(_) => {
                 let mut items = memory::reserved(changes.cells.len())?;
@@ -156,6 +171,7 @@ impl CutMaterial {
     /// How many ends there are at most, of items that were near.
     pub fn most_ends(&self, changes: &Changes, near: &[u32]) -> usize {
         match self {
+            Self::Springs(_) => 0,
             Self::Surface(_) => changes.ends.len(),
             Self::Solid(_) => near.len(),
         }
@@ -171,6 +187,7 @@ impl CutMaterial {
         mut see: impl FnMut(CutEnd),
     ) {
         match self {
+            Self::Springs(_) => {}
             Self::Surface(surface) => {
                 for &vertex in &changes.ends {
                     let vertex = &surface.vertices()[vertex as usize];
@@ -194,6 +211,10 @@ impl CutMaterial {
             solid.carry(edge);
         }
     }
+}
+
+fn with_first([a, b]: [u32; 2]) -> [u32; 4] {
+    [a, b, a, a]
 }
 
 /// A point of the material.

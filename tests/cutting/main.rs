@@ -8,5 +8,6 @@ mod motion;
 mod random;
 mod refused;
 mod shapes;
+mod springs_alone;
 mod touch;
 mod wounds;
