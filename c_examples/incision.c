@@ -1,9 +1,11 @@
-/* A scalpel opens a sheet of skin that is stretched as skin is; the wound gapes, and two sutures pull it together.
+/* A scalpel opens a sheet of skin that is stretched as skin is; the wound gapes, and two sutures pull it together. Then it opens an organ whose
+ * ends are pulled apart.
  *
  *   incision [-o DIRECTORY] [-n FRAMES]
  *
- * What is drawn here is a mesh of the program's own, which follows the list of changes alone: each new node gets its texture coordinates from
- * what it lies between. Leaves incision_open.png, incision_sutured.png and incision.csv in the directory. */
+ * What is drawn here is a mesh of the program's own, which follows the list of changes alone: each new node gets what it carries, texture
+ * coordinates on the skin and its place at rest on and in the organ, from what it lies between. Leaves incision_open.png, incision_sutured.png,
+ * incision_organ.png and incision.csv in the directory. */
 #include "example.h"
 
 #define SIZE 0.12        /* m: a square */
@@ -18,14 +20,25 @@
 #define GAPE 0.5         /* s: the wound gapes, */
 #define CLOSE 1.0        /* s: the sutures are tightened, */
 #define HOLD 0.5         /* s: and hold */
-#define SPARE 2000       /* nodes that cuts may add */
+#define SPARE 4000       /* nodes that cuts may add */
+
+#define ORGAN 0.14       /* m: how long the organ is, along x */
+#define SPACING 0.006    /* m: of its nodes */
+#define PULL 1.15        /* of its length at rest, along x */
+#define HELD 0.75        /* of half its length: what lies beyond is held */
+#define DEEP 0.018       /* m: the cut, below the top */
+#define WIDE 0.05        /* m: the cut, along z */
+#define YOUNG 5000.0     /* Pa */
+#define POISSON 0.35
+#define ORGAN_DENSITY 1060.0 /* kg/m^3 */
 
 static const double node_mass = DENSITY * (SIZE / CELLS) * (SIZE / CELLS);
 
 /* What a renderer keeps. */
 typedef struct drawing {
   uint64_t version;
-  float *textures; /* u and v of each node */
+  size_t per_node; /* how many numbers each node carries, */
+  float *carried;  /* and these */
   size_t node_count;
   uint32_t *triangles;
   size_t triangle_count;
@@ -60,36 +73,35 @@ static sinew_body_id create_skin(sinew_world *world, const sinew_mesh_view *shap
   return skin;
 }
 
-static drawing create_drawing(const sinew_mesh_view *shape) {
+/* With so many numbers per node, of which the program sets those of nodes that are there. */
+static drawing create_drawing(const sinew_world *world, sinew_body_id body, size_t node_count, size_t per_node) {
+  sinew_triangle_view triangles;
   drawing made;
-  size_t i;
+  CHECK(sinew_body_get_triangles(world, body, &triangles));
   made.version = 0;
-  made.node_count = shape->node_count;
-  made.textures = (float *)allocate(2 * (shape->node_count + SPARE), sizeof *made.textures);
-  for (i = 0; i < shape->node_count; i++) {
-    made.textures[2 * i] = (float)(shape->positions[3 * i] / SIZE + 0.5);
-    made.textures[2 * i + 1] = (float)(shape->positions[3 * i + 2] / SIZE + 0.5);
-  }
-  made.triangle_count = shape->triangle_count;
-  made.triangles = (uint32_t *)allocate(3 * (shape->triangle_count + 4 * SPARE), sizeof *made.triangles);
-  memcpy(made.triangles, shape->triangles, 3 * shape->triangle_count * sizeof *made.triangles);
+  made.per_node = per_node;
+  made.node_count = node_count;
+  made.carried = (float *)allocate(per_node * (node_count + SPARE), sizeof *made.carried);
+  made.triangle_count = triangles.count;
+  made.triangles = (uint32_t *)allocate(3 * (triangles.count + 8 * SPARE), sizeof *made.triangles);
+  memcpy(made.triangles, triangles.data, 3 * triangles.count * sizeof *made.triangles);
   return made;
 }
 
 /* Takes over what has changed since the last time. */
-static void follow(drawing *mine, const sinew_world *world, sinew_body_id skin) {
+static void follow(drawing *mine, const sinew_world *world, sinew_body_id body) {
   sinew_topology_changes changes;
   sinew_triangle_view triangles;
-  size_t i, j;
+  size_t i, j, k;
   changes.struct_size = sizeof changes;
-  CHECK(sinew_body_get_topology_changes(world, skin, mine->version, &changes));
-  CHECK(sinew_body_get_triangles(world, skin, &triangles));
+  CHECK(sinew_body_get_topology_changes(world, body, mine->version, &changes));
+  CHECK(sinew_body_get_triangles(world, body, &triangles));
   for (i = 0; i < changes.node_count; i++) {
     const sinew_new_node *added = changes.nodes + i;
-    float *texture = mine->textures + 2 * added->node;
+    float *carried = mine->carried + mine->per_node * added->node;
     for (j = 0; j < 3; j++) {
-      texture[0] += added->weights[j] * mine->textures[2 * added->sources[j]];
-      texture[1] += added->weights[j] * mine->textures[2 * added->sources[j] + 1];
+      const float *source = mine->carried + mine->per_node * added->sources[j];
+      for (k = 0; k < mine->per_node; k++) carried[k] += added->weights[j] * source[k];
     }
   }
   for (i = 0; i < changes.triangle_count; i++) {
@@ -106,10 +118,23 @@ static double texture_area(const drawing *mine) {
   size_t i;
   for (i = 0; i < mine->triangle_count; i++) {
     const uint32_t *corner = mine->triangles + 3 * i;
-    const float *a = mine->textures + 2 * corner[0], *b = mine->textures + 2 * corner[1], *c = mine->textures + 2 * corner[2];
+    const float *a = mine->carried + 2 * corner[0], *b = mine->carried + 2 * corner[1], *c = mine->carried + 2 * corner[2];
     sum += fabs(((double)b[0] - a[0]) * ((double)c[1] - a[1]) - ((double)b[1] - a[1]) * ((double)c[0] - a[0])) / 2;
   }
   return sum;
+}
+
+/* How much the drawn surface encloses at rest: all of it, whatever was cut. */
+static double enclosed_volume(const drawing *mine) {
+  double sum = 0;
+  size_t i;
+  for (i = 0; i < mine->triangle_count; i++) {
+    const uint32_t *corner = mine->triangles + 3 * i;
+    const float *a = mine->carried + 3 * corner[0], *b = mine->carried + 3 * corner[1], *c = mine->carried + 3 * corner[2];
+    sum += a[0] * ((double)b[1] * c[2] - (double)b[2] * c[1]) + a[1] * ((double)b[2] * c[0] - (double)b[0] * c[2]) +
+           a[2] * ((double)b[0] * c[1] - (double)b[1] * c[0]);
+  }
+  return sum / 6;
 }
 
 /* Cuts from where the blade's edge was to where it is: upright, at this place along the cut, which is a little curved. */
@@ -134,7 +159,7 @@ static uint32_t point_at(const drawing *mine, double u, double v, float weights[
     double parts[3], whole = 0;
     int j;
     for (j = 0; j < 3; j++) {
-      const float *a = mine->textures + 2 * corner[(j + 1) % 3], *b = mine->textures + 2 * corner[(j + 2) % 3];
+      const float *a = mine->carried + 2 * corner[(j + 1) % 3], *b = mine->carried + 2 * corner[(j + 2) % 3];
       parts[j] = (a[0] - u) * (b[1] - v) - (a[1] - v) * (b[0] - u);
       whole += parts[j];
     }
@@ -155,11 +180,10 @@ static sinew_attachment_id suture(sinew_world *world, sinew_body_id skin, const 
   return made;
 }
 
-int main(int argc, char **argv) {
+static void open_skin(options chosen) {
   const float size[2] = {SIZE, SIZE};
   const uint32_t cells[2] = {CELLS, CELLS};
   const float low[3] = {-SIZE / 2, -0.01f, -SIZE / 2}, high[3] = {SIZE / 2, 0.01f, SIZE / 2};
-  const options chosen = read_options(argc, argv, 0);
   const int all_frames = (int)lround((CUT + GAPE + CLOSE + HOLD) / FRAME);
   const int frame_count = chosen.frame_count > 0 ? chosen.frame_count : all_frames;
   sinew_world *world = create_world(9.81f);
@@ -177,7 +201,11 @@ int main(int argc, char **argv) {
   shape.struct_size = sizeof shape;
   CHECK(sinew_mesh_get_view(mesh, &shape));
   skin = create_skin(world, &shape);
-  mine = create_drawing(&shape);
+  mine = create_drawing(world, skin, shape.node_count, 2);
+  for (i = 0; i < (int)shape.node_count; i++) {
+    mine.carried[2 * i] = (float)(shape.positions[3 * i] / SIZE + 0.5);
+    mine.carried[2 * i + 1] = (float)(shape.positions[3 * i + 2] / SIZE + 0.5);
+  }
   whole = texture_area(&mine);
   picture = camera(low, high, 1);
   table = create_file(chosen.directory, "incision.csv");
@@ -229,8 +257,109 @@ int main(int argc, char **argv) {
   fclose(table);
   printf("\nat the end the mesh that follows the list draws %.6f of its texture\n", texture_area(&mine) / whole);
 
-  free(mine.textures), free(mine.triangles);
+  free(mine.carried), free(mine.triangles);
   sinew_mesh_destroy(mesh);
   sinew_world_destroy(world);
+}
+
+/* Longer along x than at rest, and held at its ends. */
+static sinew_body_id create_organ(sinew_world *world, const sinew_mesh_view *shape) {
+  float *stretched = (float *)allocate(3 * shape->node_count, sizeof *stretched);
+  sinew_body_def def;
+  sinew_body_id organ;
+  size_t i;
+  for (i = 0; i < shape->node_count; i++) {
+    memcpy(stretched + 3 * i, shape->positions + 3 * i, 3 * sizeof *stretched);
+    stretched[3 * i] *= (float)PULL;
+  }
+  CHECK(sinew_body_def_init(&def, sizeof def));
+  def.positions = stretched;
+  def.rest_positions = shape->positions;
+  def.node_count = shape->node_count;
+  def.tetrahedra = shape->tetrahedra;
+  def.tetrahedron_count = shape->tetrahedron_count;
+  def.material = SINEW_MATERIAL_TETRAHEDRA;
+  def.young_modulus = (float)YOUNG;
+  def.poisson_ratio = (float)POISSON;
+  def.density = (float)ORGAN_DENSITY;
+  def.node_damping = 2e-3f;
+  def.spare_nodes = SPARE;
+  CHECK(sinew_body_create(world, &def, &organ));
+  for (i = 0; i < shape->node_count; i++) {
+    if (fabs(shape->positions[3 * i]) > HELD * ORGAN / 2) CHECK(sinew_body_pin(world, organ, (uint32_t)i));
+  }
+  free(stretched);
+  return organ;
+}
+
+/* Across the organ, along z, from one end of the cut to the other, while the scalpel leans a little and its tip follows the top. */
+static void cut_organ(sinew_world *world, sinew_body_id organ, double top, double from, double to, sinew_cut_report *report) {
+  const double ends[2] = {from, to};
+  float edges[2][6];
+  int i;
+  for (i = 0; i < 2; i++) {
+    const float z = (float)(WIDE * (ends[i] - 0.5)), x = (float)(0.003 * sin(4 * ends[i]));
+    edges[i][0] = edges[i][3] = x;
+    edges[i][2] = edges[i][5] = z;
+    edges[i][1] = (float)(top - DEEP), edges[i][4] = (float)(top + 0.02), edges[i][5] += 0.006f;
+  }
+  CHECK(sinew_body_cut(world, organ, edges[0], edges[1], report));
+}
+
+static void open_organ(options chosen) {
+  const float low[3] = {-0.035f, -0.01f, -0.035f}, high[3] = {0.035f, 0.02f, 0.035f};
+  const int all_frames = (int)lround((CUT + GAPE) / FRAME);
+  const int frame_count = chosen.frame_count > 0 ? chosen.frame_count : all_frames;
+  sinew_world *world = create_world(0); /* as if it lay in its place */
+  double area = 0, top = 0, whole;
+  sinew_mesh_view shape;
+  sinew_mesh *mesh;
+  sinew_body_id organ;
+  sinew_picture_def picture = camera(low, high, 1);
+  drawing mine;
+  size_t i;
+  int frame;
+
+  CHECK(sinew_mesh_create_organ((float)ORGAN, (float)SPACING, &mesh));
+  shape.struct_size = sizeof shape;
+  CHECK(sinew_mesh_get_view(mesh, &shape));
+  organ = create_organ(world, &shape);
+  mine = create_drawing(world, organ, shape.node_count, 3);
+  memcpy(mine.carried, shape.positions, 3 * shape.node_count * sizeof *mine.carried);
+  for (i = 0; i < shape.node_count; i++) {
+    if (fabs(shape.positions[3 * i]) < 0.02 && shape.positions[3 * i + 1] > top) top = shape.positions[3 * i + 1];
+  }
+  whole = enclosed_volume(&mine);
+  printf("\nan organ of %zu tetrahedra, %.0f mm long, stretched by %.0f %%: a cut %.0f mm deep\n\n", shape.tetrahedron_count,
+         1e3 * ORGAN, 100 * (PULL - 1), 1e3 * DEEP);
+  printf("  time s  cut mm^2   nodes  triangles      drawn\n");
+  for (frame = 1; frame <= frame_count; frame++) {
+    const double time = frame * FRAME, before = smooth((time - FRAME) / CUT), now = smooth(time / CUT);
+    sinew_cut_report report;
+    report.struct_size = sizeof report;
+    if (now > before) {
+      cut_organ(world, organ, top, before, now, &report);
+      area += report.area;
+      follow(&mine, world, organ);
+    }
+    CHECK(sinew_world_step(world, (float)FRAME, NULL));
+    clear_progress();
+    if (frame % 10 == 0) {
+      printf("%8.2f%10.1f%8zu%11zu%11.6f\n", time, 1e6 * area, mine.node_count, mine.triangle_count, enclosed_volume(&mine) / whole);
+    }
+    show_progress(frame, frame_count);
+  }
+  clear_progress();
+  save_picture(world, &picture, chosen.directory, "incision_organ.png");
+  printf("\nat the end the mesh that follows the list encloses %.6f of its volume at rest\n", enclosed_volume(&mine) / whole);
+  free(mine.carried), free(mine.triangles);
+  sinew_mesh_destroy(mesh);
+  sinew_world_destroy(world);
+}
+
+int main(int argc, char **argv) {
+  const options chosen = read_options(argc, argv, 0);
+  open_skin(chosen);
+  open_organ(chosen);
   return 0;
 }

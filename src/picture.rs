@@ -5,6 +5,7 @@ use glam::Vec3;
 use crate::body::{Body, finite_vector};
 use crate::contact::{Contact, Form, Pose, Tool};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
 use crate::world::{BodyId, World};
@@ -74,8 +75,9 @@ impl World {
             self.body(of.body)?;
         }
         let springs = self.springs_to_draw()?;
+        let parts = self.bodies().map(skin_and_inside).collect::<Result<Vec<_>>>()?;
         let mut scene = Scene::default();
-        for (body, springs) in self.bodies().zip(&springs) {
+        for ((body, springs), parts) in self.bodies().zip(&springs).zip(&parts) {
             let is_this = |of: &&BodyValues| self.body(of.body).is_ok_and(|other| std::ptr::eq(body, other));
             let coloured = coloured.iter().find(is_this).map(|of| Coloured {
                 values: of.values,
@@ -91,16 +93,23 @@ impl World {
                     coloured,
                 });
             } else {
-                scene.surfaces.push(Surface {
-                    positions: body.positions(),
-                    triangles: body.surface(),
-                    look: look(if is_closed(body.surface())? {
-                        Look::TISSUE
-                    } else {
-                        Look::CLOTH
-                    }),
-                    coloured,
-                });
+                let all = if is_closed(body.surface())? {
+                    Look::TISSUE
+                } else {
+                    Look::CLOTH
+                };
+                let parts = match parts {
+                    None => [(body.surface(), all), (&[], all)],
+                    Some([skin, inside]) => [(&skin[..], all), (&inside[..], Look::INSIDE)],
+                };
+                for (triangles, of_part) in parts.into_iter().filter(|(triangles, _)| !triangles.is_empty()) {
+                    scene.surfaces.push(Surface {
+                        positions: body.positions(),
+                        triangles,
+                        look: look(of_part),
+                        coloured,
+                    });
+                }
             }
         }
         scene.shapes.extend(self.tools().filter_map(shape_of));
@@ -182,6 +191,18 @@ impl PictureDefinition {
             field_of_view: self.field_of_view,
         })
     }
+}
+
+/// The triangles of a body's skin, and those that cuts have bared, with a sharp edge between them; `None` where all is skin.
+fn skin_and_inside(body: &Body) -> Result<Option<[Vec<[u32; 3]>; 2]>> {
+    if !body.bared().any(|is_bared| is_bared) {
+        return Ok(None);
+    }
+    let mut parts = [Vec::new(), Vec::new()];
+    for (&triangle, is_bared) in body.surface().iter().zip(body.bared()) {
+        memory::push(&mut parts[usize::from(is_bared)], triangle)?;
+    }
+    Ok(Some(parts))
 }
 
 /// The radius of a contact's dot, and how long the largest force is drawn, as parts of the scene.

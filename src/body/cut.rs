@@ -77,6 +77,12 @@ impl Body {
         }
     }
 
+    /// For each triangle of its surface whether a cut has bared it; nothing where none can be.
+    pub(crate) fn bared(&self) -> impl Iterator<Item = bool> {
+        let material = self.cuttable.as_ref().map(|cuttable| &cuttable.material);
+        material.into_iter().flat_map(CutMaterial::bared)
+    }
+
     /// Which version its topology has: 0 when it was made.
     pub fn topology_version(&self) -> u64 {
         self.cuttable.as_ref().map_or(0, |cuttable| cuttable.log.version())

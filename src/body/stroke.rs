@@ -6,6 +6,9 @@ use crate::cutting::{CutEnd, Sweep};
 use crate::error::Result;
 use crate::memory;
 
+/// Points that reach along less than this part of an edge do not tell how it turns.
+const LITTLE: f32 = 0.02;
+
 /// Where a blade stopped.
 #[derive(Debug, Default)]
 pub(super) struct Stroke {
@@ -16,18 +19,38 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
-    /// Where the edge that a sweep begins with is in the tissue now, if the sweep begins just where the last ended.
+    /// Where the edge that a sweep begins with is in the tissue now, if the sweep begins just where the last ended: as far back that nothing lies
+    /// between it and what was cut, wherever the tissue went.
     pub fn carried(&self, sweep: &Sweep, positions: &[Vec3]) -> Option<[Vec3; 2]> {
         if self.edge != Some(sweep.start) || self.ends.is_empty() {
             return None;
         }
-        let gone: Vec3 = self
-            .ends
-            .iter()
-            .map(|(end, before)| end.place(positions) - before)
-            .sum();
-        let gone = gone / self.ends.len() as f32;
-        Some(sweep.start.map(|end| end + gone))
+        let [from, to] = sweep.start;
+        let length = from.distance(to);
+        let along = (to - from).normalize_or_zero();
+        let ends = || {
+            self.ends
+                .iter()
+                .map(|(end, before)| ((before - from).dot(along), end.place(positions) - before))
+        };
+        let count = self.ends.len() as f32;
+        let (place, gone) = ends().fold((0.0, Vec3::ZERO), |(place, gone), end| (place + end.0, gone + end.1));
+        let (place, gone) = (place / count, gone / count);
+        // The tissue along the edge goes straight on and turns with it; where little of it tells, it does not turn.
+        let (mut spread, mut turn) = (count * (LITTLE * length).powi(2), Vec3::ZERO);
+        for (at, of) in ends() {
+            spread += (at - place).powi(2);
+            turn += (of - gone) * (at - place);
+        }
+        let turn = if spread > 0.0 { turn / spread } else { Vec3::ZERO };
+        let way = (sweep.end[0] + sweep.end[1] - from - to).normalize_or_zero();
+        let off = |(at, of): (f32, Vec3)| (gone + turn * (at - place) - of).dot(way);
+        let slacks = self.ends.iter().map(|(end, _)| end.slack as f32);
+        let furthest = ends()
+            .zip(slacks)
+            .map(|(end, slack)| off(end) + slack)
+            .fold(0.0, f32::max);
+        Some([0.0, length].map(|at| from + along * at + gone + turn * (at - place) - way * furthest))
     }
 
     /// Makes room for so many ends.

@@ -62,6 +62,16 @@ impl CutMaterial {
         }
     }
 
+    /// Of the triangles of solids, whether a cut has bared them.
+    pub fn bared(&self) -> impl Iterator<Item = bool> {
+        let solid = match self {
+            Self::Springs(_) | Self::Surface(_) => None,
+            Self::Solid(solid) => Some(solid),
+        };
+        let triangles = solid.map_or(&[][..], CutSolid::triangles);
+        triangles.iter().map(|triangle| triangle.is_inner)
+    }
+
     /// The corners of a triangle, by their numbers among nodes.
     pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
         match self {
@@ -195,6 +205,7 @@ impl CutMaterial {
                     see(CutEnd {
                         nodes: [a, b, c, a],
                         weights: [u, v, w, 0.0],
+                        slack: 0.0,
                     });
                 }
             }
@@ -222,6 +233,8 @@ fn with_first([a, b]: [u32; 2]) -> [u32; 4] {
 pub(crate) struct CutEnd {
     pub nodes: [u32; 4],
     pub weights: [f64; 4],
+    /// How far from it what was cut may end, m: nothing where it is an end of that itself.
+    pub slack: f64,
 }
 
 impl CutEnd {

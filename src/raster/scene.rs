@@ -31,6 +31,15 @@ impl Look {
         show_through: 0.0,
     };
 
+    /// What a cut has bared of it.
+    pub const INSIDE: Look = Look {
+        colour: [0.46, 0.10, 0.11],
+        gloss: 0.5,
+        two_sided: false,
+        mesh_edges: 0.0,
+        show_through: 0.0,
+    };
+
     /// A light membrane with both sides alike and its mesh drawn faintly.
     pub const CLOTH: Look = Look {
         colour: [0.80, 0.58, 0.52],

@@ -345,3 +345,56 @@ fn what_is_cut_off_falls_and_what_is_held_stays() {
         }
     }
 }
+
+#[test]
+fn a_stroke_through_tissue_that_gapes_leaves_no_bridge() {
+    let (rest, cells) = mesh();
+    let mut random = Random(8);
+    for round in 0..24 {
+        let solver = SOLVERS[round % 2];
+        let positions: Vec<Vec3> = rest.iter().map(|&place| place * vec3(1.2, 1.0, 1.0)).collect();
+        let mut world = World::new(WorldDefinition::default()).unwrap();
+        let body = world
+            .create_body(&BodyDefinition {
+                positions: &positions,
+                rest_positions: Some(&rest),
+                tetrahedra: &cells,
+                material: Some(Material {
+                    model: Model::Tetrahedra,
+                    young_modulus: 5000.0,
+                    poisson_ratio: 0.35,
+                    density: 1000.0,
+                    ..Default::default()
+                }),
+                node_dampings: Values::Uniform([1e-2, 3e-2, 1e-1, 0.3][round % 4]),
+                spare_nodes: 3000,
+                solver,
+                ..Default::default()
+            })
+            .unwrap();
+        for node in (0..rest.len()).filter(|&node| rest[node].x < 0.001 || rest[node].x > 0.059) {
+            world.body_mut(body).unwrap().pin(node as u32).unwrap();
+        }
+        let [a, b, lean, bend] = [0; 4].map(|_| random.between(-1.0, 1.0));
+        let steps = [15, 40, 90][round % 3];
+        let edge = |part: f32| {
+            let x = 0.036 + 0.008 * a + 0.008 * b * (2.0 * part - 1.0) + 0.003 * bend * (3.0 * part).sin();
+            let y = -0.01 + 0.07 * part;
+            [
+                vec3(x - 0.004 * lean, y, -0.02),
+                vec3(x + 0.004 * lean, y + 0.006 * bend, 0.06),
+            ]
+        };
+        for step in 0..steps {
+            let at = |step: i32| edge(step as f32 / steps as f32);
+            let sweep = Sweep {
+                start: at(step),
+                end: at(step + 1),
+            };
+            world.cut(body, &sweep).unwrap();
+            world.step(1.0 / 120.0).unwrap();
+        }
+        let count = world.body(body).unwrap().pieces().unwrap().count;
+        assert_eq!(count, 2, "round {round}, {steps} steps, {solver:?}");
+    }
+}

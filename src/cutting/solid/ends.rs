@@ -33,6 +33,8 @@ impl CutSolid {
         (enters < leaves).then(|| CutEnd {
             nodes,
             weights: std::array::from_fn(|k| weights[0][k] + middle * (weights[1][k] - weights[0][k])),
+            // What was snapped may lie on either side; a step that begins too early finds what is open already.
+            slack: 3.0 * self.cells[cell].snap,
         })
     }
 
