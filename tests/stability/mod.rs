@@ -166,9 +166,9 @@ pub const KNOWN: [Known; 14] = [
     ),
     Known {
         case: "springs removed in motion",
-        applies: |setup| is_full(setup) && setup.solver == Solver::Newton && setup.step == 1.0,
+        applies: |setup| is_full(setup) && setup.solver != Solver::Verlet && setup.step == 1.0,
         figure: "implicit formulas keep momentum, and lose angular momentum",
-        // 4.35 times what the parts had: in a step of a second they turn several times.
+        // 4.35 times what the parts had with NEWTON, 4.24 with IMPLICIT: in a step of a second they turn several times.
         fails: &[
             ("momentum lost over that of the parts", 4.0),
             ("angular momentum lost over that of the parts", 5e6),
