@@ -88,15 +88,20 @@ impl Body {
             ..Limits::NONE
         };
         let changes = cuttable.surface.cut(sweep, self.positions(), &near, limits)?;
-        let applied = self.apply(cuttable, sweep, &near, &changes, first_triangle);
-        if applied.is_err() {
-            cuttable.surface.undo();
+        let room = cuttable.stroke.reserve(changes.ends.len());
+        let applied = room.and_then(|()| self.apply(cuttable, sweep, &near, &changes, first_triangle));
+        match applied {
+            Ok(_) => {
+                let surface = &cuttable.surface;
+                cuttable.stroke.stop(sweep, &changes.ends, surface, self.positions());
+            }
+            Err(_) => cuttable.surface.undo(),
         }
         applied
     }
 
     /// Makes the body what the changes say. Changes nothing where it fails.
-    fn apply(
+    pub(super) fn apply(
         &mut self,
         cuttable: &mut Cuttable,
         sweep: &Sweep,
@@ -113,10 +118,6 @@ impl Body {
             self.take_away(surface, sweep, near, changes, &mut rewiring)?;
         }
         if changes.triangles.is_empty() && changes.nodes.is_empty() && rewiring.is_empty() {
-            cuttable.stroke.reserve(changes.ends.len())?;
-            cuttable
-                .stroke
-                .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
             return Ok(CutReport::default());
         }
         let is_held = |source: u32| self.inverse_masses[self.order.own(source) as usize] == 0.0;
@@ -152,7 +153,6 @@ impl Body {
             added: &added,
             hidden: &changes.undrawn,
         };
-        cuttable.stroke.reserve(changes.ends.len())?;
         self.reserve_surface(nodes.len(), changed.len(), added.len())?;
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
@@ -161,6 +161,9 @@ impl Body {
         let mut changing = memory::reserved(touched.len())?;
         changing.extend(touched.iter().map(|touched| touched.node));
         let candidates = memory::reserved(touched.len())?;
+        if let Some(tears) = &mut self.tears {
+            tears.reserve(rewiring.added.len())?;
+        }
         self.springs.resize(known + nodes.len())?;
         let rewired = self.rewire(&rewiring);
         if rewired.is_err() {
@@ -170,6 +173,10 @@ impl Body {
         // From here on nothing fails. Damping is to be that of masses as they are.
         self.scale_masses(0.0);
         self.add_nodes(&nodes)?;
+        if let Some(tears) = &mut self.tears {
+            tears.grow(known + nodes.len());
+            tears.follow(changes, &rewiring, &self.order);
+        }
         self.rebind(changes);
         self.share_masses(cuttable, changes)?;
         self.go_on(&touched, &changing, candidates);
@@ -181,9 +188,6 @@ impl Body {
             cuttable.log.add(changes, &gone);
         }
         self.publish_new(known);
-        cuttable
-            .stroke
-            .stop(sweep, &changes.ends, &cuttable.surface, self.positions());
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
             new_triangles: added.len() as u32,

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::tearing::Tearing;
 use crate::contact::BodyContact;
 use crate::error::{Error, Result};
 use crate::material::{Material, Viscosity, Yielding};
@@ -181,6 +182,9 @@ pub struct BodyDefinition<'a> {
     /// A surface that is to be cut is one of triangles turned one way all over, of which two at most have an edge and those about a node hang
     /// together.
     pub spare_nodes: u32,
+    /// When it tears by itself, at the end of a step; a body that does may be cut. See [`Body::tear_report`](crate::Body::tear_report) and
+    /// [`Body::set_tear_limits`](crate::Body::set_tear_limits).
+    pub tearing: Tearing,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -221,6 +225,7 @@ impl Default for BodyDefinition<'_> {
             accuracy: 0.0,
             mass_scaling: 0.001,
             spare_nodes: 0,
+            tearing: Tearing::default(),
         }
     }
 }
@@ -284,6 +289,7 @@ impl BodyDefinition<'_> {
         self.viscosity.check()?;
         self.yielding.check()?;
         self.contact.check()?;
+        self.tearing.check(self)?;
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
         if let Some(material) = &self.material {

@@ -26,6 +26,8 @@ mod region;
 mod state;
 mod stroke;
 mod surface;
+mod tear;
+mod tearing;
 mod tissue;
 mod tune;
 mod vectors;
@@ -47,6 +49,9 @@ pub(crate) use grow::NewNode;
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
+pub(crate) use tear::Torn;
+pub(crate) use tearing::Withheld;
+pub use tearing::{TearReport, Tearing};
 pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
@@ -72,6 +77,7 @@ pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use state::State;
+use tearing::Tears;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
 ///
@@ -121,6 +127,8 @@ pub struct Body {
     pub(crate) bindings: Option<Bindings>,
     /// For bodies that may be cut.
     cuttable: Option<Box<Cuttable>>,
+    /// For bodies that tear.
+    tears: Option<Box<Tears>>,
     /// How many nodes there is room for; 0: for those that there are.
     node_room: usize,
     /// Whether an edge of its surface was taken away.
@@ -194,6 +202,7 @@ impl Body {
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
+        let tears = Tears::new(definition, &springs)?;
         let springs = store(needs.kernel, definition, &springs)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
@@ -253,6 +262,7 @@ impl Body {
             contact: definition.contact,
             bindings: None,
             cuttable,
+            tears,
             node_room: 0,
             is_cut_open: false,
             corners: Vec::new(),

@@ -24,9 +24,11 @@ mod points;
 mod snap;
 mod split;
 mod surface;
+mod tear;
 mod tracked;
 mod union;
 
 pub use changes::{BoundPoint, Changes, PieceOfCell, PieceOfNode, PieceOfSpring, RimEdge, Source};
 pub use cut::{Limits, Sweep};
 pub use surface::{CutSurface, SurfaceCell, SurfaceTriangle, SurfaceVertex};
+pub(crate) use tear::Load;

@@ -1,0 +1,418 @@
+//! What springs of a body bear before it tears, and which of them are beyond that.
+
+use super::definition::not_negative;
+use super::{BodyDefinition, NodeOrder, Spring, Vectors};
+use crate::cutting::Changes;
+use crate::diagnostics::StateHasher;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::springs::{Change, Link, Rewiring};
+
+/// No spring.
+const NONE: u32 = u32::MAX;
+
+/// When a body tears.
+///
+/// A spring that a step has left beyond its limits tears the surface through one of its nodes, across what pulls that node apart (O'Brien,
+/// Hodgins 1999, equation 13); where a cut ends in a triangle next to the spring, that goes on instead. A tear goes as far as the next triangle
+/// that is simulated, and is a cut in all it does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tearing {
+    /// The part of its rest length by which a spring may become longer, at least 0; 0: any. A spring without a rest length has no strain.
+    pub strain: f32,
+    /// How much a spring may pull, N, at least 0; 0: any. What a cut leaves of a spring bears its part.
+    pub force: f32,
+    /// The most tears in a step, those of the most loaded springs; 0: the body does not tear, and pays nothing for it.
+    pub most_per_step: u32,
+    /// A tear that would part a piece with less area in the rest shape, m², is not made; at least 0.
+    pub smallest_piece: f32,
+}
+
+/// What tore in the last step, and what did not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TearReport {
+    /// Tears that were made.
+    pub tears: u32,
+    /// How many more pieces the surface has.
+    pub pieces_parted: u32,
+    /// Springs beyond their limits whose turn is to come: there were as many tears as there may be, one beside them, or nothing pulls their nodes
+    /// apart.
+    pub waiting: u32,
+    /// Springs beyond their limits that would part too small a piece.
+    pub small_pieces: u32,
+    /// Springs beyond their limits for whose tears there is no room: not as many spare nodes, or places in a row of fixed length, or memory.
+    pub no_room: u32,
+}
+
+/// Why a spring beyond its limits was not torn. It is not tried again before the topology changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Withheld {
+    SmallPiece,
+    NoRoom,
+    NoWay,
+}
+
+/// A spring that may tear, in the body's own numbers, the lower first.
+#[derive(Clone, Copy, Debug)]
+struct Watched {
+    nodes: [u32; 2],
+    /// Of the longest that it may be, m².
+    longest_squared: f32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    strain: f32,
+    force: f32,
+    /// The next spring of the same lower node.
+    next: u32,
+    /// Since which version of the topology.
+    withheld: Option<(u32, Withheld)>,
+}
+
+/// A spring beyond its limits.
+#[derive(Clone, Copy, Debug)]
+struct Beyond {
+    /// Its stretch as a multiple of the most that it may have.
+    load: f32,
+    callers: [u32; 2],
+    nodes: [u32; 2],
+}
+
+/// The springs of a body that tears, and those beyond their limits after the last step.
+#[derive(Debug)]
+pub(crate) struct Tears {
+    asked: Tearing,
+    /// Each with its limits at the same place.
+    springs: Vec<Watched>,
+    limits: Vec<Limits>,
+    /// Of each node the first spring that it is the lower one of.
+    first: Vec<u32>,
+    /// The most loaded first.
+    beyond: Vec<Beyond>,
+    /// How many of them have had their turn.
+    seen: usize,
+    /// Tears that were tried in this step.
+    tried: u32,
+    /// Nodes about the tears of this step.
+    torn: Vec<u32>,
+    pub(super) report: TearReport,
+}
+
+impl Tearing {
+    /// Refuses what is out of its range, or not possible for such a body.
+    pub(super) fn check(&self, definition: &BodyDefinition) -> Result<()> {
+        let of_springs = [("tear_strain", self.strain), ("tear_force", self.force)];
+        for (name, value) in of_springs.into_iter().chain([("smallest_piece", self.smallest_piece)]) {
+            not_negative(name, value)?;
+            if value > 0.0 && self.most_per_step == 0 {
+                return Err(Error::invalid(format!(
+                    "{name} is {value}, and most_tears is 0: must be at least 1"
+                )));
+            }
+        }
+        if self.most_per_step == 0 {
+            return Ok(());
+        }
+        let most = self.most_per_step;
+        if definition.spare_nodes == 0 {
+            return Err(Error::invalid(format!(
+                "most_tears is {most}, and spare_nodes is 0: a tear needs nodes to come"
+            )));
+        }
+        if !definition.tetrahedra.is_empty() || !definition.cells.is_empty() {
+            return Err(Error::Unsupported(format!(
+                "most_tears is {most}: bodies with tetrahedra or cells do not tear"
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl Tears {
+    /// With springs in the body's own numbers, and room for `spare` nodes; `None`: the body is not to tear.
+    pub fn new(definition: &BodyDefinition, springs: &[Spring]) -> Result<Option<Box<Self>>> {
+        let asked = definition.tearing;
+        if asked.most_per_step == 0 {
+            return Ok(None);
+        }
+        let node_count = definition.positions.len();
+        let mut first = memory::reserved(node_count + definition.spare_nodes as usize)?;
+        first.resize(node_count, NONE);
+        let mut tears = Self {
+            asked,
+            springs: memory::reserved(springs.len())?,
+            limits: memory::reserved(springs.len())?,
+            first,
+            beyond: Vec::new(),
+            seen: 0,
+            tried: 0,
+            torn: Vec::new(),
+            report: TearReport::default(),
+        };
+        // In the order of their nodes, which is that of their places in memory.
+        let mut order = memory::reserved(springs.len())?;
+        order.extend(0..springs.len() as u32);
+        order.sort_unstable_by_key(|&at| sorted(springs[at as usize].nodes));
+        for at in order {
+            let spring = springs[at as usize];
+            tears.add(
+                sorted(spring.nodes),
+                [asked.strain, asked.force],
+                &Link::ends(&spring)[0],
+            );
+        }
+        Ok(Some(Box::new(tears)))
+    }
+
+    /// A tear that would part a piece with less area is not to be made, m².
+    pub fn smallest_piece(&self) -> f64 {
+        f64::from(self.asked.smallest_piece)
+    }
+
+    /// Makes room for so many more springs.
+    pub fn reserve(&mut self, springs: usize) -> Result<()> {
+        self.springs.try_reserve(springs)?;
+        Ok(self.limits.try_reserve(springs)?)
+    }
+
+    /// Nodes have come, for which there is room, up to so many in all.
+    pub fn grow(&mut self, node_count: usize) {
+        self.first.resize(node_count, NONE);
+    }
+
+    /// Gives a spring its limits, strain and force, for which there is room if it has none yet.
+    pub fn set(&mut self, nodes: [u32; 2], [strain, force]: [Option<f32>; 2], link: &Link) {
+        match self.find(nodes) {
+            Some(at) => {
+                let limits = &mut self.limits[at];
+                limits.strain = strain.unwrap_or(limits.strain);
+                limits.force = force.unwrap_or(limits.force);
+                limits.withheld = None;
+                self.springs[at].longest_squared = longest_squared(limits, link);
+            }
+            None => self.add(sorted(nodes), [strain, force].map(|limit| limit.unwrap_or(0.0)), link),
+        }
+    }
+
+    /// A spring is no more.
+    pub fn remove(&mut self, nodes: [u32; 2]) {
+        let Some(at) = self.find(nodes) else {
+            return;
+        };
+        self.rename(at, self.limits[at].next);
+        let last = self.springs.len() - 1;
+        if at < last {
+            self.rename(last, at as u32);
+        }
+        self.springs.swap_remove(at);
+        self.limits.swap_remove(at);
+    }
+
+    /// Springs have other stiffnesses or rest lengths; limits stay.
+    pub fn change(&mut self, changes: &[Change]) {
+        for change in changes {
+            if let Some(at) = self.find([change.node, change.after.neighbour]) {
+                self.springs[at].longest_squared = longest_squared(&self.limits[at], &change.after);
+            }
+        }
+    }
+
+    /// A cut has changed springs: each part of one bears its part. There is room for those that are new.
+    pub fn follow(&mut self, changes: &Changes, rewiring: &Rewiring, order: &NodeOrder) {
+        let own = |nodes: [u32; 2]| nodes.map(|node| order.own(node));
+        for piece in changes.springs.iter().filter(|piece| piece.nodes != piece.source) {
+            if let Some(at) = self.find(own(piece.source)) {
+                let (spring, limits) = (self.springs[at], self.limits[at]);
+                // As long as the whole.
+                self.link(
+                    Watched {
+                        nodes: sorted(own(piece.nodes)),
+                        ..spring
+                    },
+                    Limits {
+                        force: (f64::from(limits.force) * piece.part) as f32,
+                        withheld: None,
+                        ..limits
+                    },
+                );
+            }
+        }
+        for spring in &rewiring.removed {
+            self.remove(spring.nodes);
+        }
+        for Change { node, before, after } in &rewiring.changed {
+            if let Some(at) = self.find([*node, after.neighbour])
+                && before.stiffness > 0.0
+            {
+                self.limits[at].force *= after.stiffness / before.stiffness;
+            }
+        }
+    }
+
+    /// Finds the springs beyond their limits: whether there are any that may be torn with this version of the topology. Without memory for
+    /// all of them some wait for the next step.
+    pub fn begin(&mut self, positions: &Vectors, version: u64, order: &NodeOrder) -> bool {
+        self.beyond.clear();
+        self.torn.clear();
+        (self.seen, self.tried) = (0, 0);
+        self.report = TearReport::default();
+        let [x, y, z] = positions.axes();
+        for (at, spring) in self.springs.iter().enumerate() {
+            let [a, b] = spring.nodes.map(|node| node as usize);
+            let (u, v, w) = (x[b] - x[a], y[b] - y[a], z[b] - z[a]);
+            let squared = u * u + v * v + w * w;
+            if squared <= spring.longest_squared {
+                continue;
+            }
+            let limits = &self.limits[at];
+            match limits.withheld.filter(|&(since, _)| since == version as u32) {
+                Some((_, why)) => self.report.withhold(why),
+                None => {
+                    let beyond = Beyond {
+                        load: squared / spring.longest_squared,
+                        callers: sorted(spring.nodes.map(|node| order.caller(node))),
+                        nodes: spring.nodes,
+                    };
+                    if memory::push(&mut self.beyond, beyond).is_err() {
+                        self.report.waiting += 1;
+                    }
+                }
+            }
+        }
+        !self.beyond.is_empty()
+    }
+
+    /// Puts the most loaded first, given what each spring is like.
+    pub fn sort(&mut self, link: impl Fn([u32; 2]) -> Option<Link>) {
+        for at in 0..self.beyond.len() {
+            let nodes = self.beyond[at].nodes;
+            if let (Some(link), Some(spring)) = (link(nodes), self.find(nodes)) {
+                let longest = self.springs[spring].longest_squared;
+                let length = (self.beyond[at].load * longest).sqrt();
+                self.beyond[at].load = (length - link.rest_length) / (longest.sqrt() - link.rest_length);
+            }
+        }
+        self.beyond
+            .sort_unstable_by(|a, b| b.load.total_cmp(&a.load).then(a.callers.cmp(&b.callers)));
+    }
+
+    /// The next spring that is to tear.
+    pub fn next(&mut self) -> Option<[u32; 2]> {
+        while let Some(&Beyond { nodes, .. }) = self.beyond.get(self.seen) {
+            self.seen += 1;
+            if self.find(nodes).is_none() {
+                continue;
+            }
+            let is_beside = nodes.iter().any(|node| self.torn.contains(node));
+            let most = self.asked.most_per_step;
+            // As many again may be tried in vain.
+            if is_beside || self.report.tears >= most || self.tried >= most.saturating_mul(2) {
+                self.report.waiting += 1;
+                continue;
+            }
+            self.tried += 1;
+            return Some(nodes);
+        }
+        None
+    }
+
+    /// A tear was made, through cells of these nodes.
+    pub fn made(&mut self, pieces_parted: u32, nodes: impl Iterator<Item = u32>) {
+        self.report.tears += 1;
+        self.report.pieces_parted += pieces_parted;
+        for node in nodes {
+            // Out of memory: another tear may come beside it.
+            let _ = memory::push(&mut self.torn, node);
+        }
+    }
+
+    /// A spring was not torn.
+    pub fn withhold(&mut self, nodes: [u32; 2], why: Withheld, version: u64) {
+        self.report.withhold(why);
+        if let Some(at) = self.find(nodes) {
+            self.limits[at].withheld = Some((version as u32, why));
+        }
+    }
+
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for (spring, limits) in self.springs.iter().zip(&self.limits) {
+            let [a, b] = spring.nodes;
+            hasher.write_u64(u64::from(a) << 32 | u64::from(b));
+            hasher.write_floats(&[spring.longest_squared, limits.force]);
+            let withheld = limits
+                .withheld
+                .map_or(0, |(since, why)| u64::from(since) << 2 | (1 + why as u64));
+            hasher.write_u64(withheld);
+        }
+    }
+
+    fn add(&mut self, nodes: [u32; 2], [strain, force]: [f32; 2], link: &Link) {
+        let limits = Limits {
+            strain,
+            force,
+            next: NONE,
+            withheld: None,
+        };
+        let longest_squared = longest_squared(&limits, link);
+        self.link(Watched { nodes, longest_squared }, limits);
+    }
+
+    /// Appends a spring, for which there is room.
+    fn link(&mut self, spring: Watched, limits: Limits) {
+        let number = self.springs.len() as u32;
+        let next = std::mem::replace(&mut self.first[spring.nodes[0] as usize], number);
+        self.springs.push(spring);
+        self.limits.push(Limits { next, ..limits });
+    }
+
+    /// The place of a spring.
+    fn find(&self, nodes: [u32; 2]) -> Option<usize> {
+        let nodes = sorted(nodes);
+        let mut at = self.first[nodes[0] as usize];
+        while at != NONE {
+            if self.springs[at as usize].nodes == nodes {
+                return Some(at as usize);
+            }
+            at = self.limits[at as usize].next;
+        }
+        None
+    }
+
+    /// What named the spring at a place names another.
+    fn rename(&mut self, at: usize, to: u32) {
+        let mut name = &mut self.first[self.springs[at].nodes[0] as usize];
+        while *name != at as u32 {
+            let before = *name as usize;
+            name = &mut self.limits[before].next;
+        }
+        *name = to;
+    }
+}
+
+impl TearReport {
+    fn withhold(&mut self, why: Withheld) {
+        *match why {
+            Withheld::SmallPiece => &mut self.small_pieces,
+            Withheld::NoRoom => &mut self.no_room,
+            Withheld::NoWay => &mut self.waiting,
+        } += 1;
+    }
+}
+
+fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The square of the longest that a spring may be, m²; infinity: any length.
+fn longest_squared(limits: &Limits, link: &Link) -> f32 {
+    let [rest, stiffness] = [link.rest_length, link.stiffness].map(f64::from);
+    let mut longest = f64::INFINITY;
+    if limits.strain > 0.0 && rest > 0.0 {
+        longest = rest * (1.0 + f64::from(limits.strain));
+    }
+    if limits.force > 0.0 && stiffness > 0.0 {
+        longest = longest.min(rest + f64::from(limits.force) / stiffness);
+    }
+    (longest * longest) as f32
+}
