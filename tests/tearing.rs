@@ -10,12 +10,20 @@ use glam::{DVec3, Vec2, Vec3, vec2};
 use sheet::{Random, grid, unstructured};
 use sinew::cutting::Sweep;
 use sinew::{
-    Body, BodyDefinition, BodyId, Error, Solver, Storage, TearReport, Tearing, Values, World, WorldDefinition,
+    Body, BodyDefinition, BodyId, Error, Material, Model, Solver, Storage, TearReport, Tearing, Values, World,
+    WorldDefinition,
 };
 
 const CELL: f32 = 0.01;
 
-const STIFFNESS: f32 = 50.0;
+/// A millimetre thick, some 50 N/m a spring.
+const TISSUE: Material = Material {
+    model: Model::Springs,
+    young_modulus: 5e4,
+    poisson_ratio: 0.0,
+    density: 1000.0,
+    thickness: 1e-3,
+};
 
 /// A sheet in the plane z = 0 at rest.
 struct Sheet {
@@ -70,16 +78,6 @@ impl Sheet {
             .collect()
     }
 
-    fn masses(&self) -> Vec<f32> {
-        let mut masses = vec![0.0; self.rest.len()];
-        for cell in &self.cells {
-            let [a, b, c] = cell.map(|node| self.rest[node as usize]);
-            let area = 0.5 * (b - a).cross(c - a).length();
-            cell.iter().for_each(|&node| masses[node as usize] += area / 3.0);
-        }
-        masses
-    }
-
     fn world(&self, made: Made) -> Result<(World, BodyId), Error> {
         let mut world = World::new(WorldDefinition {
             gravity: Vec3::ZERO,
@@ -90,10 +88,10 @@ impl Sheet {
         let body = world.create_body(&BodyDefinition {
             positions: &self.positions(made.stretched),
             rest_positions: Some(&self.rest),
-            masses: Values::Each(&self.masses()),
+            material: Some(TISSUE),
             triangles: &self.cells,
-            stiffnesses: Values::Uniform(STIFFNESS),
-            node_dampings: Values::Uniform(1e-4),
+            spring_dampings: Values::Uniform(0.02),
+            node_dampings: Values::Uniform(1e-3),
             springs_per_node: if made.storage == Storage::FastLink { 24 } else { 0 },
             mass_scaling: 0.0,
             spare_nodes: made.spare_nodes,
@@ -154,6 +152,12 @@ fn rim(sheet: &Sheet, body: &Body, since: u64) -> Vec<DVec3> {
         .flat_map(|edge| edge.nodes)
         .map(|node| rest[node as usize])
         .collect()
+}
+
+fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+        [low.min(value), high.max(value)]
+    })
 }
 
 /// The areas at rest of the pieces of what is drawn, m².
@@ -285,18 +289,42 @@ fn a_strip_tears_across_at_its_limit_and_not_below() {
             assert!(steps < 4000);
         }
         let mut parted = report(&torn, body).pieces_parted;
-        for _ in 0..200 {
+        let mut version = 0;
+        for step in 0..200 {
+            if std::env::var_os("SHOW").is_some() {
+                let it = torn.body(body).unwrap();
+                let r = report(&torn, body);
+                let mut l = loads(it);
+                l.sort_by(|a, b| b.1.total_cmp(&a.1));
+                let rest = at_rest(&strip, it);
+                let at = |n: u32| format!("({:.2},{:.2})", rest[n as usize].x * 100.0, rest[n as usize].y * 100.0);
+                println!(
+                    "step {step} {r:?} most {:?}",
+                    l[..3]
+                        .iter()
+                        .map(|l| format!("{} {} {:.3}", at(l.0[0]), at(l.0[1]), l.1))
+                        .collect::<Vec<_>>()
+                );
+                let ch = it.changes_since(version).unwrap();
+                for e in ch.rim {
+                    println!("   rim {} {}", at(e.nodes[0]), at(e.nodes[1]));
+                }
+                version = ch.version;
+            }
             torn.step(5e-3).unwrap();
             parted += report(&torn, body).pieces_parted;
         }
         let it = torn.body(body).unwrap();
         assert_eq!(it.pieces().unwrap().count, 1 + parted);
         assert_eq!(piece_areas(&strip, it).len(), 2, "by force: {by_force}");
-        for place in rim(&strip, it, 0) {
-            assert!(
-                (place.x as f32 - 0.5 * length).abs() < 4.0 * CELL,
-                "by force: {by_force}, at {place}"
-            );
+        let [from, to] = extent(rim(&strip, it, 0).iter().map(|place| place.x));
+        assert!(
+            to - from < 3.0 * f64::from(CELL),
+            "by force: {by_force}, from {from} to {to}"
+        );
+        // Where it is narrow strain is largest, and the force of a spring the same.
+        if !by_force {
+            assert!((0.5 * (from + to) - 0.5 * f64::from(length)).abs() < 4.0 * f64::from(CELL));
         }
         // Nothing is left that pulls.
         assert!(most(it) < 0.5 * f64::from(limit));
@@ -427,7 +455,7 @@ fn a_tear_keeps_mass_momentum_and_energy_and_is_the_same_wherever_springs_are_ke
             for _ in 0..100 {
                 torn.step(2e-4).unwrap();
                 let now = kept(&torn, body).3;
-                assert!(now < 1.001 * last, "{what}: {last} then {now} J");
+                assert!(now < 1.01 * last, "{what}: {last} then {now} J");
                 last = now;
             }
         }
@@ -621,9 +649,8 @@ fn without_room_the_step_goes_on_and_nothing_tears() {
                 .create_body(&BodyDefinition {
                     positions: &sheet.positions(0.25),
                     rest_positions: Some(&sheet.rest),
-                    masses: Values::Each(&sheet.masses()),
+                    material: Some(TISSUE),
                     triangles: &sheet.cells,
-                    stiffnesses: Values::Uniform(STIFFNESS),
                     node_dampings: Values::Uniform(1e-3),
                     spare_nodes: made.spare_nodes,
                     storage: made.storage,

@@ -118,10 +118,11 @@ impl Body {
     fn torn_apart(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, Load)>> {
         let surface = &cuttable.surface;
         let callers = spring.map(|node| self.order.caller(node));
+        let is_free = |own: u32| self.inverse_masses[own as usize] > 0.0;
         let mut at_nodes = memory::reserved(2)?;
         for (own, node) in spring.into_iter().zip(callers) {
             // What holds a node would hold its copies too.
-            if self.inverse_masses[own as usize] > 0.0
+            if is_free(own)
                 && let Some(vertex) = surface.vertex_of(node)?
                 && let Some(load) = surface.load_at(vertex, self.separation(own), self.positions())?
             {
@@ -130,15 +131,12 @@ impl Body {
         }
         at_nodes.sort_unstable_by(|a, b| b.1.tension.total_cmp(&a.1.tension).then(a.0.cmp(&b.0)));
         let mut found = memory::reserved(4)?;
-        let is_free = |node: u32| self.inverse_masses[self.order.own(node) as usize] > 0.0;
-        let will_do = |vertex: u32| surface.node_of(vertex).is_none_or(is_free);
-        let tip = surface.tip_near(callers)?;
-        let other = if at_nodes.is_empty() {
-            surface.vertex_between(callers, will_do)?
-        } else {
+        let other = if spring.into_iter().any(is_free) {
             None
+        } else {
+            surface.vertex_between(callers, |node| is_free(self.order.own(node)))?
         };
-        for vertex in tip.into_iter().chain(other) {
+        for vertex in surface.tip_near(callers)?.into_iter().chain(other) {
             let mut forces = DMat3::ZERO;
             for node in surface.nodes_about(vertex)? {
                 forces += self.separation(self.order.own(node));

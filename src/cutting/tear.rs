@@ -62,18 +62,22 @@ impl CutSurface {
         Ok(nearest.map(|(_, vertex)| vertex))
     }
 
-    /// The vertices in cells of both nodes that will do, that next to the middle between them in the rest shape first.
+    /// The vertex at the third node of a cell of two, of those that will do; that next to the middle between them in the rest shape.
     pub(crate) fn vertex_between(&self, nodes: [u32; 2], will_do: impl Fn(u32) -> bool) -> Result<Option<u32>> {
         let mut nearest: Option<(f64, u32)> = None;
-        let mut seen = Vec::new();
         for cell in self.cells_at(nodes[0]).filter(|cell| cell.nodes.contains(&nodes[1])) {
-            self.list_vertices(cell.first, &mut seen)?;
-        }
-        memory::sort_once(&mut seen);
-        for vertex in seen.into_iter().filter(|&vertex| will_do(vertex)) {
-            let off = self.off_middle(vertex, nodes);
-            if nearest.is_none_or(|(least, _)| off < least) {
-                nearest = Some((off, vertex));
+            for node in cell
+                .nodes
+                .into_iter()
+                .filter(|node| !nodes.contains(node) && will_do(*node))
+            {
+                let Some(vertex) = self.vertex_of(node)? else {
+                    continue;
+                };
+                let off = self.off_middle(vertex, nodes);
+                if nearest.is_none_or(|least| (off, vertex) < least) {
+                    nearest = Some((off, vertex));
+                }
             }
         }
         Ok(nearest.map(|(_, vertex)| vertex))
