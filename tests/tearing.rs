@@ -10,8 +10,8 @@ use glam::{DVec3, Vec2, Vec3, vec2};
 use sheet::{Random, grid, unstructured};
 use sinew::cutting::Sweep;
 use sinew::{
-    Body, BodyDefinition, BodyId, Error, Material, Model, Solver, Storage, TearReport, Tearing, Values, World,
-    WorldDefinition,
+    Anchor, Body, BodyDefinition, BodyId, Error, Material, Model, Solver, Storage, SurfacePoint, SutureDefinition,
+    TearReport, Tearing, Values, World, WorldDefinition,
 };
 
 const CELL: f32 = 0.01;
@@ -724,6 +724,105 @@ fn fill_rows(worlds: &mut [(&mut World, BodyId)], places: usize, inner: impl Fn(
             assert_eq!(counts[node as usize], places);
         }
     }
+}
+
+#[test]
+fn what_is_sutured_stays_at_its_place_in_the_material() {
+    let sheet = Sheet::of(unstructured(12, 8));
+    let made = Made {
+        stretched: 0.25,
+        ..PLAIN
+    };
+    let (mut scout, body) = sheet.world(made).unwrap();
+    scout.step(1e-4).unwrap();
+    let torn_at = rim(&sheet, scout.body(body).unwrap(), 0);
+    // Points in all triangles next to the tear, each sutured to one far off.
+    let middle = |cell: &[u32; 3]| {
+        cell.map(|node| sheet.rest[node as usize].as_dvec3())
+            .into_iter()
+            .sum::<DVec3>()
+            / 3.0
+    };
+    let is_near = |cell: &[u32; 3]| {
+        torn_at
+            .iter()
+            .any(|place| place.distance(middle(cell)) < f64::from(CELL))
+    };
+    let far = (0..sheet.cells.len())
+        .find(|&cell| {
+            torn_at
+                .iter()
+                .all(|place| place.distance(middle(&sheet.cells[cell])) > 0.05)
+        })
+        .unwrap() as u32;
+    let mut worlds = [PLAIN.tearing, NEVER].map(|tearing| sheet.world(Made { tearing, ..made }).unwrap());
+    let mut sutures = Vec::new();
+    for triangle in (0..sheet.cells.len() as u32).filter(|&cell| is_near(&sheet.cells[cell as usize])) {
+        for weights in [[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]] {
+            let [near, far] = [(triangle, weights), (far, [0.3, 0.3, 0.4])]
+                .map(|(triangle, weights)| Anchor::Point(SurfacePoint { triangle, weights }));
+            let slack = SutureDefinition {
+                length: Some(1.0),
+                ..Default::default()
+            };
+            let ids = worlds
+                .iter_mut()
+                .map(|(world, body)| world.suture(*body, &near, *body, &far, &slack).unwrap());
+            sutures.push(ids.collect::<Vec<_>>());
+        }
+    }
+    assert!(sutures.len() > 10);
+    for (world, _) in &mut worlds {
+        world.step(1e-4).unwrap();
+    }
+    let [(torn, body), (whole, _)] = &worlds;
+    assert_eq!(report(torn, *body).tears, 1);
+    for ids in sutures {
+        let distances =
+            [torn.suture_report(ids[0]), whole.suture_report(ids[1])].map(|report| report.unwrap().distance);
+        assert!((distances[0] - distances[1]).abs() < 1e-6, "{distances:?}");
+    }
+}
+
+#[test]
+fn springs_along_no_edge_tear_the_surface_and_go_where_it_has_torn() {
+    let sheet = Sheet::of(grid(12));
+    let at = |x: u32, y: u32| y * 13 + x;
+    let over = (0..13).flat_map(|y| (0..11).map(move |x| [at(x, y), at(x + 2, y)]));
+    let over: Vec<[u32; 2]> = over.collect();
+    let (mut world, body) = sheet
+        .world(Made {
+            stretched: 0.1,
+            ..PLAIN
+        })
+        .unwrap();
+    let it = world.body_mut(body).unwrap();
+    for &[a, b] in &over {
+        it.add_spring(a, b, 20.0, Some(2.0 * CELL)).unwrap();
+    }
+    // Those in the middle alone bear little.
+    let middle: Vec<[u32; 2]> = over.iter().copied().filter(|[a, _]| a % 13 == 5).collect();
+    it.set_tear_limits(&middle, Some(Values::Uniform(0.05)), None).unwrap();
+    let mut parted = 0;
+    for _ in 0..60 {
+        // Held out by hand.
+        let it = world.body_mut(body).unwrap();
+        let rest = at_rest(&sheet, it);
+        let taut: Vec<Vec3> = rest
+            .iter()
+            .map(|place| Vec3::new(1.1 * place.x as f32, place.y as f32, 0.0))
+            .collect();
+        it.set_positions(&taut).unwrap();
+        it.set_velocities(&vec![Vec3::ZERO; taut.len()]).unwrap();
+        world.step(1e-5).unwrap();
+        parted += report(&world, body).pieces_parted;
+    }
+    let it = world.body(body).unwrap();
+    assert_eq!(piece_areas(&sheet, it).len(), 2);
+    assert_eq!(parted, 1);
+    // With their springs.
+    assert_eq!(it.pieces().unwrap().count, 2);
+    assert_eq!(report(&world, body), TearReport::default());
 }
 
 #[test]

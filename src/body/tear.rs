@@ -10,6 +10,7 @@ use crate::cutting::{Limits, Load};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::springs::pull;
+use crate::threads::Team;
 
 /// What became of a spring that was to tear.
 #[derive(Clone, Copy, Debug)]
@@ -59,21 +60,15 @@ impl Body {
         self.tears.as_ref().map(|tears| tears.report).unwrap_or_default()
     }
 
-    /// A step has ended: whether springs of it are to tear.
-    pub(crate) fn begin_tears(&mut self) -> bool {
+    /// A step has ended: finds the springs that are to tear.
+    pub(crate) fn find_tears(&mut self, team: &Team) {
         let version = self.topology_version();
-        let Some(tears) = &mut self.tears else {
-            return false;
-        };
-        if !tears.begin(self.state.positions(), version, &self.order) {
-            return false;
+        if let Some(mut tears) = self.tears.take() {
+            if tears.begin(self.state.positions(), version, &self.order, team) {
+                tears.sort(|nodes| self.link(nodes));
+            }
+            self.tears = Some(tears);
         }
-        let Some(mut tears) = self.tears.take() else {
-            return false;
-        };
-        tears.sort(|nodes| self.link(nodes));
-        self.tears = Some(tears);
-        true
     }
 
     /// The next of them, in its own numbers.

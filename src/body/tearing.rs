@@ -7,9 +7,13 @@ use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::springs::{Change, Link, Rewiring};
+use crate::threads::{Items, Team};
 
 /// No spring.
 const NONE: u32 = u32::MAX;
+
+/// So many springs are looked at by a thread at a time.
+const CHUNK: usize = 4096;
 
 /// When a body tears.
 ///
@@ -88,6 +92,8 @@ pub(crate) struct Tears {
     limits: Vec<Limits>,
     /// Of each node the first spring that it is the lower one of.
     first: Vec<u32>,
+    /// Of each chunk of springs whether one is beyond its limits.
+    chunks: Vec<bool>,
     /// The most loaded first.
     beyond: Vec<Beyond>,
     /// How many of them have had their turn.
@@ -144,6 +150,7 @@ impl Tears {
             springs: memory::reserved(springs.len())?,
             limits: memory::reserved(springs.len())?,
             first,
+            chunks: memory::reserved(springs.len().div_ceil(CHUNK))?,
             beyond: Vec::new(),
             seen: 0,
             tried: 0,
@@ -173,6 +180,7 @@ impl Tears {
     /// Makes room for so many more springs.
     pub fn reserve(&mut self, springs: usize) -> Result<()> {
         self.springs.try_reserve(springs)?;
+        self.chunks.try_reserve(springs.div_ceil(CHUNK))?;
         Ok(self.limits.try_reserve(springs)?)
     }
 
@@ -252,31 +260,36 @@ impl Tears {
 
     /// Finds the springs beyond their limits: whether there are any that may be torn with this version of the topology. Without memory for
     /// all of them some wait for the next step.
-    pub fn begin(&mut self, positions: &Vectors, version: u64, order: &NodeOrder) -> bool {
+    pub fn begin(&mut self, positions: &Vectors, version: u64, order: &NodeOrder, team: &Team) -> bool {
         self.beyond.clear();
         self.torn.clear();
         (self.seen, self.tried) = (0, 0);
         self.report = TearReport::default();
-        let [x, y, z] = positions.axes();
-        for (at, spring) in self.springs.iter().enumerate() {
-            let [a, b] = spring.nodes.map(|node| node as usize);
-            let (u, v, w) = (x[b] - x[a], y[b] - y[a], z[b] - z[a]);
-            let squared = u * u + v * v + w * w;
-            if squared <= spring.longest_squared {
-                continue;
-            }
-            let limits = &self.limits[at];
-            match limits.withheld.filter(|&(since, _)| since == version as u32) {
-                Some((_, why)) => self.report.withhold(why),
-                None => {
-                    let beyond = Beyond {
-                        load: squared / spring.longest_squared,
-                        callers: sorted(spring.nodes.map(|node| order.caller(node))),
-                        nodes: spring.nodes,
-                    };
-                    if memory::push(&mut self.beyond, beyond).is_err() {
-                        self.report.waiting += 1;
-                    }
+        let of_chunk = |chunk: usize| &self.springs[chunk * CHUNK..self.springs.len().min((chunk + 1) * CHUNK)];
+        let count = self.springs.len().div_ceil(CHUNK);
+        team.pass(count, Items::new(&mut self.chunks[..count]), |chunk, is_any| {
+            *is_any = is_any_beyond(of_chunk(chunk), positions.axes());
+        });
+        for chunk in (0..count).filter(|&chunk| self.chunks[chunk]) {
+            for (at, spring) in (chunk * CHUNK..).zip(of_chunk(chunk)) {
+                let [a, b] = spring.nodes.map(|node| positions.get(node as usize));
+                let squared = a.distance_squared(b);
+                let is_beyond = squared > spring.longest_squared;
+                if !is_beyond {
+                    continue;
+                }
+                let withheld = self.limits[at].withheld;
+                if let Some((_, why)) = withheld.filter(|&(since, _)| since == version as u32) {
+                    self.report.withhold(why);
+                    continue;
+                }
+                let beyond = Beyond {
+                    load: squared / spring.longest_squared,
+                    callers: sorted(spring.nodes.map(|node| order.caller(node))),
+                    nodes: spring.nodes,
+                };
+                if memory::push(&mut self.beyond, beyond).is_err() {
+                    self.report.waiting += 1;
                 }
             }
         }
@@ -339,7 +352,7 @@ impl Tears {
         for (spring, limits) in self.springs.iter().zip(&self.limits) {
             let [a, b] = spring.nodes;
             hasher.write_u64(u64::from(a) << 32 | u64::from(b));
-            hasher.write_floats(&[spring.longest_squared, limits.force]);
+            hasher.write_floats(&[spring.longest_squared, limits.strain, limits.force]);
             let withheld = limits
                 .withheld
                 .map_or(0, |(since, why)| u64::from(since) << 2 | (1 + why as u64));
@@ -362,6 +375,9 @@ impl Tears {
     fn link(&mut self, spring: Watched, limits: Limits) {
         let number = self.springs.len() as u32;
         let next = std::mem::replace(&mut self.first[spring.nodes[0] as usize], number);
+        if self.chunks.len() * CHUNK <= self.springs.len() {
+            self.chunks.push(false);
+        }
         self.springs.push(spring);
         self.limits.push(Limits { next, ..limits });
     }
@@ -388,6 +404,18 @@ impl Tears {
         }
         *name = to;
     }
+}
+
+/// Whether one of some springs is beyond its limits.
+fn is_any_beyond(springs: &[Watched], [x, y, z]: [&[f32]; 3]) -> bool {
+    let (y, z) = (&y[..x.len()], &z[..x.len()]);
+    let mut is_any = false;
+    for spring in springs {
+        let [a, b] = spring.nodes.map(|node| node as usize);
+        let (u, v, w) = (x[b] - x[a], y[b] - y[a], z[b] - z[a]);
+        is_any |= u * u + v * v + w * w > spring.longest_squared;
+    }
+    is_any
 }
 
 impl TearReport {

@@ -301,8 +301,12 @@ fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: 
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit(substeps, carry, tools, team);
+                body.find_tears(team);
             }
-            _ => body.stay(),
+            _ => {
+                body.stay();
+                body.find_tears(team);
+            }
         }
     }
 }

@@ -2,20 +2,15 @@
 
 use super::{BodyId, World};
 use crate::body::{Body, Torn, Withheld};
+use crate::error::Result;
 
 impl World {
-    /// Tears bodies, one after the other, at the springs that are beyond what they bear. A tear for which there is no room is not made.
+    /// Tears bodies, one after the other, at the springs that the step has left beyond what they bear. A tear for which there is no room is
+    /// not made.
     pub(super) fn tear(&mut self) {
         for place in 0..self.bodies.places() {
-            if !self.bodies.at_mut(place).is_some_and(Body::begin_tears) {
-                continue;
-            }
-            let id = self.bodies.iter_ids().map(|(id, _)| id).find(|id| id.index() == place);
-            let Some(id) = id.map(BodyId) else {
-                continue;
-            };
             while let Some(spring) = self.bodies.at_mut(place).and_then(Body::next_tear) {
-                let why = match self.change_topology(id, |body| body.tear(spring)) {
+                let why = match self.tear_body(place, spring) {
                     Ok(Torn::Made) => continue,
                     Ok(Torn::Not(why)) => why,
                     Err(_) => Withheld::NoRoom,
@@ -24,6 +19,16 @@ impl World {
                     body.withhold_tear(spring, why);
                 }
             }
+        }
+    }
+
+    fn tear_body(&mut self, place: usize, spring: [u32; 2]) -> Result<Torn> {
+        let mut ids = self.bodies.iter_ids().map(|(id, _)| id);
+        let id = ids.find(|id| id.index() == place);
+        drop(ids);
+        match id {
+            Some(id) => self.change_topology(BodyId(id), |body| body.tear(spring)),
+            None => Ok(Torn::Not(Withheld::NoWay)),
         }
     }
 }
