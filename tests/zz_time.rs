@@ -55,6 +55,8 @@ fn time() {
                 *least = least.min(start.elapsed().as_secs_f64());
             }
         }
-        println!("{threads} threads, {sub} substeps: {:?} us", least.map(|l| l * 1e6));
+        let r = worlds[2].bodies().next().unwrap().tear_report();
+    assert_eq!(r, TearReport::default());
+    println!("{threads} threads, {sub} substeps: {:?} us", least.map(|l| l * 1e6));
     }
 }

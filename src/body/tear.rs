@@ -64,7 +64,7 @@ impl Body {
     pub(crate) fn find_tears(&mut self, team: &Team) {
         let version = self.topology_version();
         if let Some(mut tears) = self.tears.take() {
-            if tears.begin(self.state.positions(), version, &self.order, team) {
+            if tears.begin(self.state.positions(), version, &self.order, (self.kernel, team)) {
                 tears.sort(|nodes| self.link(nodes));
             }
             self.tears = Some(tears);

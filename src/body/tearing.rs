@@ -1,19 +1,25 @@
 //! What springs of a body bear before it tears, and which of them are beyond that.
 
 use super::definition::not_negative;
-use super::{BodyDefinition, NodeOrder, Spring, Vectors};
+use super::{BodyDefinition, Bounds, NodeOrder, Spring, Vectors};
 use crate::cutting::Changes;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::springs::{Change, Link, Rewiring};
+use crate::springs::{Change, ChosenKernel, Link, Loops, Rewiring, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// No spring.
 const NONE: u32 = u32::MAX;
 
-/// So many springs are looked at by a thread at a time.
-const CHUNK: usize = 4096;
+/// Springs that are looked at together.
+const CHUNK: usize = 512;
+
+/// What rounding may make of a length, as a part of it.
+const ROUNDING: f32 = 1e-6;
+
+/// Nodes that are worked on side by side.
+const LANES: usize = 16;
 
 /// When a body tears.
 ///
@@ -74,6 +80,14 @@ struct Limits {
     withheld: Option<(u32, Withheld)>,
 }
 
+/// What is known of some springs.
+#[derive(Clone, Copy, Debug, Default)]
+struct Chunk {
+    /// How much longer each of them may have become since they were measured without any being beyond its limits, m.
+    slack: f32,
+    is_any_beyond: bool,
+}
+
 /// A spring beyond its limits.
 #[derive(Clone, Copy, Debug)]
 struct Beyond {
@@ -92,8 +106,15 @@ pub(crate) struct Tears {
     limits: Vec<Limits>,
     /// Of each node the first spring that it is the lower one of.
     first: Vec<u32>,
-    /// Of each chunk of springs whether one is beyond its limits.
-    chunks: Vec<bool>,
+    chunks: Vec<Chunk>,
+    /// Where nodes were when chunks were last measured.
+    measured: Vectors,
+    /// Whether chunks and `measured` are of the springs and nodes that there are.
+    is_measured: bool,
+    /// How many chunks have been looked through since.
+    looked: usize,
+    /// How far the nodes of each tile have gone since.
+    drifts: Vec<Bounds>,
     /// The most loaded first.
     beyond: Vec<Beyond>,
     /// How many of them have had their turn.
@@ -151,12 +172,18 @@ impl Tears {
             limits: memory::reserved(springs.len())?,
             first,
             chunks: memory::reserved(springs.len().div_ceil(CHUNK))?,
+            measured: Vectors::zeros(node_count)?,
+            is_measured: false,
+            looked: 0,
+            drifts: memory::reserved(tile_count(node_count + definition.spare_nodes as usize))?,
             beyond: Vec::new(),
             seen: 0,
             tried: 0,
             torn: Vec::new(),
             report: TearReport::default(),
         };
+        tears.measured.reserve(node_count + definition.spare_nodes as usize)?;
+        tears.drifts.resize(tile_count(node_count), Bounds::EMPTY);
         // In the order of their nodes, which is that of their places in memory.
         let mut order = memory::reserved(springs.len())?;
         order.extend(0..springs.len() as u32);
@@ -187,6 +214,9 @@ impl Tears {
     /// Nodes have come, for which there is room, up to so many in all.
     pub fn grow(&mut self, node_count: usize) {
         self.first.resize(node_count, NONE);
+        self.measured.grow(node_count);
+        self.drifts.resize(tile_count(node_count), Bounds::EMPTY);
+        self.is_measured = false;
     }
 
     /// Gives a spring its limits, strain and force, for which there is room if it has none yet.
@@ -198,6 +228,7 @@ impl Tears {
                 limits.force = force.unwrap_or(limits.force);
                 limits.withheld = None;
                 self.springs[at].longest_squared = longest_squared(limits, link);
+                self.is_measured = false;
             }
             None => self.add(sorted(nodes), [strain, force].map(|limit| limit.unwrap_or(0.0)), link),
         }
@@ -215,6 +246,7 @@ impl Tears {
         }
         self.springs.swap_remove(at);
         self.limits.swap_remove(at);
+        self.is_measured = false;
     }
 
     /// Springs have other stiffnesses or rest lengths; limits stay.
@@ -222,6 +254,7 @@ impl Tears {
         for change in changes {
             if let Some(at) = self.find([change.node, change.after.neighbour]) {
                 self.springs[at].longest_squared = longest_squared(&self.limits[at], &change.after);
+                self.is_measured = false;
             }
         }
     }
@@ -260,18 +293,17 @@ impl Tears {
 
     /// Finds the springs beyond their limits: whether there are any that may be torn with this version of the topology. Without memory for
     /// all of them some wait for the next step.
-    pub fn begin(&mut self, positions: &Vectors, version: u64, order: &NodeOrder, team: &Team) -> bool {
+    pub fn begin(&mut self, positions: &Vectors, version: u64, order: &NodeOrder, team: (ChosenKernel, &Team)) -> bool {
         self.beyond.clear();
         self.torn.clear();
         (self.seen, self.tried) = (0, 0);
         self.report = TearReport::default();
-        let of_chunk = |chunk: usize| &self.springs[chunk * CHUNK..self.springs.len().min((chunk + 1) * CHUNK)];
-        let count = self.springs.len().div_ceil(CHUNK);
-        team.pass(count, Items::new(&mut self.chunks[..count]), |chunk, is_any| {
-            *is_any = is_any_beyond(of_chunk(chunk), positions.axes());
-        });
-        for chunk in (0..count).filter(|&chunk| self.chunks[chunk]) {
-            for (at, spring) in (chunk * CHUNK..).zip(of_chunk(chunk)) {
+        self.look(positions, team);
+        for chunk in 0..self.springs.len().div_ceil(CHUNK) {
+            if !self.chunks[chunk].is_any_beyond {
+                continue;
+            }
+            for (at, spring) in (chunk * CHUNK..).zip(of_chunk(&self.springs, chunk)) {
                 let [a, b] = spring.nodes.map(|node| positions.get(node as usize));
                 let squared = a.distance_squared(b);
                 let is_beyond = squared > spring.longest_squared;
@@ -294,6 +326,37 @@ impl Tears {
             }
         }
         !self.beyond.is_empty()
+    }
+
+    /// Finds the chunks with springs beyond their limits. Those of which nodes have not gone far enough since they were measured are not looked
+    /// through.
+    fn look(&mut self, positions: &Vectors, (kernel, team): (ChosenKernel, &Team)) {
+        let (springs, axes) = (&self.springs, positions.axes());
+        let count = springs.len().div_ceil(CHUNK);
+        let chunks = &mut self.chunks[..count];
+        if !self.is_measured || self.looked >= count {
+            team.pass(count, Items::new(chunks), |chunk, it| {
+                *it = measured(of_chunk(springs, chunk), axes);
+            });
+            self.measured.copy_from(positions);
+            (self.is_measured, self.looked) = (true, 0);
+            return;
+        }
+        let nodes = positions.len();
+        let before = &self.measured;
+        team.pass(tile_count(nodes), Items::new(&mut self.drifts), |tile, drift| {
+            let [now, before] = [positions, before].map(|places| places.slices(tile_nodes(tile, nodes)));
+            *drift = kernel.run(Drift { now, before });
+        });
+        let drift = self.drifts.iter().fold(Bounds::EMPTY, |all, drift| all.and(drift));
+        let furthest = drift.min.abs().max(drift.max.abs()).max_element();
+        let spread = (drift.max - drift.min).length() * (1.0 + ROUNDING) + furthest * ROUNDING;
+        // What is no number is looked at.
+        let is_looked_at = |chunk: &Chunk| !(spread < chunk.slack);
+        self.looked += chunks.iter().filter(|chunk| is_looked_at(chunk)).count();
+        team.pass(count, Items::new(chunks), |chunk, it| {
+            it.is_any_beyond = is_looked_at(it) && measured(of_chunk(springs, chunk), axes).is_any_beyond;
+        });
     }
 
     /// Puts the most loaded first, given what each spring is like.
@@ -376,8 +439,9 @@ impl Tears {
         let number = self.springs.len() as u32;
         let next = std::mem::replace(&mut self.first[spring.nodes[0] as usize], number);
         if self.chunks.len() * CHUNK <= self.springs.len() {
-            self.chunks.push(false);
+            self.chunks.push(Chunk::default());
         }
+        self.is_measured = false;
         self.springs.push(spring);
         self.limits.push(Limits { next, ..limits });
     }
@@ -406,16 +470,58 @@ impl Tears {
     }
 }
 
-/// Whether one of some springs is beyond its limits.
-fn is_any_beyond(springs: &[Watched], [x, y, z]: [&[f32]; 3]) -> bool {
+fn of_chunk(springs: &[Watched], chunk: usize) -> &[Watched] {
+    &springs[chunk * CHUNK..springs.len().min((chunk + 1) * CHUNK)]
+}
+
+/// What is to be known of some springs.
+fn measured(springs: &[Watched], [x, y, z]: [&[f32]; 3]) -> Chunk {
     let (y, z) = (&y[..x.len()], &z[..x.len()]);
-    let mut is_any = false;
+    let mut chunk = Chunk {
+        slack: f32::INFINITY,
+        is_any_beyond: false,
+    };
     for spring in springs {
         let [a, b] = spring.nodes.map(|node| node as usize);
         let (u, v, w) = (x[b] - x[a], y[b] - y[a], z[b] - z[a]);
-        is_any |= u * u + v * v + w * w > spring.longest_squared;
+        let squared = u * u + v * v + w * w;
+        chunk.is_any_beyond |= squared > spring.longest_squared;
+        let slack = spring.longest_squared.sqrt() * (1.0 - ROUNDING) - squared.sqrt() * (1.0 + ROUNDING);
+        chunk.slack = chunk.slack.min(slack);
     }
-    is_any
+    chunk
+}
+
+/// How far nodes have gone.
+struct Drift<'a> {
+    now: [&'a [f32]; 3],
+    before: [&'a [f32]; 3],
+}
+
+impl Loops for Drift<'_> {
+    type Output = Bounds;
+
+    #[inline(always)]
+    fn run(self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for axis in 0..3 {
+            let (now, before) = (self.now[axis], self.before[axis]);
+            let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+            for (now, before) in now.chunks_exact(LANES).zip(before.chunks_exact(LANES)) {
+                for lane in 0..LANES {
+                    let way = now[lane] - before[lane];
+                    low[lane] = if way < low[lane] { way } else { low[lane] };
+                    high[lane] = if way > high[lane] { way } else { high[lane] };
+                }
+            }
+            let done = now.len() - now.len() % LANES;
+            let rest = (done..now.len()).map(|node| now[node] - before[node]);
+            let ways = |lanes: [f32; LANES]| lanes.into_iter().chain(rest.clone());
+            bounds.min[axis] = ways(low).fold(f32::INFINITY, f32::min);
+            bounds.max[axis] = ways(high).fold(f32::NEG_INFINITY, f32::max);
+        }
+        bounds
+    }
 }
 
 impl TearReport {

@@ -10,6 +10,9 @@ use crate::memory;
 /// How far beside a side of a triangle a way may go, as a part of how far it goes along it, to be taken for one along the side.
 const BESIDE: f64 = 0.05;
 
+/// How far the way goes on at either end to pass through springs that meet it just there, as a part of it.
+const BEYOND: f64 = 0.01;
+
 /// A way that meets more triangles in one cell ends there.
 const MOST_TRIANGLES: usize = 64;
 
@@ -29,7 +32,7 @@ pub(crate) struct Load {
 pub(crate) struct Tear {
     /// What it is cut with: more than the way, which begins and ends where `triangles` do.
     pub sweep: Sweep,
-    /// The same, just as long as the way.
+    /// The same, hardly longer than the way.
     pub way: Sweep,
     /// Those that are met.
     pub triangles: Vec<u32>,
@@ -190,8 +193,8 @@ impl CutSurface {
                 end: edge(end + 0.5 * way),
             },
             way: Sweep {
-                start: edge(start),
-                end: edge(end),
+                start: edge(start - BEYOND * way),
+                end: edge(end + BEYOND * way),
             },
             triangles,
         }))
