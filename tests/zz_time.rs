@@ -56,7 +56,7 @@ fn time() {
             }
         }
         let r = worlds[2].bodies().next().unwrap().tear_report();
-    assert_eq!(r, TearReport::default());
-    println!("{threads} threads, {sub} substeps: {:?} us", least.map(|l| l * 1e6));
+        assert_eq!(r, TearReport::default());
+        println!("{threads} threads, {sub} substeps: {:?} us", least.map(|l| l * 1e6));
     }
 }

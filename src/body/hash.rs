@@ -59,7 +59,7 @@ impl Body {
             bindings.hash(hasher);
         }
         if let Some(tears) = &self.tears {
-            tears.hash(hasher);
+            tears.bearing.hash(hasher);
         }
         if let Some(grasps) = &self.grasps {
             grasps.hash(hasher);

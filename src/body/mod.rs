@@ -1,5 +1,6 @@
 //! A body: nodes with mass, joined by springs.
 
+mod bearing;
 mod bindings;
 #[cfg(test)]
 mod bound_tests;
@@ -24,10 +25,12 @@ mod published;
 mod records;
 mod region;
 mod state;
+mod stretch;
 mod stroke;
 mod surface;
 mod tear;
 mod tearing;
+mod tears;
 mod tissue;
 mod tune;
 mod vectors;
@@ -77,7 +80,7 @@ pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use state::State;
-use tearing::Tears;
+use tears::Tears;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
 ///

@@ -64,9 +64,8 @@ impl Body {
     pub(crate) fn find_tears(&mut self, team: &Team) {
         let version = self.topology_version();
         if let Some(mut tears) = self.tears.take() {
-            if tears.begin(self.state.positions(), version, &self.order, (self.kernel, team)) {
-                tears.sort(|nodes| self.link(nodes));
-            }
+            let link = |nodes| self.link(nodes);
+            tears.begin(self.state.positions(), version, &self.order, link, (self.kernel, team));
             self.tears = Some(tears);
         }
     }
@@ -172,7 +171,11 @@ impl Body {
             Ok(None)
         };
         let applied = match why {
-            Ok(None) => self.apply(cuttable, &tear.way, &tear.triangles, &changes, first_triangle),
+            // Springs along no edge may reach over a triangle.
+            Ok(None) => cuttable
+                .surface
+                .beside(&tear.triangles)
+                .and_then(|near| self.apply(cuttable, &tear.way, &near, &changes, first_triangle)),
             Ok(Some(why)) => {
                 cuttable.surface.undo();
                 return Ok(Torn::Not(why));

@@ -117,6 +117,18 @@ impl CutSurface {
         self.cells[self.triangles[triangle].cell].nodes
     }
 
+    /// A triangle of each cell that shares a node with those of some triangles.
+    pub(crate) fn beside(&self, triangles: &[u32]) -> Result<Vec<u32>> {
+        let mut beside = Vec::new();
+        for node in triangles.iter().flat_map(|&triangle| self.nodes_under(triangle)) {
+            for cell in self.cells_at(node) {
+                memory::push(&mut beside, cell.first)?;
+            }
+        }
+        memory::sort_once(&mut beside);
+        Ok(beside)
+    }
+
     /// What a tensor of forces, N, does to a vertex in the surface as it is now: its larger principal value there; `None`: nothing pulls it apart.
     pub(crate) fn load_at(&self, vertex: u32, forces: DMat3, positions: &[Vec3]) -> Result<Option<Load>> {
         let mut ring = memory::reserved(8)?;
