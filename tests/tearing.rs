@@ -515,6 +515,23 @@ fn the_most_loaded_tear_first_and_no_more_than_asked() {
         assert_eq!(world.body(body).unwrap().topology_version(), u64::from(most));
         assert!(report.waiting + most <= beyond);
         assert!(report.waiting + 8 * most >= beyond, "{report:?} of {beyond}");
+        // None is beside another.
+        let it = world.body(body).unwrap();
+        let rest = at_rest(&sheet, it);
+        let mut seen: Vec<DVec3> = Vec::new();
+        for version in 0..u64::from(most) {
+            let (from, later) = (
+                it.changes_since(version).unwrap().rim,
+                it.changes_since(version + 1).unwrap().rim,
+            );
+            let places: Vec<DVec3> = from[..from.len() - later.len()]
+                .iter()
+                .flat_map(|edge| edge.nodes)
+                .map(|node| rest[node as usize])
+                .collect();
+            assert!(places.iter().all(|place| !seen.contains(place)), "{most}");
+            seen.extend(places);
+        }
         // The first runs through a node of the most loaded.
         let [a, b] = loads[0].0.map(|node| sheet.rest[node as usize].as_dvec3());
         let rim = rim(&sheet, world.body(body).unwrap(), 0);
@@ -768,19 +785,46 @@ fn what_is_sutured_stays_at_its_place_in_the_material() {
             let ids = worlds
                 .iter_mut()
                 .map(|(world, body)| world.suture(*body, &near, *body, &far, &slack).unwrap());
-            sutures.push(ids.collect::<Vec<_>>());
+            let corners = sheet.cells[triangle as usize].map(|node| sheet.rest[node as usize].as_dvec3());
+            let place: DVec3 = (0..3).map(|k| f64::from(weights[k]) * corners[k]).sum();
+            sutures.push((ids.collect::<Vec<_>>(), place));
         }
     }
     assert!(sutures.len() > 10);
     for (world, _) in &mut worlds {
         world.step(1e-4).unwrap();
     }
-    let [(torn, body), (whole, _)] = &worlds;
-    assert_eq!(report(torn, *body).tears, 1);
-    for ids in sutures {
+    assert_eq!(report(&worlds[0].0, worlds[0].1).tears, 1);
+    for (ids, _) in &sutures {
+        let [(torn, _), (whole, _)] = &worlds;
         let distances =
             [torn.suture_report(ids[0]), whole.suture_report(ids[1])].map(|report| report.unwrap().distance);
         assert!((distances[0] - distances[1]).abs() < 1e-6, "{distances:?}");
+    }
+    // And still when it gapes.
+    let (torn, body) = &mut worlds[0];
+    for _ in 0..100 {
+        torn.step(1e-4).unwrap();
+    }
+    let it = torn.body(*body).unwrap();
+    let rest = at_rest(&sheet, it);
+    let now = |place: DVec3| {
+        let found = it.surface().iter().find_map(|corners| {
+            let [a, b, c] = corners.map(|node| rest[node as usize]);
+            let whole = (b - a).cross(c - a).z;
+            let weights = [(b, c), (c, a), (a, b)].map(|(p, q)| (p - place).cross(q - place).z / whole);
+            let at = corners.map(|node| it.positions()[node as usize].as_dvec3());
+            let is_inside = weights.iter().all(|&weight| weight >= 0.0);
+            is_inside.then(|| (0..3).map(|k| weights[k] * at[k]).sum::<DVec3>())
+        });
+        found.unwrap()
+    };
+    let corners = sheet.cells[far as usize].map(|node| sheet.rest[node as usize].as_dvec3());
+    let far = now(0.3 * corners[0] + 0.3 * corners[1] + 0.4 * corners[2]);
+    for (ids, place) in sutures {
+        let distance = f64::from(torn.suture_report(ids[0]).unwrap().distance);
+        let expected = now(place).distance(far);
+        assert!((distance - expected).abs() < 1e-6, "{place}: {distance} and {expected}");
     }
 }
 
@@ -823,6 +867,91 @@ fn springs_along_no_edge_tear_the_surface_and_go_where_it_has_torn() {
     // With their springs.
     assert_eq!(it.pieces().unwrap().count, 2);
     assert_eq!(report(&world, body), TearReport::default());
+}
+
+#[test]
+fn what_is_held_does_not_tear_but_its_neighbour() {
+    let sheet = Sheet::of(unstructured(12, 8));
+    let never = Tearing {
+        strain: 0.0,
+        ..PLAIN.tearing
+    };
+    let made = Made {
+        stretched: 0.25,
+        tearing: never,
+        ..PLAIN
+    };
+    let inner = |node: &u32| (sheet.rest[*node as usize] - Vec3::new(0.06, 0.06, 0.0)).length() < 0.03;
+    let (world, body) = sheet.world(made).unwrap();
+    let mut pairs = world.body(body).unwrap().spring_pairs().unwrap();
+    pairs.retain(|pair| pair.iter().all(inner));
+    let along = |[a, b]: [u32; 2]| sheet.rest[a as usize].x - sheet.rest[b as usize].x;
+    pairs.retain(|pair| along(*pair).abs() > 0.9 * CELL);
+    assert!(pairs.len() > 3);
+    for pair in pairs {
+        for [held, free] in [pair, [pair[1], pair[0]]] {
+            let (mut world, body) = sheet.world(made).unwrap();
+            let it = world.body_mut(body).unwrap();
+            it.pin(held).unwrap();
+            it.set_tear_limits(&[pair], Some(Values::Uniform(0.02)), None).unwrap();
+            world.step(1e-4).unwrap();
+            assert_eq!(report(&world, body).tears, 1);
+            let [held, free] = [held, free].map(|node| sheet.rest[node as usize].as_dvec3());
+            let rim = rim(&sheet, world.body(body).unwrap(), 0);
+            let doubled = |at: DVec3| rim.iter().filter(|place| **place == at).count() == 4;
+            assert!(doubled(free) && !doubled(held), "{pair:?}");
+        }
+    }
+}
+
+#[test]
+fn what_a_cut_leaves_of_a_spring_bears_its_part() {
+    let sheet = Sheet::of(grid(12));
+    let never = Tearing {
+        strain: 0.0,
+        ..PLAIN.tearing
+    };
+    let (mut world, body) = sheet
+        .world(Made {
+            tearing: never,
+            ..PLAIN
+        })
+        .unwrap();
+    let spring = [6 * 13 + 5, 6 * 13 + 6];
+    let it = world.body_mut(body).unwrap();
+    let before = it.springs(&[spring]).unwrap()[0];
+    let bears = 0.2 * before.stiffness * before.rest_length;
+    it.set_tear_limits(&[spring], None, Some(Values::Uniform(bears)))
+        .unwrap();
+    let blade = |at: Vec2| [-0.1, 0.1].map(|z| at.extend(z));
+    let sweep = Sweep {
+        start: blade(vec2(-CELL, 5.5 * CELL)),
+        end: blade(vec2(13.0 * CELL, 5.5 * CELL)),
+    };
+    assert_eq!(world.cut(body, &sweep).unwrap().pieces_parted, 1);
+    let it = world.body_mut(body).unwrap();
+    let after = it.springs(&[spring]).unwrap()[0];
+    assert!(after.stiffness < 0.9 * before.stiffness);
+    for is_set_again in [false, true] {
+        for (strain, tears) in [(0.199, 0), (0.201, u32::from(is_set_again))] {
+            let it = world.body_mut(body).unwrap();
+            if is_set_again {
+                // As it is: the limit is worked out anew.
+                it.set_springs(&[spring], Some(Values::Uniform(after.stiffness)), None)
+                    .unwrap();
+            } else if tears == 0 && strain > 0.2 {
+                continue;
+            }
+            let taut: Vec<Vec3> = at_rest(&sheet, it)
+                .iter()
+                .map(|place| Vec3::new((1.0 + strain) * place.x as f32, place.y as f32, 0.0))
+                .collect();
+            it.set_positions(&taut).unwrap();
+            it.set_velocities(&vec![Vec3::ZERO; taut.len()]).unwrap();
+            world.step(1e-6).unwrap();
+            assert_eq!(report(&world, body).tears, tears, "{strain}");
+        }
+    }
 }
 
 #[test]
