@@ -731,11 +731,10 @@ fn fill_rows(worlds: &mut [(&mut World, BodyId)], places: usize, inner: impl Fn(
         let nodes = 0..it.node_count() as u32;
         for node in nodes.clone().filter(&inner) {
             for other in nodes.clone().filter(|other| !inner(other)) {
-                if counts[node as usize] < places && counts[other as usize] < places {
-                    if it.add_spring(node, other, 0.0, None).is_ok() {
-                        counts[node as usize] += 1;
-                        counts[other as usize] += 1;
-                    }
+                let has_room = counts[node as usize] < places && counts[other as usize] < places;
+                if has_room && it.add_spring(node, other, 0.0, None).is_ok() {
+                    counts[node as usize] += 1;
+                    counts[other as usize] += 1;
                 }
             }
             assert_eq!(counts[node as usize], places);
