@@ -734,6 +734,27 @@ typedef struct sinew_body_def {
    * 0.
    */
   uint32_t reserved3;
+  /**
+   * The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
+   * limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
+   * force and as far as the next triangle (O'Brien, Hodgins 1999); where a cut ends in a triangle next to the spring, that goes on
+   * instead. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
+   * beyond its limits may allocate.
+   */
+  float tear_strain;
+  /**
+   * N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part.
+   */
+  float tear_force;
+  /**
+   * The most tears in a step, those of the most loaded springs; 0, the default: the body does not tear, and pays nothing for it. Else
+   * spare_nodes is above 0.
+   */
+  uint32_t most_tears;
+  /**
+   * m2, at least 0: a tear that would part a piece with less area at rest is not made; default 0.
+   */
+  float smallest_piece;
 } sinew_body_def;
 
 /**
@@ -895,6 +916,41 @@ typedef struct sinew_triangle_view {
    */
   size_t count;
 } sinew_triangle_view;
+
+/**
+ * What tore in the last step, and what did not; all 0 of a body that does not tear.
+ */
+typedef struct sinew_tear_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Tears that were made.
+   */
+  uint32_t tears;
+  /**
+   * How many more pieces the surface has.
+   */
+  uint32_t pieces_parted;
+  /**
+   * Springs beyond their limits whose turn is to come: there were most_tears, one beside them, or nothing pulls their nodes apart.
+   */
+  uint32_t waiting;
+  /**
+   * Springs beyond their limits that would part a piece smaller than smallest_piece. They are tried again when the topology has changed.
+   */
+  uint32_t small_pieces;
+  /**
+   * Springs beyond their limits for whose tears there is no room: not as many spare nodes, FAST_LINK: no free place of a node, or no memory.
+   * They are tried again when the topology has changed.
+   */
+  uint32_t no_room;
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} sinew_tear_report;
 
 /**
  * How a triangle or tetrahedron is strained, as a part of its lengths at rest: 0 wherever it is moved and turned, 0.1 where it is a
@@ -2245,6 +2301,36 @@ sinew_status sinew_body_get_node_mass(const struct sinew_world *world,
                                       struct sinew_body_id body,
                                       uint32_t node,
                                       float *out);
+
+/**
+ * Writes what tore in the last step of a body, and what did not. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_body_get_tear_report(const struct sinew_world *world,
+                                        struct sinew_body_id body,
+                                        struct sinew_tear_report *out);
+
+/**
+ * Gives the springs of `count` pairs of nodes other limits than tear_strain and tear_force of the definition: `pairs` are 2 `count` indices,
+ * `strains` and `forces`, N, `count` floats each, at least 0, 0: any; NULL: they stay. Springs that are added later have none until they are given
+ * some. Of a pair that is named more than once the last counts.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (most_tears was 0),
+ * SINEW_STATUS_OUT_OF_MEMORY; then no limit is changed.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
+ */
+sinew_status sinew_body_set_tear_limits(struct sinew_world *world,
+                                        struct sinew_body_id body,
+                                        const uint32_t *pairs,
+                                        size_t count,
+                                        const float *strains,
+                                        const float *forces);
 
 /**
  * Writes the strain L/L0 - 1 of `count` pairs of nodes, 0 where L0 is 0: `pairs` are 2 `count` indices, `rest_lengths` `count` floats,

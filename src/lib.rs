@@ -27,8 +27,8 @@ mod threads;
 mod world;
 
 pub use body::{
-    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Solver, SpringState, Storage, TopologyChanges,
-    Values,
+    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Solver, SpringState, Storage, TearReport,
+    Tearing, TopologyChanges, Values,
 };
 pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};

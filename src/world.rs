@@ -3,6 +3,7 @@
 mod attachments;
 mod step;
 mod sutures;
+mod tear;
 
 use glam::{Quat, Vec3};
 
@@ -201,12 +202,20 @@ impl World {
     /// the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no free place in a row of fixed
     /// length. [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
+        self.change_topology(body, |it| it.cut(sweep))
+    }
+
+    /// Lets a body change its topology, and what is attached of it follow.
+    fn change_topology<T>(&mut self, body: BodyId, change: impl FnOnce(&mut Body) -> Result<T>) -> Result<T> {
         let place = self.bodies.place(body.0)?;
         let carried = self.attached_points(body, place)?;
         let mut moved = crate::memory::reserved(carried.len())?;
         let it = self.bodies.get_mut(body.0)?;
         let before = it.topology_version();
-        let report = it.cut(sweep)?;
+        let changed = change(it)?;
+        if it.topology_version() == before {
+            return Ok(changed);
+        }
         let which = Which {
             prefix: "",
             index: None,
@@ -226,7 +235,7 @@ impl World {
                 of.map(|(_, now)| *now)
             });
         }
-        Ok(report)
+        Ok(changed)
     }
 
     /// What others are attached to of a body, points with their places in its material; there is room to bind them anew.

@@ -18,8 +18,8 @@ use sinew::capi::tool::SINEW_DETECTION_IMAGE_SPACE;
 use sinew::capi::world::{sinew_world_create, sinew_world_def_init, sinew_world_destroy};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage, ToolDefinition,
-    Values, Viscosity, World, WorldDefinition, Yielding,
+    BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage, Tearing,
+    ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 thread_local! {
@@ -96,6 +96,53 @@ fn tissue_against_tissue_allocates_nothing() {
         // They met: it would have fallen three centimetres.
         let places = world.body(first.expect("a body")).expect("a body").positions();
         assert!(places.iter().all(|place| place.y > 0.001), "{detection:?}");
+    }
+}
+
+#[test]
+fn a_step_that_tears_nothing_allocates_nothing() {
+    let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
+    let taut: Vec<Vec3> = mesh.positions.iter().map(|place| 1.3 * *place).collect();
+    for is_taut in [false, true] {
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let cloth = BodyDefinition {
+            positions: if is_taut { &taut } else { &mesh.positions },
+            rest_positions: Some(&mesh.positions),
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(2e-4),
+            stiffnesses: Values::Uniform(50.0),
+            spare_nodes: 100,
+            tearing: Tearing {
+                strain: 0.2,
+                most_per_step: 1000,
+                // None is to be torn off.
+                smallest_piece: 1.0,
+                ..Tearing::default()
+            },
+            ..BodyDefinition::default()
+        };
+        let cloth = world.create_body(&cloth).expect("a body");
+        for node in [0, 9] {
+            world.body_mut(cloth).and_then(|body| body.pin(node)).expect("a node");
+        }
+        if is_taut {
+            // All have been tried, or the nodes are used up.
+            for _ in 0..30 {
+                world.step(1e-5).expect("a step");
+            }
+        }
+        let mut without = 0;
+        for step in 0..40 {
+            let allocated = asked(|| drop(world.step(if is_taut { 1e-5 } else { 1e-3 })));
+            let report = world.body(cloth).expect("a body").tear_report();
+            assert!(
+                allocated == 0 || report.tears > 0,
+                "taut: {is_taut}, step {step}, {report:?}"
+            );
+            without += u32::from(report.tears == 0);
+            assert_eq!(is_taut, report.no_room + report.small_pieces > 0, "{report:?}");
+        }
+        assert!(without > 20, "taut: {is_taut}: {without}");
     }
 }
 

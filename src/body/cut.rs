@@ -101,15 +101,17 @@ impl Body {
         };
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
         let changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
-        let applied = self.apply(cuttable, &sweep, &near, &changes, counts);
-        if applied.is_err() {
-            cuttable.material.undo();
+        let room = cuttable.stroke.reserve(cuttable.material.most_ends(&changes, &near));
+        let applied = room.and_then(|()| self.apply(cuttable, &sweep, &near, &changes, counts));
+        match applied {
+            Ok(_) => self.stop(cuttable, &sweep, &near, &changes),
+            Err(_) => cuttable.material.undo(),
         }
         applied
     }
 
     /// Makes the body what the changes say, of so many triangles and items that there were before. Changes nothing where it fails.
-    fn apply(
+    pub(super) fn apply(
         &mut self,
         cuttable: &mut Cuttable,
         sweep: &Sweep,
@@ -126,8 +128,6 @@ impl Body {
             self.take_away(material, sweep, near, changes, &mut rewiring)?;
         }
         if changes.is_empty() && rewiring.is_empty() {
-            cuttable.stroke.reserve(material.most_ends(changes, near))?;
-            self.stop(cuttable, sweep, near, changes);
             return Ok(CutReport::default());
         }
         let is_held = |source: u32| self.inverse_masses[self.order.own(source) as usize] == 0.0;
@@ -163,7 +163,6 @@ impl Body {
             added: &added,
             hidden: &changes.undrawn,
         };
-        cuttable.stroke.reserve(material.most_ends(changes, near))?;
         self.reserve_surface(nodes.len(), changed.len(), added.len())?;
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
@@ -182,6 +181,9 @@ impl Body {
             let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
             elements.reserve_pieces(&pieces, known + nodes.len(), sums)?;
         }
+        if let Some(tears) = &mut self.tears {
+            tears.reserve(rewiring.added.len())?;
+        }
         self.springs.resize(known + nodes.len())?;
         let rewired = self.rewire(&rewiring, 6 * pieces.len());
         if rewired.is_err() {
@@ -195,6 +197,10 @@ impl Body {
             let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
             elements.rewire(&pieces, known + nodes.len(), sums);
         }
+        if let Some(tears) = &mut self.tears {
+            tears.grow(known + nodes.len());
+            tears.follow(changes, &rewiring, &self.order);
+        }
         self.rebind(changes);
         self.share_masses(cuttable, changes)?;
         self.follow_elements(&cuttable.material, changes, &at_pieces);
@@ -206,7 +212,6 @@ impl Body {
             cuttable.log.add(changes, &gone);
         }
         self.publish_new(known);
-        self.stop(cuttable, sweep, near, changes);
         Ok(CutReport {
             new_nodes: nodes.len() as u32,
             new_triangles: added.len() as u32,

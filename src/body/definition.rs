@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::tearing::Tearing;
 use crate::contact::BodyContact;
 use crate::error::{Error, Result};
 use crate::material::{Material, Viscosity, Yielding};
@@ -182,6 +183,9 @@ pub struct BodyDefinition<'a> {
     /// together; a solid is one of tetrahedra of which those about a node hang together by faces at it, and `triangles` are its boundary, if there
     /// are any. A body of springs alone loses those that a blade passes through, and needs no room: 1 will do.
     pub spare_nodes: u32,
+    /// When it tears by itself, at the end of a step; a body that does may be cut. See [`Body::tear_report`](crate::Body::tear_report) and
+    /// [`Body::set_tear_limits`](crate::Body::set_tear_limits).
+    pub tearing: Tearing,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -222,6 +226,7 @@ impl Default for BodyDefinition<'_> {
             accuracy: 0.0,
             mass_scaling: 0.001,
             spare_nodes: 0,
+            tearing: Tearing::default(),
         }
     }
 }
@@ -285,6 +290,7 @@ impl BodyDefinition<'_> {
         self.viscosity.check()?;
         self.yielding.check()?;
         self.contact.check()?;
+        self.tearing.check(self)?;
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
         if let Some(material) = &self.material {

@@ -348,6 +348,9 @@ impl Body {
     /// Removes a spring, given as the first of its nodes sees it.
     fn remove_link(&mut self, [own_a, own_b]: [u32; 2], link: Link) -> Result<()> {
         self.springs.remove(own_a, own_b)?;
+        if let Some(tears) = &mut self.tears {
+            tears.remove([own_a, own_b]);
+        }
         self.forces_current = false;
         self.forget_rates();
         if let Some(implicit) = &mut self.implicit {

@@ -58,6 +58,9 @@ impl Body {
         if let Some(bindings) = &self.bindings {
             bindings.hash(hasher);
         }
+        if let Some(tears) = &self.tears {
+            tears.bearing.hash(hasher);
+        }
         if let Some(grasps) = &self.grasps {
             grasps.hash(hasher);
         }

@@ -1,5 +1,6 @@
 //! A body: nodes with mass, joined by springs.
 
+mod bearing;
 mod bindings;
 #[cfg(test)]
 mod bound_tests;
@@ -24,8 +25,12 @@ mod published;
 mod records;
 mod region;
 mod state;
+mod stretch;
 mod stroke;
 mod surface;
+mod tear;
+mod tearing;
+mod tears;
 mod tissue;
 mod tune;
 mod vectors;
@@ -47,6 +52,9 @@ pub(crate) use grow::NewNode;
 pub(crate) use nodes::{Region, Scale};
 pub(crate) use origin::Bounds;
 pub(crate) use records::{Record, Records, WriteRecords};
+pub(crate) use tear::Torn;
+pub(crate) use tearing::Withheld;
+pub use tearing::{TearReport, Tearing};
 pub use tune::SpringState;
 pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
@@ -72,6 +80,7 @@ pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use state::State;
+use tears::Tears;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
 ///
@@ -121,6 +130,8 @@ pub struct Body {
     pub(crate) bindings: Option<Bindings>,
     /// For bodies that may be cut.
     cuttable: Option<Box<Cuttable>>,
+    /// For bodies that tear.
+    tears: Option<Box<Tears>>,
     /// How many nodes there is room for; 0: for those that there are.
     node_room: usize,
     /// Whether an edge of its surface was taken away.
@@ -199,6 +210,7 @@ impl Body {
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
+        let tears = Tears::new(definition, &springs)?;
         let springs = store(needs.kernel, definition, &springs)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
@@ -253,6 +265,7 @@ impl Body {
             contact: definition.contact,
             bindings: None,
             cuttable,
+            tears,
             node_room: 0,
             is_cut_open: false,
             corners: Vec::new(),

@@ -90,6 +90,9 @@ impl Body {
         if let Some(terms) = &mut self.terms {
             changes.iter().for_each(|change| terms.set_spring(change));
         }
+        if let Some(tears) = &mut self.tears {
+            tears.change(changes);
+        }
         self.measure_anew();
         self.forces_current = false;
         if let Some(implicit) = &mut self.implicit {
@@ -122,7 +125,7 @@ impl Body {
     }
 
     /// The node of a pair with the lower number of the body's own, and what it sees of the pair's spring.
-    fn link_of_pair(&self, pairs: &[[u32; 2]], index: usize) -> Result<(u32, Link)> {
+    pub(super) fn link_of_pair(&self, pairs: &[[u32; 2]], index: usize) -> Result<(u32, Link)> {
         let [a, b] = pairs[index];
         let refused = |error| Error::invalid(format!("pairs[{index}]: {error}"));
         let [own_a, own_b] = self.check_pair(a, b).map_err(refused)?;

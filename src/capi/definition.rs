@@ -6,7 +6,7 @@ use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
-use crate::body::{BodyDefinition, Solver, Storage, Values};
+use crate::body::{BodyDefinition, Solver, Storage, Tearing, Values};
 use crate::contact::{BodyContact, CollisionFilter};
 use crate::error::{Error, Result};
 use crate::material::{Material, Model, Viscosity, Yielding};
@@ -230,6 +230,19 @@ pub struct sinew_body_def {
     pub spare_nodes: u32,
     /// 0.
     pub reserved3: u32,
+    /// The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
+    /// limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
+    /// force and as far as the next triangle (O'Brien, Hodgins 1999); where a cut ends in a triangle next to the spring, that goes on
+    /// instead. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
+    /// beyond its limits may allocate.
+    pub tear_strain: f32,
+    /// N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part.
+    pub tear_force: f32,
+    /// The most tears in a step, those of the most loaded springs; 0, the default: the body does not tear, and pays nothing for it. Else
+    /// spare_nodes is above 0.
+    pub most_tears: u32,
+    /// m2, at least 0: a tear that would part a piece with less area at rest is not made; default 0.
+    pub smallest_piece: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -316,6 +329,10 @@ impl sinew_body_def {
             collision_mask: CollisionFilter::default().mask,
             spare_nodes: 0,
             reserved3: 0,
+            tear_strain: 0.0,
+            tear_force: 0.0,
+            most_tears: 0,
+            smallest_piece: 0.0,
         }
     }
 
@@ -492,6 +509,12 @@ impl sinew_body_def {
                 pressure: self.pressure,
                 contact: self.contact()?,
                 spare_nodes: self.spare_nodes,
+                tearing: Tearing {
+                    strain: self.tear_strain,
+                    force: self.tear_force,
+                    most_per_step: self.most_tears,
+                    smallest_piece: self.smallest_piece,
+                },
             })
         }
     }

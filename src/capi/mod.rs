@@ -22,6 +22,8 @@ pub mod springs;
 
 pub mod cut;
 
+pub mod tear;
+
 pub mod strain;
 
 pub mod report;

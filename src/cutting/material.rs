@@ -19,6 +19,14 @@ pub(crate) enum CutMaterial {
 }
 
 impl CutMaterial {
+    /// That of triangles.
+    pub fn surface(&self) -> Option<&CutSurface> {
+        match self {
+            Self::Surface(surface) => Some(surface),
+            Self::Springs(_) | Self::Solid(_) => None,
+        }
+    }
+
     pub fn reserve(&mut self, nodes: u32) -> Result<()> {
         match self {
             Self::Springs(_) => Ok(()),

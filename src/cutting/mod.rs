@@ -26,6 +26,7 @@ mod snap;
 mod solid;
 mod split;
 mod surface;
+mod tear;
 mod tracked;
 mod union;
 
@@ -34,3 +35,4 @@ pub use cut::{Limits, Sweep};
 pub(crate) use material::{CutEnd, CutMaterial};
 pub use solid::{CutSolid, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
 pub use surface::{CutSurface, SurfaceCell, SurfaceTriangle, SurfaceVertex};
+pub(crate) use tear::Load;

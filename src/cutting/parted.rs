@@ -36,6 +36,39 @@ impl CutSurface {
         }
         Ok(Some(after - floods.count()))
     }
+
+    /// Whether the last cut, of which `rim` is the new rim, has parted a piece of less area than `least` in the rest shape, m².
+    ///
+    /// From both sides of the rim it goes on until all meet, or have been over as much, or all over their piece.
+    pub fn has_parted_less(&self, rim: &[RimEdge], least: f64) -> Result<bool> {
+        let mut floods = Floods::from(rim)?;
+        let mut areas = memory::filled(0.0, floods.open.len())?;
+        let mut is_done = false;
+        while !is_done {
+            is_done = true;
+            for flood in 0..floods.open.len() {
+                if floods.sum(flood, &areas) >= least {
+                    continue;
+                }
+                if let Some(triangle) = floods.open[flood].pop() {
+                    is_done = false;
+                    areas[flood] += self.rest_area(triangle);
+                    for across in self.triangles[triangle].neighbours {
+                        if across != NONE {
+                            floods.reach(across, flood)?;
+                        }
+                    }
+                }
+            }
+        }
+        for edge in rim {
+            let [a, b] = [edge.triangle, edge.across].map(|triangle| floods.of(triangle));
+            if a != b && floods.sum(a, &areas).min(floods.sum(b, &areas)) < least {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
 }
 
 /// Sets of triangles that hang together, each growing.
@@ -73,6 +106,20 @@ impl Floods {
         (0..self.open.len())
             .filter(|&flood| self.met.lowest(flood) == flood)
             .count() as u32
+    }
+
+    /// The lowest of the floods that have met with that which has reached a triangle.
+    fn of(&mut self, triangle: u32) -> usize {
+        self.met.lowest(self.reached[&triangle])
+    }
+
+    /// What all floods that have met with this one have.
+    fn sum(&mut self, flood: usize, values: &[f64]) -> f64 {
+        let lowest = self.met.lowest(flood);
+        (0..values.len())
+            .filter(|&other| self.met.lowest(other) == lowest)
+            .map(|other| values[other])
+            .sum()
     }
 
     fn reach(&mut self, triangle: u32, flood: usize) -> Result<()> {

@@ -239,7 +239,7 @@ impl CutSurface {
         self.cells_at(a).any(|cell| cell.nodes.contains(&b))
     }
 
-    fn cells_at(&self, node: u32) -> impl Iterator<Item = &SurfaceCell> {
+    pub(crate) fn cells_at(&self, node: u32) -> impl Iterator<Item = &SurfaceCell> {
         let next = |&corner: &u32| {
             let next = self.cells[corner / 3].next[corner as usize % 3];
             (next != NONE).then_some(next)

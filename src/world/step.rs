@@ -43,13 +43,16 @@ impl World {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
         }
-        if !is_worth_sharing(&self.bodies) {
-            return self.step_with(dt, &Team::alone());
-        }
-        let mut threads = std::mem::take(&mut self.threads);
-        let result = threads.lead(|team| self.step_with(dt, team));
-        self.threads = threads;
-        result
+        let report = if is_worth_sharing(&self.bodies) {
+            let mut threads = std::mem::take(&mut self.threads);
+            let result = threads.lead(|team| self.step_with(dt, team));
+            self.threads = threads;
+            result?
+        } else {
+            self.step_with(dt, &Team::alone())?
+        };
+        self.tear();
+        Ok(report)
     }
 
     /// The step, with the threads that help.
@@ -298,8 +301,12 @@ fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: 
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit(substeps, carry, tools, team);
+                body.find_tears(team);
             }
-            _ => body.stay(),
+            _ => {
+                body.stay();
+                body.find_tears(team);
+            }
         }
     }
 }

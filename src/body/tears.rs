@@ -1,0 +1,177 @@
+//! Which springs tear after a step, the most loaded first.
+
+use super::bearing::{Bearing, sorted};
+use super::stretch::Stretch;
+use super::tearing::{TearReport, Tearing, Withheld};
+use super::{BodyDefinition, NodeOrder, Spring, Vectors};
+use crate::cutting::Changes;
+use crate::error::Result;
+use crate::memory;
+use crate::springs::{Change, ChosenKernel, Link, Rewiring};
+use crate::threads::Team;
+
+/// A spring beyond its limits.
+#[derive(Clone, Copy, Debug)]
+struct Beyond {
+    /// Its stretch as a multiple of the most that it may have.
+    load: f32,
+    callers: [u32; 2],
+    nodes: [u32; 2],
+}
+
+/// The springs of a body that tears, and those beyond their limits after the last step.
+#[derive(Debug)]
+pub(crate) struct Tears {
+    asked: Tearing,
+    pub(super) bearing: Bearing,
+    stretch: Stretch,
+    /// The most loaded first.
+    beyond: Vec<Beyond>,
+    /// How many of them have had their turn.
+    seen: usize,
+    /// Tears that were tried in this step.
+    tried: u32,
+    /// Nodes about the tears of this step.
+    torn: Vec<u32>,
+    pub(super) report: TearReport,
+}
+
+impl Tears {
+    /// With springs in the body's own numbers; `None`: the body is not to tear.
+    pub fn new(definition: &BodyDefinition, springs: &[Spring]) -> Result<Option<Box<Self>>> {
+        let asked = definition.tearing;
+        if asked.most_per_step == 0 {
+            return Ok(None);
+        }
+        let node_count = definition.positions.len();
+        let room = node_count + definition.spare_nodes as usize;
+        let mut tears = Self {
+            asked,
+            bearing: Bearing::new(springs, [asked.strain, asked.force], node_count, room)?,
+            stretch: Stretch::new(node_count, room)?,
+            beyond: Vec::new(),
+            seen: 0,
+            tried: 0,
+            torn: Vec::new(),
+            report: TearReport::default(),
+        };
+        tears.reserve(0)?;
+        Ok(Some(Box::new(tears)))
+    }
+
+    /// A tear that would part a piece with less area is not to be made, m².
+    pub fn smallest_piece(&self) -> f64 {
+        f64::from(self.asked.smallest_piece)
+    }
+
+    /// Makes room for so many more springs.
+    pub fn reserve(&mut self, springs: usize) -> Result<()> {
+        self.bearing.reserve(springs)?;
+        self.stretch.reserve(self.bearing.springs().len() + springs)
+    }
+
+    /// Nodes have come, for which there is room, up to so many in all.
+    pub fn grow(&mut self, node_count: usize) {
+        self.bearing.grow(node_count);
+        self.stretch.grow(node_count);
+    }
+
+    /// Gives a spring limits: see [`Bearing::set`].
+    pub fn set(&mut self, nodes: [u32; 2], limits: [Option<f32>; 2], link: &Link) {
+        self.bearing.set(nodes, limits, link);
+        self.stretch.forget();
+    }
+
+    /// A spring is no more.
+    pub fn remove(&mut self, nodes: [u32; 2]) {
+        self.bearing.remove(nodes);
+        self.stretch.forget();
+    }
+
+    /// Springs have other stiffnesses or rest lengths; limits stay.
+    pub fn change(&mut self, changes: &[Change]) {
+        self.bearing.change(changes);
+        self.stretch.forget();
+    }
+
+    /// A cut has changed springs: see [`Bearing::follow`].
+    pub fn follow(&mut self, changes: &Changes, rewiring: &Rewiring, order: &NodeOrder) {
+        self.bearing.follow(changes, rewiring, order);
+        self.stretch.forget();
+    }
+
+    /// Finds the springs beyond their limits that may be torn with this version of the topology, given what each is like. Without memory for all
+    /// of them some wait for the next step.
+    pub fn begin(
+        &mut self,
+        positions: &Vectors,
+        version: u64,
+        order: &NodeOrder,
+        link: impl Fn([u32; 2]) -> Option<Link>,
+        team: (ChosenKernel, &Team),
+    ) {
+        self.beyond.clear();
+        self.torn.clear();
+        (self.seen, self.tried) = (0, 0);
+        self.report = TearReport::default();
+        let springs = self.bearing.springs();
+        self.stretch.look(springs, positions, team);
+        for (at, spring) in self.stretch.found(springs) {
+            let [a, b] = spring.nodes.map(|node| positions.get(node as usize));
+            if a.distance_squared(b) <= spring.longest_squared {
+                continue;
+            }
+            if let Some(why) = self.bearing.withheld(at, version) {
+                self.report.withhold(why);
+                continue;
+            }
+            let rest = link(spring.nodes).map_or(0.0, |link| link.rest_length);
+            let beyond = Beyond {
+                load: (a.distance(b) - rest) / (spring.longest_squared.sqrt() - rest),
+                callers: sorted(spring.nodes.map(|node| order.caller(node))),
+                nodes: spring.nodes,
+            };
+            if memory::push(&mut self.beyond, beyond).is_err() {
+                self.report.waiting += 1;
+            }
+        }
+        self.beyond
+            .sort_unstable_by(|a, b| b.load.total_cmp(&a.load).then(a.callers.cmp(&b.callers)));
+    }
+
+    /// The next spring that is to tear.
+    pub fn next(&mut self) -> Option<[u32; 2]> {
+        while let Some(&Beyond { nodes, .. }) = self.beyond.get(self.seen) {
+            self.seen += 1;
+            if !self.bearing.has(nodes) {
+                continue;
+            }
+            let is_beside = nodes.iter().any(|node| self.torn.contains(node));
+            let most = self.asked.most_per_step;
+            // As many again may be tried in vain.
+            if is_beside || self.report.tears >= most || self.tried >= most.saturating_mul(2) {
+                self.report.waiting += 1;
+                continue;
+            }
+            self.tried += 1;
+            return Some(nodes);
+        }
+        None
+    }
+
+    /// A tear was made, through cells of these nodes.
+    pub fn made(&mut self, pieces_parted: u32, nodes: impl Iterator<Item = u32>) {
+        self.report.tears += 1;
+        self.report.pieces_parted += pieces_parted;
+        for node in nodes {
+            // Out of memory: another tear may come beside it.
+            let _ = memory::push(&mut self.torn, node);
+        }
+    }
+
+    /// A spring was not torn.
+    pub fn withhold(&mut self, nodes: [u32; 2], why: Withheld, version: u64) {
+        self.report.withhold(why);
+        self.bearing.withhold(nodes, why, version);
+    }
+}
