@@ -71,6 +71,11 @@ impl Tearing {
                 "most_tears is {most}: bodies with tetrahedra or cells do not tear"
             )));
         }
+        if definition.triangles.is_empty() {
+            return Err(Error::Unsupported(format!(
+                "most_tears is {most}: bodies without triangles do not tear"
+            )));
+        }
         Ok(())
     }
 }
