@@ -1,12 +1,15 @@
 //! A world: bodies and tools that are stepped together.
 
 mod attachments;
+mod blade;
+mod blades;
+mod resistance;
 mod step;
 mod sutures;
 
 use glam::{Quat, Vec3};
 
-use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, finite_vector, not_negative};
+use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, Stroke, finite_vector, not_negative};
 use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::diagnostics::StateHasher;
@@ -17,6 +20,9 @@ use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{RunTasks, Threads};
 pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 use attachments::{Attachment, Which};
+use blade::Blade;
+pub use blade::{BladeDefinition, BladeReport};
+pub use blades::BladeId;
 pub use step::StepReport;
 pub use sutures::{SutureDefinition, SutureReport};
 
@@ -84,6 +90,9 @@ pub struct World {
     attachments: Slots<Attachment>,
     /// What of that ended with the last step.
     slipped: Vec<AttachmentId>,
+    blades: Slots<Blade>,
+    /// How many threads to blades there ever were.
+    holds_made: u32,
 }
 
 impl World {
@@ -113,6 +122,8 @@ impl World {
             outcomes: Vec::new(),
             attachments: Slots::new("attachment"),
             slipped: Vec::new(),
+            blades: Slots::new("blade"),
+            holds_made: 0,
         })
     }
 
@@ -145,7 +156,7 @@ impl World {
         let body = Body::new(definition, needs)?;
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
         let id = self.bodies.insert(body)?;
-        match self.join_tissue(id) {
+        match self.join_tissue(id).and_then(|()| self.meet_blades(id)) {
             Ok(()) => Ok(BodyId(id)),
             Err(error) => {
                 self.bodies.remove(id)?;
@@ -163,6 +174,14 @@ impl World {
         }
         make_walks(&mut self.walks, place)?;
         self.tissue.get_or_insert_default().join(place, body)
+    }
+
+    /// Lets blades stand in a body.
+    fn meet_blades(&mut self, id: SlotId) -> Result<()> {
+        if self.blades.count() == 0 {
+            return Ok(());
+        }
+        self.make_ready_for_blades(self.bodies.place(id)?)
     }
 
     /// Removes a body, and with it what is attached of it.
@@ -201,12 +220,25 @@ impl World {
     /// the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no free place in a row of fixed
     /// length. [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
+        self.cut_along(body, sweep, None)
+    }
+
+    /// The same along a stroke of its own, or with the last of the body.
+    fn cut_along(&mut self, body: BodyId, sweep: &Sweep, stroke: Option<&mut Stroke>) -> Result<CutReport> {
         let place = self.bodies.place(body.0)?;
         let carried = self.attached_points(body, place)?;
         let mut moved = crate::memory::reserved(carried.len())?;
         let it = self.bodies.get_mut(body.0)?;
         let before = it.topology_version();
-        let report = it.cut(sweep)?;
+        let report = match stroke {
+            None => it.cut(sweep),
+            Some(stroke) => {
+                it.swap_stroke(stroke);
+                let report = it.cut(sweep);
+                it.swap_stroke(stroke);
+                report
+            }
+        }?;
         let which = Which {
             prefix: "",
             index: None,
@@ -463,6 +495,10 @@ impl World {
         }
         if let Some(tissue) = &self.tissue {
             tissue.bonds.hash(&mut hasher);
+        }
+        for (place, blade) in self.blades.iter() {
+            hasher.write_u64(place as u64);
+            blade.hash(&mut hasher);
         }
         hasher.finish()
     }

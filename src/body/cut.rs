@@ -82,7 +82,8 @@ impl Body {
     fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
         let first_triangle = cuttable.surface.triangles().len() as u32;
         let sweep = &cuttable.stroke.carried(sweep, &cuttable.surface, self.positions());
-        let near = self.triangles_near(cuttable, sweep)?;
+        let mut near = Vec::new();
+        self.triangles_near(cuttable, sweep, &mut near)?;
         let limits = Limits {
             nodes: self.node_room as u32,
             ..Limits::NONE

@@ -23,6 +23,8 @@ pub(super) struct Cuttable {
     pub density: f64,
     /// Whether every spring lies along an edge of a cell.
     pub springs_are_edges: bool,
+    /// What it takes to cut it, J/m.
+    pub toughness: f32,
 }
 
 impl Cuttable {
@@ -70,6 +72,7 @@ impl Cuttable {
             log: ChangeLog::default(),
             stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
+            toughness: definition.toughness,
         })))
     }
 }
@@ -143,13 +146,12 @@ impl Search {
         })
     }
 
-    /// The triangles that a blade may have met, given the boxes of tiles and where those began.
-    fn near(&self, body: &Body, surface: &CutSurface, swept: &Bounds) -> Result<Vec<u32>> {
+    /// Adds the triangles that a blade may have met.
+    fn near(&self, body: &Body, surface: &CutSurface, swept: &Bounds, near: &mut Vec<u32>) -> Result<()> {
         let positions = body.positions();
         let origin = body.origin.as_vec3();
         // What was rounded is in the box all the same.
         let slack = 4.0 * f32::EPSILON * (origin.abs().max_element() + body.reach());
-        let mut near = Vec::new();
         for home in &self.homes {
             let tiles = home.tiles.iter().map(|&tile| body.boxes[tile as usize]);
             let tiles = tiles.fold(Bounds::EMPTY, |all, tile| all.and(&tile)).extended(slack);
@@ -166,11 +168,11 @@ impl Search {
                 let corners = surface.corner_points(triangle);
                 let places = corners.map(|corner| positions[corner as usize]);
                 if Bounds::of(places.into_iter()).overlaps(swept) {
-                    memory::push(&mut near, triangle)?;
+                    memory::push(near, triangle)?;
                 }
             }
         }
-        Ok(near)
+        Ok(())
     }
 
     /// Makes room for what a cut adds, so that listing it cannot fail.
@@ -213,10 +215,10 @@ impl Search {
 }
 
 impl Body {
-    /// The triangles whose box a sweep's meets.
-    pub(super) fn triangles_near(&self, cuttable: &Cuttable, sweep: &Sweep) -> Result<Vec<u32>> {
+    /// Adds the triangles whose box a sweep's meets.
+    pub(super) fn triangles_near(&self, cuttable: &Cuttable, sweep: &Sweep, near: &mut Vec<u32>) -> Result<()> {
         let ends = sweep.start.into_iter().chain(sweep.end);
-        cuttable.search.near(self, &cuttable.surface, &Bounds::of(ends))
+        cuttable.search.near(self, &cuttable.surface, &Bounds::of(ends), near)
     }
 
     /// How far it reaches from where its coordinates begin, m.

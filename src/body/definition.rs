@@ -181,6 +181,9 @@ pub struct BodyDefinition<'a> {
     /// A surface that is to be cut is one of triangles turned one way all over, of which two at most have an edge and those about a node hang
     /// together.
     pub spare_nodes: u32,
+    /// What a blade ([`World::create_blade`](crate::World::create_blade)) spends to cut it, J for each m of the cut in the rest shape: the
+    /// fracture toughness of the material, J/m², times the thickness of the surface. At least 0; 0: it is cut for nothing.
+    pub toughness: f32,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -221,6 +224,7 @@ impl Default for BodyDefinition<'_> {
             accuracy: 0.0,
             mass_scaling: 0.001,
             spare_nodes: 0,
+            toughness: 0.0,
         }
     }
 }
@@ -286,6 +290,7 @@ impl BodyDefinition<'_> {
         self.contact.check()?;
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
+        not_negative("toughness", self.toughness)?;
         if let Some(material) = &self.material {
             material.check(self)?;
         }

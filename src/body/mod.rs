@@ -1,6 +1,7 @@
 //! A body: nodes with mass, joined by springs.
 
 mod bindings;
+mod blade;
 #[cfg(test)]
 mod bound_tests;
 mod change_log;
@@ -72,6 +73,7 @@ pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use state::State;
+pub(crate) use stroke::Stroke;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
 ///

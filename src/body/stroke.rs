@@ -3,12 +3,13 @@
 use glam::Vec3;
 
 use crate::cutting::{CutSurface, Sweep};
+use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 
 /// Where a blade stopped.
 #[derive(Debug, Default)]
-pub(super) struct Stroke {
+pub(crate) struct Stroke {
     /// The blade's edge.
     edge: Option<[Vec3; 2]>,
     /// The vertices where it stood in the surface, which may lie a little beside it, and its points next to them.
@@ -16,6 +17,19 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
+    /// The vertices where it stands in the surface, and its points next to them.
+    pub fn ends(&self) -> &[(u32, Vec3)] {
+        &self.ends
+    }
+
+    /// Adds the bits that where a cut goes on depends on.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for point in self.edge.iter().flatten().chain(self.ends.iter().map(|(_, point)| point)) {
+            hasher.write_floats(&point.to_array());
+        }
+        self.ends.iter().for_each(|&(vertex, _)| hasher.write_u64(u64::from(vertex)));
+    }
+
     /// The sweep as it is in the tissue now: where it begins just where the last ended it begins where those vertices are now.
     pub fn carried(&self, sweep: &Sweep, surface: &CutSurface, positions: &[Vec3]) -> Sweep {
         if self.edge != Some(sweep.start) || self.ends.is_empty() {

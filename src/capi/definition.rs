@@ -226,8 +226,9 @@ pub struct sinew_body_def {
     /// cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
     /// have an edge and those about a node hang together. See sinew_body_cut.
     pub spare_nodes: u32,
-    /// 0.
-    pub reserved3: u32,
+    /// J/m, at least 0: what a blade (sinew_blade_create) spends for each metre of a cut, at rest: the fracture toughness of the material, J/m^2,
+    /// times the thickness of the surface; default 0: it is cut for nothing.
+    pub toughness: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -313,7 +314,7 @@ impl sinew_body_def {
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
             spare_nodes: 0,
-            reserved3: 0,
+            toughness: 0.0,
         }
     }
 
@@ -421,7 +422,6 @@ impl sinew_body_def {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
         memory::reserved("reserved2", self.reserved2)?;
-        memory::reserved("reserved3", self.reserved3)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -490,6 +490,7 @@ impl sinew_body_def {
                 pressure: self.pressure,
                 contact: self.contact()?,
                 spare_nodes: self.spare_nodes,
+                toughness: self.toughness,
             })
         }
     }

@@ -17,6 +17,7 @@ mod copies;
 mod crossing;
 mod crumbs;
 mod cut;
+mod met;
 mod open;
 mod parted;
 mod pieces;
@@ -29,4 +30,5 @@ mod union;
 
 pub use changes::{BoundPoint, Changes, PieceOfCell, PieceOfNode, PieceOfSpring, RimEdge, Source};
 pub use cut::{Limits, Sweep};
+pub(crate) use met::Met;
 pub use surface::{CutSurface, SurfaceCell, SurfaceTriangle, SurfaceVertex};

@@ -1,0 +1,438 @@
+//! Blades: edges that cut what they are moved through, and feel it.
+//!
+//! A blade's *proxy* in a body is the edge that its tissue is cut to; the true edge is ahead of it on a spring (Mahvash, Hayward 2001). Through a step
+//! the spring is a thread between the tissue where the proxy stands and the true edge, which is led along its way: an impulse of each substep, found
+//! implicitly, so that neither the spring nor the step can be too much for the tissue. It pulls no harder than the tissue resists. With the step
+//! the proxy goes on, and what is between its places is cut.
+
+use glam::{DVec3, Quat, Vec3};
+
+use super::attachments::Which;
+use super::blade::{Blade, BladeDefinition, BladeReport, Hold, MOST_HOLDS, Proxy, Stand, edge_behind};
+use super::resistance::Resistance;
+use super::{Anchor, BodyId, SurfacePoint, World, make_walks};
+use crate::contact::{Lead, Pose, Thread};
+use crate::cutting::{Met, Sweep};
+use crate::error::Result;
+use crate::slots::{SlotId, Slots};
+
+/// A blade of a world.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct BladeId(pub(crate) SlotId);
+
+/// Where a proxy is to be held: a point of the tissue, and that of the proxy next to it.
+type Held = (Anchor, DVec3);
+
+/// An edge that turned back through no more than this part of a cell is out of the tissue.
+const TURNED_BACK: f64 = 0.1;
+
+impl World {
+    /// Adds a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it ([`BodyDefinition::spare_nodes`]) as
+    /// [`World::cut`] does, and feels their [`toughness`](crate::BodyDefinition::toughness). It is an edge alone: what has a body needs a tool beside it.
+    ///
+    /// Tissue that the edge meets gives way until the edge is so far ahead, on the spring of [`BladeDefinition::stiffness`], that this pulls as hard
+    /// as the tissue resists: by its toughness for each metre that is cut, in the rest shape. From then on it is cut, at the end of each step, as far as
+    /// keeps both equal; so the work of the blade is the toughness times the length that is cut, and what the spring stores (Mahvash, Hayward 2001).
+    /// What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself meets nothing, nor
+    /// does one that goes back through its cut. Tissue of toughness 0 is cut just where the edge went.
+    ///
+    /// A body that a blade stands in takes its substeps as one that is attached does. A step in which a blade goes through tissue may allocate.
+    /// Each step in which it advances through a triangle may add a point to that, but none nearer than 5 % of its shortest edge to another.
+    ///
+    /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): something in the definition is out of its range.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn create_blade(&mut self, definition: &BladeDefinition) -> Result<BladeId> {
+        let blade = Blade::new(definition)?;
+        for place in 0..self.bodies.places() {
+            self.make_ready_for_blades(place)?;
+        }
+        Ok(BladeId(self.blades.insert(blade)?))
+    }
+
+    /// Removes a blade. What it has cut stays.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId).
+    pub fn destroy_blade(&mut self, blade: BladeId) -> Result<()> {
+        let mut blade = self.blades.remove(blade.0)?;
+        for proxy in &mut blade.proxies {
+            self.let_go_of_blade(proxy);
+        }
+        Ok(())
+    }
+
+    /// Moves a blade to `position`, m, over the next step, straight and evenly, and turns it to `orientation`, `None`: it stays as it is.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId). [`Error::InvalidArgument`](crate::Error::InvalidArgument): a number is not finite, a coordinate is
+    /// further than 1e9 m from 0, or the orientation is zero.
+    pub fn set_blade_pose(&mut self, blade: BladeId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
+        let blade = self.blades.get_mut(blade.0)?;
+        let pose = blade.target.unwrap_or(blade.pose);
+        let target = Pose {
+            position,
+            orientation: orientation.unwrap_or(pose.orientation),
+        };
+        blade.target = Some(target.checked()?);
+        Ok(())
+    }
+
+    /// What a blade did and felt in the last step.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId).
+    pub fn blade_report(&self, blade: BladeId) -> Result<&BladeReport> {
+        Ok(&self.blades.get(blade.0)?.report)
+    }
+
+    /// Makes room for a blade to stand in the body at this place, if it can be cut.
+    pub(super) fn make_ready_for_blades(&mut self, place: usize) -> Result<()> {
+        let Some(body) = self.bodies.at_mut(place).filter(|body| body.toughness().is_some()) else {
+            return Ok(());
+        };
+        body.reserve_bonds()?;
+        make_walks(&mut self.walks, place)?;
+        self.tissue.get_or_insert_default().reserve_bonds([place; 2], MOST_HOLDS)
+    }
+
+    /// Leads what holds tissue to blades along their ways in the next step.
+    pub(super) fn lead_blades(&mut self) {
+        let Self {
+            blades,
+            tissue,
+            bodies,
+            ..
+        } = self;
+        let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
+            return;
+        };
+        for (_, blade) in blades.iter_mut() {
+            let edges = blade.edges();
+            for hold in blade.proxies.iter_mut().flat_map(|proxy| &mut proxy.holds) {
+                let Some(place) = bonds.place_of(bodies, hold.id) else {
+                    continue;
+                };
+                let point = place - hold.offset;
+                let [from, to] = edges.map(|edge| Stand::next_to(point, edge));
+                // One that goes back beyond the proxy leaves it behind.
+                let to = if from.lag.dot(to.lag) < 0.0 { point } else { to.foot() };
+                hold.way = Lead { from: from.foot(), to };
+                if hold.way.from.is_finite() && hold.way.to.is_finite() {
+                    bonds.lead(hold.id, hold.way.moved(hold.offset));
+                }
+            }
+        }
+    }
+
+    /// Has blades be where the step led them, feel what it did to them, and cut.
+    pub(super) fn move_blades(&mut self) {
+        if self.blades.count() == 0 {
+            return;
+        }
+        let mut blades = std::mem::replace(&mut self.blades, Slots::new("blade"));
+        for (_, blade) in blades.iter_mut() {
+            let [start, end] = blade.edges();
+            self.feel(blade);
+            blade.proxies.retain(|proxy| self.bodies.get(proxy.body.0).is_ok());
+            for place in 0..self.bodies.places() {
+                if let Some(id) = self.bodies.id_at(place)
+                    && let Err(error) = self.follow_blade(blade, BodyId(id), [start, end])
+                {
+                    blade.report.refused = Some(error);
+                }
+            }
+        }
+        self.blades = blades;
+    }
+
+    /// Reports what the step did to a blade, which is at its end from now on.
+    fn feel(&self, blade: &mut Blade) {
+        let before = blade.pose.position.as_dvec3();
+        blade.pose = blade.target.take().unwrap_or(blade.pose);
+        let middle = 0.5 * (before + blade.pose.position.as_dvec3());
+        let (mut force, mut torque, mut work) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        for hold in blade.proxies.iter().flat_map(|proxy| &proxy.holds) {
+            let bonds = self.tissue.as_ref().map(|tissue| &tissue.bonds);
+            let on_tissue = bonds.map_or(Vec3::ZERO, |bonds| bonds.force_of(hold.id)).as_dvec3();
+            let Lead { from, to } = hold.way;
+            force -= on_tissue;
+            torque -= (0.5 * (from + to) - middle).cross(on_tissue);
+            work += on_tissue.dot(to - from);
+        }
+        // Finite, whatever the step's length.
+        let finite = |sum: DVec3| sum.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
+        blade.report = BladeReport {
+            force: finite(force),
+            torque: finite(torque),
+            work,
+            ..BladeReport::default()
+        };
+    }
+
+    /// Has the proxy of a blade in a body follow it, and cuts what is between. Where it fails the proxy stays.
+    fn follow_blade(&mut self, blade: &mut Blade, id: BodyId, [start, end]: [[Vec3; 2]; 2]) -> Result<()> {
+        let body = self.bodies.get(id.0)?;
+        let Some(toughness) = body.toughness() else {
+            return Ok(());
+        };
+        let is_met = blade.filter.meets(body.contact.filter);
+        let known = blade.proxies.iter().position(|proxy| proxy.body == id);
+        if !is_met {
+            known.into_iter().for_each(|at| self.let_go_of_blade(&mut blade.proxies[at]));
+            return Ok(());
+        }
+        if toughness > 0.0 {
+            return self.push_blade(blade, id, f64::from(toughness), [start, end]);
+        }
+        let sweep = Sweep { start, end };
+        if start == end {
+            return Ok(());
+        }
+        body.meet_blade(&sweep, &mut blade.near, &mut blade.met)?;
+        let stands = known.is_some_and(|at| !blade.proxies[at].stroke.ends().is_empty());
+        if !blade.near.is_empty() || stands {
+            let at = blade.proxy(id)?;
+            blade.report.length += self.cut_along(id, &sweep, Some(&mut blade.proxies[at].stroke))?.length;
+        }
+        Ok(())
+    }
+
+    /// The same where the tissue resists.
+    fn push_blade(
+        &mut self,
+        blade: &mut Blade,
+        id: BodyId,
+        toughness: f64,
+        [start, end]: [[Vec3; 2]; 2],
+    ) -> Result<()> {
+        let known = blade.proxies.iter().position(|proxy| proxy.body == id);
+        let mut stands = [None; MOST_HOLDS];
+        if let Some(at) = known {
+            self.leave_behind(&mut blade.proxies[at], end, &mut stands);
+        }
+        let stands = stands.into_iter().flatten();
+        let mut standing = [Stand::next_to(DVec3::ZERO, end); MOST_HOLDS];
+        let count = standing.iter_mut().zip(stands).map(|(place, stand)| *place = stand).count();
+        let standing = &standing[..count];
+        let from = if count > 0 { edge_behind(standing, end) } else { start };
+        let sweep = Sweep { start: from, end };
+        let body = self.bodies.get(id.0)?;
+        body.meet_blade(&sweep, &mut blade.near, &mut blade.met)?;
+        let met = &blade.met[..];
+        let mut lag = standing.iter().map(|stand| stand.lag).sum::<DVec3>();
+        let mut way = standing.iter().map(|stand| stand.lag.length()).sum::<f64>() / count.max(1) as f64;
+        if count == 0 {
+            lag = met.iter().min_by(|a, b| a.times[0].total_cmp(&b.times[0])).map_or(DVec3::ZERO, |first| {
+                across(&sweep, first.times[0], first.places[0])
+            });
+            way = lag.length();
+        }
+        let force = known.map(|at| &blade.proxies[at]).filter(|_| count > 0).map(|proxy| proxy.force);
+        let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].forward.dot(lag) < 0.0);
+        let is_out = turns_back && met.iter().map(|part| part.length - TURNED_BACK * part.size).sum::<f64>() <= 0.0;
+        if !(way > 0.0) || is_out || met.is_empty() {
+            known.into_iter().for_each(|at| self.let_go_of_blade(&mut blade.proxies[at]));
+            return Ok(());
+        }
+        let resistance = Resistance {
+            stiffness: blade.stiffness,
+            toughness,
+        };
+        let advance = resistance.advance(met, way, force, &mut blade.knots)?;
+        let at = blade.proxy(id)?;
+        let (proxy, report, met) = (&mut blade.proxies[at], &mut blade.report, &blade.met[..]);
+        let mut result = Ok(());
+        let mut part = advance.part;
+        let mut resists = advance.force;
+        let mut points: [Option<Held>; MOST_HOLDS] = [None; MOST_HOLDS];
+        if advance.cuts {
+            let reached = [0, 1].map(|k| from[k].lerp(end[k], part as f32));
+            let reached = if part == 1.0 { end } else { reached };
+            let body = self.bodies.get(id.0)?;
+            let before = body.topology_version();
+            let mut material = [None; MOST_HOLDS];
+            for (place, (anchor, point)) in material.iter_mut().zip(points_at(met, part)) {
+                *place = body.material_point(&anchor).map(|material| (material, point));
+            }
+            let sweep = Sweep {
+                start: proxy.last.unwrap_or(from),
+                end: reached,
+            };
+            match self.cut_along(id, &sweep, Some(&mut proxy.stroke)) {
+                Ok(done) => {
+                    report.length += done.length;
+                    proxy.last = Some(reached);
+                    let body = self.bodies.get(id.0)?;
+                    let ends = proxy.stroke.ends().iter().filter_map(|&(vertex, point)| {
+                        let node = body.point_of_vertex(vertex)?;
+                        Some((Anchor::Node(node), point.as_dvec3()))
+                    });
+                    fill(&mut points, ends);
+                    if points[0].is_none() && count == 0 {
+                        let carried = material.into_iter().flatten().filter_map(|(material, point)| {
+                            let anchor = body.surface_point(&material, before)?;
+                            Some((Anchor::Point(anchor), point))
+                        });
+                        fill(&mut points, carried);
+                    }
+                }
+                Err(error) => {
+                    result = Err(error);
+                    part = if count > 0 { 0.0 } else { first_time(met) };
+                    resists = Some(force.unwrap_or(toughness));
+                }
+            }
+        }
+        if count == 0 && !(advance.cuts && result.is_ok()) {
+            fill(&mut points, points_at(met, part).map(|(anchor, point)| (Anchor::Point(anchor), point)));
+        }
+        let Some(resists) = resists else {
+            self.let_go_of_blade(proxy);
+            return result;
+        };
+        proxy.force = resists;
+        proxy.forward = lag;
+        report.lag = report.lag.max(way * (1.0 - part));
+        // A proxy that went on where tissue was open already is held by the same points.
+        for (hold, stand) in proxy.holds.iter_mut().zip(standing) {
+            hold.offset -= part * stand.lag;
+        }
+        self.hold_blade(proxy, &points, end, blade.stiffness)?;
+        result
+    }
+
+    /// Where the points of a proxy are by now, against the true edge; lets go of those that it is not beside any more.
+    fn leave_behind(&mut self, proxy: &mut Proxy, edge: [Vec3; 2], stands: &mut [Option<Stand>; MOST_HOLDS]) {
+        let Self { bodies, tissue, .. } = self;
+        let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
+            return;
+        };
+        let mut count = 0;
+        proxy.holds.retain(|hold| {
+            let place = bonds.place_of(bodies, hold.id);
+            let stand = place.map(|place| Stand::next_to(place - hold.offset, edge));
+            let Some(stand) = stand.filter(Stand::is_beside) else {
+                bonds.end(bodies, hold.id);
+                return false;
+            };
+            stands[count] = Some(stand);
+            count += 1;
+            true
+        });
+    }
+
+    /// Holds a proxy at these points, where there are any, else where it was held, on a spring of this stiffness between all of them.
+    fn hold_blade(
+        &mut self,
+        proxy: &mut Proxy,
+        points: &[Option<Held>; MOST_HOLDS],
+        edge: [Vec3; 2],
+        stiffness: f64,
+    ) -> Result<()> {
+        let place = self.bodies.place(proxy.body.0)?;
+        self.make_ready_for_blades(place)?;
+        let which = Which {
+            prefix: "",
+            index: None,
+        };
+        let mut bounds = [None; MOST_HOLDS];
+        for (bound, (anchor, _)) in bounds.iter_mut().zip(points.iter().flatten()) {
+            *bound = Some(self.bound(proxy.body, which, anchor)?);
+        }
+        if proxy.holds.is_empty() {
+            self.bodies.get_mut(proxy.body.0)?.begin_bonds();
+        }
+        let Self {
+            bodies,
+            tissue,
+            holds_made,
+            ..
+        } = self;
+        let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
+            return Ok(());
+        };
+        let count = bounds.iter().flatten().count();
+        if count > 0 {
+            for hold in proxy.holds.drain(count.min(proxy.holds.len())..) {
+                bonds.end(bodies, hold.id);
+            }
+        }
+        for (index, (bound, held)) in bounds.into_iter().zip(points).enumerate() {
+            let (Some(bound), Some((_, point))) = (bound, held) else {
+                break;
+            };
+            if index == proxy.holds.len() {
+                *holds_made = holds_made.wrapping_add(1);
+                proxy.holds.push(Hold::new(*holds_made));
+            }
+            let hold = &mut proxy.holds[index];
+            bonds.hold(hold.id, bound)?;
+            hold.offset = bonds.place_of(bodies, hold.id).unwrap_or(*point) - *point;
+        }
+        let share = proxy.holds.len() as f64;
+        for hold in &mut proxy.holds {
+            let place = bonds.place_of(bodies, hold.id).unwrap_or_default();
+            let foot = Stand::next_to(place - hold.offset, edge).foot();
+            hold.way = Lead { from: foot, to: foot };
+            let thread = Thread::led(hold.way.moved(hold.offset), share / stiffness, proxy.force / share);
+            bonds.pull(hold.id, thread);
+        }
+        bonds.settle();
+        Ok(())
+    }
+
+    /// Nothing is in the way of a blade any more in a body.
+    fn let_go_of_blade(&mut self, proxy: &mut Proxy) {
+        let Self { bodies, tissue, .. } = self;
+        for hold in proxy.holds.drain(..) {
+            if let Some(tissue) = tissue {
+                tissue.bonds.end(bodies, hold.id);
+            }
+        }
+        proxy.last = None;
+        proxy.force = 0.0;
+    }
+}
+
+/// How far the edge has to go across itself from where it passes a place, m.
+fn across(sweep: &Sweep, time: f64, place: DVec3) -> DVec3 {
+    let [start, end] = [sweep.start, sweep.end].map(|edge| edge.map(|end| end.as_dvec3()));
+    let edge = [0, 1].map(|k| start[k].lerp(end[k], time));
+    let way = edge[1] - edge[0];
+    let along = ((place - edge[0]).dot(way) / way.length_squared()).clamp(0.0, 1.0);
+    let gone = (end[0] - start[0]).lerp(end[1] - start[1], along);
+    let along = (end[1] - end[0]).normalize_or_zero();
+    let across = gone - along * gone.dot(along);
+    if across.is_finite() { across } else { DVec3::ZERO }
+}
+
+fn first_time(met: &[Met]) -> f64 {
+    met.iter().map(|part| part.times[0]).fold(1.0, f64::min)
+}
+
+/// The points of the surface in which the edge stands when it has gone a part of its way.
+fn points_at(met: &[Met], time: f64) -> impl Iterator<Item = (SurfacePoint, DVec3)> {
+    let is_there = move |part: &&Met| part.times[0] <= time && time <= part.times[1];
+    met.iter().filter(is_there).map(move |part| {
+        let [from, to] = part.times;
+        let along = if to > from { (time - from) / (to - from) } else { 0.0 };
+        let weights = [0, 1, 2].map(|k| {
+            let [a, b] = part.weights.map(|weights| weights[k]);
+            (a + (b - a) * along) as f32
+        });
+        let point = SurfacePoint {
+            triangle: part.triangle,
+            weights,
+        };
+        (point, part.places[0].lerp(part.places[1], along))
+    })
+}
+
+fn fill(points: &mut [Option<Held>; MOST_HOLDS], held: impl Iterator<Item = Held>) {
+    for (place, held) in points.iter_mut().zip(held) {
+        *place = Some(held);
+    }
+}
