@@ -90,6 +90,9 @@ pub(super) struct Proxy {
     pub stroke: Stroke,
     /// The edge that the last cut came to, while it stands there.
     pub last: Option<[Vec3; 2]>,
+    /// How far it has gone through tissue since that, or since it met the tissue, m, and from where.
+    pub uncut: f64,
+    pub behind: DVec3,
     /// What it is held by; none: nothing resists.
     pub holds: Vec<Hold>,
     /// What resists, N, and where to.
@@ -180,10 +183,13 @@ impl Blade {
     pub fn hash(&self, hasher: &mut StateHasher) {
         hasher.write_u64(self.stiffness.to_bits());
         self.filter.hash(hasher);
+        for end in self.edge {
+            hasher.write_floats(&end.to_array());
+        }
         hasher.write_u64(u64::from(self.target.is_some()));
-        for [from, to] in self.edges() {
-            hasher.write_floats(&from.to_array());
-            hasher.write_floats(&to.to_array());
+        for pose in [Some(self.pose), self.target].into_iter().flatten() {
+            hasher.write_floats(&pose.position.to_array());
+            hasher.write_floats(&pose.orientation.to_array());
         }
         for proxy in &self.proxies {
             hasher.write_u64(proxy.body.0.index1.into());
@@ -192,12 +198,14 @@ impl Blade {
                 hasher.write_floats(&end.to_array());
             }
             let offsets = proxy.holds.iter().map(|hold| hold.offset);
-            for vector in offsets.chain([proxy.forward]) {
+            for vector in offsets.chain([proxy.forward, proxy.behind]) {
                 for value in vector.to_array() {
                     hasher.write_u64(value.to_bits());
                 }
             }
-            hasher.write_u64(proxy.force.to_bits());
+            for value in [proxy.force, proxy.uncut] {
+                hasher.write_u64(value.to_bits());
+            }
         }
     }
 }

@@ -26,18 +26,24 @@ type Held = (Anchor, DVec3);
 /// An edge that turned back through no more than this part of a cell is out of the tissue.
 const TURNED_BACK: f64 = 0.1;
 
+/// A proxy that stands in tissue is followed by cuts of no less than this part of a cell: shorter ones would zigzag from what they snap to.
+const SHORTEST_CUT: f64 = 0.2;
+
 impl World {
     /// Adds a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it ([`BodyDefinition::spare_nodes`]) as
     /// [`World::cut`] does, and feels their [`toughness`](crate::BodyDefinition::toughness). It is an edge alone: what has a body needs a tool beside it.
     ///
     /// Tissue that the edge meets gives way until the edge is so far ahead, on the spring of [`BladeDefinition::stiffness`], that this pulls as hard
-    /// as the tissue resists: by its toughness for each metre that is cut, in the rest shape. From then on it is cut, at the end of each step, as far as
-    /// keeps both equal; so the work of the blade is the toughness times the length that is cut, and what the spring stores (Mahvash, Hayward 2001).
-    /// What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself meets nothing, nor
-    /// does one that goes back through its cut. Tissue of toughness 0 is cut just where the edge went.
+    /// as the tissue resists: by its toughness for each metre that is cut, in the rest shape. From then on its proxy follows, at the end of each
+    /// step, as far as keeps both equal; so the work of the blade is the toughness times the length that is cut, and what the spring stores
+    /// (Mahvash, Hayward 2001). What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself
+    /// meets nothing, nor does one that goes back through its cut.
+    ///
+    /// The cut is made where the proxy went, by a fifth of a triangle's shortest edge at a time and to its end where it leaves the tissue; so a triangle
+    /// that is passed through takes some ten [`spare_nodes`](crate::BodyDefinition::spare_nodes). Tissue of toughness 0 is cut with each step,
+    /// just where the edge went. Where a cut fails the proxy stays and pulls on, as hard as the tissue resisted: [`BladeReport::refused`].
     ///
     /// A body that a blade stands in takes its substeps as one that is attached does. A step in which a blade goes through tissue may allocate.
-    /// Each step in which it advances through a triangle may add a point to that, but none nearer than 5 % of its shortest edge to another.
     ///
     /// [`BodyDefinition::spare_nodes`]: crate::BodyDefinition::spare_nodes
     ///
@@ -209,20 +215,32 @@ impl World {
         [start, end]: [[Vec3; 2]; 2],
     ) -> Result<()> {
         let known = blade.proxies.iter().position(|proxy| proxy.body == id);
-        let mut stands = [None; MOST_HOLDS];
-        if let Some(at) = known {
-            self.leave_behind(&mut blade.proxies[at], end, &mut stands);
-        }
-        let stands = stands.into_iter().flatten();
         let mut standing = [Stand::next_to(DVec3::ZERO, end); MOST_HOLDS];
-        let count = standing.iter_mut().zip(stands).map(|(place, stand)| *place = stand).count();
+        let count = known.map_or(0, |at| self.stands_of(&blade.proxies[at], end, &mut standing));
         let standing = &standing[..count];
         let from = if count > 0 { edge_behind(standing, end) } else { start };
+        if let Some(at) = known
+            && count > 0
+            && !standing.iter().any(Stand::is_beside)
+        {
+            // It has left the tissue along itself.
+            return self.end_stroke(&mut blade.proxies[at], from, &mut blade.report);
+        }
+        let mut lag = standing.iter().map(|stand| stand.lag).sum::<DVec3>() / count.max(1) as f64;
+        let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].forward.dot(lag) < 0.0);
+        if let Some(at) = known
+            && turns_back
+            && blade.proxies[at].uncut > 0.0
+            && let Err(error) = self.cut_to(&mut blade.proxies[at], from, from, &mut blade.report)
+        {
+            self.let_go_of_blade(&mut blade.proxies[at]);
+            return Err(error);
+        }
         let sweep = Sweep { start: from, end };
         let body = self.bodies.get(id.0)?;
         body.meet_blade(&sweep, &mut blade.near, &mut blade.met)?;
         let met = &blade.met[..];
-        let mut lag = standing.iter().map(|stand| stand.lag).sum::<DVec3>();
+        let size = met.iter().map(|part| part.size).fold(0.0, f64::max);
         let mut way = standing.iter().map(|stand| stand.lag.length()).sum::<f64>() / count.max(1) as f64;
         if count == 0 {
             lag = met.iter().min_by(|a, b| a.times[0].total_cmp(&b.times[0])).map_or(DVec3::ZERO, |first| {
@@ -230,73 +248,69 @@ impl World {
             });
             way = lag.length();
         }
-        let force = known.map(|at| &blade.proxies[at]).filter(|_| count > 0).map(|proxy| proxy.force);
-        let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].forward.dot(lag) < 0.0);
-        let is_out = turns_back && met.iter().map(|part| part.length - TURNED_BACK * part.size).sum::<f64>() <= 0.0;
+        let held = known.map(|at| &blade.proxies[at]).filter(|_| count > 0).map(|proxy| proxy.force);
+        let is_out = turns_back && met.iter().map(|part| part.length).sum::<f64>() <= TURNED_BACK * size;
         if !(way > 0.0) || is_out || met.is_empty() {
-            known.into_iter().for_each(|at| self.let_go_of_blade(&mut blade.proxies[at]));
-            return Ok(());
+            return match known {
+                Some(at) => self.end_stroke(&mut blade.proxies[at], from, &mut blade.report),
+                None => Ok(()),
+            };
         }
         let resistance = Resistance {
             stiffness: blade.stiffness,
             toughness,
         };
-        let advance = resistance.advance(met, way, force, &mut blade.knots)?;
+        let advance = resistance.advance(met, way, held, &mut blade.knots)?;
         let at = blade.proxy(id)?;
         let (proxy, report, met) = (&mut blade.proxies[at], &mut blade.report, &blade.met[..]);
-        let mut result = Ok(());
-        let mut part = advance.part;
-        let mut resists = advance.force;
+        let mut begins = 0.0;
+        if count == 0 {
+            begins = first_time(met);
+            self.let_go_of_blade(proxy);
+        }
+        let (mut part, mut force) = (advance.part, advance.force);
+        let is_due = proxy.uncut + way * (part - begins) >= SHORTEST_CUT * size;
+        let is_through = force.is_none() && (advance.cuts || proxy.uncut > 0.0);
+        let mut has_cut = advance.cuts && is_due || is_through;
         let mut points: [Option<Held>; MOST_HOLDS] = [None; MOST_HOLDS];
-        if advance.cuts {
+        let mut result = Ok(());
+        if has_cut {
             let reached = [0, 1].map(|k| from[k].lerp(end[k], part as f32));
             let reached = if part == 1.0 { end } else { reached };
-            let body = self.bodies.get(id.0)?;
-            let before = body.topology_version();
-            let mut material = [None; MOST_HOLDS];
-            for (place, (anchor, point)) in material.iter_mut().zip(points_at(met, part)) {
-                *place = body.material_point(&anchor).map(|material| (material, point));
-            }
-            let sweep = Sweep {
-                start: proxy.last.unwrap_or(from),
-                end: reached,
-            };
-            match self.cut_along(id, &sweep, Some(&mut proxy.stroke)) {
-                Ok(done) => {
-                    report.length += done.length;
-                    proxy.last = Some(reached);
+            match self.cut_to(proxy, from, reached, report) {
+                Ok(()) => {
                     let body = self.bodies.get(id.0)?;
                     let ends = proxy.stroke.ends().iter().filter_map(|&(vertex, point)| {
                         let node = body.point_of_vertex(vertex)?;
                         Some((Anchor::Node(node), point.as_dvec3()))
                     });
                     fill(&mut points, ends);
-                    if points[0].is_none() && count == 0 {
-                        let carried = material.into_iter().flatten().filter_map(|(material, point)| {
-                            let anchor = body.surface_point(&material, before)?;
-                            Some((Anchor::Point(anchor), point))
-                        });
-                        fill(&mut points, carried);
-                    }
                 }
                 Err(error) => {
+                    // It stays where it was.
                     result = Err(error);
-                    part = if count > 0 { 0.0 } else { first_time(met) };
-                    resists = Some(force.unwrap_or(toughness));
+                    has_cut = false;
+                    part = begins;
+                    force = Some(held.unwrap_or(toughness));
                 }
             }
         }
-        if count == 0 && !(advance.cuts && result.is_ok()) {
-            fill(&mut points, points_at(met, part).map(|(anchor, point)| (Anchor::Point(anchor), point)));
-        }
-        let Some(resists) = resists else {
+        let Some(force) = force else {
             self.let_go_of_blade(proxy);
             return result;
         };
-        proxy.force = resists;
+        if !has_cut {
+            proxy.uncut += way * (part - begins);
+            proxy.behind += lag * (part - begins);
+        }
+        if count == 0 && !has_cut {
+            fill(&mut points, points_at(met, part).map(|(anchor, point)| (Anchor::Point(anchor), point)));
+            // What comes before the tissue is part of the first cut.
+            proxy.behind += lag * begins;
+        }
+        proxy.force = force;
         proxy.forward = lag;
         report.lag = report.lag.max(way * (1.0 - part));
-        // A proxy that went on where tissue was open already is held by the same points.
         for (hold, stand) in proxy.holds.iter_mut().zip(standing) {
             hold.offset -= part * stand.lag;
         }
@@ -304,24 +318,45 @@ impl World {
         result
     }
 
-    /// Where the points of a proxy are by now, against the true edge; lets go of those that it is not beside any more.
-    fn leave_behind(&mut self, proxy: &mut Proxy, edge: [Vec3; 2], stands: &mut [Option<Stand>; MOST_HOLDS]) {
-        let Self { bodies, tissue, .. } = self;
-        let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
-            return;
+    /// Cuts from where the last cut of a proxy that is now here came to, or from where it met the tissue, to another edge.
+    fn cut_to(
+        &mut self,
+        proxy: &mut Proxy,
+        here: [Vec3; 2],
+        reached: [Vec3; 2],
+        report: &mut BladeReport,
+    ) -> Result<()> {
+        let entered = here.map(|end| (end.as_dvec3() - proxy.behind).as_vec3());
+        let sweep = Sweep {
+            start: proxy.last.unwrap_or(entered),
+            end: reached,
         };
-        let mut count = 0;
-        proxy.holds.retain(|hold| {
-            let place = bonds.place_of(bodies, hold.id);
-            let stand = place.map(|place| Stand::next_to(place - hold.offset, edge));
-            let Some(stand) = stand.filter(Stand::is_beside) else {
-                bonds.end(bodies, hold.id);
-                return false;
-            };
-            stands[count] = Some(stand);
-            count += 1;
-            true
+        report.length += self.cut_along(proxy.body, &sweep, Some(&mut proxy.stroke))?.length;
+        proxy.last = Some(reached);
+        proxy.uncut = 0.0;
+        proxy.behind = DVec3::ZERO;
+        Ok(())
+    }
+
+    /// A proxy that is now here stands in its body no more: what it has gone through since the last cut is cut.
+    fn end_stroke(&mut self, proxy: &mut Proxy, here: [Vec3; 2], report: &mut BladeReport) -> Result<()> {
+        let result = if proxy.uncut > 0.0 {
+            self.cut_to(proxy, here, here, report)
+        } else {
+            Ok(())
+        };
+        self.let_go_of_blade(proxy);
+        result
+    }
+
+    /// Where the points of a proxy are by now, against the true edge: how many.
+    fn stands_of(&self, proxy: &Proxy, edge: [Vec3; 2], stands: &mut [Stand; MOST_HOLDS]) -> usize {
+        let Some(tissue) = &self.tissue else { return 0 };
+        let points = proxy.holds.iter().filter_map(|hold| {
+            let place = tissue.bonds.place_of(&self.bodies, hold.id)?;
+            Some(Stand::next_to(place - hold.offset, edge))
         });
+        stands.iter_mut().zip(points).map(|(place, stand)| *place = stand).count()
     }
 
     /// Holds a proxy at these points, where there are any, else where it was held, on a spring of this stiffness between all of them.
@@ -342,7 +377,7 @@ impl World {
         for (bound, (anchor, _)) in bounds.iter_mut().zip(points.iter().flatten()) {
             *bound = Some(self.bound(proxy.body, which, anchor)?);
         }
-        if proxy.holds.is_empty() {
+        if proxy.holds.is_empty() && bounds[0].is_some() {
             self.bodies.get_mut(proxy.body.0)?.begin_bonds();
         }
         let Self {
@@ -393,7 +428,8 @@ impl World {
             }
         }
         proxy.last = None;
-        proxy.force = 0.0;
+        proxy.uncut = 0.0;
+        proxy.behind = DVec3::ZERO;
     }
 }
 
