@@ -278,15 +278,17 @@ fn a_free_sheet_gets_the_momentum_and_no_more_than_the_work() {
 
 #[test]
 fn the_jumps_of_the_force_halve_with_the_step() {
-    let jumps: Vec<f32> = [2e-3, 1e-3, 0.5e-3, 0.25e-3]
+    // Slow and soft enough for some steps of 8 ms before it cuts, and at the border at the end of a step of each length.
+    let jumps: Vec<f32> = [8e-3, 4e-3, 2e-3, 1e-3]
         .into_iter()
-        .map(|dt| {
+        .map(|dt: f32| {
             let (mut world, _) = Sheet::HELD.world();
-            let way = [vec3(-0.001, 0.048, 0.0), vec3(0.06, 0.052, 0.0)];
-            let blade = upright(&mut world, 20.0, way[0]);
+            let start = -0.05 * 0.024 + 1e-6;
+            let way = [vec3(start, 0.048, 0.0), vec3(start + 0.03, 0.05, 0.0)];
+            let blade = upright(&mut world, 10.0, way[0]);
             let mut stroke = Stroke::default();
-            stroke.draw(&mut world, blade, way, (0.6 / dt) as usize, dt);
-            assert!(stroke.length > 0.05);
+            stroke.draw(&mut world, blade, way, (0.6 / dt).round() as usize, dt);
+            assert!(stroke.length > 0.02);
             stroke.largest_jump()
         })
         .collect();
@@ -308,7 +310,7 @@ fn what_resists_gives_way_first_and_comes_back() {
     stroke.draw(&mut world, blade, [away, into], 50, 2e-3);
     stroke.draw(&mut world, blade, [into, into], 300, 2e-3);
     let force = *stroke.forces.last().unwrap();
-    assert!(force.x < -0.2 * TOUGHNESS && force.x > -0.75 * TOUGHNESS, "{force} N");
+    assert!(force.x < -0.1 * TOUGHNESS && force.x > -0.75 * TOUGHNESS, "{force} N");
     let moved = (0..).zip(world.body(body).unwrap().positions());
     let moved = moved.map(|(node, place): (usize, &Vec3)| place.distance(before[node]));
     assert!(moved.fold(0.0, f32::max) > 1e-5, "the sheet gives way");

@@ -95,6 +95,8 @@ pub(super) struct Proxy {
     pub behind: DVec3,
     /// What it is held by; none: nothing resists.
     pub holds: Vec<Hold>,
+    /// The shortest edge of what it stands in, m.
+    pub size: f64,
     /// What resists, N, and where to.
     pub force: f64,
     pub forward: DVec3,
@@ -203,7 +205,7 @@ impl Blade {
                     hasher.write_u64(value.to_bits());
                 }
             }
-            for value in [proxy.force, proxy.uncut] {
+            for value in [proxy.force, proxy.uncut, proxy.size] {
                 hasher.write_u64(value.to_bits());
             }
         }

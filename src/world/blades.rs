@@ -26,6 +26,9 @@ type Held = (Anchor, DVec3);
 /// An edge that turned back through no more than this part of a cell is out of the tissue.
 const TURNED_BACK: f64 = 0.1;
 
+/// Tissue that sprang ahead of an edge by no more than this part of a cell still lies before it.
+const SLACK: f64 = 0.2;
+
 /// A proxy that stands in tissue is followed by cuts of no less than this part of a cell: shorter ones would zigzag from what they snap to.
 const SHORTEST_CUT: f64 = 0.2;
 
@@ -224,7 +227,7 @@ impl World {
             && !standing.iter().any(Stand::is_beside)
         {
             // It has left the tissue along itself.
-            return self.end_stroke(&mut blade.proxies[at], from, &mut blade.report);
+            return self.end_stroke(&mut blade.proxies[at], [from; 2], &mut blade.report);
         }
         let mut lag = standing.iter().map(|stand| stand.lag).sum::<DVec3>() / count.max(1) as f64;
         let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].forward.dot(lag) < 0.0);
@@ -249,10 +252,18 @@ impl World {
             way = lag.length();
         }
         let held = known.map(|at| &blade.proxies[at]).filter(|_| count > 0).map(|proxy| proxy.force);
+        if let Some(at) = known
+            && turns_back
+            && way <= SLACK * blade.proxies[at].size
+        {
+            // It hangs loose in its cut, of which it has not gone out.
+            return self.hold_blade(&mut blade.proxies[at], &[None; MOST_HOLDS], end, (blade.stiffness, 0.0));
+        }
         let is_out = turns_back && met.iter().map(|part| part.length).sum::<f64>() <= TURNED_BACK * size;
-        if !(way > 0.0) || is_out || met.is_empty() {
-            return match known {
-                Some(at) => self.end_stroke(&mut blade.proxies[at], from, &mut blade.report),
+        if is_out || met.is_empty() || way <= rounding_of(&sweep) && count == 0 {
+            let reached = if turns_back { from } else { end };
+            return match known.filter(|_| count > 0) {
+                Some(at) => self.end_stroke(&mut blade.proxies[at], [from, reached], &mut blade.report),
                 None => Ok(()),
             };
         }
@@ -270,7 +281,7 @@ impl World {
         }
         let (mut part, mut force) = (advance.part, advance.force);
         let is_due = proxy.uncut + way * (part - begins) >= SHORTEST_CUT * size;
-        let is_through = force.is_none() && (advance.cuts || proxy.uncut > 0.0);
+        let is_through = force.is_none() && (advance.cuts || count > 0);
         let mut has_cut = advance.cuts && is_due || is_through;
         let mut points: [Option<Held>; MOST_HOLDS] = [None; MOST_HOLDS];
         let mut result = Ok(());
@@ -303,18 +314,22 @@ impl World {
             proxy.uncut += way * (part - begins);
             proxy.behind += lag * (part - begins);
         }
-        if count == 0 && !has_cut {
+        if !has_cut && (count == 0 || part > 0.0) {
             fill(&mut points, points_at(met, part).map(|(anchor, point)| (Anchor::Point(anchor), point)));
+        }
+        if !has_cut && count == 0 {
             // What comes before the tissue is part of the first cut.
             proxy.behind += lag * begins;
         }
         proxy.force = force;
         proxy.forward = lag;
+        proxy.size = size;
         report.lag = report.lag.max(way * (1.0 - part));
+        // Where tissue is open already it is held by what it was.
         for (hold, stand) in proxy.holds.iter_mut().zip(standing) {
             hold.offset -= part * stand.lag;
         }
-        self.hold_blade(proxy, &points, end, blade.stiffness)?;
+        self.hold_blade(proxy, &points, end, (blade.stiffness, force))?;
         result
     }
 
@@ -338,10 +353,15 @@ impl World {
         Ok(())
     }
 
-    /// A proxy that is now here stands in its body no more: what it has gone through since the last cut is cut.
-    fn end_stroke(&mut self, proxy: &mut Proxy, here: [Vec3; 2], report: &mut BladeReport) -> Result<()> {
-        let result = if proxy.uncut > 0.0 {
-            self.cut_to(proxy, here, here, report)
+    /// A proxy that is now here stands in its body no more: what it has gone through since the last cut is cut, and on to where nothing is in its way.
+    fn end_stroke(
+        &mut self,
+        proxy: &mut Proxy,
+        [here, reached]: [[Vec3; 2]; 2],
+        report: &mut BladeReport,
+    ) -> Result<()> {
+        let result = if proxy.uncut > 0.0 || here != reached {
+            self.cut_to(proxy, here, reached, report)
         } else {
             Ok(())
         };
@@ -359,13 +379,14 @@ impl World {
         stands.iter_mut().zip(points).map(|(place, stand)| *place = stand).count()
     }
 
-    /// Holds a proxy at these points, where there are any, else where it was held, on a spring of this stiffness between all of them.
+    /// Holds a proxy at these points, where there are any, else where it was held, on a spring of this stiffness between all of them that pulls no
+    /// harder than this, N/m and N.
     fn hold_blade(
         &mut self,
         proxy: &mut Proxy,
         points: &[Option<Held>; MOST_HOLDS],
         edge: [Vec3; 2],
-        stiffness: f64,
+        (stiffness, most): (f64, f64),
     ) -> Result<()> {
         let place = self.bodies.place(proxy.body.0)?;
         self.make_ready_for_blades(place)?;
@@ -412,7 +433,7 @@ impl World {
             let place = bonds.place_of(bodies, hold.id).unwrap_or_default();
             let foot = Stand::next_to(place - hold.offset, edge).foot();
             hold.way = Lead { from: foot, to: foot };
-            let thread = Thread::led(hold.way.moved(hold.offset), share / stiffness, proxy.force / share);
+            let thread = Thread::led(hold.way.moved(hold.offset), share / stiffness, most / share);
             bonds.pull(hold.id, thread);
         }
         bonds.settle();
@@ -443,6 +464,13 @@ fn across(sweep: &Sweep, time: f64, place: DVec3) -> DVec3 {
     let along = (end[1] - end[0]).normalize_or_zero();
     let across = gone - along * gone.dot(along);
     if across.is_finite() { across } else { DVec3::ZERO }
+}
+
+/// Ways of no more than this are what rounding makes of an edge that goes along itself, m.
+fn rounding_of(sweep: &Sweep) -> f64 {
+    let ends = sweep.start.into_iter().chain(sweep.end);
+    let furthest = ends.fold(0.0, |furthest: f32, end| furthest.max(end.abs().max_element()));
+    f64::from(2.0 * f32::EPSILON * furthest)
 }
 
 fn first_time(met: &[Met]) -> f64 {
