@@ -163,6 +163,23 @@ fn energy(world: &World, body: BodyId) -> f64 {
     energy.kinetic + energy.elastic
 }
 
+/// Whether each corner of the border of a body's surface has one way in and one way out.
+fn has_simple_rims(world: &World, body: BodyId) -> bool {
+    let it = world.body(body).unwrap();
+    let mut sides: Vec<[u32; 2]> = it
+        .surface()
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .collect();
+    sides.sort_unstable();
+    let is_rim = |[a, b]: &&[u32; 2]| sides.binary_search(&[*b, *a]).is_err();
+    let mut begins: Vec<u32> = sides.iter().filter(is_rim).map(|side| side[0]).collect();
+    let count = begins.len();
+    begins.sort_unstable();
+    begins.dedup();
+    begins.len() == count
+}
+
 fn is_within(found: f64, expected: f64, part: f64) -> bool {
     (found - expected).abs() <= part * expected.abs()
 }
@@ -193,12 +210,12 @@ fn the_work_of_a_stroke_is_toughness_times_length() {
             stroke.length,
             stroke.work / spent
         );
-        println!("{shape}, {} nodes", world.body(body).unwrap().node_count());
         assert!(is_within(stroke.work, spent, 0.05), "{shape}");
         assert!(is_within(stroke.told, stroke.work, 1e-3), "{shape}");
         assert!(is_within(stroke.length, 0.1001, 0.03), "{shape}");
         assert_eq!(stroke.refused, 0);
         assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2, "{shape}");
+        assert!(has_simple_rims(&world, body), "{shape}");
         assert_eq!(*stroke.forces.last().unwrap(), Vec3::ZERO, "{shape}");
     }
 }
@@ -216,10 +233,10 @@ fn a_curved_stroke_costs_as_much_as_a_straight_one() {
         stroke.draw(&mut world, blade, [at(turn(step)), at(turn(step + 1))], 1, 2e-3);
     }
     let (spent, way) = (f64::from(TOUGHNESS) * stroke.length, 0.03 * 1.75 * std::f64::consts::PI);
-    println!("curved: work {} spent {spent} length {} way {way}", stroke.work, stroke.length);
     assert!(is_within(stroke.length, way, 0.04), "{} of {way} m", stroke.length);
     assert!(is_within(stroke.work, spent, 0.05), "{} of {spent} J", stroke.work);
     assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 1);
+    assert!(has_simple_rims(&world, body));
     // Out of it, upwards along itself: nothing more is cut, and nothing is felt.
     let last = at(1.75 * std::f32::consts::PI);
     let mut out = Stroke::default();
@@ -266,7 +283,6 @@ fn a_free_sheet_gets_the_momentum_and_no_more_than_the_work() {
             energy(&world, body),
             stroke.work - spent - energy(&world, body),
         );
-        println!("{shape}");
         assert!(linear.distance(impulse) <= 1e-4 * impulse.length(), "{shape}");
         assert!(angular.distance(spin) <= 1e-2 * spin.length(), "{shape}");
         assert!(worst <= 0.02 * stroke.work, "{shape}");
@@ -292,7 +308,6 @@ fn the_jumps_of_the_force_halve_with_the_step() {
             stroke.largest_jump()
         })
         .collect();
-    println!("jumps {jumps:?} N");
     for pair in jumps.windows(2) {
         assert!(pair[1] < 0.6 * pair[0], "{jumps:?} N");
     }
@@ -316,7 +331,9 @@ fn what_resists_gives_way_first_and_comes_back() {
     assert!(moved.fold(0.0, f32::max) > 1e-5, "the sheet gives way");
     stroke.draw(&mut world, blade, [into, away], 50, 2e-3);
     assert_eq!(*stroke.forces.last().unwrap(), Vec3::ZERO);
-    assert!(stroke.forces.iter().all(|force| force.x < 1e-4), "it never pulls");
+    // It never pulls, but for what the edge goes in a step.
+    let pull = stroke.forces.iter().map(|force| force.x).fold(0.0, f32::max);
+    assert!(pull < 0.05 * TOUGHNESS, "{pull} N");
     stroke.draw(&mut world, blade, [away, away], 1000, 2e-3);
     let it = world.body(body).unwrap();
     assert_eq!((stroke.length, it.topology_version()), (0.0, 0), "nothing is cut");

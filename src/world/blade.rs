@@ -229,6 +229,13 @@ impl Hold {
     }
 }
 
+impl Proxy {
+    /// The direction that it came from where it is, m.
+    pub fn came_along(&self) -> DVec3 {
+        if self.uncut > 0.0 { self.behind } else { self.forward }
+    }
+}
+
 impl Stand {
     /// The point next to another on the line of an edge.
     pub fn next_to(point: DVec3, edge: [Vec3; 2]) -> Self {

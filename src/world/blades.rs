@@ -26,6 +26,12 @@ type Held = (Anchor, DVec3);
 /// An edge that turned back through no more than this part of a cell is out of the tissue.
 const TURNED_BACK: f64 = 0.1;
 
+/// What is met of tissue over less than this part of a cell is rounding.
+const CRUMB: f64 = 1e-3;
+
+/// Tissue is looked for so far beyond an edge, as a part of a cell: further than what snapping has opened before it.
+const PROBED: f64 = 0.12;
+
 /// Tissue that sprang ahead of an edge by no more than this part of a cell still lies before it.
 const SLACK: f64 = 0.2;
 
@@ -230,7 +236,7 @@ impl World {
             return self.end_stroke(&mut blade.proxies[at], [from; 2], &mut blade.report);
         }
         let mut lag = standing.iter().map(|stand| stand.lag).sum::<DVec3>() / count.max(1) as f64;
-        let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].forward.dot(lag) < 0.0);
+        let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].came_along().dot(lag) < 0.0);
         if let Some(at) = known
             && turns_back
             && blade.proxies[at].uncut > 0.0
@@ -239,12 +245,27 @@ impl World {
             self.let_go_of_blade(&mut blade.proxies[at]);
             return Err(error);
         }
-        let sweep = Sweep { start: from, end };
+        let mut way = standing.iter().map(|stand| stand.lag.length()).sum::<f64>() / count.max(1) as f64;
+        // Whether tissue is ahead shows a little beyond the edge, however near that is.
+        let mut beyond = DVec3::ZERO;
+        if let Some(at) = known
+            && count > 0
+        {
+            let proxy = &blade.proxies[at];
+            let direction = lag.try_normalize().unwrap_or(proxy.came_along().normalize_or_zero());
+            beyond = PROBED * proxy.size * direction;
+        }
+        let sweep = Sweep {
+            start: from,
+            end: end.map(|end| (end.as_dvec3() + beyond).as_vec3()),
+        };
         let body = self.bodies.get(id.0)?;
         body.meet_blade(&sweep, &mut blade.near, &mut blade.met)?;
+        let size = blade.met.iter().map(|part| part.size).fold(0.0, f64::max);
+        if count > 0 {
+            blade.met.retain(|part| part.length > CRUMB * size);
+        }
         let met = &blade.met[..];
-        let size = met.iter().map(|part| part.size).fold(0.0, f64::max);
-        let mut way = standing.iter().map(|stand| stand.lag.length()).sum::<f64>() / count.max(1) as f64;
         if count == 0 {
             lag = met.iter().min_by(|a, b| a.times[0].total_cmp(&b.times[0])).map_or(DVec3::ZERO, |first| {
                 across(&sweep, first.times[0], first.places[0])
@@ -271,7 +292,8 @@ impl World {
             stiffness: blade.stiffness,
             toughness,
         };
-        let advance = resistance.advance(met, way, held, &mut blade.knots)?;
+        let reach = way + beyond.length();
+        let advance = resistance.advance((met, reach), way, held, &mut blade.knots)?;
         let at = blade.proxy(id)?;
         let (proxy, report, met) = (&mut blade.proxies[at], &mut blade.report, &blade.met[..]);
         let mut begins = 0.0;
@@ -315,7 +337,7 @@ impl World {
             proxy.behind += lag * (part - begins);
         }
         if !has_cut && (count == 0 || part > 0.0) {
-            fill(&mut points, points_at(met, part).map(|(anchor, point)| (Anchor::Point(anchor), point)));
+            fill(&mut points, points_at(met, part * way / reach).map(|(anchor, point)| (Anchor::Point(anchor), point)));
         }
         if !has_cut && count == 0 {
             // What comes before the tissue is part of the first cut.
@@ -360,7 +382,7 @@ impl World {
         [here, reached]: [[Vec3; 2]; 2],
         report: &mut BladeReport,
     ) -> Result<()> {
-        let result = if proxy.uncut > 0.0 || here != reached {
+        let result = if proxy.uncut > 0.0 || proxy.last.is_some() && here != reached {
             self.cut_to(proxy, here, reached, report)
         } else {
             Ok(())

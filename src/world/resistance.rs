@@ -38,16 +38,22 @@ pub(super) struct Advance {
 }
 
 impl Resistance {
-    /// Lets the proxy go along a way of so many metres, on which it meets this, until the spring pulls no harder than the tissue resists there; so
+    /// Lets the proxy go along a way of so many metres, on which, and on to its `reach`, it meets this, until the spring pulls no harder than the tissue resists there; so
     /// what the spring gives is the toughness times what is cut. `held`: what resisted where it stands.
     ///
     /// Triangles are strained each for itself, so that resistance jumps between them; what holds is drawn after that over the length of a cell.
-    pub fn advance(&self, met: &[Met], way: f64, held: Option<f64>, knots: &mut Vec<Knot>) -> Result<Advance> {
+    pub fn advance(
+        &self,
+        (met, reach): (&[Met], f64),
+        way: f64,
+        held: Option<f64>,
+        knots: &mut Vec<Knot>,
+    ) -> Result<Advance> {
         knots.clear();
         let mut size = 0.0_f64;
         for part in met.iter().filter(|part| part.length > 0.0) {
             size = size.max(part.size);
-            let [from, to] = part.times.map(|time| time * way);
+            let [from, to] = part.times.map(|time| time * reach);
             let width = (to - from).max(STEEPEST * part.length);
             let change = self.toughness * part.length / width;
             for (at, change, begins) in [(from, change, true), (from + width, -change, false)] {
@@ -55,6 +61,16 @@ impl Resistance {
             }
         }
         knots.sort_unstable_by(|a, b| a.at.total_cmp(&b.at).then(a.change.total_cmp(&b.change)));
+        if let (Some(force), Some(first)) = (held, knots.first())
+            && self.stiffness * way <= force
+            && first.at <= BRIDGED * size
+        {
+            return Ok(Advance {
+                part: 0.0,
+                force: held,
+                cuts: false,
+            });
+        }
         let (mut at, mut force, mut cuts) = (0.0, held, false);
         let (mut level, mut open) = (0.0_f64, 0_u32);
         for index in 0..=knots.len() {
