@@ -18,8 +18,8 @@ use sinew::capi::tool::SINEW_DETECTION_IMAGE_SPACE;
 use sinew::capi::world::{sinew_world_create, sinew_world_def_init, sinew_world_destroy};
 use sinew::mesh::Mesh;
 use sinew::{
-    BladeDefinition, BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage, ToolDefinition,
-    Values, Viscosity, World, WorldDefinition, Yielding,
+    BladeDefinition, BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage,
+    ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 thread_local! {
@@ -68,7 +68,15 @@ fn a_blade_that_cuts_nothing_allocates_nothing() {
         })
         .expect("a world");
         let edge = [Vec3::new(0.0, -0.01, 0.0), Vec3::new(0.0, 0.01, 0.0)];
-        let blade = world.create_blade(&BladeDefinition::new(edge)).expect("a blade");
+        let blade = world
+            .create_blade(&BladeDefinition {
+                pose: Pose {
+                    position: Vec3::new(-0.07, 0.0, 0.003),
+                    ..Pose::IDENTITY
+                },
+                ..BladeDefinition::new(edge)
+            })
+            .expect("a blade");
         // It comes later than the blade.
         let cloth = BodyDefinition {
             positions: &mesh.positions,

@@ -4,7 +4,8 @@
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{
-    BladeDefinition, BladeId, BodyDefinition, BodyId, CollisionFilter, Error, Pose, Solver, Values, World, WorldDefinition,
+    BladeDefinition, BladeId, BodyDefinition, BodyId, CollisionFilter, Error, Pose, Solver, Values, World,
+    WorldDefinition,
 };
 
 /// J/m.
@@ -145,7 +146,6 @@ impl Stroke {
     }
 }
 
-
 /// The momentum of a body and its angular momentum about the origin.
 fn momentum(world: &World, body: BodyId) -> [DVec3; 2] {
     let it = world.body(body).unwrap();
@@ -193,10 +193,7 @@ fn the_work_of_a_stroke_is_toughness_times_length() {
         (Solver::Verlet, 4000),
         (Solver::Implicit, 250),
     ] {
-        let sheet = Sheet {
-            solver,
-            ..Sheet::HELD
-        };
+        let sheet = Sheet { solver, ..Sheet::HELD };
         let (mut world, body) = sheet.world();
         let way = [vec3(-0.01, 0.048, 0.0), vec3(0.115, 0.053, 0.0)];
         let blade = upright(&mut world, 200.0, way[0]);
@@ -288,7 +285,10 @@ fn a_free_sheet_gets_the_momentum_and_no_more_than_the_work() {
         assert!(worst <= 0.02 * stroke.work, "{shape}");
         assert!(stroke.length > 0.05, "{shape}");
         let kept = energy(&world, body);
-        assert!(stroke.work >= 0.95 * spent + kept && stroke.work <= 1.2 * (spent + kept), "{shape}");
+        assert!(
+            stroke.work >= 0.95 * spent + kept && stroke.work <= 1.2 * (spent + kept),
+            "{shape}"
+        );
     }
 }
 
@@ -363,7 +363,13 @@ fn nothing_is_felt_of_nothing_nor_of_what_a_blade_does_not_meet() {
             ..BladeDefinition::new([vec3(0.0, 0.0, -0.1), vec3(0.0, 0.0, 0.1)])
         })
         .unwrap();
-    stroke.draw(&mut world, other, [vec3(-0.01, 0.05, 0.0), vec3(0.11, 0.05, 0.0)], 100, 1e-3);
+    stroke.draw(
+        &mut world,
+        other,
+        [vec3(-0.01, 0.05, 0.0), vec3(0.11, 0.05, 0.0)],
+        100,
+        1e-3,
+    );
     assert_eq!((stroke.work, stroke.length, stroke.told), (0.0, 0.0, 0.0));
     assert!(stroke.forces.iter().all(|force| *force == Vec3::ZERO));
     assert_eq!(world.body(body).unwrap().topology_version(), 0);
@@ -441,7 +447,10 @@ fn whatever_is_asked_of_it_stays_finite() {
             let shape = format!("{stiffness} N/m, {dt} s, {stride} m, {mass} kg/m2, {solver:?}, step {step}");
             world.step(dt).unwrap_or_else(|error| panic!("{shape}: {error}"));
             let report = world.blade_report(blade).unwrap();
-            assert!(report.force.is_finite() && report.torque.is_finite(), "{shape}: {report:?}");
+            assert!(
+                report.force.is_finite() && report.torque.is_finite(),
+                "{shape}: {report:?}"
+            );
             assert!(report.work.is_finite() && report.lag.is_finite(), "{shape}: {report:?}");
             // An edge is held by no more than what resists: along a triangle, some times the toughness.
             assert!(report.force.length() <= 20.0 * TOUGHNESS, "{shape}: {report:?}");
@@ -544,7 +553,10 @@ fn what_is_no_blade_is_refused() {
         ("stiffness", with(&|blade| blade.stiffness = 0.0)),
         ("stiffness", with(&|blade| blade.stiffness = f32::INFINITY)),
         ("position", with(&|blade| blade.pose.position.x = f32::INFINITY)),
-        ("orientation", with(&|blade| blade.pose.orientation = glam::Quat::from_xyzw(0.0, 0.0, 0.0, 0.0))),
+        (
+            "orientation",
+            with(&|blade| blade.pose.orientation = glam::Quat::from_xyzw(0.0, 0.0, 0.0, 0.0)),
+        ),
     ] {
         let refused = world.create_blade(&wrong);
         assert!(
@@ -558,7 +570,10 @@ fn what_is_no_blade_is_refused() {
     assert!(matches!(refused, Err(Error::InvalidArgument(why)) if why.starts_with("position")));
     world.destroy_blade(blade).unwrap();
     assert!(matches!(world.destroy_blade(blade), Err(Error::StaleId(_))));
-    assert!(matches!(world.set_blade_pose(blade, Vec3::ZERO, None), Err(Error::StaleId(_))));
+    assert!(matches!(
+        world.set_blade_pose(blade, Vec3::ZERO, None),
+        Err(Error::StaleId(_))
+    ));
     for toughness in [-1.0, f32::NAN, f32::INFINITY] {
         let refused = world.create_body(&BodyDefinition {
             positions: &[Vec3::ZERO],

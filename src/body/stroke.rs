@@ -24,10 +24,17 @@ impl Stroke {
 
     /// Adds the bits that where a cut goes on depends on.
     pub fn hash(&self, hasher: &mut StateHasher) {
-        for point in self.edge.iter().flatten().chain(self.ends.iter().map(|(_, point)| point)) {
+        for point in self
+            .edge
+            .iter()
+            .flatten()
+            .chain(self.ends.iter().map(|(_, point)| point))
+        {
             hasher.write_floats(&point.to_array());
         }
-        self.ends.iter().for_each(|&(vertex, _)| hasher.write_u64(u64::from(vertex)));
+        self.ends
+            .iter()
+            .for_each(|&(vertex, _)| hasher.write_u64(u64::from(vertex)));
     }
 
     /// The sweep as it is in the tissue now: where it begins just where the last ended it begins where those vertices are now.

@@ -27,13 +27,7 @@ pub(crate) struct Met {
 impl CutSurface {
     /// What of the triangles `candidates` a blade passes through while nodes are at `positions`, but for what it passes along a rim that is there:
     /// within the snapping distance of that nothing would be cut.
-    pub(crate) fn meet(
-        &self,
-        sweep: &Sweep,
-        positions: &[Vec3],
-        candidates: &[u32],
-        met: &mut Vec<Met>,
-    ) -> Result<()> {
+    pub(crate) fn meet(&self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], met: &mut Vec<Met>) -> Result<()> {
         met.clear();
         for (is_last, swept) in [false, true].into_iter().zip(sweep.triangles()) {
             let swept = swept.map(|corner| corner.as_dvec3());
@@ -107,6 +101,10 @@ fn time_of(swept: [DVec3; 3], is_last: bool, place: DVec3) -> f64 {
     let (side, other) = (swept[1] - swept[0], swept[2] - swept[0]);
     let normal = side.cross(other);
     let weight = side.cross(place - swept[0]).dot(normal) / normal.length_squared();
-    let weight = if weight.is_finite() { weight.clamp(0.0, 1.0) } else { 0.0 };
+    let weight = if weight.is_finite() {
+        weight.clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     if is_last { 1.0 - weight } else { weight }
 }

@@ -9,7 +9,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::attachments::Which;
 use super::blade::{Blade, BladeDefinition, BladeReport, Hold, MOST_HOLDS, Proxy, Stand, edge_behind};
-use super::resistance::Resistance;
+use super::resistance::{Advance, Resistance};
 use super::{Anchor, BodyId, SurfacePoint, World, make_walks};
 use crate::contact::{Lead, Pose, Thread};
 use crate::cutting::{Met, Sweep};
@@ -37,6 +37,23 @@ const SLACK: f64 = 0.2;
 
 /// A proxy that stands in tissue is followed by cuts of no less than this part of a cell: shorter ones would zigzag from what they snap to.
 const SHORTEST_CUT: f64 = 0.2;
+
+const NOWHERE: [Option<Held>; MOST_HOLDS] = [None; MOST_HOLDS];
+
+/// A proxy as a step ends, and the true edge ahead of it.
+struct Approach {
+    /// The points where it stands in the tissue.
+    stands: [Stand; MOST_HOLDS],
+    count: usize,
+    /// The proxy, which is the true edge before the step where it stands nowhere, and the true edge.
+    from: [Vec3; 2],
+    end: [Vec3; 2],
+    /// From the one to the other across the edge, in the mean, m, and how far.
+    lag: DVec3,
+    way: f64,
+    /// How far beyond tissue is looked for.
+    probe: DVec3,
+}
 
 impl World {
     /// Adds a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it ([`BodyDefinition::spare_nodes`]) as
@@ -110,16 +127,15 @@ impl World {
         };
         body.reserve_bonds()?;
         make_walks(&mut self.walks, place)?;
-        self.tissue.get_or_insert_default().reserve_bonds([place; 2], MOST_HOLDS)
+        self.tissue
+            .get_or_insert_default()
+            .reserve_bonds([place; 2], MOST_HOLDS)
     }
 
     /// Leads what holds tissue to blades along their ways in the next step.
     pub(super) fn lead_blades(&mut self) {
         let Self {
-            blades,
-            tissue,
-            bodies,
-            ..
+            blades, tissue, bodies, ..
         } = self;
         let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
             return;
@@ -196,7 +212,9 @@ impl World {
         let is_met = blade.filter.meets(body.contact.filter);
         let known = blade.proxies.iter().position(|proxy| proxy.body == id);
         if !is_met {
-            known.into_iter().for_each(|at| self.let_go_of_blade(&mut blade.proxies[at]));
+            known
+                .into_iter()
+                .for_each(|at| self.let_go_of_blade(&mut blade.proxies[at]));
             return Ok(());
         }
         if toughness > 0.0 {
@@ -216,75 +234,100 @@ impl World {
     }
 
     /// The same where the tissue resists.
-    fn push_blade(
-        &mut self,
-        blade: &mut Blade,
-        id: BodyId,
-        toughness: f64,
-        [start, end]: [[Vec3; 2]; 2],
-    ) -> Result<()> {
-        let known = blade.proxies.iter().position(|proxy| proxy.body == id);
-        let mut standing = [Stand::next_to(DVec3::ZERO, end); MOST_HOLDS];
-        let count = known.map_or(0, |at| self.stands_of(&blade.proxies[at], end, &mut standing));
-        let standing = &standing[..count];
-        let from = if count > 0 { edge_behind(standing, end) } else { start };
-        if let Some(at) = known
-            && count > 0
-            && !standing.iter().any(Stand::is_beside)
-        {
-            // It has left the tissue along itself.
-            return self.end_stroke(&mut blade.proxies[at], [from; 2], &mut blade.report);
-        }
-        let mut lag = standing.iter().map(|stand| stand.lag).sum::<DVec3>() / count.max(1) as f64;
-        let turns_back = known.is_some_and(|at| count > 0 && blade.proxies[at].came_along().dot(lag) < 0.0);
-        if let Some(at) = known
-            && turns_back
-            && blade.proxies[at].uncut > 0.0
-            && let Err(error) = self.cut_to(&mut blade.proxies[at], from, from, &mut blade.report)
-        {
-            self.let_go_of_blade(&mut blade.proxies[at]);
-            return Err(error);
-        }
-        let mut way = standing.iter().map(|stand| stand.lag.length()).sum::<f64>() / count.max(1) as f64;
-        // Whether tissue is ahead shows a little beyond the edge, however near that is.
-        let mut beyond = DVec3::ZERO;
-        if let Some(at) = known
-            && count > 0
-        {
-            let proxy = &blade.proxies[at];
-            let direction = lag.try_normalize().unwrap_or(proxy.came_along().normalize_or_zero());
-            beyond = PROBED * proxy.size * direction;
-        }
-        let sweep = Sweep {
-            start: from,
-            end: end.map(|end| (end.as_dvec3() + beyond).as_vec3()),
+    fn push_blade(&mut self, blade: &mut Blade, id: BodyId, toughness: f64, edges: [[Vec3; 2]; 2]) -> Result<()> {
+        let mut approach = Approach::of(edges);
+        let Some(at) = blade.proxies.iter().position(|proxy| proxy.body == id) else {
+            return self.go_on(blade, id, toughness, &mut approach);
         };
-        let body = self.bodies.get(id.0)?;
-        body.meet_blade(&sweep, &mut blade.near, &mut blade.met)?;
-        let size = blade.met.iter().map(|part| part.size).fold(0.0, f64::max);
-        if count > 0 {
+        let (proxy, report) = (&mut blade.proxies[at], &mut blade.report);
+        self.stand(proxy, &mut approach);
+        let Some(stands) = approach.stands() else {
+            return self.go_on(blade, id, toughness, &mut approach);
+        };
+        if !stands.iter().any(Stand::is_beside) {
+            // It has left the tissue along itself.
+            return self.end_stroke(proxy, [approach.from; 2], report);
+        }
+        if proxy.came_along().dot(approach.lag) < 0.0 {
+            // Behind it is what was gone through: that is open from now on.
+            if proxy.uncut > 0.0
+                && let Err(error) = self.cut_to(proxy, approach.from, approach.from, report)
+            {
+                self.let_go_of_blade(proxy);
+                return Err(error);
+            }
+            if approach.way <= SLACK * proxy.size {
+                // It hangs loose in its cut, of which it has not gone out.
+                return self.hold_blade(proxy, &NOWHERE, edges[1], (blade.stiffness, 0.0));
+            }
+            self.look_ahead(blade, id, &approach)?;
+            let length: f64 = blade.met.iter().map(|part| part.length).sum();
+            if length <= TURNED_BACK * blade.proxies[at].size {
+                return self.end_stroke(&mut blade.proxies[at], [approach.from; 2], &mut blade.report);
+            }
+        }
+        self.go_on(blade, id, toughness, &mut approach)
+    }
+
+    /// Finds where a proxy stands, if it does.
+    fn stand(&self, proxy: &Proxy, approach: &mut Approach) {
+        let Some(tissue) = &self.tissue else { return };
+        let points = proxy.holds.iter().filter_map(|hold| {
+            let place = tissue.bonds.place_of(&self.bodies, hold.id)?;
+            Some(Stand::next_to(place - hold.offset, approach.end))
+        });
+        approach.count = approach
+            .stands
+            .iter_mut()
+            .zip(points)
+            .map(|(stand, found)| *stand = found)
+            .count();
+        if let Some(stands) = approach.stands() {
+            let count = stands.len() as f64;
+            let lag = stands.iter().map(|stand| stand.lag).sum::<DVec3>() / count;
+            let way = stands.iter().map(|stand| stand.lag.length()).sum::<f64>() / count;
+            let ahead = lag.try_normalize().unwrap_or(proxy.came_along().normalize_or_zero());
+            *approach = Approach {
+                from: edge_behind(stands, approach.end),
+                lag,
+                way,
+                probe: PROBED * proxy.size * ahead,
+                ..*approach
+            };
+        }
+    }
+
+    /// Finds what of a body is ahead of a proxy, and a little beyond the true edge.
+    fn look_ahead(&self, blade: &mut Blade, id: BodyId, approach: &Approach) -> Result<()> {
+        let end = approach.end.map(|end| (end.as_dvec3() + approach.probe).as_vec3());
+        let sweep = Sweep {
+            start: approach.from,
+            end,
+        };
+        self.bodies
+            .get(id.0)?
+            .meet_blade(&sweep, &mut blade.near, &mut blade.met)?;
+        if approach.count > 0 {
+            let size = size_of(&blade.met);
             blade.met.retain(|part| part.length > CRUMB * size);
         }
-        let met = &blade.met[..];
-        if count == 0 {
-            lag = met.iter().min_by(|a, b| a.times[0].total_cmp(&b.times[0])).map_or(DVec3::ZERO, |first| {
-                across(&sweep, first.times[0], first.places[0])
-            });
-            way = lag.length();
+        Ok(())
+    }
+
+    /// Has a proxy go as far as the true edge draws it through what resists, and cuts that where it is time.
+    fn go_on(&mut self, blade: &mut Blade, id: BodyId, toughness: f64, approach: &mut Approach) -> Result<()> {
+        self.look_ahead(blade, id, approach)?;
+        let known = blade.proxies.iter().position(|proxy| proxy.body == id);
+        let standing = known.filter(|_| approach.count > 0);
+        if standing.is_none() {
+            approach.enter(&blade.met);
         }
-        let held = known.map(|at| &blade.proxies[at]).filter(|_| count > 0).map(|proxy| proxy.force);
-        if let Some(at) = known
-            && turns_back
-            && way <= SLACK * blade.proxies[at].size
-        {
-            // It hangs loose in its cut, of which it has not gone out.
-            return self.hold_blade(&mut blade.proxies[at], &[None; MOST_HOLDS], end, (blade.stiffness, 0.0));
-        }
-        let is_out = turns_back && met.iter().map(|part| part.length).sum::<f64>() <= TURNED_BACK * size;
-        if is_out || met.is_empty() || way <= rounding_of(&sweep) && count == 0 {
-            let reached = if turns_back { from } else { end };
-            return match known.filter(|_| count > 0) {
-                Some(at) => self.end_stroke(&mut blade.proxies[at], [from, reached], &mut blade.report),
+        let Approach {
+            from, end, lag, way, ..
+        } = *approach;
+        if blade.met.is_empty() || way == 0.0 && standing.is_none() {
+            return match standing {
+                Some(at) => self.end_stroke(&mut blade.proxies[at], [from, end], &mut blade.report),
                 None => Ok(()),
             };
         }
@@ -292,63 +335,59 @@ impl World {
             stiffness: blade.stiffness,
             toughness,
         };
-        let reach = way + beyond.length();
-        let advance = resistance.advance((met, reach), way, held, &mut blade.knots)?;
+        let held = standing.map(|at| blade.proxies[at].force);
+        let reach = way + approach.probe.length();
+        let advance = resistance.advance((&blade.met, reach), way, held, &mut blade.knots)?;
         let at = blade.proxy(id)?;
         let (proxy, report, met) = (&mut blade.proxies[at], &mut blade.report, &blade.met[..]);
         let mut begins = 0.0;
-        if count == 0 {
-            begins = first_time(met);
+        if standing.is_none() {
+            begins = met.iter().map(|part| part.times[0]).fold(1.0, f64::min);
             self.let_go_of_blade(proxy);
         }
-        let (mut part, mut force) = (advance.part, advance.force);
-        let is_due = proxy.uncut + way * (part - begins) >= SHORTEST_CUT * size;
-        let is_through = force.is_none() && (advance.cuts || count > 0);
-        let mut has_cut = advance.cuts && is_due || is_through;
-        let mut points: [Option<Held>; MOST_HOLDS] = [None; MOST_HOLDS];
+        let Advance {
+            mut part,
+            mut force,
+            cuts,
+        } = advance;
+        let is_due = proxy.uncut + way * (part - begins) >= SHORTEST_CUT * size_of(met);
+        let is_through = force.is_none() && (cuts || standing.is_some());
+        let mut points = NOWHERE;
         let mut result = Ok(());
-        if has_cut {
+        if cuts && is_due || is_through {
             let reached = [0, 1].map(|k| from[k].lerp(end[k], part as f32));
-            let reached = if part == 1.0 { end } else { reached };
-            match self.cut_to(proxy, from, reached, report) {
-                Ok(()) => {
-                    let body = self.bodies.get(id.0)?;
-                    let ends = proxy.stroke.ends().iter().filter_map(|&(vertex, point)| {
-                        let node = body.point_of_vertex(vertex)?;
-                        Some((Anchor::Node(node), point.as_dvec3()))
-                    });
-                    fill(&mut points, ends);
-                }
-                Err(error) => {
-                    // It stays where it was.
-                    result = Err(error);
-                    has_cut = false;
-                    part = begins;
-                    force = Some(held.unwrap_or(toughness));
-                }
+            result = self.cut_to(proxy, from, if part == 1.0 { end } else { reached }, report);
+            if result.is_ok() {
+                let body = self.bodies.get(id.0)?;
+                let ends = proxy.stroke.ends().iter().filter_map(|&(vertex, point)| {
+                    let node = body.point_of_vertex(vertex)?;
+                    Some((Anchor::Node(node), point.as_dvec3()))
+                });
+                fill(&mut points, ends);
+            } else {
+                // It stays where it was.
+                part = begins;
+                force = Some(held.unwrap_or(toughness));
             }
         }
         let Some(force) = force else {
             self.let_go_of_blade(proxy);
             return result;
         };
-        if !has_cut {
+        if !(cuts && is_due && result.is_ok()) {
             proxy.uncut += way * (part - begins);
-            proxy.behind += lag * (part - begins);
-        }
-        if !has_cut && (count == 0 || part > 0.0) {
-            fill(&mut points, points_at(met, part * way / reach).map(|(anchor, point)| (Anchor::Point(anchor), point)));
-        }
-        if !has_cut && count == 0 {
             // What comes before the tissue is part of the first cut.
-            proxy.behind += lag * begins;
+            proxy.behind += lag * part;
+            if standing.is_none() || part > 0.0 {
+                fill(&mut points, points_at(met, part * way / reach));
+            }
         }
         proxy.force = force;
         proxy.forward = lag;
-        proxy.size = size;
+        proxy.size = size_of(met);
         report.lag = report.lag.max(way * (1.0 - part));
         // Where tissue is open already it is held by what it was.
-        for (hold, stand) in proxy.holds.iter_mut().zip(standing) {
+        for (hold, stand) in proxy.holds.iter_mut().zip(&approach.stands) {
             hold.offset -= part * stand.lag;
         }
         self.hold_blade(proxy, &points, end, (blade.stiffness, force))?;
@@ -389,16 +428,6 @@ impl World {
         };
         self.let_go_of_blade(proxy);
         result
-    }
-
-    /// Where the points of a proxy are by now, against the true edge: how many.
-    fn stands_of(&self, proxy: &Proxy, edge: [Vec3; 2], stands: &mut [Stand; MOST_HOLDS]) -> usize {
-        let Some(tissue) = &self.tissue else { return 0 };
-        let points = proxy.holds.iter().filter_map(|hold| {
-            let place = tissue.bonds.place_of(&self.bodies, hold.id)?;
-            Some(Stand::next_to(place - hold.offset, edge))
-        });
-        stands.iter_mut().zip(points).map(|(place, stand)| *place = stand).count()
     }
 
     /// Holds a proxy at these points, where there are any, else where it was held, on a spring of this stiffness between all of them that pulls no
@@ -476,31 +505,54 @@ impl World {
     }
 }
 
-/// How far the edge has to go across itself from where it passes a place, m.
-fn across(sweep: &Sweep, time: f64, place: DVec3) -> DVec3 {
-    let [start, end] = [sweep.start, sweep.end].map(|edge| edge.map(|end| end.as_dvec3()));
-    let edge = [0, 1].map(|k| start[k].lerp(end[k], time));
-    let way = edge[1] - edge[0];
-    let along = ((place - edge[0]).dot(way) / way.length_squared()).clamp(0.0, 1.0);
-    let gone = (end[0] - start[0]).lerp(end[1] - start[1], along);
-    let along = (end[1] - end[0]).normalize_or_zero();
-    let across = gone - along * gone.dot(along);
-    if across.is_finite() { across } else { DVec3::ZERO }
+impl Approach {
+    /// Of an edge that stands nowhere, before a step and after it.
+    fn of([from, end]: [[Vec3; 2]; 2]) -> Self {
+        Self {
+            stands: [Stand::next_to(DVec3::ZERO, end); MOST_HOLDS],
+            count: 0,
+            from,
+            end,
+            lag: DVec3::ZERO,
+            way: 0.0,
+            probe: DVec3::ZERO,
+        }
+    }
+
+    /// The points where it stands in the tissue, if it does.
+    fn stands(&self) -> Option<&[Stand]> {
+        (self.count > 0).then(|| &self.stands[..self.count])
+    }
+
+    /// Sees how far an edge that stood nowhere has to go across itself, from where it first met something.
+    fn enter(&mut self, met: &[Met]) {
+        let Some(first) = met.iter().min_by(|a, b| a.times[0].total_cmp(&b.times[0])) else {
+            return;
+        };
+        let [from, to] = [self.from, self.end].map(|edge| edge.map(|end| end.as_dvec3()));
+        let met_by = [0, 1].map(|k| from[k].lerp(to[k], first.times[0]));
+        let edge = met_by[1] - met_by[0];
+        let along = ((first.places[0] - met_by[0]).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        let gone = (to[0] - from[0]).lerp(to[1] - from[1], along);
+        let edge = (to[1] - to[0]).normalize_or_zero();
+        let across = gone - edge * gone.dot(edge);
+        // What rounding makes of an edge that goes along itself is no way.
+        let ends = self.from.into_iter().chain(self.end);
+        let furthest = ends.fold(0.0, |furthest: f32, end| furthest.max(end.abs().max_element()));
+        if across.length() > f64::from(2.0 * f32::EPSILON * furthest) {
+            self.lag = across;
+            self.way = across.length();
+        }
+    }
 }
 
-/// Ways of no more than this are what rounding makes of an edge that goes along itself, m.
-fn rounding_of(sweep: &Sweep) -> f64 {
-    let ends = sweep.start.into_iter().chain(sweep.end);
-    let furthest = ends.fold(0.0, |furthest: f32, end| furthest.max(end.abs().max_element()));
-    f64::from(2.0 * f32::EPSILON * furthest)
-}
-
-fn first_time(met: &[Met]) -> f64 {
-    met.iter().map(|part| part.times[0]).fold(1.0, f64::min)
+/// The largest of the cells that are met, by their shortest edges, m.
+fn size_of(met: &[Met]) -> f64 {
+    met.iter().map(|part| part.size).fold(0.0, f64::max)
 }
 
 /// The points of the surface in which the edge stands when it has gone a part of its way.
-fn points_at(met: &[Met], time: f64) -> impl Iterator<Item = (SurfacePoint, DVec3)> {
+fn points_at(met: &[Met], time: f64) -> impl Iterator<Item = Held> {
     let is_there = move |part: &&Met| part.times[0] <= time && time <= part.times[1];
     met.iter().filter(is_there).map(move |part| {
         let [from, to] = part.times;
@@ -513,7 +565,7 @@ fn points_at(met: &[Met], time: f64) -> impl Iterator<Item = (SurfacePoint, DVec
             triangle: part.triangle,
             weights,
         };
-        (point, part.places[0].lerp(part.places[1], along))
+        (Anchor::Point(point), part.places[0].lerp(part.places[1], along))
     })
 }
 
