@@ -159,6 +159,7 @@ impl World {
         match self.join_tissue(id).and_then(|()| self.meet_blades(id)) {
             Ok(()) => Ok(BodyId(id)),
             Err(error) => {
+                self.leave_blades(BodyId(id));
                 self.bodies.remove(id)?;
                 Err(error)
             }
@@ -176,14 +177,6 @@ impl World {
         self.tissue.get_or_insert_default().join(place, body)
     }
 
-    /// Lets blades stand in a body.
-    fn meet_blades(&mut self, id: SlotId) -> Result<()> {
-        if self.blades.count() == 0 {
-            return Ok(());
-        }
-        self.make_ready_for_blades(self.bodies.place(id)?)
-    }
-
     /// Removes a body, and with it what is attached of it.
     ///
     /// # Errors
@@ -195,6 +188,7 @@ impl World {
             tissue.leave(&mut self.bodies, place);
         }
         self.forget_attachments_of(body);
+        self.leave_blades(body);
         Ok(())
     }
 

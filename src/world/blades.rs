@@ -77,9 +77,12 @@ impl World {
     /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): something in the definition is out of its range.
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn create_blade(&mut self, definition: &BladeDefinition) -> Result<BladeId> {
-        let blade = Blade::new(definition)?;
+        let mut blade = Blade::new(definition)?;
         for place in 0..self.bodies.places() {
             self.make_ready_for_blades(place)?;
+            if let Some(id) = self.bodies.id_at(place) {
+                blade.proxy(BodyId(id))?;
+            }
         }
         Ok(BladeId(self.blades.insert(blade)?))
     }
@@ -118,6 +121,25 @@ impl World {
     /// [`Error::StaleId`](crate::Error::StaleId).
     pub fn blade_report(&self, blade: BladeId) -> Result<&BladeReport> {
         Ok(&self.blades.get(blade.0)?.report)
+    }
+
+    /// Lets blades stand in a new body.
+    pub(super) fn meet_blades(&mut self, id: SlotId) -> Result<()> {
+        if self.blades.count() == 0 {
+            return Ok(());
+        }
+        self.make_ready_for_blades(self.bodies.place(id)?)?;
+        for (_, blade) in self.blades.iter_mut() {
+            blade.proxy(BodyId(id))?;
+        }
+        Ok(())
+    }
+
+    /// A body is gone.
+    pub(super) fn leave_blades(&mut self, body: BodyId) {
+        for (_, blade) in self.blades.iter_mut() {
+            blade.proxies.retain(|proxy| proxy.body != body);
+        }
     }
 
     /// Makes room for a blade to stand in the body at this place, if it can be cut.
@@ -167,7 +189,6 @@ impl World {
         for (_, blade) in blades.iter_mut() {
             let [start, end] = blade.edges();
             self.feel(blade);
-            blade.proxies.retain(|proxy| self.bodies.get(proxy.body.0).is_ok());
             for place in 0..self.bodies.places() {
                 if let Some(id) = self.bodies.id_at(place)
                     && let Err(error) = self.follow_blade(blade, BodyId(id), [start, end])
