@@ -79,7 +79,7 @@ impl World {
     pub fn create_blade(&mut self, definition: &BladeDefinition) -> Result<BladeId> {
         let mut blade = Blade::new(definition)?;
         for place in 0..self.bodies.places() {
-            self.make_ready_for_blades(place)?;
+            self.make_room_for_holds(place, MOST_HOLDS)?;
             if let Some(id) = self.bodies.id_at(place) {
                 blade.proxy(BodyId(id))?;
             }
@@ -128,7 +128,7 @@ impl World {
         if self.blades.count() == 0 {
             return Ok(());
         }
-        self.make_ready_for_blades(self.bodies.place(id)?)?;
+        self.make_room_for_holds(self.bodies.place(id)?, MOST_HOLDS)?;
         for (_, blade) in self.blades.iter_mut() {
             blade.proxy(BodyId(id))?;
         }
@@ -142,16 +142,16 @@ impl World {
         }
     }
 
-    /// Makes room for a blade to stand in the body at this place, if it can be cut.
-    pub(super) fn make_ready_for_blades(&mut self, place: usize) -> Result<()> {
+    /// Makes room for a blade to be held at so many points more of the body at this place, if it can be cut.
+    fn make_room_for_holds(&mut self, place: usize, count: usize) -> Result<()> {
         let Some(body) = self.bodies.at_mut(place).filter(|body| body.toughness().is_some()) else {
             return Ok(());
         };
         body.reserve_bonds()?;
         make_walks(&mut self.walks, place)?;
-        self.tissue
-            .get_or_insert_default()
-            .reserve_bonds([place; 2], MOST_HOLDS)
+        let tissue = self.tissue.get_or_insert_default();
+        tissue.bonds.reserve_rebinding(place)?;
+        tissue.reserve_bonds([place; 2], count)
     }
 
     /// Leads what holds tissue to blades along their ways in the next step.
@@ -461,7 +461,8 @@ impl World {
         (stiffness, most): (f64, f64),
     ) -> Result<()> {
         let place = self.bodies.place(proxy.body.0)?;
-        self.make_ready_for_blades(place)?;
+        let count = points.iter().flatten().count();
+        self.make_room_for_holds(place, if count > proxy.holds.len() { count } else { 0 })?;
         let which = Which {
             prefix: "",
             index: None,
@@ -482,7 +483,6 @@ impl World {
         let Some(bonds) = tissue.as_mut().map(|tissue| &mut tissue.bonds) else {
             return Ok(());
         };
-        let count = bounds.iter().flatten().count();
         if count > 0 {
             for hold in proxy.holds.drain(count.min(proxy.holds.len())..) {
                 bonds.end(bodies, hold.id);
