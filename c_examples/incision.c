@@ -1,5 +1,5 @@
-/* A scalpel opens a sheet of skin that is stretched as skin is; the wound gapes, and two sutures pull it together. Then it opens an organ whose
- * ends are pulled apart.
+/* A scalpel opens a sheet of skin that is stretched as skin is, and feels it; the wound gapes, and two sutures pull it together. Then it opens an
+ * organ whose ends are pulled apart.
  *
  *   incision [-o DIRECTORY] [-n FRAMES]
  *
@@ -14,7 +14,8 @@
 #define DENSITY 1.0      /* kg/m^2: a millimetre of tissue */
 #define STIFFNESS 80.0   /* N/m per spring */
 #define DAMPING 15.0     /* 1/s: how fast a free node loses its speed */
-#define LENGTH 0.06      /* m: the cut */
+#define TOUGHNESS 0.1    /* J/m: 100 J/m^2 */
+#define LENGTH 0.06      /* m: the way of the scalpel */
 #define BITE 0.006       /* m: how far from the cut a suture holds */
 #define CUT 1.0          /* s: the scalpel goes along, */
 #define GAPE 0.5         /* s: the wound gapes, */
@@ -68,6 +69,7 @@ static sinew_body_id create_skin(sinew_world *world, const sinew_mesh_view *shap
   def.node_damping = (float)(DAMPING * node_mass);
   def.stiffness = (float)STIFFNESS;
   def.spare_nodes = SPARE;
+  def.toughness = (float)TOUGHNESS;
   CHECK(sinew_body_create(world, &def, &skin));
   free(masses), free(stretched);
   return skin;
@@ -137,18 +139,22 @@ static double enclosed_volume(const drawing *mine) {
   return sum / 6;
 }
 
-/* Cuts from where the blade's edge was to where it is: upright, at this place along the cut, which is a little curved. */
-static void cut(sinew_world *world, sinew_body_id skin, double from, double to, sinew_cut_report *report) {
-  const double ends[2] = {from, to};
-  float edges[2][6];
-  int i;
-  for (i = 0; i < 2; i++) {
-    const float x = (float)(LENGTH * (ends[i] - 0.5)), z = (float)(0.004 * sin(3 * ends[i]));
-    edges[i][0] = edges[i][3] = x;
-    edges[i][2] = edges[i][5] = z;
-    edges[i][1] = -0.05f, edges[i][4] = 0.05f;
-  }
-  CHECK(sinew_body_cut(world, skin, edges[0], edges[1], report));
+/* Where the scalpel is on its way, which is a little curved, and how far above the skin its edge's middle. */
+static void place_of(double along, double height, float place[3]) {
+  place[0] = (float)(LENGTH * (along - 0.5));
+  place[1] = (float)height;
+  place[2] = (float)(0.004 * sin(3 * along));
+}
+
+/* An upright edge, in the skin. */
+static sinew_blade_id create_scalpel(sinew_world *world) {
+  sinew_blade_def def;
+  sinew_blade_id scalpel;
+  CHECK(sinew_blade_def_init(&def, sizeof def));
+  def.edge[1] = -0.05f, def.edge[4] = 0.05f;
+  place_of(0, 0, def.position);
+  CHECK(sinew_blade_create(world, &def, &scalpel));
+  return scalpel;
 }
 
 /* The triangle that is drawn at a place of the sheet at rest, by the texture, and its point there. */
@@ -188,11 +194,12 @@ static void open_skin(options chosen) {
   const int frame_count = chosen.frame_count > 0 ? chosen.frame_count : all_frames;
   sinew_world *world = create_world(9.81f);
   sinew_attachment_id sutures[2];
-  double wide[2] = {0, 0}, length = 0, whole;
+  double wide[2] = {0, 0}, length = 0, work = 0, whole;
   int frame, suture_count = 0, i;
   sinew_mesh_view shape;
   sinew_mesh *mesh;
   sinew_body_id skin;
+  sinew_blade_id scalpel;
   sinew_picture_def picture;
   drawing mine;
   FILE *table;
@@ -201,6 +208,7 @@ static void open_skin(options chosen) {
   shape.struct_size = sizeof shape;
   CHECK(sinew_mesh_get_view(mesh, &shape));
   skin = create_skin(world, &shape);
+  scalpel = create_scalpel(world);
   mine = create_drawing(world, skin, shape.node_count, 2);
   for (i = 0; i < (int)shape.node_count; i++) {
     mine.carried[2 * i] = (float)(shape.positions[3 * i] / SIZE + 0.5);
@@ -209,22 +217,20 @@ static void open_skin(options chosen) {
   whole = texture_area(&mine);
   picture = camera(low, high, 1);
   table = create_file(chosen.directory, "incision.csv");
-  fprintf(table, "time s,cut mm,nodes,triangles,width 1 mm,width 2 mm,force 1 N,force 2 N\n");
+  fprintf(table, "time s,cut mm,nodes,triangles,width 1 mm,width 2 mm,force 1 N,force 2 N,scalpel N\n");
 
   printf("skin of %d x %d cells, %.0f mm wide, stretched by %.0f %% across the cut\n\n", CELLS, CELLS, 1e3 * SIZE,
          100 * (STRETCH - 1));
   printf("width: how far apart the points of the two sutures are; drawn: of the texture, by a mesh that follows the list of changes\n\n");
   printf("  time s   cut mm   nodes  triangles   width mm            force N             drawn\n");
   for (frame = 1; frame <= frame_count; frame++) {
-    const double time = frame * FRAME, before = smooth((time - FRAME) / CUT), now = smooth(time / CUT);
-    float forces[2] = {0, 0};
-    sinew_cut_report report;
+    const double time = frame * FRAME;
+    float forces[2] = {0, 0}, place[3];
+    sinew_blade_report report;
     report.struct_size = sizeof report;
-    if (now > before) {
-      cut(world, skin, before, now, &report);
-      length += report.length;
-      follow(&mine, world, skin);
-    }
+    /* At the end it is lifted out. */
+    place_of(smooth(time / CUT), time < CUT + 2 * FRAME ? 0 : 0.2, place);
+    CHECK(sinew_blade_set_pose(world, scalpel, place, NULL));
     if (suture_count == 0 && time > CUT + GAPE) {
       save_picture(world, &picture, chosen.directory, "incision_open.png");
       for (i = 0; i < 2; i++) sutures[i] = suture(world, skin, &mine, i == 0 ? 0.35 : 0.65);
@@ -243,9 +249,14 @@ static void open_skin(options chosen) {
       forces[i] = sqrtf(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
     }
     CHECK(sinew_world_step(world, (float)FRAME, NULL));
+    CHECK(sinew_blade_get_report(world, scalpel, &report));
+    length += report.length;
+    work += report.work;
+    follow(&mine, world, skin);
     clear_progress();
-    fprintf(table, "%.4f,%.3f,%zu,%zu,%.3f,%.3f,%.4f,%.4f\n", time, 1e3 * length, mine.node_count, mine.triangle_count, 1e3 * wide[0],
-            1e3 * wide[1], (double)forces[0], (double)forces[1]);
+    fprintf(table, "%.4f,%.3f,%zu,%zu,%.3f,%.3f,%.4f,%.4f,%.4f\n", time, 1e3 * length, mine.node_count, mine.triangle_count, 1e3 * wide[0],
+            1e3 * wide[1], (double)forces[0], (double)forces[1],
+            sqrt((double)report.force[0] * report.force[0] + (double)report.force[2] * report.force[2]));
     if (frame % 10 == 0) {
       printf("%8.2f%9.1f%8zu%11zu%10.2f%8.2f%10.4f%10.4f%10.6f\n", time, 1e3 * length, mine.node_count, mine.triangle_count,
              1e3 * wide[0], 1e3 * wide[1], (double)forces[0], (double)forces[1], texture_area(&mine) / whole);
@@ -255,6 +266,7 @@ static void open_skin(options chosen) {
   clear_progress();
   save_picture(world, &picture, chosen.directory, "incision_sutured.png");
   fclose(table);
+  printf("\nthe scalpel's work is %.3f of the skin's toughness times the length that it cut", work / (TOUGHNESS * length));
   printf("\nat the end the mesh that follows the list draws %.6f of its texture\n", texture_area(&mine) / whole);
 
   free(mine.carried), free(mine.triangles);

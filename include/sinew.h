@@ -731,9 +731,10 @@ typedef struct sinew_body_def {
    */
   uint32_t spare_nodes;
   /**
-   * 0.
+   * J/m, at least 0: what a blade (sinew_blade_create) spends for each metre of a cut, at rest: the fracture toughness of the material, J/m^2,
+   * times the thickness of the surface; default 0: it is cut for nothing.
    */
-  uint32_t reserved3;
+  float toughness;
   /**
    * The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
    * limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
@@ -1378,6 +1379,95 @@ typedef struct sinew_suture_report {
    */
   double energy;
 } sinew_suture_report;
+
+/**
+ * What a blade is. Filled by sinew_blade_def_init; used only during sinew_blade_create.
+ */
+typedef struct sinew_blade_def {
+  /**
+   * Set by sinew_blade_def_init.
+   */
+  size_t struct_size;
+  /**
+   * Both ends of the cutting edge about the blade's own origin, m, each coordinate within 1e9 of 0; not at one place; no default.
+   */
+  float edge[6];
+  /**
+   * N/m, above 0 and finite; default 1000: the force for each metre by which it is ahead of where tissue is cut, in each body. How blunt it is:
+   * tissue of toughness T resists with some T, and gives way by T / stiffness first.
+   */
+  float stiffness;
+  /**
+   * The categories that it belongs to, a bit for each; default 1. It meets bodies where each has a category that the other's
+   * mask has.
+   */
+  uint32_t collision_category;
+  /**
+   * The categories that it meets, a bit for each; default 0xffffffff.
+   */
+  uint32_t collision_mask;
+  /**
+   * Where it is at first, m, each within 1e9 of 0; default 0 0 0.
+   */
+  float position[3];
+  /**
+   * x y z w; default 0 0 0 1; normalised, zero is refused.
+   */
+  float orientation[4];
+} sinew_blade_def;
+
+/**
+ * A blade: a plain value, all zero is "none".
+ */
+typedef struct sinew_blade_id {
+  /**
+   * Which place, from 1.
+   */
+  uint32_t index1;
+  /**
+   * Which of the blades that lived there.
+   */
+  uint32_t generation;
+} sinew_blade_id;
+
+/**
+ * What a blade did in the last step, and what was done to it.
+ */
+typedef struct sinew_blade_report {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * The force on it, world axes, mean over the step, N.
+   */
+  float force[3];
+  /**
+   * The torque on it about its position, world axes, mean over the step, N m.
+   */
+  float torque[3];
+  /**
+   * What whoever moves it has spent on tissue in the step, J.
+   */
+  double work;
+  /**
+   * How long the cuts are that it made at the end of the step, at rest, m.
+   */
+  double length;
+  /**
+   * How far it is ahead of where tissue is cut, m: 0 where nothing is in its way.
+   */
+  double lag;
+  /**
+   * SINEW_STATUS_OK, or why what it went through was not cut: SINEW_STATUS_CAPACITY or SINEW_STATUS_OUT_OF_MEMORY. It is tried again with the
+   * next step.
+   */
+  sinew_status status;
+  /**
+   * 0.
+   */
+  uint32_t reserved0;
+} sinew_blade_report;
 
 /**
  * What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
@@ -2891,6 +2981,78 @@ sinew_status sinew_suture_set_length(struct sinew_world *world,
 sinew_status sinew_suture_get_report(const struct sinew_world *world,
                                      struct sinew_attachment_id suture,
                                      struct sinew_suture_report *report);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_blade_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_blade_def_init(struct sinew_blade_def *def, size_t struct_size);
+
+/**
+ * Creates a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it (their definition's spare_nodes) as
+ * sinew_body_cut does, and feels their toughness. It is an edge alone: what has a body needs a tool beside it.
+ *
+ * Tissue that the edge meets gives way until the edge is so far ahead, on the spring of the definition's stiffness, that this pulls as hard as the
+ * tissue resists: by its toughness for each metre that is cut, at rest. From then on its proxy follows, at the end of each step, as far as
+ * keeps both equal; so the work of the blade is the toughness times the length that is cut, and what the spring stores (Mahvash, Hayward 2001).
+ * What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself meets nothing, nor
+ * does one that goes back through its cut.
+ *
+ * The cut is made where the proxy went, by a fifth of a triangle's shortest edge at a time and to its end where it leaves the tissue; so a triangle that
+ * is passed through takes some ten spare_nodes. Tissue of toughness 0 is cut with each step, just where the edge went. Where a cut fails the
+ * proxy stays and pulls on, as hard as the tissue resisted: the report's status tells; the step itself succeeds.
+ *
+ * A body that a blade stands in takes its substeps as one that is attached does. A step in which a blade goes through tissue may allocate.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_blade_create(struct sinew_world *world,
+                                const struct sinew_blade_def *def,
+                                struct sinew_blade_id *out);
+
+/**
+ * Destroys a blade. What it has cut stays.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_blade_destroy(struct sinew_world *world, struct sinew_blade_id blade);
+
+/**
+ * Moves a blade to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be NULL: as it is. It goes
+ * straight and evenly.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0 or the orientation is zero),
+ * SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
+ */
+sinew_status sinew_blade_set_pose(struct sinew_world *world,
+                                  struct sinew_blade_id blade,
+                                  const float *position,
+                                  const float *orientation);
+
+/**
+ * Writes what a blade did and felt in the last step. `out->struct_size` is set by the caller.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_blade_get_report(const struct sinew_world *world,
+                                    struct sinew_blade_id blade,
+                                    struct sinew_blade_report *out);
 
 /**
  * Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements

@@ -41,6 +41,6 @@ pub use springs::Kernel;
 pub use terms::SpringLaw;
 pub use threads::RunTasks;
 pub use world::{
-    Anchor, AttachmentId, BodyId, StepReport, SurfacePoint, SutureDefinition, SutureReport, ToolId, World,
-    WorldDefinition,
+    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepReport, SurfacePoint, SutureDefinition,
+    SutureReport, ToolId, World, WorldDefinition,
 };

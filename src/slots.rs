@@ -110,6 +110,16 @@ impl<T> Slots<T> {
         self.slots.get(place)?.content.as_ref()
     }
 
+    /// The id of what lives at a place.
+    pub fn id_at(&self, place: usize) -> Option<SlotId> {
+        let slot = self.slots.get(place)?;
+        slot.content.as_ref()?;
+        Some(SlotId {
+            index1: place as u32 + 1,
+            generation: slot.generation,
+        })
+    }
+
     /// What lives at a place.
     pub fn at_mut(&mut self, place: usize) -> Option<&mut T> {
         self.slots.get_mut(place)?.content.as_mut()

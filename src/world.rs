@@ -1,13 +1,16 @@
 //! A world: bodies and tools that are stepped together.
 
 mod attachments;
+mod blade;
+mod blades;
+mod resistance;
 mod step;
 mod sutures;
 mod tear;
 
 use glam::{Quat, Vec3};
 
-use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, finite_vector, not_negative};
+use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, Stroke, finite_vector, not_negative};
 use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::diagnostics::StateHasher;
@@ -18,6 +21,9 @@ use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{RunTasks, Threads};
 pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 use attachments::{Attachment, Which};
+use blade::Blade;
+pub use blade::{BladeDefinition, BladeReport};
+pub use blades::BladeId;
 pub use step::StepReport;
 pub use sutures::{SutureDefinition, SutureReport};
 
@@ -85,6 +91,9 @@ pub struct World {
     attachments: Slots<Attachment>,
     /// What of that ended with the last step.
     slipped: Vec<AttachmentId>,
+    blades: Slots<Blade>,
+    /// How many threads to blades there ever were.
+    holds_made: u32,
 }
 
 impl World {
@@ -114,6 +123,8 @@ impl World {
             outcomes: Vec::new(),
             attachments: Slots::new("attachment"),
             slipped: Vec::new(),
+            blades: Slots::new("blade"),
+            holds_made: 0,
         })
     }
 
@@ -146,9 +157,10 @@ impl World {
         let body = Body::new(definition, needs)?;
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
         let id = self.bodies.insert(body)?;
-        match self.join_tissue(id) {
+        match self.join_tissue(id).and_then(|()| self.meet_blades(id)) {
             Ok(()) => Ok(BodyId(id)),
             Err(error) => {
+                self.leave_blades(BodyId(id));
                 self.bodies.remove(id)?;
                 Err(error)
             }
@@ -177,6 +189,7 @@ impl World {
             tissue.leave(&mut self.bodies, place);
         }
         self.forget_attachments_of(body);
+        self.leave_blades(body);
         Ok(())
     }
 
@@ -203,6 +216,16 @@ impl World {
     /// length. [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
         self.change_topology(body, |it| it.cut(sweep))
+    }
+
+    /// The same along a stroke of its own.
+    fn cut_along(&mut self, body: BodyId, sweep: &Sweep, stroke: &mut Stroke) -> Result<CutReport> {
+        self.change_topology(body, |it| {
+            it.swap_stroke(stroke);
+            let report = it.cut(sweep);
+            it.swap_stroke(stroke);
+            report
+        })
     }
 
     /// Lets a body change its topology, and what is attached of it follow.
@@ -472,6 +495,10 @@ impl World {
         }
         if let Some(tissue) = &self.tissue {
             tissue.bonds.hash(&mut hasher);
+        }
+        for (place, blade) in self.blades.iter() {
+            hasher.write_u64(place as u64);
+            blade.hash(&mut hasher);
         }
         hasher.finish()
     }

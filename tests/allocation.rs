@@ -18,8 +18,8 @@ use sinew::capi::tool::SINEW_DETECTION_IMAGE_SPACE;
 use sinew::capi::world::{sinew_world_create, sinew_world_def_init, sinew_world_destroy};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage, Tearing,
-    ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
+    BladeDefinition, BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage,
+    Tearing, ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 thread_local! {
@@ -55,6 +55,51 @@ fn a_step_allocates_nothing() {
         for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
             steps_allocate_nothing(storage, solver, &[0.0]);
         }
+    }
+}
+
+#[test]
+fn a_blade_that_cuts_nothing_allocates_nothing() {
+    let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let mut world = World::new(WorldDefinition {
+            gravity: Vec3::ZERO,
+            ..WorldDefinition::default()
+        })
+        .expect("a world");
+        let edge = [Vec3::new(0.0, -0.01, 0.0), Vec3::new(0.0, 0.01, 0.0)];
+        let blade = world
+            .create_blade(&BladeDefinition {
+                pose: Pose {
+                    position: Vec3::new(-0.07, 0.0, 0.003),
+                    ..Pose::IDENTITY
+                },
+                ..BladeDefinition::new(edge)
+            })
+            .expect("a blade");
+        // It comes later than the blade.
+        let cloth = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(2e-4),
+            stiffnesses: Values::Uniform(50.0),
+            spare_nodes: 100,
+            toughness: 1.0,
+            solver,
+            ..BodyDefinition::default()
+        };
+        let body = world.create_body(&cloth).expect("a body");
+        let mut feels = 0;
+        for step in 0..40 {
+            // From beside the cloth against its border, and away.
+            let part = (1.0 - (step as f32 / 20.0 - 1.0).abs()) * 0.0205;
+            let place = Vec3::new(-0.07 + part, 0.0, 0.003);
+            world.set_blade_pose(blade, place, None).expect("a pose");
+            assert_eq!(asked(|| drop(world.step(1e-3))), 0, "{solver:?}, step {step}");
+            feels += usize::from(world.blade_report(blade).expect("a blade").force != Vec3::ZERO);
+        }
+        assert!(feels > 0);
+        assert_eq!(world.body(body).expect("a body").topology_version(), 0);
     }
 }
 

@@ -90,11 +90,12 @@ impl Body {
 
     fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
         let mut sweep = *sweep;
-        if let Some(start) = cuttable.stroke.carried(&sweep, self.positions()) {
+        if let Some(start) = cuttable.stroke.carried(&sweep, &cuttable.material, self.positions()) {
             sweep.start = start;
             cuttable.material.carry(start);
         }
-        let near = self.items_near(cuttable, &sweep)?;
+        let mut near = Vec::new();
+        self.items_near(cuttable, &sweep, &mut near)?;
         let limits = Limits {
             nodes: self.node_room as u32,
             ..Limits::NONE
@@ -227,7 +228,9 @@ impl Body {
         let Cuttable { stroke, material, .. } = cuttable;
         if stroke.stop(sweep) {
             let positions = self.positions();
-            material.ends(changes, sweep, positions, near, |end| stroke.stands_at(end, positions));
+            material.ends(changes, sweep, positions, near, |end| {
+                stroke.stands_at(end, material, positions)
+            });
         }
     }
 

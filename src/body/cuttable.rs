@@ -23,6 +23,8 @@ pub(super) struct Cuttable {
     pub density: f64,
     /// Whether every spring lies along an edge of a cell.
     pub springs_are_edges: bool,
+    /// What it takes to cut it, J/m.
+    pub toughness: f32,
 }
 
 impl Cuttable {
@@ -93,6 +95,7 @@ impl Cuttable {
             log: ChangeLog::default(),
             stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
+            toughness: definition.toughness,
         })))
     }
 }
@@ -136,6 +139,9 @@ fn check_offered(definition: &BodyDefinition) -> Result<()> {
         .is_some_and(|material| material.keeps_volume_by_rings())
     {
         return lacking("tetrahedra of a poisson_ratio of 0.4 or more");
+    }
+    if definition.toughness > 0.0 && (definition.triangles.is_empty() || !definition.tetrahedra.is_empty()) {
+        return lacking("a toughness, but for surfaces,");
     }
     if definition.contact.with_bodies || definition.contact.with_itself {
         return lacking("contact with other tissue or with themselves");
@@ -193,13 +199,12 @@ impl Search {
         })
     }
 
-    /// The items that a blade may have met, given the boxes of tiles and where those began.
-    fn near(&self, body: &Body, material: &CutMaterial, swept: &Bounds) -> Result<Vec<u32>> {
+    /// Adds the items that a blade may have met.
+    fn near(&self, body: &Body, material: &CutMaterial, swept: &Bounds, near: &mut Vec<u32>) -> Result<()> {
         let positions = body.positions();
         let origin = body.origin.as_vec3();
         // What was rounded is in the box all the same.
         let slack = 4.0 * f32::EPSILON * (origin.abs().max_element() + body.reach());
-        let mut near = Vec::new();
         for home in &self.homes {
             let tiles = home.tiles.iter().map(|&tile| body.boxes[tile as usize]);
             let tiles = tiles.fold(Bounds::EMPTY, |all, tile| all.and(&tile)).extended(slack);
@@ -215,11 +220,11 @@ impl Search {
             for &item in &home.items {
                 let places = material.corners_of(item).map(|corner| positions[corner as usize]);
                 if Bounds::of(places.into_iter()).overlaps(swept) {
-                    memory::push(&mut near, item)?;
+                    memory::push(near, item)?;
                 }
             }
         }
-        Ok(near)
+        Ok(())
     }
 
     /// Makes room for what a cut adds, so many cells and of these items, so that listing it cannot fail.
@@ -281,10 +286,10 @@ impl Search {
 }
 
 impl Body {
-    /// The items of its material whose box a sweep's meets.
-    pub(super) fn items_near(&self, cuttable: &Cuttable, sweep: &Sweep) -> Result<Vec<u32>> {
+    /// Adds the items of its material whose box a sweep's meets.
+    pub(super) fn items_near(&self, cuttable: &Cuttable, sweep: &Sweep, near: &mut Vec<u32>) -> Result<()> {
         let ends = sweep.start.into_iter().chain(sweep.end);
-        cuttable.search.near(self, &cuttable.material, &Bounds::of(ends))
+        cuttable.search.near(self, &cuttable.material, &Bounds::of(ends), near)
     }
 
     /// How far it reaches from where its coordinates begin, m.

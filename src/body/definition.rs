@@ -186,6 +186,9 @@ pub struct BodyDefinition<'a> {
     /// When it tears by itself, at the end of a step; a body that does may be cut. See [`Body::tear_report`](crate::Body::tear_report) and
     /// [`Body::set_tear_limits`](crate::Body::set_tear_limits).
     pub tearing: Tearing,
+    /// What a blade ([`World::create_blade`](crate::World::create_blade)) spends to cut it, J for each m of the cut in the rest shape: the
+    /// fracture toughness of the material, J/m², times the thickness of the surface. At least 0; 0: it is cut for nothing.
+    pub toughness: f32,
 }
 
 impl Default for BodyDefinition<'_> {
@@ -227,6 +230,7 @@ impl Default for BodyDefinition<'_> {
             mass_scaling: 0.001,
             spare_nodes: 0,
             tearing: Tearing::default(),
+            toughness: 0.0,
         }
     }
 }
@@ -293,6 +297,7 @@ impl BodyDefinition<'_> {
         self.tearing.check(self)?;
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
+        not_negative("toughness", self.toughness)?;
         if let Some(material) = &self.material {
             material.check(self)?;
         }

@@ -55,6 +55,9 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
+        if let Some(toughness) = self.toughness() {
+            hasher.write_floats(&[toughness]);
+        }
         if let Some(bindings) = &self.bindings {
             bindings.hash(hasher);
         }

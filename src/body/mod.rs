@@ -2,6 +2,7 @@
 
 mod bearing;
 mod bindings;
+mod blade;
 #[cfg(test)]
 mod bound_tests;
 mod change_log;
@@ -80,6 +81,7 @@ pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use state::State;
+pub(crate) use stroke::Stroke;
 use tears::Tears;
 
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use crate::cutting::{CutEnd, Sweep};
+use crate::cutting::{CutEnd, CutMaterial, Sweep};
+use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 
@@ -11,7 +12,7 @@ const LITTLE: f32 = 0.02;
 
 /// Where a blade stopped.
 #[derive(Debug, Default)]
-pub(super) struct Stroke {
+pub(crate) struct Stroke {
     /// The blade's edge.
     edge: Option<[Vec3; 2]>,
     /// Points of the tissue where it stood, which may lie a little beside it, and its points next to them.
@@ -19,9 +20,30 @@ pub(super) struct Stroke {
 }
 
 impl Stroke {
+    /// Points of the tissue where it stands, and its points next to them.
+    pub fn ends(&self) -> &[(CutEnd, Vec3)] {
+        &self.ends
+    }
+
+    /// Adds the bits that where a cut goes on depends on.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for point in self
+            .edge
+            .iter()
+            .flatten()
+            .chain(self.ends.iter().map(|(_, point)| point))
+        {
+            hasher.write_floats(&point.to_array());
+        }
+        for (end, _) in &self.ends {
+            end.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
+            end.weights.iter().for_each(|weight| hasher.write_u64(weight.to_bits()));
+        }
+    }
+
     /// Where the edge that a sweep begins with is in the tissue now, if the sweep begins just where the last ended: as far back that nothing lies
     /// between it and what was cut, wherever the tissue went.
-    pub fn carried(&self, sweep: &Sweep, positions: &[Vec3]) -> Option<[Vec3; 2]> {
+    pub fn carried(&self, sweep: &Sweep, material: &CutMaterial, positions: &[Vec3]) -> Option<[Vec3; 2]> {
         if self.edge != Some(sweep.start) || self.ends.is_empty() {
             return None;
         }
@@ -31,7 +53,7 @@ impl Stroke {
         let ends = || {
             self.ends
                 .iter()
-                .map(|(end, before)| ((before - from).dot(along), end.place(positions) - before))
+                .map(|(end, before)| ((before - from).dot(along), material.place_of(end, positions) - before))
         };
         let count = self.ends.len() as f32;
         let (place, gone) = ends().fold((0.0, Vec3::ZERO), |(place, gone), end| (place + end.0, gone + end.1));
@@ -69,11 +91,11 @@ impl Stroke {
     }
 
     /// It stands in the tissue at this point.
-    pub fn stands_at(&mut self, end: CutEnd, positions: &[Vec3]) {
+    pub fn stands_at(&mut self, end: CutEnd, material: &CutMaterial, positions: &[Vec3]) {
         let Some([from, to]) = self.edge else {
             return;
         };
-        let place = end.place(positions);
+        let place = material.place_of(&end, positions);
         let along = (place - from).dot(to - from) / from.distance_squared(to);
         let nearest = if along.is_finite() {
             from.lerp(to, along.clamp(0.0, 1.0))

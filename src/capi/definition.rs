@@ -228,8 +228,9 @@ pub struct sinew_body_def {
     /// and triangles are its boundary, if there are any. A body of springs alone loses those that a blade passes through, and needs no room: 1
     /// will do. See sinew_body_cut.
     pub spare_nodes: u32,
-    /// 0.
-    pub reserved3: u32,
+    /// J/m, at least 0: what a blade (sinew_blade_create) spends for each metre of a cut, at rest: the fracture toughness of the material, J/m^2,
+    /// times the thickness of the surface; default 0: it is cut for nothing.
+    pub toughness: f32,
     /// The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
     /// limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
     /// force and as far as the next triangle (O'Brien, Hodgins 1999); where a cut ends in a triangle next to the spring, that goes on
@@ -328,7 +329,7 @@ impl sinew_body_def {
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
             spare_nodes: 0,
-            reserved3: 0,
+            toughness: 0.0,
             tear_strain: 0.0,
             tear_force: 0.0,
             most_tears: 0,
@@ -440,7 +441,6 @@ impl sinew_body_def {
         memory::reserved("reserved", self.reserved)?;
         memory::reserved("reserved1", self.reserved1)?;
         memory::reserved("reserved2", self.reserved2)?;
-        memory::reserved("reserved3", self.reserved3)?;
         if self.springs.is_null() && self.spring_count > 0 {
             return Err(Error::invalid(format!(
                 "springs is NULL while spring_count is {}",
@@ -509,6 +509,7 @@ impl sinew_body_def {
                 pressure: self.pressure,
                 contact: self.contact()?,
                 spare_nodes: self.spare_nodes,
+                toughness: self.toughness,
                 tearing: Tearing {
                     strain: self.tear_strain,
                     force: self.tear_force,

@@ -40,6 +40,8 @@ pub mod attachment;
 
 pub mod suture;
 
+pub mod blade;
+
 pub mod mesh;
 
 pub mod picture;

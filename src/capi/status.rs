@@ -49,7 +49,7 @@ pub(super) fn fail(error: Error) -> sinew_status {
     status
 }
 
-fn status_of(error: &Error) -> sinew_status {
+pub(super) fn status_of(error: &Error) -> sinew_status {
     match error {
         Error::InvalidArgument(_) => SINEW_STATUS_INVALID_ARGUMENT,
         Error::StaleId(_) => SINEW_STATUS_STALE_ID,

@@ -27,7 +27,7 @@ impl CollisionFilter {
         mask: u32::MAX,
     };
 
-    pub(super) fn hash(self, hasher: &mut StateHasher) {
+    pub(crate) fn hash(self, hasher: &mut StateHasher) {
         for bits in [self.category, self.mask] {
             hasher.write_u64(u64::from(bits));
         }

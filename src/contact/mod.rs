@@ -36,6 +36,6 @@ pub(crate) use limit::TRIES;
 pub(crate) use path::{Frame, ToolPath};
 pub use report::{Contact, ContactChange};
 pub(crate) use surface::SurfaceChange;
-pub(crate) use tissue::{Bonds, Bound, Moment, Thread, Tissue, are_one, distance};
+pub(crate) use tissue::{Bonds, Bound, Lead, Moment, Thread, Tissue, are_one, distance};
 pub use tool::{Detection, Pose, Shape, ToolDefinition};
 pub(crate) use tool::{Form, Tool};

@@ -208,9 +208,10 @@ impl CutMaterial {
             Self::Springs(_) => {}
             Self::Surface(surface) => {
                 for &vertex in &changes.ends {
-                    let vertex = &surface.vertices()[vertex as usize];
-                    let ([a, b, c], [u, v, w]) = (vertex.nodes, vertex.weights);
+                    let of = &surface.vertices()[vertex as usize];
+                    let ([a, b, c], [u, v, w]) = (of.nodes, of.weights);
                     see(CutEnd {
+                        vertex: Some(vertex),
                         nodes: [a, b, c, a],
                         weights: [u, v, w, 0.0],
                         slack: 0.0,
@@ -222,6 +223,16 @@ impl CutMaterial {
                 ends.for_each(see);
             }
         }
+    }
+
+    /// Where an end is if nodes are at `positions`, also after other cuts.
+    pub fn place_of(&self, end: &CutEnd, positions: &[Vec3]) -> Vec3 {
+        if let (Self::Surface(surface), Some(vertex)) = (self, end.vertex) {
+            return positions[surface.vertices()[vertex as usize].point as usize];
+        }
+        let parts = end.nodes.iter().zip(end.weights);
+        let places = parts.map(|(&node, weight)| weight * positions[node as usize].as_dvec3());
+        places.sum::<DVec3>().as_vec3()
     }
 
     /// The material has moved since the last cut: the blade's edge, which stopped there, is here in it now.
@@ -239,17 +250,10 @@ fn with_first([a, b]: [u32; 2]) -> [u32; 4] {
 /// A point of the material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CutEnd {
+    /// The vertex of a surface that it is.
+    pub vertex: Option<u32>,
     pub nodes: [u32; 4],
     pub weights: [f64; 4],
     /// How far from it what was cut may end, m: nothing where it is an end of that itself.
     pub slack: f64,
-}
-
-impl CutEnd {
-    /// Where it is if nodes are at `positions`.
-    pub fn place(&self, positions: &[Vec3]) -> Vec3 {
-        let parts = self.nodes.iter().zip(self.weights);
-        let places = parts.map(|(&node, weight)| weight * positions[node as usize].as_dvec3());
-        places.sum::<DVec3>().as_vec3()
-    }
 }

@@ -60,6 +60,7 @@ impl World {
         for (_, tool) in self.tools.iter_mut() {
             tool.set_out();
         }
+        self.lead_blades();
         let mut left = TRIES;
         let crossings = loop {
             self.plan_tools();
@@ -81,6 +82,7 @@ impl World {
         };
         let report = report(&self.bodies, &self.outcomes, crossings);
         self.commit(dt, team);
+        self.move_blades();
         Ok(report)
     }
 

@@ -13,7 +13,7 @@ mod link;
 mod search;
 mod skin;
 
-pub(crate) use self::bonds::{Bonds, Bound, Thread, are_one, distance};
+pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
 use self::groups::Groups;
 use self::link::Link;
 use self::search::{Party, Search};

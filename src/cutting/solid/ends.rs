@@ -31,6 +31,7 @@ impl CutSolid {
         }
         let middle = 0.5 * (enters + leaves);
         (enters < leaves).then(|| CutEnd {
+            vertex: None,
             nodes,
             weights: std::array::from_fn(|k| weights[0][k] + middle * (weights[1][k] - weights[0][k])),
             // What was snapped may lie on either side; a step that begins too early finds what is open already.

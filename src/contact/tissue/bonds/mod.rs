@@ -24,7 +24,7 @@ use crate::slots::{SlotId, Slots};
 use crate::solver::Outcome;
 use crate::world::Anchor;
 
-pub(crate) use self::thread::Thread;
+pub(crate) use self::thread::{Lead, Thread};
 
 /// Nodes of a point: corners of a triangle, or of a tetrahedron.
 const OF_POINT: usize = 4;
@@ -44,6 +44,13 @@ pub(crate) struct Bound {
     pub anchor: Anchor,
     /// Nodes in the body's own numbers, with their parts in the point, 1 in sum; 0 where there is none.
     pub nodes: [(u32, f32); OF_POINT],
+}
+
+impl Bound {
+    /// The sum of the parts of its nodes: 1, but for rounding; 0 of what is no point of tissue.
+    fn weight(&self) -> f64 {
+        self.nodes.iter().map(|&(_, weight)| f64::from(weight)).sum()
+    }
 }
 
 /// A corner of one of the points of a bond.
@@ -210,6 +217,53 @@ impl Bonds {
         memory::push(&mut self.bonds, bond)
     }
 
+    /// Has a thread to a blade begin at a point from now on, for which there is room: that of this name, which goes on with what it did, or a new
+    /// one. To be followed by [`Self::pull`] and [`Self::settle`].
+    pub fn hold(&mut self, id: SlotId, point: Bound) -> Result<()> {
+        let nowhere = Bound {
+            nodes: [(0, 0.0); OF_POINT],
+            ..point
+        };
+        let points = [point, nowhere];
+        match self.bonds.iter_mut().find(|bond| bond.id == id) {
+            Some(bond) => {
+                bond.corners = corners_of(&points);
+                bond.points = points;
+                Ok(())
+            }
+            None => self.add(id, points, 0.0, Some(Thread::new(0.0, 0.0, 0.0))),
+        }
+    }
+
+    /// Has this be the thread of a bond to a blade.
+    pub fn pull(&mut self, id: SlotId, mut thread: Thread) {
+        if let Some(bond) = self.bonds.iter_mut().find(|bond| bond.id == id) {
+            let whole = bond.points[0].weight();
+            thread.lead = thread.lead.map(|lead| lead.scaled(whole));
+            bond.thread = Some(thread);
+        }
+    }
+
+    /// Leads what the thread of a bond ends at along this way in the next step.
+    pub fn lead(&mut self, id: SlotId, lead: Lead) {
+        if let Some(bond) = self.bonds.iter_mut().find(|bond| bond.id == id) {
+            let whole = bond.points[0].weight();
+            if let Some(thread) = &mut bond.thread {
+                thread.lead = Some(lead.scaled(whole));
+            }
+        }
+    }
+
+    /// Where the first point of a bond is now, m.
+    pub fn place_of(&self, bodies: &Slots<Body>, id: SlotId) -> Option<DVec3> {
+        let bond = self.bonds.iter().find(|bond| bond.id == id)?;
+        let body = bodies.at(bond.points[0].body)?;
+        let positions = body.state.positions();
+        let place = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
+        let (nodes, whole) = (bond.points[0].nodes, bond.points[0].weight());
+        Some(nodes.into_iter().map(place).sum::<DVec3>() / whole + body.origin)
+    }
+
     /// Makes room for points of a body to be bound to others.
     pub fn reserve_rebinding(&mut self, body: usize) -> Result<()> {
         let count = self.bonds.iter().filter(|bond| bond.concerns(body)).count();
@@ -219,14 +273,15 @@ impl Bonds {
     /// The points of a body.
     pub fn points_of(&self, body: usize) -> impl Iterator<Item = &Bound> {
         let points = self.bonds.iter().flat_map(|bond| &bond.points);
-        points.filter(move |point| point.body == body)
+        points.filter(move |point| point.body == body && point.weight() > 0.0)
     }
 
     /// Has points of a body that `carried` knows be bound to what it says from now on: their triangles were cut, or copied. No point
     /// moves with that, as far as the new nodes are where they should be. There is room for it.
     pub fn rebind(&mut self, body: usize, mut carried: impl FnMut(&Bound) -> Option<Bound>) {
         for bond in &mut self.bonds {
-            for point in bond.points.iter_mut().filter(|point| point.body == body) {
+            let is_its = |point: &&mut Bound| point.body == body && point.weight() > 0.0;
+            for point in bond.points.iter_mut().filter(is_its) {
                 *point = carried(point).unwrap_or(*point);
             }
             bond.corners = corners_of(&bond.points);
@@ -342,8 +397,13 @@ impl Bonds {
             hasher.write_floats(&[bond.limit]);
             hasher.write_floats(&bond.foreseen.to_array());
             if let Some(thread) = &bond.thread {
-                for value in [thread.length, thread.target, thread.compliance] {
+                for value in [thread.length, thread.target, thread.compliance, thread.most] {
                     hasher.write_u64(value.to_bits());
+                }
+                for place in thread.lead.iter().flat_map(|lead| [lead.from, lead.to]) {
+                    for value in place.to_array() {
+                        hasher.write_u64(value.to_bits());
+                    }
                 }
             }
         }

@@ -4,6 +4,8 @@
 //! much for any substep, and what does not stretch is a compliance of 0. It acts along the line on which the points are as the substep begins,
 //! as a kick of leapfrog does, which keeps angular momentum; points that pass each other within a substep have no such line, and are pulled
 //! along the one on which they would end.
+//!
+//! A thread may have a blade at its end instead of a second point (`Lead`), and pull no harder than the tissue that is cut resists.
 
 use glam::DVec3;
 
@@ -20,35 +22,82 @@ pub(crate) struct Thread {
     pub target: f64,
     /// m/N; 0: it does not stretch.
     pub compliance: f64,
+    /// It pulls no harder, N.
+    pub most: f64,
+    /// What it ends at instead of a point of tissue.
+    pub lead: Option<Lead>,
     // The step in progress.
     /// How fast it becomes longer, m/s, and how long it is by now, m.
     pace: f64,
     current: f64,
     /// How far apart its points may be at the end of the substep, m.
     reach: f64,
+    /// Where the lead is by now, m, and how fast, m/s.
+    led: DVec3,
+    speed: DVec3,
     /// From the second point to the first, m.
     apart: DVec3,
     /// The direction in which it acts; where there is none, that of the points as they would end.
     line: Option<DVec3>,
-    /// How long velocities act on places in the substep, s.
+    /// How long velocities act on places in the substep, s, and forces on velocities.
     drift: f64,
+    duration: f64,
     /// By how much it is longer for an impulse, m/(N s), and by how much its points become faster against each other, 1/kg.
     give: f64,
     answer: DVec3,
 }
 
+/// A place that goes straight and evenly from one to another over the next step, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lead {
+    pub from: DVec3,
+    pub to: DVec3,
+}
+
+impl Lead {
+    /// The same way beside it.
+    pub fn moved(self, offset: DVec3) -> Self {
+        Self {
+            from: self.from + offset,
+            to: self.to + offset,
+        }
+    }
+
+    /// As it is to be taken off the sum of a point's parts, which are `whole` together.
+    pub fn scaled(self, whole: f64) -> Self {
+        Self {
+            from: self.from * whole,
+            to: self.to * whole,
+        }
+    }
+}
+
 impl Thread {
+    /// Of no length, from a point to a place that is led.
+    pub fn led(lead: Lead, compliance: f64, most: f64) -> Self {
+        Self {
+            lead: Some(lead),
+            most,
+            ..Self::new(0.0, 0.0, compliance)
+        }
+    }
+
     pub fn new(length: f64, target: f64, compliance: f64) -> Self {
         Self {
             length,
             target,
             compliance,
+            most: f64::INFINITY,
+            lead: None,
             pace: 0.0,
             current: length,
             reach: length,
+            led: DVec3::ZERO,
+            speed: DVec3::ZERO,
             apart: DVec3::ZERO,
             line: None,
             drift: 0.0,
+            duration: 0.0,
             give: 0.0,
             answer: DVec3::ZERO,
         }
@@ -73,6 +122,10 @@ impl Thread {
     pub fn begin(&mut self, dt: f32) {
         self.pace = (self.length_after(dt) - self.length) / f64::from(dt);
         self.current = self.length;
+        if let Some(Lead { from, to }) = self.lead {
+            self.led = from;
+            self.speed = (to - from) / f64::from(dt);
+        }
     }
 
     /// Takes a substep as it is to be: its points are `apart` as it begins and go at this velocity against each other; forces act for `duration`
@@ -81,8 +134,10 @@ impl Thread {
         // The half kick that closes a step is to leave velocities that go on as they should.
         let part = if moment.drifts { 1.0 } else { 0.5 };
         self.drift = part * f64::from(moment.duration);
-        self.give = self.compliance / f64::from(duration);
+        self.duration = f64::from(duration);
+        self.give = self.compliance / self.duration;
         self.answer = answer;
+        let (apart, velocity) = (apart - self.led, velocity - self.speed);
         self.apart = apart;
         let distance = apart.length();
         let is_resolved = velocity.length() * self.drift <= RESOLVED * distance && distance > 0.0;
@@ -98,13 +153,14 @@ impl Thread {
     pub fn go_on(&mut self, moment: &Moment) {
         if moment.drifts {
             self.current = (self.current + self.pace * self.drift).max(0.0);
+            self.led += self.speed * self.drift;
         }
     }
 
     /// The impulse on its first point that this substep takes in all, N s, where the points go at this velocity against each other with what was
     /// `given` so far.
     pub fn impulse(&self, velocity: DVec3, given: DVec3) -> DVec3 {
-        let free = self.apart + (velocity - self.answer * given) * self.drift;
+        let free = self.apart + (velocity - self.speed - self.answer * given) * self.drift;
         let distance = free.length();
         if !(distance > self.reach) {
             return DVec3::ZERO;
@@ -121,7 +177,7 @@ impl Thread {
             _ => half / square,
         };
         if pull > 0.0 && pull.is_finite() {
-            -line * pull
+            -line * pull.min(self.most * self.duration)
         } else {
             DVec3::ZERO
         }
