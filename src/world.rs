@@ -201,6 +201,10 @@ impl World {
     /// that are not drawn where its material is beyond the cut, and with its part of masses and stiffnesses; copies share nodes where their
     /// material hangs together (Molino, Bao, Fedkiw 2004). Springs along no edge of a triangle are taken away where the blade passed through them.
     ///
+    /// Of tetrahedra the edges that the blade crosses are divided in the same way, and faces between points on its way open once one of their
+    /// corners parts: at the latest when a tetrahedron's last edge is crossed. What was inside is drawn from then on. A body of springs alone loses
+    /// those that the blade passed through.
+    ///
     /// A sweep that begins just where the last of the body ended goes on with it: it begins where the tissue that the blade stood in has gone
     /// meanwhile. A blade that stays in tissue that moves so leaves no bridges.
     ///

@@ -39,7 +39,10 @@ impl Body {
     /// Takes a stroke for that of its next cut, and gives the one that it had.
     pub(crate) fn swap_stroke(&mut self, stroke: &mut Stroke) {
         if let Some(cuttable) = &mut self.cuttable {
+            // The material has the one that is in use.
+            cuttable.material.swap_stroke(&mut cuttable.stroke.of_solid);
             std::mem::swap(&mut cuttable.stroke, stroke);
+            cuttable.material.swap_stroke(&mut cuttable.stroke.of_solid);
         }
     }
 

@@ -1,17 +1,14 @@
 //! A cut: what the blade parted falls apart in everything that a body is moved with.
 
-use glam::{BVec3, DVec3, Vec3};
-
 use super::change_log::{TopologyChanges, unchanged};
-use super::cuttable::{Cuttable, passes};
-use super::{Body, Bound, NewNode, SMALLEST_MASS, Spring};
+use super::cuttable::Cuttable;
+use super::{Body, Bound, NewNode};
 use crate::contact::SurfaceChange;
-use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, PieceOfSpring, Sweep};
+use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::solver::{Candidate, Masses, close, make_up_for};
-use crate::springs::{Change, Link, Rewiring, pull};
+use crate::solver::close;
 
 /// What a cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,32 +27,8 @@ pub struct CutReport {
     pub area: f64,
 }
 
-/// A node whose springs or mass a cut changes.
-struct Touched {
-    /// In its own number.
-    node: u32,
-    source: u32,
-    /// Its part of the mass that it, or its source, had.
-    part: f32,
-    /// What springs did to its source, N.
-    before: Vec3,
-}
-
 impl Body {
-    /// Cuts the surface where a blade's edge passed since the last step, while nodes are where they are: see [`CutSurface::cut`] for what
-    /// is drawn then. What is simulated stays as well shaped as it was: triangles that fell apart are copied for each of their pieces, with nodes that
-    /// are not drawn where their material is beyond the cut, and with their parts of masses and stiffnesses (Molino, Bao, Fedkiw 2004). Springs
-    /// along no edge of a triangle are taken away where the blade passed through them.
-    ///
-    /// Velocities and places stay what they were, and with them momentum and energy. A node that is held stays held where it is drawn; copies of it
-    /// beyond the cut are free, and have the mass that their material has in the mean where it had none.
-    ///
-    /// [`CutSurface::cut`]: crate::cutting::CutSurface::cut
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`]: the body was made without [`BodyDefinition::spare_nodes`](crate::BodyDefinition::spare_nodes).
-    /// [`Error::InvalidArgument`]: an end of the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no
-    /// free place in a row of fixed length. [`Error::OutOfMemory`]. Then nothing has changed.
+    /// See [`World::cut`](crate::World::cut), which has what is attached follow. Changes nothing where it fails.
     pub(crate) fn cut(&mut self, sweep: &Sweep) -> Result<CutReport> {
         let mut cuttable = self
             .cuttable
@@ -234,114 +207,6 @@ impl Body {
         }
     }
 
-    /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
-    /// nothing where it fails.
-    pub(super) fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
-        let beside = (self.terms.as_deref(), self.enclosed.as_deref());
-        let roomier = match &self.implicit {
-            Some(implicit) => {
-                let more = rewiring.added.len() + pairs;
-                implicit.roomier(&*self.springs, more, self.elements.as_deref(), beside)?
-            }
-            None => None,
-        };
-        self.springs.rewire(rewiring)?;
-        if let (Some(implicit), Some(roomier)) = (&mut self.implicit, roomier) {
-            implicit.adopt(roomier);
-        }
-        Ok(())
-    }
-
-    /// What becomes of springs along edges of cells.
-    fn rewiring(&self, changes: &Changes) -> Result<Rewiring> {
-        let mut rewiring = Rewiring::default();
-        let own = |nodes: [u32; 2]| nodes.map(|node| self.order.own(node));
-        for pieces in changes.springs.chunk_by(|a, b| a.source == b.source) {
-            let source = own(pieces[0].source);
-            let Some(link) = self.link(source) else {
-                continue;
-            };
-            let is_source = |piece: &&PieceOfSpring| piece.nodes == piece.source;
-            match pieces.iter().find(is_source) {
-                Some(piece) => memory::push(&mut rewiring.changed, part_of(source[0], link, piece.part))?,
-                None => memory::push(&mut rewiring.removed, spring_of(source, &link, 1.0))?,
-            }
-            for piece in pieces.iter().filter(|piece| !is_source(piece)) {
-                memory::push(&mut rewiring.added, spring_of(own(piece.nodes), &link, piece.part))?;
-            }
-        }
-        Ok(rewiring)
-    }
-
-    /// Springs along no edge of a cell: those that the blade passed through go, and those of nodes that fell apart become as much softer as
-    /// the lighter of their nodes becomes lighter.
-    fn take_away(
-        &self,
-        material: &CutMaterial,
-        sweep: &Sweep,
-        near: &[u32],
-        changes: &Changes,
-        rewiring: &mut Rewiring,
-    ) -> Result<()> {
-        let mut nodes = memory::reserved(4 * near.len())?;
-        for &item in near {
-            nodes.extend(material.nodes_of(item).map(|node| self.order.own(node)));
-        }
-        // New ones have no springs yet.
-        let known = self.node_count() as u32;
-        nodes.retain(|&node| node < known);
-        let parted = changes.nodes.iter().filter(|piece| piece.node == piece.source);
-        let mut parts = memory::reserved(changes.nodes.len())?;
-        parts.extend(parted.map(|piece| (self.order.own(piece.node), piece.part)));
-        parts.sort_unstable_by_key(|&(node, _)| node);
-        nodes.try_reserve(parts.len())?;
-        nodes.extend(parts.iter().map(|&(node, _)| node));
-        memory::sort_once(&mut nodes);
-        let part_of_node = |node: u32| match parts.binary_search_by_key(&node, |&(node, _)| node) {
-            Ok(place) => parts[place].1,
-            Err(_) => 1.0,
-        };
-        let mut known_ends = memory::reserved(rewiring.removed.len() + rewiring.changed.len())?;
-        let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        known_ends.extend(rewiring.removed.iter().map(|spring| ordered(spring.nodes)));
-        known_ends.extend(
-            rewiring
-                .changed
-                .iter()
-                .map(|change| ordered([change.node, change.before.neighbour])),
-        );
-        known_ends.sort_unstable();
-        let (positions, swept) = (self.positions(), sweep.triangles());
-        let mut found = Vec::new();
-        for &node in &nodes {
-            let mut room = Ok(());
-            self.springs.visit(node as usize, &mut |link| {
-                let ends = ordered([node, link.neighbour]);
-                // Of two nodes that are both looked at the lower sees to it.
-                let is_seen = ends[0] != node && nodes.binary_search(&ends[0]).is_ok();
-                if !is_seen && room.is_ok() && known_ends.binary_search(&ends).is_err() {
-                    room = memory::push(&mut found, (node, link));
-                }
-            });
-            room?;
-        }
-        for (node, link) in found {
-            let ends = [node, link.neighbour];
-            let callers = ends.map(|node| self.order.caller(node));
-            if material.has_edge(callers) {
-                continue;
-            }
-            let segment = callers.map(|node| positions[node as usize]);
-            let part = part_of_node(node).min(part_of_node(link.neighbour));
-            if swept.into_iter().any(|triangle| passes(segment, triangle)) {
-                memory::push(&mut rewiring.removed, spring_of(ends, &link, 1.0))?;
-            } else if part < 1.0 {
-                memory::push(&mut rewiring.changed, part_of(node, link, part))?;
-            }
-        }
-        Ok(())
-    }
-
     /// What becomes of tetrahedra that are elements.
     fn pieces_of_elements(&self, material: &CutMaterial, changes: &Changes) -> Result<Vec<PieceOfElement>> {
         if self.elements.is_none() {
@@ -395,193 +260,9 @@ impl Body {
             weights: bound.weights.map(|weight| weight as f32),
         }
     }
-
-    /// All nodes whose springs or mass are to change, in order, with what springs do to them now.
-    fn touched(&self, changes: &Changes, rewiring: &Rewiring) -> Result<Vec<Touched>> {
-        let known = self.node_count() as u32;
-        let mut touched: Vec<Touched> = Vec::new();
-        for piece in &changes.nodes {
-            memory::push(
-                &mut touched,
-                Touched {
-                    node: self.order.own(piece.node),
-                    source: self.order.own(piece.source),
-                    part: piece.part as f32,
-                    before: Vec3::ZERO,
-                },
-            )?;
-        }
-        let changed = rewiring
-            .changed
-            .iter()
-            .flat_map(|change| [change.node, change.before.neighbour]);
-        let ends = rewiring.removed.iter().flat_map(|spring| spring.nodes).chain(changed);
-        let added = rewiring.added.iter().flat_map(|spring| spring.nodes);
-        for node in ends.chain(added.filter(|&node| node < known)) {
-            let (source, part, before) = (node, 1.0, Vec3::ZERO);
-            memory::push(
-                &mut touched,
-                Touched {
-                    node,
-                    source,
-                    part,
-                    before,
-                },
-            )?;
-        }
-        // Of a node that fell apart what is known of that comes first.
-        touched.sort_unstable_by(|a, b| a.node.cmp(&b.node).then(a.part.total_cmp(&b.part)));
-        touched.dedup_by_key(|touched| touched.node);
-        for touched in &mut touched {
-            touched.before = self.spring_force(touched.source);
-        }
-        Ok(touched)
-    }
-
-    /// What springs do to a node where it is, but for their damping, N; nothing where nobody asks.
-    fn spring_force(&self, node: u32) -> Vec3 {
-        let mut force = Vec3::ZERO;
-        if self.carry.closing.is_some() {
-            let positions = self.state.positions();
-            let here = positions.get(node as usize);
-            self.springs.visit(node as usize, &mut |link| {
-                force += pull(
-                    node as usize,
-                    &link,
-                    positions.get(link.neighbour as usize) - here,
-                    None,
-                );
-            });
-        }
-        force
-    }
-
-    /// Gives nodes that fell apart their parts of the mass, and holds copies of held nodes that are drawn.
-    fn share_masses(&mut self, cuttable: &Cuttable, changes: &Changes) -> Result<()> {
-        for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
-            let source = self.order.own(pieces[0].source);
-            let whole = f64::from(self.masses[source as usize]);
-            // Of what a tool holds no copies are held.
-            let axes = if self.is_held_by_tool(source) {
-                BVec3::FALSE
-            } else {
-                self.pins.axes_of(source)
-            };
-            let is_held = self.inverse_masses[source as usize] == 0.0;
-            for piece in pieces {
-                let node = self.order.own(piece.node);
-                let is_drawn = changes.undrawn.binary_search(&piece.node).is_err();
-                let is_copy = piece.node != piece.source;
-                let mass = if whole > 0.0 {
-                    whole * piece.part
-                } else if is_drawn {
-                    0.0
-                } else {
-                    cuttable.density * cuttable.material.share_at(piece.node)
-                } as f32;
-                let mass = if mass > 0.0 { mass.max(SMALLEST_MASS) } else { mass };
-                if is_copy && is_drawn && axes.any() {
-                    let target = self.pins.get(source).and_then(|pin| pin.target);
-                    self.pins.hold(node, axes)?;
-                    if let Some(pin) = self.pins.get_mut(node) {
-                        pin.target = target;
-                    }
-                } else if mass == 0.0 {
-                    self.pins.hold(node, BVec3::TRUE)?;
-                }
-                let stays_held = mass == 0.0
-                    || if is_copy {
-                        is_drawn && axes == BVec3::TRUE
-                    } else {
-                        is_held
-                    };
-                self.masses[node as usize] = mass;
-                self.inverse_masses[node as usize] = if stays_held { 0.0 } else { 1.0 / mass };
-            }
-        }
-        Ok(())
-    }
-
-    /// The same for elements, at all nodes of pieces and all others of which masses or springs have changed.
-    fn follow_elements(&mut self, material: &CutMaterial, changes: &Changes, nodes: &[u32]) {
-        let Some(elements) = &mut self.elements else {
-            return;
-        };
-        let order = &self.order;
-        let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-        };
-        let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
-        elements.find_rates_at(nodes, cells_at, &*self.springs, &masses);
-        if self.carry.closing.is_none() {
-            return;
-        }
-        for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
-            let force_on = |body: &Self, node: u32| {
-                let cells = material.tetrahedra_at(node);
-                let elements = body.elements.as_ref();
-                elements.map_or(DVec3::ZERO, |elements| {
-                    elements.force_at(body.order.own(node), cells, body.state.positions())
-                })
-            };
-            let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
-            for piece in pieces {
-                let more = whole * piece.part - force_on(self, piece.node);
-                make_up_for(self, self.order.own(piece.node), more.as_vec3());
-            }
-        }
-    }
-
-    /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
-    fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
-        self.forces_current = false;
-        self.published.forget_velocities();
-        self.scale_for_springs(nodes);
-        for touched in touched {
-            let force = self.spring_force(touched.node);
-            make_up_for(self, touched.node, touched.before * touched.part - force);
-        }
-        self.follow_nodes();
-        let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-        };
-        let watched = (&mut self.watched, candidates);
-        let positions = self.state.positions();
-        self.carry.stability = self
-            .carry
-            .stability
-            .cut(nodes, &*self.springs, masses, positions, watched);
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
-    }
 }
 
 /// Those below a number, and the others, of numbers in order.
 fn split_at(numbers: &[u32], first: u32) -> (&[u32], &[u32]) {
     numbers.split_at(numbers.partition_point(|&number| number < first))
-}
-
-/// A spring of the ends of a link, with a part of its stiffness and damping.
-fn spring_of(nodes: [u32; 2], link: &Link, part: f64) -> Spring {
-    Spring {
-        nodes,
-        stiffness: (f64::from(link.stiffness) * part) as f32,
-        rest_length: link.rest_length,
-        damping: (f64::from(link.damping) * part) as f32,
-    }
-}
-
-fn part_of(node: u32, link: Link, part: f64) -> Change {
-    Change {
-        node,
-        before: link,
-        after: Link {
-            stiffness: (f64::from(link.stiffness) * part) as f32,
-            damping: (f64::from(link.damping) * part) as f32,
-            ..link
-        },
-    }
 }

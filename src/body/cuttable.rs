@@ -60,7 +60,7 @@ impl Cuttable {
                 CutMaterial::Springs(pairs)
             }
             (_, []) => CutMaterial::Surface(CutSurface::new(rest, drawn).map_err(refused)?),
-            _ => CutMaterial::Solid(CutSolid::new(rest, tetrahedra, drawn).map_err(refused)?),
+            _ => CutMaterial::Solid(CutSolid::new(rest, tetrahedra, definition.triangles).map_err(refused)?),
         };
         material.reserve(spare)?;
         let mut search = Search::new(rest.len(), &material, order)?;
@@ -101,6 +101,15 @@ impl Cuttable {
 }
 
 impl Cuttable {
+    /// Makes a surface that of the material.
+    pub fn take_surface(&self, surface: &mut Vec<[u32; 3]>) -> Result<()> {
+        let count = self.material.triangle_count();
+        surface.clear();
+        surface.try_reserve(count as usize)?;
+        surface.extend((0..count).map(|triangle| self.material.corner_points(triangle)));
+        Ok(())
+    }
+
     /// Makes room for a spring that is added by hand.
     pub fn reserve_spring(&mut self, nodes: [u32; 2], order: &NodeOrder) -> Result<()> {
         if let CutMaterial::Springs(springs) = &mut self.material {
@@ -230,13 +239,17 @@ impl Search {
     /// Makes room for what a cut adds, so many cells and of these items, so that listing it cannot fail.
     pub fn reserve(&mut self, material: &CutMaterial, cells: usize, items: &[u32]) -> Result<()> {
         self.home_of_cell.try_reserve(cells)?;
-        // Each of them may come to any home, and with all corners.
-        for &item in items {
-            if let Some(&home) = self.home_of_cell.get(material.cell_of(item) as usize) {
-                let home = &mut self.homes[home as usize];
-                home.items.try_reserve(items.len())?;
-                home.later.try_reserve(4 * items.len())?;
-            }
+        let mut homes = memory::reserved(items.len())?;
+        let known = items.iter().map(|&item| material.cell_of(item) as usize);
+        homes.extend(known.filter_map(|cell| self.home_of_cell.get(cell).copied()));
+        homes.sort_unstable();
+        // Copies come to the homes of what they were copied from, which may be any of these.
+        let copies = items.len() - homes.len();
+        for at_home in homes.chunk_by(|a, b| a == b) {
+            let home = &mut self.homes[at_home[0] as usize];
+            let most = at_home.len() + copies;
+            home.items.try_reserve(most)?;
+            home.later.try_reserve(4 * most)?;
         }
         Ok(())
     }

@@ -41,6 +41,9 @@ impl Body {
         if let Some(applied) = &mut self.applied {
             applied.reserve(count)?;
         }
+        if let Some(elements) = &mut self.elements {
+            elements.reserve_nodes(count)?;
+        }
         if let Some(coarse) = &mut self.coarse {
             coarse.reserve(count)?;
         }

@@ -8,6 +8,8 @@ mod bound_tests;
 mod change_log;
 mod coarse;
 mod cut;
+mod cut_masses;
+mod cut_springs;
 mod cuttable;
 mod damping;
 mod definition;
@@ -203,12 +205,16 @@ impl Body {
             }
         }
         let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
-        let surface = match (definition.triangles, definition.tetrahedra) {
+        let mut surface = match (definition.triangles, definition.tetrahedra) {
             ([], []) => crate::mesh::cell_boundary(definition.cells)?,
             ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,
             (triangles, _) => memory::copied(triangles)?,
         };
         let cuttable = Cuttable::new(definition, &springs, &surface, &order)?;
+        if let Some(cuttable) = cuttable.as_ref().filter(|_| definition.triangles.is_empty()) {
+            // Outward however tetrahedra are turned.
+            cuttable.take_surface(&mut surface)?;
+        }
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::cutting::{CutEnd, CutMaterial, Sweep};
+use crate::cutting::{CutEnd, CutMaterial, SolidStroke, Sweep};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
@@ -11,12 +11,24 @@ use crate::memory;
 const LITTLE: f32 = 0.02;
 
 /// Where a blade stopped.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Stroke {
     /// The blade's edge.
     edge: Option<[Vec3; 2]>,
     /// Points of the tissue where it stood, which may lie a little beside it, and its points next to them.
     ends: Vec<(CutEnd, Vec3)>,
+    /// What a solid knows of it while another is made in it.
+    pub of_solid: SolidStroke,
+}
+
+impl Default for Stroke {
+    fn default() -> Self {
+        Self {
+            edge: None,
+            ends: Vec::new(),
+            of_solid: SolidStroke::NONE,
+        }
+    }
 }
 
 impl Stroke {

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::changes::Changes;
 use super::cut::{Limits, Sweep};
-use super::solid::CutSolid;
+use super::solid::{CutSolid, SolidStroke};
 use super::surface::CutSurface;
 use crate::error::Result;
 use crate::memory;
@@ -233,6 +233,13 @@ impl CutMaterial {
         let parts = end.nodes.iter().zip(end.weights);
         let places = parts.map(|(&node, weight)| weight * positions[node as usize].as_dvec3());
         places.sum::<DVec3>().as_vec3()
+    }
+
+    /// Takes a stroke for that of the next cut, and gives the one that it had.
+    pub fn swap_stroke(&mut self, stroke: &mut SolidStroke) {
+        if let Self::Solid(solid) = self {
+            std::mem::swap(&mut solid.stroke, stroke);
+        }
     }
 
     /// The material has moved since the last cut: the blade's edge, which stopped there, is here in it now.

@@ -35,6 +35,7 @@ pub use changes::{BoundPoint, Changes, CutFace, PieceOfCell, PieceOfNode, PieceO
 pub use cut::{Limits, Sweep};
 pub(crate) use material::{CutEnd, CutMaterial};
 pub(crate) use met::Met;
+pub(crate) use solid::SolidStroke;
 pub use solid::{CutSolid, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
 pub use surface::{CutSurface, SurfaceCell, SurfaceTriangle, SurfaceVertex};
 pub(crate) use tear::Load;

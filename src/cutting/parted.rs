@@ -15,8 +15,10 @@ impl CutSurface {
     /// their piece but for one: the cost is that of the smaller pieces, or of the way round. None if that is more than `most` triangles.
     pub fn parted(&self, rim: &[RimEdge], most: usize) -> Result<Option<u32>> {
         let mut floods = Floods::from(rim)?;
-        while floods.live() > 1 {
-            for flood in 0..floods.open.len() {
+        let mut live = memory::reserved(floods.open.len())?;
+        live.extend(0..floods.open.len());
+        while live.len() > 1 {
+            for &flood in &live {
                 if floods.reached.len() > most {
                     return Ok(None);
                 }
@@ -29,6 +31,8 @@ impl CutSurface {
                     }
                 }
             }
+            // Those that have met another have nothing open either.
+            live.retain(|&flood| !floods.open[flood].is_empty());
         }
         let after = floods.count();
         for edge in rim {
@@ -95,11 +99,6 @@ impl Floods {
         }
         floods.met.reset(floods.open.len())?;
         Ok(floods)
-    }
-
-    /// How many floods have not been all over their piece.
-    fn live(&self) -> usize {
-        self.open.iter().filter(|open| !open.is_empty()).count()
     }
 
     fn count(&mut self) -> u32 {

@@ -88,6 +88,14 @@ impl Elements {
         Ok(())
     }
 
+    /// Makes room for so many nodes in all.
+    pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
+        for values in [&mut self.stiffnesses, &mut self.carried] {
+            memory::reserve(values, count)?;
+        }
+        Ok(())
+    }
+
     /// Makes room for these pieces, copies of sources in the order of their numbers, in a body of so many nodes then, and in sums beside these.
     pub fn reserve_pieces(
         &mut self,
@@ -118,12 +126,13 @@ impl Elements {
         if let Some(memory) = &mut self.memory {
             memory.reserve_parts(more, GROUPS)?;
         }
-        for values in [&mut self.stiffnesses, &mut self.carried] {
-            memory::reserve(values, node_count)?;
-        }
+        self.reserve_nodes(node_count)?;
+        let Some(cells) = &self.cells else {
+            return Ok(());
+        };
         self.copies.reserve(tile_count(node_count), pieces)?;
         // The solvers make room for as many.
-        self.count += copies;
+        self.count = self.count.max(cells.places.len() + copies);
         Ok(())
     }
 

@@ -83,7 +83,10 @@ impl Sums {
 
     /// Makes room for more copies and parts.
     fn reserve(&mut self, copies: usize, parts: usize) -> Result<()> {
-        for records in [&mut self.positions, &mut self.sums, &mut self.ways] {
+        if !self.ways.is_empty() {
+            self.ways.try_reserve(copies)?;
+        }
+        for records in [&mut self.positions, &mut self.sums] {
             records.try_reserve(copies)?;
         }
         Ok(self.of_parts.try_reserve(parts)?)

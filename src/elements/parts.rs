@@ -247,8 +247,16 @@ impl Copies {
         let more = tiles.saturating_sub(self.later.len());
         self.later.try_reserve(more)?;
         self.later.resize_with(self.later.len() + more, Vec::new);
-        for node in pieces.iter().flat_map(|piece| piece.nodes) {
-            self.later[node as usize / TILE].try_reserve(4 * pieces.len())?;
+        let mut tiles = memory::reserved(4 * pieces.len())?;
+        tiles.extend(
+            pieces
+                .iter()
+                .flat_map(|piece| piece.nodes)
+                .map(|node| node as usize / TILE),
+        );
+        tiles.sort_unstable();
+        for at_tile in tiles.chunk_by(|a, b| a == b) {
+            self.later[at_tile[0]].try_reserve(at_tile.len())?;
         }
         Ok(())
     }

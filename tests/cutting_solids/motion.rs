@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{
-    Body, BodyDefinition, BodyId, Material, Model, Solver, Storage, Values, Viscosity, World, WorldDefinition,
+    BladeDefinition, Body, BodyDefinition, BodyId, Material, Model, Solver, Storage, Values, Viscosity, World,
+    WorldDefinition,
 };
 
 use super::block::{Mesh, Random, shaken, upright};
@@ -397,4 +398,71 @@ fn a_stroke_through_tissue_that_gapes_leaves_no_bridge() {
         let count = world.body(body).unwrap().pieces().unwrap().count;
         assert_eq!(count, 2, "round {round}, {steps} steps, {solver:?}");
     }
+}
+
+#[test]
+fn tetrahedra_may_be_turned_either_way() {
+    let (positions, cells) = mesh();
+    let turned: Vec<[u32; 4]> = (0..)
+        .zip(&cells)
+        .map(|(at, &[a, b, c, d])| if at % 3 == 0 { [b, a, c, d] } else { [a, b, c, d] })
+        .collect();
+    let mut seen = Vec::new();
+    for tetrahedra in [&cells, &turned] {
+        let mut world = World::new(WorldDefinition::default()).unwrap();
+        let body = world
+            .create_body(&BodyDefinition {
+                positions: &positions,
+                masses: Values::Uniform(1e-3),
+                tetrahedra,
+                stiffnesses: Values::Uniform(20.0),
+                spare_nodes: 1000,
+                ..Default::default()
+            })
+            .unwrap();
+        let it = world.body(body).unwrap();
+        let sweep = Sweep {
+            start: edge(it, [-0.02, 0.023], [-0.02, 0.06]),
+            end: edge(it, [0.08, 0.026], [-0.02, 0.06]),
+        };
+        let report = world.cut(body, &sweep).unwrap();
+        let it = world.body(body).unwrap();
+        let volume = enclosed(it.surface(), |node| it.positions()[node as usize].as_dvec3());
+        assert!((volume / 1.2e-4 - 1.0).abs() < 1e-6, "{volume}");
+        seen.push((report.pieces_parted, (report.area * 1e9) as i64));
+    }
+    assert_eq!(seen[0].0, 1);
+    assert_eq!(seen[0], seen[1]);
+}
+
+#[test]
+fn two_blades_in_one_solid_have_a_stroke_each() {
+    let (mut world, body) = made(Matter::Elements, Solver::Implicit, Storage::Packed, Vec3::ZERO);
+    let it = world.body(body).unwrap();
+    // They cross, one after the other.
+    let ways = [
+        [
+            edge(it, [-0.01, 0.021], [-0.02, 0.06]),
+            edge(it, [0.07, 0.027], [-0.02, 0.06]),
+        ],
+        [
+            edge(it, [0.022, -0.03], [-0.02, 0.06]),
+            edge(it, [0.033, 0.06], [-0.02, 0.06]),
+        ],
+    ];
+    let blades = ways.map(|[start, _]| {
+        let middle = 0.5 * (start[0] + start[1]);
+        let mut definition = BladeDefinition::new(start.map(|end| end - middle));
+        definition.pose.position = middle;
+        world.create_blade(&definition).unwrap()
+    });
+    for step in 1..=80 {
+        for ((&blade, [start, end]), wait) in blades.iter().zip(&ways).zip([0, 20]) {
+            let [from, to] = [start, end].map(|edge| 0.5 * (edge[0] + edge[1]));
+            let part = ((step - wait) as f32 / 60.0).clamp(0.0, 1.0);
+            world.set_blade_pose(blade, from.lerp(to, part), None).unwrap();
+        }
+        world.step(2e-3).unwrap();
+    }
+    assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 4);
 }

@@ -115,8 +115,11 @@ pub struct CutSolid {
     pub(crate) tetrahedra: Tracked<Tetrahedron>,
     pub(crate) triangles: Tracked<SolidTriangle>,
     pub(crate) vertices: Tracked<SolidVertex>,
+    /// How many strokes there were.
+    pub(crate) strokes: u32,
     pub(crate) stroke: Stroke,
-    pub(crate) stroke_before: Stroke,
+    /// Both before the last cut.
+    pub(crate) before: (u32, Stroke),
 }
 
 impl CutSolid {

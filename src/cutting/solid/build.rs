@@ -82,8 +82,9 @@ impl CutSolid {
             tetrahedra: Tracked::new(tetrahedra),
             triangles: Tracked::new(triangles),
             vertices: Tracked::new(vertices),
+            strokes: 0,
             stroke: Stroke::NONE,
-            stroke_before: Stroke::NONE,
+            before: (0, Stroke::NONE),
         };
         solid.check_stars()?;
         Ok(solid)

@@ -66,7 +66,7 @@ impl CutSolid {
         self.tetrahedra.undo();
         self.triangles.undo();
         self.vertices.undo();
-        self.stroke = self.stroke_before;
+        (self.strokes, self.stroke) = self.before;
     }
 
     fn begin(&mut self) {
@@ -75,7 +75,7 @@ impl CutSolid {
         self.tetrahedra.begin();
         self.triangles.begin();
         self.vertices.begin();
-        self.stroke_before = self.stroke;
+        self.before = (self.strokes, self.stroke);
     }
 
     /// The cells whose box meets the sweep's if nodes are at `positions`, found by going through all.
@@ -126,7 +126,8 @@ impl Cut<'_> {
     fn make(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
         let mut candidates = memory::copied(candidates)?;
         memory::sort_once(&mut candidates);
-        self.solid.stroke.go_on(sweep);
+        let CutSolid { stroke, strokes, .. } = &mut *self.solid;
+        stroke.go_on(sweep, strokes);
         for triangle in sweep.triangles() {
             let swept = Swept::new(triangle.map(|corner| corner.as_dvec3()));
             let sign = self.solid.stroke.turn(swept.normal);

@@ -29,3 +29,4 @@ mod sever;
 mod split;
 
 pub use body::{CutSolid, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
+pub(crate) use sever::Stroke as SolidStroke;

@@ -20,8 +20,10 @@ impl CutSolid {
             floods.start(side)?;
         }
         floods.met.reset(floods.open.len())?;
-        while floods.live() > 1 {
-            for flood in 0..floods.open.len() {
+        let mut live = memory::reserved(floods.open.len())?;
+        live.extend(0..floods.open.len());
+        while live.len() > 1 {
+            for &flood in &live {
                 if floods.reached.len() > most {
                     return Ok(None);
                 }
@@ -34,6 +36,8 @@ impl CutSolid {
                     }
                 }
             }
+            // Those that have met another have nothing open either.
+            live.retain(|&flood| !floods.open[flood].is_empty());
         }
         let after = floods.count();
         for [one, other] in faces.iter().map(sides_of) {
@@ -64,11 +68,6 @@ impl Floods {
         self.reached.try_reserve(1)?;
         self.reached.insert(tetrahedron, self.open.len());
         memory::push(&mut self.open, open)
-    }
-
-    /// How many floods have not been all over their piece.
-    fn live(&self) -> usize {
-        self.open.iter().filter(|open| !open.is_empty()).count()
     }
 
     fn count(&mut self) -> u32 {

@@ -30,10 +30,11 @@ impl Stroke {
         turns_up: false,
     };
 
-    /// Goes on with a step, or begins again with it.
-    pub(crate) fn go_on(&mut self, sweep: &Sweep) {
+    /// Goes on with a step, or begins again with it, as the next of so many strokes.
+    pub(crate) fn go_on(&mut self, sweep: &Sweep, strokes: &mut u32) {
         if self.end != sweep.start {
-            self.number += 1;
+            *strokes += 1;
+            self.number = *strokes;
             self.normal = DVec3::ZERO;
         }
         let way = (sweep.end[0] + sweep.end[1] - sweep.start[0] - sweep.start[1]).as_dvec3();
