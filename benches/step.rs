@@ -6,7 +6,9 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Pose, Shape, Storage, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{
+    BodyDefinition, HapticDefinition, Pose, Shape, Sleep, Storage, ToolDefinition, Values, World, WorldDefinition,
+};
 
 /// Short enough for every body here.
 const SUBSTEP: f32 = 1e-4;
@@ -130,6 +132,79 @@ fn features(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// A step of a body that rests: with what never sleeps, asleep, and asleep but for where a ball moves.
+fn sleep(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("sleep");
+    group.sample_size(20);
+    for side in [100_u32, 316, 1000] {
+        let (positions, springs) = grid(side);
+        let nodes = side * side;
+        for (name, speed, pressed) in [
+            ("awake", 0.0, false),
+            ("may sleep", 1e-9, false),
+            ("asleep", 1e-3, false),
+            ("pressed", 1e-3, true),
+        ] {
+            let definition = BodyDefinition {
+                sleep: Sleep {
+                    speed,
+                    time: 2.0 * SUBSTEP,
+                },
+                // What moves it does not spread over all of it.
+                node_dampings: Values::Uniform(0.5),
+                ..definition(&positions, &springs)
+            };
+            let mut world = world();
+            world.set_gravity(Vec3::ZERO).expect("no gravity");
+            let id = world.create_body(&definition).expect("a body");
+            let node = nodes / 2 + side / 2;
+            for _ in 0..4 {
+                world.step(SUBSTEP).expect("a step");
+            }
+            group.bench_function(BenchmarkId::new(name, nodes), |bencher| {
+                bencher.iter(|| {
+                    if pressed {
+                        let body = world.body_mut(id).expect("a body");
+                        body.apply_force(node, Vec3::Y * 1e-3).expect("a force");
+                    }
+                    world.step(black_box(SUBSTEP)).expect("a stable step")
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+/// What readers cost the step: none, one, and one that was there.
+fn readers(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("readers");
+    group.sample_size(20);
+    for side in [100, 316] {
+        let (positions, springs) = grid(side);
+        let nodes = side * side;
+        for (name, is_kept) in [("never", None), ("one", Some(true)), ("one that is gone", Some(false))] {
+            let mut world = world();
+            let id = world.create_body(&definition(&positions, &springs)).expect("a body");
+            world.body_mut(id).and_then(|body| body.pin(0)).expect("a node");
+            let mut reader = is_kept.map(|_| world.create_reader(id).expect("a reader"));
+            if is_kept == Some(false) {
+                reader = None;
+            }
+            group.bench_function(BenchmarkId::new(name, nodes), |bencher| {
+                bencher.iter(|| world.step(black_box(SUBSTEP)).expect("a stable step"));
+            });
+            drop(reader);
+        }
+        let mut world = world();
+        let id = world.create_body(&definition(&positions, &springs)).expect("a body");
+        let mut reader = world.create_reader(id).expect("a reader");
+        group.bench_function(BenchmarkId::new("a read", nodes), |bencher| {
+            bencher.iter(|| black_box(reader.read().version));
+        });
+    }
+    group.finish();
+}
+
 /// How the springs are kept: a sheet of 10K nodes in each storage that is offered.
 fn storages(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("storages");
@@ -205,5 +280,55 @@ fn tools(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, sizes, features, storages, tools);
+/// A hand on a tool: a step with a handle and without, and a tick, each with something to feel.
+fn haptics(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("haptics");
+    group.sample_size(20);
+    let mesh = Mesh::cloth([0.1, 0.1], [30, 30]).expect("a cloth");
+    let is_rim = |place: &Vec3| place.x.abs().max(place.z.abs()) > 0.0499;
+    let mass_of = |place: &Vec3| if is_rim(place) { 0.0 } else { 1e-5 };
+    let masses: Vec<f32> = mesh.positions.iter().map(mass_of).collect();
+    for is_led in [false, true] {
+        let mut world = world();
+        let body = BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Each(&masses),
+            stiffnesses: Values::Uniform(10.0),
+            node_dampings: Values::Uniform(1e-3),
+            ..BodyDefinition::default()
+        };
+        world.create_body(&body).expect("a valid body");
+        world.set_gravity(Vec3::ZERO).expect("a finite vector");
+        let pose = Pose {
+            position: Vec3::new(0.0, 0.005, 0.0),
+            ..Pose::IDENTITY
+        };
+        let ball = ToolDefinition {
+            pose,
+            ..ToolDefinition::new(Shape::Sphere { radius: 0.01 })
+        };
+        let tool = world.create_tool(&ball).expect("a valid tool");
+        let handle = is_led.then(|| world.create_haptic(&HapticDefinition::new(tool)).expect("a handle"));
+        let name = if is_led {
+            "a step with a handle"
+        } else {
+            "a step without"
+        };
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| world.step(black_box(1e-3)).expect("a stable step"));
+        });
+        if let Some(mut handle) = handle {
+            group.bench_function("a tick", |bencher| {
+                bencher.iter(|| {
+                    let tick = handle.tick(black_box(pose), Some(Vec3::ZERO), None, 1e-3);
+                    tick.expect("a pose").force
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sizes, features, sleep, readers, storages, tools, haptics);
 criterion_main!(benches);

@@ -9,7 +9,8 @@
  * constant, a negative mass or stiffness, a reserved field that is not zero.
  *
  * const sinew_world *: any number of threads at once. sinew_world *: one thread, nobody else inside
- * that world. Two worlds share nothing.
+ * that world. Two worlds share nothing. Handles made for the purpose (a reader) are the exception:
+ * each is used by one thread, whatever another does to its world.
  *
  * A definition is filled by its init function, then changed, and read during the call only. What
  * the caller creates, the caller destroys; bodies and tools end with their world. A view is borrowed
@@ -292,10 +293,23 @@
 typedef struct sinew_detector sinew_detector;
 
 /**
+ * The device's side of a tool of a world, for one thread, the device's own: it may tick while another thread steps the world, or uses it otherwise.
+ */
+typedef struct sinew_haptic sinew_haptic;
+
+/**
  * A mesh: positions, triangles, tetrahedra and cells. It belongs to the caller, never changes, and may be read by any number of
  * threads at once.
  */
 typedef struct sinew_mesh sinew_mesh;
+
+/**
+ * A reader of a body: the latest complete positions for one thread, without a lock, while another thread steps the world.
+ *
+ * It is the exception to the rule of threads: made by who has the world, it is then used by one thread at a time, any, whatever others do to the
+ * world meanwhile, until its end; it outlives body and world. A thread more needs a reader more.
+ */
+typedef struct sinew_reader sinew_reader;
 
 /**
  * A world: bodies and tools that are stepped together.
@@ -677,7 +691,8 @@ typedef struct sinew_body_def {
    * volume V, V0 at rest, is enclosed_stiffness / 2 V0 (V/V0 - 1)^2 - pressure (V - V0). The surface is triangles, or where there are
    * none the boundary of the tetrahedra or cells; each of its parts that hang together by edges must be closed and have a volume. Each is a
    * cavity of its own, unless some are inside out, as the inner wall of a hollow organ is: then those alone are cavities.
-   * sinew_body_remove_spring opens the cavities whose triangles have the edge, for good.
+   * sinew_body_remove_spring opens the cavities whose triangles have the edge, for good, and a cut those of which it divides or parts
+   * triangles, however little: what is open is neither kept nor pressed. A cut beside a cavity leaves it.
    */
   float enclosed_stiffness;
   /**
@@ -699,7 +714,8 @@ typedef struct sinew_body_def {
    */
   uint32_t meets_bodies;
   /**
-   * 1: it meets itself; 0, the default: it does not.
+   * 1: it meets itself; 0, the default: it does not. The two sides of a cut meet from then on, at no distance: they part freely, and rest against
+   * each other where they are pressed together again; the rims of a sheet may slide over each other until they have parted.
    */
   uint32_t meets_itself;
   /**
@@ -732,19 +748,21 @@ typedef struct sinew_body_def {
   uint32_t spare_nodes;
   /**
    * J/m, at least 0: what a blade (sinew_blade_create) spends for each metre of a cut, at rest: the fracture toughness of the material, J/m^2,
-   * times the thickness of the surface; default 0: it is cut for nothing.
+   * times the thickness of the surface. Of tetrahedra the toughness itself, J/m^2. Springs alone have none (SINEW_STATUS_UNSUPPORTED); default 0: it is cut for nothing.
    */
   float toughness;
   /**
    * The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
    * limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
    * force and as far as the next triangle (O'Brien, Hodgins 1999); where a cut ends in a triangle next to the spring, that goes on
-   * instead. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
+   * instead. A solid tears at that of them about which the material is stretched more, across that and along faces of its tetrahedra; of
+   * tetrahedra that are elements each edge has the limit of a spring. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
    * beyond its limits may allocate.
    */
   float tear_strain;
   /**
-   * N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part.
+   * N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part. Edges of elements
+   * have no such limit: SINEW_STATUS_UNSUPPORTED where a body has elements and no springs.
    */
   float tear_force;
   /**
@@ -753,9 +771,21 @@ typedef struct sinew_body_def {
    */
   uint32_t most_tears;
   /**
-   * m2, at least 0: a tear that would part a piece with less area at rest is not made; default 0.
+   * m2, of solids m3, at least 0: a tear that would part a piece with less area or volume at rest is not made; default 0.
    */
   float smallest_piece;
+  /**
+   * m/s, at least 0: what is slower is at rest; 0, the default: the body never sleeps, and pays nothing for it. Else parts of it that have
+   * been at rest for sleep_time, and on which no force acts that would make them as fast in that time, stand still and are not stepped
+   * until a neighbour, a force, a pin, a tool, a cut or a changed property reaches them. Speed by time is about how far off their places
+   * may be. Parts of the body sleep by themselves with SINEW_SOLVER_VERLET, where it is made of springs and elements alone and was not cut; else
+   * all of it does or nothing. What meets other tissue or is sewn to it does not sleep. See sinew_body_get_awake_share.
+   */
+  float sleep_speed;
+  /**
+   * s, above 0: some times what the tissue takes to settle; default 0.5.
+   */
+  float sleep_time;
 } sinew_body_def;
 
 /**
@@ -774,7 +804,8 @@ typedef struct sinew_body_id {
 
 /**
  * Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
- * set_positions, set_velocities or rest_state, the next change of topology of that body, or its end.
+ * set_positions, set_velocities or rest_state, the next change of topology of that body, or its end; in a sinew_frame as long
+ * as that says.
  */
 typedef struct sinew_vec3_view {
   /**
@@ -1451,7 +1482,7 @@ typedef struct sinew_blade_report {
    */
   double work;
   /**
-   * How long the cuts are that it made at the end of the step, at rest, m.
+   * How long the cuts are that it made at the end of the step, at rest, m; of solids on their skin.
    */
   double length;
   /**
@@ -1467,7 +1498,144 @@ typedef struct sinew_blade_report {
    * 0.
    */
   uint32_t reserved0;
+  /**
+   * Of solids: how large the faces are that have opened, at rest, m^2.
+   */
+  double area;
 } sinew_blade_report;
+
+/**
+ * How a device is coupled to a tool. Filled by sinew_haptic_def_init; used only during sinew_haptic_create.
+ */
+typedef struct sinew_haptic_def {
+  /**
+   * Set by sinew_haptic_def_init.
+   */
+  size_t struct_size;
+  /**
+   * The tool that the device leads; no default.
+   */
+  struct sinew_tool_id tool;
+  /**
+   * Of the spring between device and tool, N/m, above 0; default 1000. A device should stand it with its own sampling: about half of its damping,
+   * N s/m, by the time between ticks, or less.
+   */
+  float stiffness;
+  /**
+   * The same for turning, N m/rad, at least a millionth of the stiffness at the lever, which is half of the tool's length; default 0: that stiffness.
+   */
+  float angular_stiffness;
+  /**
+   * Of the damper beside that spring, which acts where tissue resists; default 1: it damps device_mass on the spring critically. 0: what the loop
+   * makes of energy is still damped away, but less surely.
+   */
+  float damping_ratio;
+  /**
+   * What the hand moves of the device, kg, above 0; default 0.05.
+   */
+  float device_mass;
+  /**
+   * The largest force, N, above 0; default infinity.
+   */
+  float force_limit;
+  /**
+   * The largest torque, N m, above 0; default infinity.
+   */
+  float torque_limit;
+  /**
+   * How fast the force may change, N/s, above 0; default infinity. A force that such a limit makes late gives a hand more than it took: the loop is
+   * kept passive where it is not reached.
+   */
+  float force_rate_limit;
+  /**
+   * How fast the torque may change, N m/s, above 0; default infinity.
+   */
+  float torque_rate_limit;
+  /**
+   * A model that is older, s, above 0, is stale: force and torque go to 0 until there is a newer one; default 0.1.
+   */
+  float stale_after;
+  /**
+   * The time in which they do, or come back, s, above 0; default 0.1.
+   */
+  float ramp;
+} sinew_haptic_def;
+
+/**
+ * What a tick comes to.
+ */
+typedef struct sinew_haptic_result {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * On the device, world axes, N, until the next tick.
+   */
+  float force[3];
+  /**
+   * On the device, about its position, world axes, N m.
+   */
+  float torque[3];
+  /**
+   * Where the tool is to go, m: the device, but for what the spring between them is drawn out.
+   */
+  float proxy_position[3];
+  /**
+   * x y z w.
+   */
+  float proxy_orientation[4];
+  /**
+   * Contacts of the tool as the model was made: sinew_haptic_get_contacts.
+   */
+  uint32_t contact_count;
+  /**
+   * How long ago the device was where the model was made, s, by the ticks; infinity as long as there was none.
+   */
+  float age;
+  /**
+   * The steps of the world that were published for it.
+   */
+  uint64_t version;
+  /**
+   * What part of the model's forces is given: less than 1 where that was stale.
+   */
+  float gain;
+  /**
+   * 1: the tool, or its world, is gone.
+   */
+  uint32_t is_over;
+  /**
+   * What the coupling has lost of the energy that went through it, J: kept at 0 or above as far as damping can.
+   */
+  double lost;
+} sinew_haptic_result;
+
+/**
+ * Where a tool pressed a body as the model of its handle was made.
+ */
+typedef struct sinew_haptic_contact {
+  /**
+   * The body.
+   */
+  struct sinew_body_id body;
+  /**
+   * The point, m.
+   */
+  float point[3];
+  /**
+   * Away from the tool, of unit length.
+   */
+  float normal[3];
+  /**
+   * How fast the tissue moves there, m/s.
+   */
+  float velocity[3];
+  /**
+   * On the tool, N.
+   */
+  float force[3];
+} sinew_haptic_contact;
 
 /**
  * What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
@@ -1669,6 +1837,49 @@ typedef struct sinew_surface_point {
    */
   uint32_t reserved;
 } sinew_surface_point;
+
+/**
+ * What a reader sees of a body: all of one moment. What it points to is valid, and stays as it is, until the next sinew_reader_read of the same
+ * reader, or the reader's end.
+ */
+typedef struct sinew_frame {
+  /**
+   * Set by the caller.
+   */
+  size_t struct_size;
+  /**
+   * Where each node is, m, in the caller's order, with those that cuts have added.
+   */
+  struct sinew_vec3_view positions;
+  /**
+   * The triangles that were drawn then, as sinew_body_get_triangles gives them; they change with topology_version alone.
+   */
+  struct sinew_triangle_view triangles;
+  /**
+   * Above that of earlier frames; the same as long as nothing has moved the body.
+   */
+  uint64_t version;
+  /**
+   * What sinew_body_get_topology_changes told as `version` then.
+   */
+  uint64_t topology_version;
+  /**
+   * How many steps the world had taken.
+   */
+  uint64_t step;
+  /**
+   * The sum of their lengths, s.
+   */
+  double time;
+  /**
+   * 1: this reader did not read this frame before.
+   */
+  uint32_t is_new;
+  /**
+   * 1: the body, or its world, is no more: this is its last frame.
+   */
+  uint32_t is_over;
+} sinew_frame;
 
 /**
  * Which two bodies are compared, and how. Filled by sinew_detector_def_init; used only during sinew_detector_create.
@@ -2326,6 +2537,9 @@ sinew_status sinew_body_scale_region(struct sinew_world *world,
  * drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none. It takes as long as the cut is
  * large, but with NEWTON, which is made anew. Positions and triangles that were lent before are stale; sinew_body_get_topology_changes tells what has changed.
  *
+ * Terms beside springs go on in parts: home springs with those of the nodes' masses, what goes by springs with those, fibres with the tetrahedra, and hinges of
+ * bending by area, where pieces of both triangles still share the edge. A hinge whose edge is cut along is gone, with its energy, and so is what a cavity had that is cut open.
+ *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (spare_nodes was 0), SINEW_STATUS_CAPACITY (there are
  * not as many spare nodes left, or FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY; then nothing has changed.
  *
@@ -2409,11 +2623,11 @@ sinew_status sinew_body_get_tear_report(const struct sinew_world *world,
                                         struct sinew_tear_report *out);
 
 /**
- * Gives the springs of `count` pairs of nodes other limits than tear_strain and tear_force of the definition: `pairs` are 2 `count` indices,
+ * Gives the springs of `count` pairs of nodes, or edges of elements, other limits than tear_strain and tear_force of the definition: `pairs` are 2 `count` indices,
  * `strains` and `forces`, N, `count` floats each, at least 0, 0: any; NULL: they stay. Springs that are added later have none until they are given
  * some. Of a pair that is named more than once the last counts.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (most_tears was 0),
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has neither), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (most_tears was 0),
  * SINEW_STATUS_OUT_OF_MEMORY; then no limit is changed.
  *
  * # Safety
@@ -2494,6 +2708,30 @@ sinew_status sinew_mean_at_nodes(const uint32_t *elements,
                                  size_t element_count,
                                  float *means,
                                  size_t node_count);
+
+/**
+ * Writes what part of a body's nodes is awake, 0 to 1: stepped. 1 for a body that never sleeps, 0 where all of it is at rest, and a step
+ * costs next to nothing.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_body_get_awake_share(const struct sinew_world *world,
+                                        struct sinew_body_id body,
+                                        float *out);
+
+/**
+ * Has all of a body be stepped again, until it has been at rest for as long as it takes: whatever reaches it does so by itself.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses.
+ */
+sinew_status sinew_body_wake(struct sinew_world *world,
+                             struct sinew_body_id body);
 
 /**
  * Writes the energy of a body. `out->struct_size` is set by the caller.
@@ -2624,8 +2862,8 @@ sinew_status sinew_tool_destroy(struct sinew_world *world, struct sinew_tool_id 
  * NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way. What of its way a tool of limited force has
  * not gone in that step is forgotten: it is sent again.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0 or the orientation is zero),
- * SINEW_STATUS_STALE_ID.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0, the orientation is zero, or a haptic handle leads the
+ * tool), SINEW_STATUS_STALE_ID.
  *
  * # Safety
  * `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
@@ -2686,6 +2924,20 @@ sinew_status sinew_tool_get_pose(const struct sinew_world *world,
                                  struct sinew_tool_id tool,
                                  float *position,
                                  float *orientation);
+
+/**
+ * Writes where the last step led a tool: where it is, but for one of limited force. Either may be NULL, as for sinew_tool_get_pose. Sent there by
+ * sinew_tool_set_pose step by step, it does the same in another world: so what a haptic handle did can be taken down and done again.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
+ */
+sinew_status sinew_tool_get_target(const struct sinew_world *world,
+                                   struct sinew_tool_id tool,
+                                   float *position,
+                                   float *orientation);
 
 /**
  * Writes the force, 3 floats, N, and the torque about its position, 3 floats, N m, on a tool: world axes, mean over the
@@ -3002,13 +3254,16 @@ sinew_status sinew_blade_def_init(struct sinew_blade_def *def, size_t struct_siz
  *
  * Tissue that the edge meets gives way until the edge is so far ahead, on the spring of the definition's stiffness, that this pulls as hard as the
  * tissue resists: by its toughness for each metre that is cut, at rest. From then on its proxy follows, at the end of each step, as far as
- * keeps both equal; so the work of the blade is the toughness times the length that is cut, and what the spring stores (Mahvash, Hayward 2001).
+ * keeps both equal; so the work of the blade is the toughness times the length that is cut, or the area in solids, and what the spring stores (Mahvash,
+ * Hayward 2001).
  * What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself meets nothing, nor
  * does one that goes back through its cut.
  *
  * The cut is made where the proxy went, by a fifth of a triangle's shortest edge at a time and to its end where it leaves the tissue; so a triangle that
  * is passed through takes some ten spare_nodes. Tissue of toughness 0 is cut with each step, just where the edge went. Where a cut fails the
  * proxy stays and pulls on, as hard as the tissue resisted: the report's status tells; the step itself succeeds.
+ *
+ * Tissue that moves onto an edge is cut as if that had moved; a turn is followed in parts of half a radian.
  *
  * A body that a blade stands in takes its substeps as one that is attached does. A step in which a blade goes through tissue may allocate.
  *
@@ -3057,6 +3312,73 @@ sinew_status sinew_blade_set_pose(struct sinew_world *world,
 sinew_status sinew_blade_get_report(const struct sinew_world *world,
                                     struct sinew_blade_id blade,
                                     struct sinew_blade_report *out);
+
+/**
+ * Fills `def` with the defaults. `struct_size` is sizeof(sinew_haptic_def).
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_haptic_def_init(struct sinew_haptic_def *def, size_t struct_size);
+
+/**
+ * Lets a device lead a tool through a handle, which the caller destroys with sinew_haptic_destroy. The tool should be where the device is: the
+ * first step leads it there. As long as there is the handle, sinew_tool_set_pose of the tool is refused: each step leads it to where the handle's
+ * proxy was last, as sinew_tool_get_target tells. Each step costs the handle some microseconds.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where another handle leads the tool), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
+ */
+sinew_status sinew_haptic_create(struct sinew_world *world,
+                                 const struct sinew_haptic_def *def,
+                                 struct sinew_haptic **out);
+
+/**
+ * Destroys a handle, before its world or after. The tool is the world's again. NULL: nothing.
+ *
+ * # Safety
+ * `haptic` is NULL or a handle that is not destroyed and that nobody uses any more.
+ */
+void sinew_haptic_destroy(struct sinew_haptic *haptic);
+
+/**
+ * Takes where the device is, 3 floats, m, and how it is turned, x y z w, `dt` seconds after the last tick, above 0 and at most 1, and writes what it
+ * is to feel until the next. `orientation` may be NULL: as it was, at first as the tool. `velocity`, m/s, and `angular_velocity`, rad/s, 3 floats each,
+ * world axes, may be NULL: as its way since the last tick says. `out->struct_size` is set by the caller.
+ *
+ * It waits for nothing, takes no lock and allocates nothing, whatever other threads do with the world. It takes some microseconds.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT: `out` is as it was, and the device should be given no force.
+ *
+ * # Safety
+ * `haptic` is NULL or a handle nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4, `velocity` and `angular_velocity` NULL or
+ * 3; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_haptic_tick(struct sinew_haptic *haptic,
+                               const float *position,
+                               const float *orientation,
+                               const float *velocity,
+                               const float *angular_velocity,
+                               float dt,
+                               struct sinew_haptic_result *out);
+
+/**
+ * Writes the contacts of the tool as the model was made that the last tick used, up to `capacity`, and how many there are in all to `count`: at most
+ * 32, of more the most pressed. `contacts` may be NULL with a capacity of 0. As sinew_haptic_tick it waits for nothing.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `haptic` is NULL or a handle nobody else uses; `contacts` is NULL or writable for `capacity` contacts; `count` is NULL or writable.
+ */
+sinew_status sinew_haptic_get_contacts(const struct sinew_haptic *haptic,
+                                       struct sinew_haptic_contact *contacts,
+                                       size_t capacity,
+                                       size_t *count);
 
 /**
  * Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements
@@ -3218,6 +3540,42 @@ sinew_status sinew_world_find_nearest(const struct sinew_world *world,
                                       const float *point,
                                       float max_distance,
                                       struct sinew_surface_point *out);
+
+/**
+ * Creates a reader of a body, which the caller destroys with sinew_reader_destroy. No more than 126 of one body live at a time.
+ *
+ * Each step that moves the body shows it to its readers when it has been taken, and so does what moves or cuts it between steps, at once. A step
+ * that is refused is never seen, nor one that is not complete. A body without readers takes no time or memory for them; one that has keeps two
+ * copies of its positions more than it has readers, writes one of them each step, and copies its triangles when cuts or tears have changed them.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_CAPACITY (126 readers), SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `out` is NULL or writable.
+ */
+sinew_status sinew_reader_create(struct sinew_world *world,
+                                 struct sinew_body_id body,
+                                 struct sinew_reader **out);
+
+/**
+ * Destroys a reader, on any thread, before or after its body and its world. NULL: nothing.
+ *
+ * # Safety
+ * `reader` is NULL or a reader that is not destroyed and that nobody uses any more.
+ */
+void sinew_reader_destroy(struct sinew_reader *reader);
+
+/**
+ * Writes the latest frame; `out->struct_size` is set by the caller. What the frame before pointed to ends. Nothing is copied, allocated or locked,
+ * and nobody waits: it is the same frame again where there is none later.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `reader` is NULL or a reader nobody else uses, whatever happens to the world; `out` is NULL or writable for the size that it states.
+ */
+sinew_status sinew_reader_read(struct sinew_reader *reader,
+                               struct sinew_frame *out);
 
 /**
  * Fills `def` with the defaults. `struct_size` is sizeof(sinew_detector_def).

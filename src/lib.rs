@@ -9,6 +9,8 @@ mod diagnostics;
 mod elements;
 mod enclosed;
 mod error;
+mod handover;
+mod haptics;
 pub mod material;
 mod memory;
 pub mod mesh;
@@ -17,6 +19,7 @@ mod query;
 #[cfg(test)]
 mod random;
 pub mod raster;
+mod readers;
 mod signs;
 mod slots;
 mod solver;
@@ -27,15 +30,17 @@ mod threads;
 mod world;
 
 pub use body::{
-    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Solver, SpringState, Storage, TearReport,
-    Tearing, TopologyChanges, Values,
+    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Sleep, Solver, SpringState, Storage,
+    TearReport, Tearing, TopologyChanges, Values,
 };
 pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use error::{Error, Result};
+pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
 pub use material::{Material, Model, Viscosity, Yielding};
 pub use picture::{BodyValues, PictureDefinition};
 pub use query::SurfaceHit;
+pub use readers::{BodyReader, Frame};
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use springs::Kernel;
 pub use terms::SpringLaw;

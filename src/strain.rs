@@ -201,7 +201,7 @@ impl Strain {
 }
 
 /// The eigenvalues of a symmetric matrix, the smallest first (Smith 1961).
-fn eigenvalues(matrix: &DMat3) -> [f64; 3] {
+pub(crate) fn eigenvalues(matrix: &DMat3) -> [f64; 3] {
     let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
     let mean = (x.x + y.y + z.z) / 3.0;
     let off = *matrix - DMat3::from_diagonal(DVec3::splat(mean));

@@ -1,8 +1,13 @@
 //! A world: bodies and tools that are stepped together.
 
+mod approach;
 mod attachments;
 mod blade;
 mod blades;
+mod haptics;
+mod holds;
+mod push;
+mod readers;
 mod resistance;
 mod step;
 mod sutures;
@@ -11,10 +16,11 @@ mod tear;
 use glam::{Quat, Vec3};
 
 use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, Stroke, finite_vector, not_negative};
-use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::readers::Clock;
 use crate::slots::{SlotId, Slots};
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
@@ -94,6 +100,10 @@ pub struct World {
     blades: Slots<Blade>,
     /// How many threads to blades there ever were.
     holds_made: u32,
+    /// Tools that devices lead.
+    haptics: Vec<haptics::Link>,
+    /// The steps that were taken.
+    clock: Clock,
 }
 
 impl World {
@@ -125,6 +135,8 @@ impl World {
             slipped: Vec::new(),
             blades: Slots::new("blade"),
             holds_made: 0,
+            haptics: Vec::new(),
+            clock: Clock::default(),
         })
     }
 
@@ -140,6 +152,7 @@ impl World {
     pub fn set_gravity(&mut self, gravity: Vec3) -> Result<()> {
         finite_vector("gravity", gravity)?;
         self.definition.gravity = gravity;
+        self.bodies.iter_mut().for_each(|(_, body)| body.wake());
         Ok(())
     }
 
@@ -212,6 +225,9 @@ impl World {
     /// which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where
     /// it is drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none.
     ///
+    /// Terms beside springs go on in parts: home springs with those of the nodes' masses, what goes by springs with those, fibres with the tetrahedra, and hinges of
+    /// bending by area, where pieces of both triangles still share the edge. A hinge whose edge is cut along is gone, with its energy, and so is what a cavity had that is cut open.
+    ///
     /// Positions and triangles that were lent before are stale. [`Body::changes_since`] tells a renderer what has changed.
     ///
     /// # Errors
@@ -219,27 +235,36 @@ impl World {
     /// the blade is not finite. [`Error::Capacity`]: there are not as many spare nodes left, or a node has no free place in a row of fixed
     /// length. [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, body: BodyId, sweep: &Sweep) -> Result<CutReport> {
-        self.change_topology(body, |it| it.cut(sweep))
+        let report = self.change_topology(body, |it, skin| it.cut(sweep, skin))?;
+        self.bodies.get_mut(body.0)?.show_topology();
+        Ok(report)
     }
 
     /// The same along a stroke of its own.
     fn cut_along(&mut self, body: BodyId, sweep: &Sweep, stroke: &mut Stroke) -> Result<CutReport> {
-        self.change_topology(body, |it| {
+        let report = self.change_topology(body, |it, skin| {
             it.swap_stroke(stroke);
-            let report = it.cut(sweep);
+            let report = it.cut(sweep, skin);
             it.swap_stroke(stroke);
             report
-        })
+        })?;
+        self.bodies.get_mut(body.0)?.show_topology();
+        Ok(report)
     }
 
     /// Lets a body change its topology, and what is attached of it follow.
-    fn change_topology<T>(&mut self, body: BodyId, change: impl FnOnce(&mut Body) -> Result<T>) -> Result<T> {
+    fn change_topology<T>(
+        &mut self,
+        body: BodyId,
+        change: impl FnOnce(&mut Body, Option<&mut Skin>) -> Result<T>,
+    ) -> Result<T> {
         let place = self.bodies.place(body.0)?;
         let carried = self.attached_points(body, place)?;
         let mut moved = crate::memory::reserved(carried.len())?;
         let it = self.bodies.get_mut(body.0)?;
         let before = it.topology_version();
-        let changed = change(it)?;
+        let skin = self.tissue.as_mut().and_then(|tissue| tissue.skin_mut(place));
+        let changed = change(it, skin)?;
         if it.topology_version() == before {
             return Ok(changed);
         }
@@ -258,7 +283,7 @@ impl World {
         }
         if let Some(bonds) = self.bonds_mut() {
             bonds.rebind(place, |bound| {
-                let of = moved.iter().find(|(anchor, _)| *anchor == bound.anchor);
+                let of = moved.iter().find(|(anchor, _)| Some(*anchor) == bound.anchor);
                 of.map(|(_, now)| *now)
             });
         }
@@ -274,11 +299,12 @@ impl World {
         };
         tissue.bonds.reserve_rebinding(place)?;
         for bound in tissue.bonds.points_of(place) {
-            let at = match &bound.anchor {
+            let Some(anchor) = bound.anchor else { continue };
+            let at = match &anchor {
                 Anchor::Point(point) => it.material_point(point),
                 Anchor::Node(_) => None,
             };
-            crate::memory::push(&mut points, (bound.anchor, at))?;
+            crate::memory::push(&mut points, (anchor, at))?;
         }
         Ok(points)
     }
@@ -354,11 +380,13 @@ impl World {
         self.tools.remove(tool.0)?;
         // They share what a mesh takes.
         self.paths.clear();
+        self.leave_haptics(tool);
         self.release_all_of(tool);
         if self.tool_places() == 0 {
             self.drop_contacts();
         }
         for (_, body) in self.bodies.iter_mut() {
+            body.wake();
             if let Some(contacts) = &mut body.contacts {
                 contacts.forget_tool(slot);
             }
@@ -387,8 +415,9 @@ impl World {
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, or the
-    /// orientation is zero.
+    /// orientation is zero, or a [`HapticHandle`](crate::HapticHandle) leads the tool.
     pub fn set_pose(&mut self, tool: ToolId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
+        self.check_not_led(tool)?;
         let tool = self.tools.get_mut(tool.0)?;
         let pose = tool.target.unwrap_or(tool.pose);
         let target = Pose {
@@ -404,7 +433,9 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not finite.
     pub fn set_friction(&mut self, tool: ToolId, friction: f32) -> Result<()> {
-        self.tools.get_mut(tool.0)?.set_friction(friction)
+        self.tools.get_mut(tool.0)?.set_friction(friction)?;
+        self.bodies.iter_mut().for_each(|(_, body)| body.wake());
+        Ok(())
     }
 
     /// Has this force, N, at least 0 or infinity, be the largest that moves a tool, from the next step on.
@@ -422,6 +453,7 @@ impl World {
     pub fn set_collision_filter(&mut self, tool: ToolId, filter: CollisionFilter) -> Result<()> {
         self.tools.get_mut(tool.0)?.filter = filter;
         for (_, body) in self.bodies.iter_mut() {
+            body.wake();
             if let Some(contacts) = &mut body.contacts {
                 contacts.look_again();
             }
@@ -435,6 +467,15 @@ impl World {
     /// [`Error::StaleId`].
     pub fn pose(&self, tool: ToolId) -> Result<Pose> {
         Ok(self.tools.get(tool.0)?.pose)
+    }
+
+    /// Where the last step led a tool: where it is, but for one of limited force. Sent there by [`World::set_pose`] step by step, it does the same in
+    /// another world: so what a [`HapticHandle`](crate::HapticHandle) did can be taken down and done again.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`].
+    pub fn tool_target(&self, tool: ToolId) -> Result<Pose> {
+        Ok(self.tools.get(tool.0)?.led_to)
     }
 
     /// The force and the torque on a tool about its position, world axes, mean over the last step, N and N m.

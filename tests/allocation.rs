@@ -16,10 +16,11 @@ use sinew::capi::detector::{
 };
 use sinew::capi::tool::SINEW_DETECTION_IMAGE_SPACE;
 use sinew::capi::world::{sinew_world_create, sinew_world_def_init, sinew_world_destroy};
+use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
-    BladeDefinition, BodyContact, BodyDefinition, Detection, Error, Material, Model, Pose, Shape, Solver, Storage,
-    Tearing, ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
+    BladeDefinition, BodyContact, BodyDefinition, Detection, Error, HapticDefinition, Material, Model, Pose, Shape,
+    Solver, Storage, Tearing, ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 thread_local! {
@@ -189,6 +190,95 @@ fn a_step_that_tears_nothing_allocates_nothing() {
         }
         assert!(without > 20, "taut: {is_taut}: {without}");
     }
+}
+
+#[test]
+fn a_step_that_readers_see_allocates_nothing() {
+    let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let cloth = BodyDefinition {
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
+        masses: Values::Uniform(2e-4),
+        stiffnesses: Values::Uniform(50.0),
+        spare_nodes: 300,
+        ..BodyDefinition::default()
+    };
+    let cloth = world.create_body(&cloth).expect("a body");
+    let mut readers = [(), (), ()].map(|()| world.create_reader(cloth).expect("a reader"));
+    for cut in 0..6 {
+        let x = 0.017 * (cut as f32 - 2.4);
+        let edge = |z: f32| [Vec3::new(x, -9.0, z), Vec3::new(x, 9.0, z)];
+        let sweep = Sweep {
+            start: edge(-0.1),
+            end: edge(0.02),
+        };
+        world.cut(cloth, &sweep).expect("a cut");
+        for step in 0..9 {
+            assert_eq!(asked(|| drop(world.step(1e-3))), 0, "cut {cut}, step {step}");
+            // One reads each step, one every third, one holds a frame of before the last cut: frames of old topologies end too.
+            for (reader, every) in readers.iter_mut().zip([1, 3, 8]) {
+                if step % every == every - 1 {
+                    assert_eq!(asked(|| assert!(reader.read().is_new)), 0, "cut {cut}, step {step}");
+                }
+            }
+        }
+    }
+    assert!(world.body(cloth).expect("a body").topology_version() >= 6);
+}
+
+#[test]
+fn a_hand_at_a_kilohertz_allocates_nothing() {
+    let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let rim = |place: &Vec3| place.x.abs().max(place.z.abs()) > 0.049;
+    let masses: Vec<f32> = mesh
+        .positions
+        .iter()
+        .map(|place| if rim(place) { 0.0 } else { 2e-4 })
+        .collect();
+    let cloth = BodyDefinition {
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
+        masses: Values::Each(&masses),
+        stiffnesses: Values::Uniform(50.0),
+        ..BodyDefinition::default()
+    };
+    world.create_body(&cloth).expect("a body");
+    let mut handles = [-0.02, 0.02].map(|x| {
+        let pose = Pose {
+            position: Vec3::new(x, 0.02, 0.0),
+            ..Pose::IDENTITY
+        };
+        let ball = ToolDefinition {
+            pose,
+            ..ToolDefinition::new(Shape::Sphere { radius: 0.01 })
+        };
+        let tool = world.create_tool(&ball).expect("a tool");
+        Some((
+            world.create_haptic(&HapticDefinition::new(tool)).expect("a handle"),
+            pose,
+        ))
+    });
+    let mut felt = 0;
+    for tick in 0..600 {
+        for (handle, pose) in handles.iter_mut().flatten() {
+            pose.position.y -= 5e-5;
+            let asked = asked(|| {
+                let tick = handle.tick(*pose, None, None, 1e-3).expect("a tick");
+                felt += u32::from(tick.force.length() > 0.01);
+            });
+            assert_eq!(asked, 0, "tick {tick}");
+        }
+        if tick == 500 {
+            // What is left behind is not cleared away in a step.
+            handles[1] = None;
+        }
+        if tick % 4 == 0 {
+            assert_eq!(asked(|| drop(world.step(4e-3))), 0, "tick {tick}");
+        }
+    }
+    assert!(felt > 100, "{felt}");
 }
 
 #[test]

@@ -13,8 +13,8 @@ use glam::{Vec3, vec2, vec3};
 use sheet::{Body, unstructured, wavy};
 use sinew::cutting::{Limits, Sweep};
 use sinew::{
-    BodyDefinition, Error, Material, Model, Shape, Solver, Storage, ToolDefinition, Values, Viscosity, World,
-    WorldDefinition,
+    BodyContact, BodyDefinition, Error, Material, Model, Shape, Solver, SpringLaw, Storage, ToolDefinition, Values,
+    Viscosity, World, WorldDefinition,
 };
 
 thread_local! {
@@ -98,7 +98,9 @@ fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, what: 
     let mut tool = ToolDefinition::new(Shape::Sphere { radius: 1.0 });
     tool.pose.position = 1.5 * Vec3::Z;
     world.create_tool(&tool).unwrap();
+    let mut readers = [(), ()].map(|()| world.create_reader(body).unwrap());
     world.step(1e-3).unwrap();
+    assert!(readers[0].read().is_new);
     let before = world.state_hash();
     let mut times = 0;
     loop {
@@ -115,6 +117,7 @@ fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, what: 
         }
         assert_eq!(world.state_hash(), before, "{what}: without memory after {times} times");
         assert_eq!(world.body(body).unwrap().changes_since(0).unwrap().version, 0);
+        assert!(!readers[0].read().is_new);
         // Nearly all of the ways that it may run out.
         times += 1 + times / 200;
     }
@@ -124,8 +127,18 @@ fn cut_while_memory_is_scarce(definition: &BodyDefinition, sweep: &Sweep, what: 
     LEFT.with(|left| left.set(None));
     steps.unwrap();
     let it = world.body(body).unwrap();
+    for reader in &mut readers {
+        let frame = reader.read();
+        assert!(frame.positions == it.positions() && frame.triangles == it.surface() && frame.topology_version == 1);
+    }
     assert!(it.positions().iter().all(|place| place.is_finite()));
 }
+
+const MEETS_TISSUE: BodyContact = BodyContact {
+    with_bodies: true,
+    with_itself: true,
+    ..BodyContact::NOTHING
+};
 
 fn blade(x: f32, y: f32) -> [Vec3; 2] {
     [vec3(x, y, -9.0), vec3(x, y, 9.0)]
@@ -134,11 +147,11 @@ fn blade(x: f32, y: f32) -> [Vec3; 2] {
 #[test]
 fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
     let (rest, cells) = unstructured(8, 3);
-    for (solver, storage) in [
-        (Solver::Verlet, Storage::Packed),
-        (Solver::Verlet, Storage::Efficient),
-        (Solver::Implicit, Storage::DynamicBulk),
-        (Solver::Newton, Storage::FastLink),
+    for (solver, storage, contact) in [
+        (Solver::Verlet, Storage::Packed, MEETS_TISSUE),
+        (Solver::Verlet, Storage::Efficient, BodyContact::NOTHING),
+        (Solver::Implicit, Storage::DynamicBulk, MEETS_TISSUE),
+        (Solver::Newton, Storage::FastLink, BodyContact::NOTHING),
     ] {
         let definition = BodyDefinition {
             positions: &rest,
@@ -149,6 +162,7 @@ fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
             spare_nodes: 200,
             solver,
             storage,
+            contact,
             ..Default::default()
         };
         let sweep = Sweep {
@@ -160,23 +174,57 @@ fn a_body_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
 }
 
 #[test]
+fn a_sheet_with_terms_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
+    let (rest, cells) = unstructured(8, 3);
+    for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+        let definition = BodyDefinition {
+            positions: &rest,
+            masses: Values::Uniform(1.0),
+            triangles: &cells,
+            stiffnesses: Values::Uniform(100.0),
+            bending_stiffness: 1.0,
+            home_stiffnesses: Values::Uniform(1.0),
+            spring_law: SpringLaw::Cubic {
+                quadratic: 0.0,
+                cubic: 1.0,
+                limit: 1.0,
+            },
+            spare_nodes: 200,
+            solver,
+            ..Default::default()
+        };
+        let sweep = Sweep {
+            start: blade(2.0, 6.6),
+            end: blade(5.1, -1.0),
+        };
+        cut_while_memory_is_scarce(&definition, &sweep, &format!("terms, {solver:?}"));
+    }
+}
+
+#[test]
 fn a_solid_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
     let (rest, cells) = block::shaken([4, 4, 2], 3);
     let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| block::upright(&rest, cell)).collect();
-    for (solver, has_springs) in [
-        (Solver::Verlet, true),
-        (Solver::Verlet, false),
-        (Solver::Implicit, false),
-        (Solver::Newton, false),
+    // Strained: what is nearly incompressible remembers how.
+    let positions: Vec<Vec3> = rest.iter().map(|rest| *rest * vec3(1.1, 1.0, 0.95)).collect();
+    for (solver, has_springs, poisson_ratio, contact) in [
+        (Solver::Verlet, true, 0.3, MEETS_TISSUE),
+        (Solver::Verlet, false, 0.3, BodyContact::NOTHING),
+        (Solver::Implicit, false, 0.3, MEETS_TISSUE),
+        (Solver::Newton, false, 0.3, BodyContact::NOTHING),
+        (Solver::Verlet, false, 0.45, MEETS_TISSUE),
+        (Solver::Implicit, false, 0.45, BodyContact::NOTHING),
+        (Solver::Newton, false, 0.45, MEETS_TISSUE),
     ] {
         let elements = Material {
             model: Model::Tetrahedra,
             young_modulus: 100.0,
-            poisson_ratio: 0.3,
+            poisson_ratio,
             ..Default::default()
         };
         let definition = BodyDefinition {
-            positions: &rest,
+            positions: &positions,
+            rest_positions: Some(&rest),
             masses: Values::Uniform(1.0),
             tetrahedra: &cells,
             stiffnesses: Values::Uniform(if has_springs { 100.0 } else { 0.0 }),
@@ -187,12 +235,17 @@ fn a_solid_that_cannot_be_cut_for_lack_of_memory_stays_as_it_was() {
             },
             spare_nodes: 400,
             solver,
+            contact,
             ..Default::default()
         };
         let sweep = Sweep {
             start: blade(1.2, 4.6),
             end: blade(2.9, -0.6),
         };
-        cut_while_memory_is_scarce(&definition, &sweep, &format!("{solver:?}, springs: {has_springs}"));
+        cut_while_memory_is_scarce(
+            &definition,
+            &sweep,
+            &format!("{solver:?}, springs: {has_springs}, {poisson_ratio}"),
+        );
     }
 }

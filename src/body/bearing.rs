@@ -146,6 +146,10 @@ impl Bearing {
         for spring in &rewiring.removed {
             self.remove(spring.nodes);
         }
+        // Edges without a spring are removed by their names alone.
+        for &nodes in &changes.removed_springs {
+            self.remove(own(nodes));
+        }
         for Change { node, before, after } in &rewiring.changed {
             if let Some(at) = self.find([*node, after.neighbour])
                 && before.stiffness > 0.0

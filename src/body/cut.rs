@@ -2,13 +2,15 @@
 
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::Cuttable;
-use super::{Body, Bound, NewNode};
-use crate::contact::SurfaceChange;
+use super::{Body, Bound, NewNode, NodeOrder};
+use crate::contact::{Skin, SkinChange, SurfaceChange, SurfaceToBe};
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::solver::close;
+use crate::solver::close_beside;
+use crate::springs::{Change, Rewiring};
+use crate::terms::Parting;
 
 /// What a cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,13 +30,14 @@ pub struct CutReport {
 }
 
 impl Body {
-    /// See [`World::cut`](crate::World::cut), which has what is attached follow. Changes nothing where it fails.
-    pub(crate) fn cut(&mut self, sweep: &Sweep) -> Result<CutReport> {
+    /// See [`World::cut`](crate::World::cut), which has what is attached follow; its skin follows here, if it meets
+    /// tissue. Changes nothing where it fails.
+    pub(crate) fn cut(&mut self, sweep: &Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
         let mut cuttable = self
             .cuttable
             .take()
             .ok_or_else(|| Error::Unsupported("spare_nodes is 0: the body was not made to be cut".into()))?;
-        let report = self.cut_with(&mut cuttable, sweep);
+        let report = self.cut_with(&mut cuttable, sweep, skin);
         self.cuttable = Some(cuttable);
         report
     }
@@ -61,8 +64,17 @@ impl Body {
         self.cuttable.as_ref().map_or(0, |cuttable| cuttable.log.version())
     }
 
-    fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep) -> Result<CutReport> {
-        let mut sweep = *sweep;
+    fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
+        let stroke = cuttable.material.stroke();
+        let report = self.cut_from(cuttable, *sweep, skin);
+        if report.is_err() {
+            cuttable.material.take_back(stroke);
+        }
+        report
+    }
+
+    /// The same, with another stroke of the material's where it fails.
+    fn cut_from(&mut self, cuttable: &mut Cuttable, mut sweep: Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
         if let Some(start) = cuttable.stroke.carried(&sweep, &cuttable.material, self.positions()) {
             sweep.start = start;
             cuttable.material.carry(start);
@@ -76,7 +88,7 @@ impl Body {
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
         let changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
         let room = cuttable.stroke.reserve(cuttable.material.most_ends(&changes, &near));
-        let applied = room.and_then(|()| self.apply(cuttable, &sweep, &near, &changes, counts));
+        let applied = room.and_then(|()| self.apply(cuttable, skin, (&sweep, &near), &changes, counts));
         match applied {
             Ok(_) => self.stop(cuttable, &sweep, &near, &changes),
             Err(_) => cuttable.material.undo(),
@@ -88,8 +100,23 @@ impl Body {
     pub(super) fn apply(
         &mut self,
         cuttable: &mut Cuttable,
-        sweep: &Sweep,
-        near: &[u32],
+        skin: Option<&mut Skin>,
+        way: (&Sweep, &[u32]),
+        changes: &Changes,
+        before: [u32; 2],
+    ) -> Result<CutReport> {
+        let applied = self.try_apply(cuttable, skin, way, changes, before);
+        if let Some(terms) = self.terms.as_mut().filter(|_| applied.is_err()) {
+            terms.forget_parts();
+        }
+        applied
+    }
+
+    fn try_apply(
+        &mut self,
+        cuttable: &mut Cuttable,
+        mut skin: Option<&mut Skin>,
+        (sweep, near): (&Sweep, &[u32]),
         changes: &Changes,
         [first_triangle, first_item]: [u32; 2],
     ) -> Result<CutReport> {
@@ -104,10 +131,14 @@ impl Body {
         if changes.is_empty() && rewiring.is_empty() {
             return Ok(CutReport::default());
         }
+        let mut closed = None;
         let is_held = |source: u32| self.inverse_masses[self.order.own(source) as usize] == 0.0;
         if self.carry.masses_for > 0.0 || changes.nodes.iter().any(|piece| is_held(piece.source)) {
             // What closes the last step is made with the masses that it was taken with, and gives nothing to copies of what was held.
-            close(self);
+            if let Some(beside) = close_beside(self) {
+                let forces = beside.forces(self)?;
+                closed = Some((beside, forces));
+            }
         }
         let nodes = self.new_nodes(changes)?;
         let pieces = self.pieces_of_elements(material, changes)?;
@@ -138,6 +169,10 @@ impl Body {
             hidden: &changes.undrawn,
         };
         self.reserve_surface(nodes.len(), changed.len(), added.len())?;
+        let skin_change = match &mut skin {
+            Some(skin) => self.prepare_skin(skin, material, changes, (&change, &nodes))?,
+            None => None,
+        };
         self.pins.reserve(nodes.len(), known + nodes.len())?;
         if let Some(scaling) = &mut self.scaling {
             scaling.reserve(touched.len())?;
@@ -154,9 +189,14 @@ impl Body {
         if let Some(elements) = &mut self.elements {
             let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
             elements.reserve_pieces(&pieces, known + nodes.len(), sums)?;
+            elements.reserve_rings(changes.nodes.len())?;
         }
         if let Some(tears) = &mut self.tears {
-            tears.reserve(rewiring.added.len())?;
+            tears.reserve(changes.springs.len().max(rewiring.added.len()))?;
+        }
+        if let Some(terms) = &mut self.terms {
+            let parting = parting(&self.order, material, changes, &rewiring)?;
+            terms.prepare_parts(&parting, known + nodes.len())?;
         }
         self.springs.resize(known + nodes.len())?;
         let rewired = self.rewire(&rewiring, 6 * pieces.len());
@@ -164,22 +204,38 @@ impl Body {
             self.springs.resize(known)?;
             return rewired.map(|()| CutReport::default());
         }
-        // From here on nothing fails. Damping is to be that of masses as they are.
+        // From here on nothing fails.
+        if let Some((beside, forces)) = closed {
+            self.pins
+                .iter_mut()
+                .zip(forces)
+                .for_each(|(pin, force)| pin.force = force);
+            beside.commit(self);
+        }
+        // Damping is to be that of masses as they are.
         self.scale_masses(0.0);
         self.add_nodes(&nodes)?;
         if let Some(elements) = &mut self.elements {
             let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
             elements.rewire(&pieces, known + nodes.len(), sums);
         }
+        if let Some(terms) = &mut self.terms {
+            terms.take_parts(known + nodes.len());
+        }
         if let Some(tears) = &mut self.tears {
             tears.grow(known + nodes.len());
             tears.follow(changes, &rewiring, &self.order);
         }
         self.rebind(changes);
+        self.part_rings(&cuttable.material, changes);
         self.share_masses(cuttable, changes)?;
         self.follow_elements(&cuttable.material, changes, &at_pieces);
         self.go_on(&touched, &changing, candidates);
+        self.open_cavities(&changed);
         self.change_surface(&change);
+        if let (Some(skin), Some(change)) = (skin, skin_change) {
+            skin.change(change);
+        }
         cuttable.search.add_cells(copies.map(|piece| piece.source));
         cuttable.search.see(&cuttable.material, &items, first_item);
         if !changes.is_empty() || !gone.is_empty() {
@@ -196,6 +252,40 @@ impl Body {
         })
     }
 
+    /// Parts the rings of nodes that fell apart.
+    fn part_rings(&mut self, material: &CutMaterial, changes: &Changes) {
+        let Some(elements) = &mut self.elements else {
+            return;
+        };
+        let order = &self.order;
+        for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
+            let copies = pieces.iter().map(|piece| order.own(piece.node));
+            let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
+            elements.part_ring(order.own(pieces[0].source), copies, cells_at, self.state.positions());
+        }
+    }
+
+    /// Opens the cavities of which triangles, given as they are now, had other corners.
+    fn open_cavities(&mut self, changed: &[(u32, [u32; 3])]) {
+        let Some(enclosed) = &mut self.enclosed else {
+            return;
+        };
+        let mut opened = false;
+        for &(triangle, mut corners) in changed {
+            let mut before = self.surface[triangle as usize];
+            before.sort_unstable();
+            corners.sort_unstable();
+            if before != corners {
+                opened |= enclosed.open_at(before.map(|node| self.order.own(node)));
+            }
+        }
+        enclosed.forget_rates();
+        if let Some(implicit) = self.implicit.as_mut().filter(|_| opened) {
+            // What a step of second order takes from the last, pressure gave.
+            implicit.forget_history();
+        }
+    }
+
     /// Remembers where the blade stands in the material.
     fn stop(&self, cuttable: &mut Cuttable, sweep: &Sweep, near: &[u32], changes: &Changes) {
         let Cuttable { stroke, material, .. } = cuttable;
@@ -204,6 +294,7 @@ impl Body {
             material.ends(changes, sweep, positions, near, |end| {
                 stroke.stands_at(end, material, positions)
             });
+            stroke.sort_ends();
         }
     }
 
@@ -220,6 +311,28 @@ impl Body {
             part: piece.part as f32,
         }));
         Ok(pieces)
+    }
+
+    /// What becomes of its skin.
+    fn prepare_skin(
+        &self,
+        skin: &mut Skin,
+        material: &CutMaterial,
+        changes: &Changes,
+        (change, nodes): (&SurfaceChange, &[NewNode]),
+    ) -> Result<Option<SkinChange>> {
+        let mut bared = memory::reserved(changes.triangles.len())?;
+        bared.extend(changes.triangles.iter().map(|&triangle| material.is_bared(triangle)));
+        let mut bound = memory::reserved(changes.bound.len())?;
+        bound.extend(changes.bound.iter().map(|bound| self.bound(bound)));
+        let to_be = SurfaceToBe {
+            change,
+            bared: &bared,
+            nodes,
+            bound: &bound,
+            is_open: material.surface().is_some() && !changes.rim.is_empty(),
+        };
+        skin.prepare(self, &to_be)
     }
 
     /// The new nodes in the order of their numbers.
@@ -260,6 +373,37 @@ impl Body {
             weights: bound.weights.map(|weight| weight as f32),
         }
     }
+}
+
+/// What becomes of what terms are of.
+fn parting(order: &NodeOrder, material: &CutMaterial, changes: &Changes, rewiring: &Rewiring) -> Result<Parting> {
+    let own = |nodes: [u32; 2]| nodes.map(|node| order.own(node));
+    let mut parting = Parting::default();
+    for piece in &changes.nodes {
+        parting.add_node(order.own(piece.source), order.own(piece.node), piece.part)?;
+    }
+    for piece in &changes.springs {
+        parting.add_spring(own(piece.source), own(piece.nodes), piece.part)?;
+    }
+    let known = parting.know_springs();
+    for spring in &rewiring.removed {
+        parting.add_other_spring(spring.nodes, known, 0.0)?;
+    }
+    for Change { node, before, after } in &rewiring.changed {
+        let part = f64::from(after.stiffness) / f64::from(before.stiffness);
+        parting.add_other_spring(
+            [*node, before.neighbour],
+            known,
+            if part.is_finite() { part } else { 1.0 },
+        )?;
+    }
+    let sources = parting.know_nodes()?;
+    for piece in &changes.cells {
+        let nodes = material.nodes_of_cell(piece.cell).iter();
+        parting.add_cell(nodes.map(|&node| order.own(node)), piece.part, &sources)?;
+    }
+    parting.complete()?;
+    Ok(parting)
 }
 
 /// Those below a number, and the others, of numbers in order.

@@ -23,7 +23,7 @@ pub(super) struct Cuttable {
     pub density: f64,
     /// Whether every spring lies along an edge of a cell.
     pub springs_are_edges: bool,
-    /// What it takes to cut it, J/m.
+    /// What it takes to cut it, J/m, of solids J/m².
     pub toughness: f32,
 }
 
@@ -140,20 +140,8 @@ fn check_offered(definition: &BodyDefinition) -> Result<()> {
     if !definition.cells.is_empty() {
         return lacking("cells");
     }
-    if definition.enclosed_stiffness > 0.0 || definition.pressure != 0.0 {
-        return lacking("an enclosed_stiffness or a pressure");
-    }
-    if definition
-        .material
-        .is_some_and(|material| material.keeps_volume_by_rings())
-    {
-        return lacking("tetrahedra of a poisson_ratio of 0.4 or more");
-    }
-    if definition.toughness > 0.0 && (definition.triangles.is_empty() || !definition.tetrahedra.is_empty()) {
-        return lacking("a toughness, but for surfaces,");
-    }
-    if definition.contact.with_bodies || definition.contact.with_itself {
-        return lacking("contact with other tissue or with themselves");
+    if definition.toughness > 0.0 && definition.triangles.is_empty() && definition.tetrahedra.is_empty() {
+        return lacking("a toughness and springs alone");
     }
     Ok(())
 }

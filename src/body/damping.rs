@@ -3,9 +3,11 @@
 //! Over a time t with a constant force, `v(t) = v e^-s + f t/m (1 - e^-s)/s` with s = gamma t / m. The paper's factor
 //! per step becomes the same decay and the same terminal velocity at every step.
 
+use super::Sleeper;
 use crate::error::Result;
 use crate::memory;
 use crate::solver::{MassScaling, Sliver};
+use crate::springs::TILE;
 
 /// What half a substep does to each node's velocity; kept only by bodies that have node damping.
 #[derive(Debug)]
@@ -113,6 +115,8 @@ pub(crate) struct Mobility<'a> {
     pub substep: f32,
     /// Whether the kick is half of one.
     pub half: bool,
+    /// What sleeps does not move.
+    pub sleeper: Option<&'a Sleeper>,
 }
 
 impl Mobility<'_> {
@@ -120,6 +124,9 @@ impl Mobility<'_> {
     /// whole kick, so that damping takes of it what it takes of any force.
     #[inline]
     pub fn of(&self, node: usize) -> f32 {
+        if self.sleeper.is_some_and(|sleeper| sleeper.is_asleep(node / TILE)) {
+            return 0.0;
+        }
         let inverse_mass = self.inverse_masses[node];
         let Some(NodeDamping { loss, gain, .. }) = self.damping else {
             return inverse_mass;

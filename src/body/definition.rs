@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::sleep::Sleep;
 use super::tearing::Tearing;
 use crate::contact::BodyContact;
 use crate::error::{Error, Result};
@@ -145,7 +146,8 @@ pub struct BodyDefinition<'a> {
     /// The surface is `triangles`, or where there are none the boundary of the tetrahedra or cells; each of its parts that hang together
     /// by edges must be closed and have a volume at rest. Each is a cavity of its own, unless some are inside out, as the inner wall
     /// of a hollow organ is: then those alone are cavities. [`Body::remove_spring`](crate::Body::remove_spring) opens the cavities whose
-    /// triangles have the edge, for good.
+    /// triangles have the edge, for good, and a cut those of which it divides or parts triangles, however little: what is open is neither kept nor
+    /// pressed, and what that took goes with what was inside. A cut beside a cavity leaves it.
     pub enclosed_stiffness: f32,
     /// By how much the pressure inside of a cavity that has its volume at rest is above that outside, Pa; below 0 it sucks; 0: it is not. See
     /// [`Self::enclosed_stiffness`], and [`Body::set_pressure`](crate::Body::set_pressure) to change it. Without a stiffness the pressure
@@ -176,6 +178,8 @@ pub struct BodyDefinition<'a> {
     /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay
     /// as they are. See [`SolverReport::added_mass`](crate::SolverReport::added_mass).
     pub mass_scaling: f32,
+    /// Whether what is at rest of it is left alone, and when.
+    pub sleep: Sleep,
     /// How many nodes cuts may add, of which room is made: copies of nodes, and points of the surface between them. Some five for each triangle or
     /// tetrahedron that a blade passes through. 0: the body cannot be cut, and pays nothing for it.
     ///
@@ -187,7 +191,8 @@ pub struct BodyDefinition<'a> {
     /// [`Body::set_tear_limits`](crate::Body::set_tear_limits).
     pub tearing: Tearing,
     /// What a blade ([`World::create_blade`](crate::World::create_blade)) spends to cut it, J for each m of the cut in the rest shape: the
-    /// fracture toughness of the material, J/m², times the thickness of the surface. At least 0; 0: it is cut for nothing.
+    /// fracture toughness of the material, J/m², times the thickness of the surface; of tetrahedra that itself, for each m² of their faces that opens.
+    /// Springs alone have none. At least 0; 0: it is cut for nothing.
     pub toughness: f32,
 }
 
@@ -228,6 +233,7 @@ impl Default for BodyDefinition<'_> {
             iterations: 0,
             accuracy: 0.0,
             mass_scaling: 0.001,
+            sleep: Sleep::default(),
             spare_nodes: 0,
             tearing: Tearing::default(),
             toughness: 0.0,
@@ -254,6 +260,7 @@ impl BodyDefinition<'_> {
                 u32::MAX / 2
             )));
         }
+        self.sleep.check()?;
         finite_vectors("positions", self.positions)?;
         if let Some(rest) = self.rest_positions {
             expect_count("rest_positions", rest.len(), nodes)?;

@@ -57,6 +57,12 @@ impl Body {
                 None => push(own, force),
             }
         }
+        if self.sleeps() {
+            for &node in nodes {
+                let own = self.order.own(node);
+                self.movers(own).for_each(|(node, _)| self.wake_at(node));
+            }
+        }
         Ok(())
     }
 
@@ -82,6 +88,7 @@ impl Body {
         expect_count("velocities", velocities.len(), self.node_count())?;
         finite_vectors("velocities", velocities)?;
         close(self);
+        self.wake();
         for (node, &velocity) in (0..).zip(velocities) {
             let own = self.order.own(node);
             if self.inverse_masses[own as usize] > 0.0 {
@@ -138,6 +145,7 @@ impl Body {
         } else {
             1.0 / self.mass_of_unpinned(node)?
         };
+        self.wake_at(own);
         if before.any() {
             close(self);
         }
@@ -165,6 +173,7 @@ impl Body {
         let own = self.order.own(node);
         let mass = self.mass_of_unpinned(node)?;
         if self.pins.get(own).is_some() {
+            self.wake_at(own);
             close(self);
             self.pins.remove(own);
             self.inverse_masses[own as usize] = 1.0 / mass;
@@ -188,6 +197,7 @@ impl Body {
             Some(pin) => pin.target = Some(position),
             None => return Err(not_pinned(node)),
         }
+        self.wake_at(self.order.own(node));
         Ok(())
     }
 
@@ -249,7 +259,11 @@ impl Body {
         if let Some(cuttable) = &mut self.cuttable {
             cuttable.add_spring([a, b], &self.order);
         }
+        if let Some(sleeper) = &mut self.sleeper {
+            sleeper.join([a, b].map(|node| self.order.own(node)));
+        }
         self.forces_current = false;
+        self.wake();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -289,6 +303,7 @@ impl Body {
         removed += enclosed.map_or(0, |enclosed| enclosed.remove_edge(own_a, own_b));
         if removed > 0 {
             self.forces_current = false;
+            self.wake();
             self.forget_rates();
             if let Some(implicit) = &mut self.implicit {
                 implicit.forget_matrix();
@@ -317,6 +332,7 @@ impl Body {
         };
         enclosed.set_pressure(pressure);
         self.forces_current = false;
+        self.wake();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_energy();
         }
@@ -352,6 +368,7 @@ impl Body {
             tears.remove([own_a, own_b]);
         }
         self.forces_current = false;
+        self.wake();
         self.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
@@ -454,6 +471,7 @@ impl Body {
         self.published.forget_velocities();
         if self.springs.damped() {
             self.forces_current = false;
+            self.wake();
         }
     }
 

@@ -240,6 +240,11 @@ impl Body {
         sum.map(|sum| sum / f64::from(substeps))
     }
 
+    /// Whether the tool at this place holds anything of it.
+    pub(crate) fn is_held_by(&self, tool: usize) -> bool {
+        self.held_nodes().any(|held| held.tool == tool)
+    }
+
     /// Whether a tool holds anything of it.
     pub(crate) fn is_grasped(&self) -> bool {
         self.held_nodes().next().is_some()

@@ -31,6 +31,9 @@ impl Body {
         }
         memory::reserve(&mut self.surveys, tile_count(count))?;
         memory::reserve(&mut self.boxes, tile_count(count))?;
+        if let Some(sleeper) = &mut self.sleeper {
+            sleeper.reserve(tile_count(count))?;
+        }
         self.state.reserve(count)?;
         if let Some(records) = &mut self.records {
             records.reserve(count)?;
@@ -43,6 +46,12 @@ impl Body {
         }
         if let Some(elements) = &mut self.elements {
             elements.reserve_nodes(count)?;
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.reserve_nodes(count)?;
+        }
+        if let Some(sums) = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut()) {
+            sums.reserve_rings(count)?;
         }
         if let Some(coarse) = &mut self.coarse {
             coarse.reserve(count)?;
@@ -92,6 +101,10 @@ impl Body {
         self.published.grow(count);
         self.surveys.resize(tile_count(count), Survey::NOTHING);
         self.boxes.resize(tile_count(count), Bounds::EMPTY);
+        self.wake();
+        if let Some(sleeper) = &mut self.sleeper {
+            sleeper.grow(tile_count(count));
+        }
         // Nodes differ in mass now.
         self.uniform_inverse_mass = None;
         if let Some(scaling) = &mut self.scaling {

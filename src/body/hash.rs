@@ -55,8 +55,10 @@ impl Body {
                 hasher.write_floats(&target.to_array());
             }
         }
-        if let Some(toughness) = self.toughness() {
-            hasher.write_floats(&[toughness]);
+        if let Some(cuttable) = &self.cuttable {
+            hasher.write_floats(&[cuttable.toughness]);
+            cuttable.stroke.hash(hasher);
+            cuttable.material.hash(hasher);
         }
         if let Some(bindings) = &self.bindings {
             bindings.hash(hasher);
@@ -81,6 +83,9 @@ impl Body {
         }
         if let Some(implicit) = &self.implicit {
             implicit.hash(hasher);
+        }
+        if let Some(sleeper) = &self.sleeper {
+            sleeper.hash(hasher);
         }
         self.contact.hash(hasher);
         if let Some(contacts) = &self.contacts {

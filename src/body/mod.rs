@@ -27,11 +27,14 @@ mod pins;
 mod published;
 mod records;
 mod region;
+mod shown;
+mod sleep;
 mod state;
 mod stretch;
 mod stroke;
 mod surface;
 mod tear;
+mod tear_solid;
 mod tearing;
 mod tears;
 mod tissue;
@@ -41,6 +44,7 @@ mod vectors;
 use glam::{BVec3, DVec3, Vec3};
 
 pub(crate) use bindings::{Bindings, Bound};
+pub(crate) use blade::HoldAt;
 pub use change_log::{NewNodeSource, NewRimEdge, TopologyChanges};
 pub(crate) use coarse::CoarseStep;
 pub use cut::CutReport;
@@ -68,6 +72,7 @@ use crate::enclosed::Enclosed;
 use crate::error::{Error, Result};
 use crate::material::Made;
 use crate::memory;
+use crate::readers::Shown;
 use crate::solver::{
     Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close,
     write_records,
@@ -82,6 +87,8 @@ use origin::shift_towards;
 pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
+pub use sleep::Sleep;
+pub(crate) use sleep::Sleeper;
 use state::State;
 pub(crate) use stroke::Stroke;
 use tears::Tears;
@@ -152,6 +159,10 @@ pub struct Body {
     /// Kept only in worlds with a tolerance.
     pub(crate) coarse: Option<CoarseStep>,
     published: Published,
+    /// For bodies that have readers.
+    shown: Option<Box<Shown>>,
+    /// For bodies that sleep.
+    pub(crate) sleeper: Option<Box<Sleeper>>,
 }
 
 /// What a world asks of its bodies.
@@ -218,7 +229,7 @@ impl Body {
         for spring in &mut springs {
             spring.nodes = spring.nodes.map(|node| order.own(node));
         }
-        let tears = Tears::new(definition, &springs)?;
+        let tears = Tears::new(definition, &springs, law.is_some(), &order)?;
         let springs = store(needs.kernel, definition, &springs)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
@@ -290,12 +301,15 @@ impl Body {
             forces_current: false,
             forces_applied: false,
             published: Published::new(node_count)?,
+            shown: None,
+            sleeper: None,
         };
         body.place(definition.positions);
         let BodyDefinition {
             order,
             iterations,
             accuracy,
+            sleep,
             ..
         } = *definition;
         let positions = body.state.positions();
@@ -326,13 +340,8 @@ impl Body {
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
         }
+        body.make_sleeper(sleep)?;
         if definition.spare_nodes > 0 {
-            if body.terms.is_some() {
-                return Err(Error::Unsupported(format!(
-                    "spare_nodes is {}: bodies with terms beside springs cannot be cut",
-                    definition.spare_nodes
-                )));
-            }
             body.reserve_nodes(definition.spare_nodes as usize)?;
         }
         Ok(body)
@@ -519,6 +528,7 @@ impl Body {
     }
 
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
+        self.wake();
         match &mut self.contacts {
             Some(contacts) => contacts.reserve(tools)?,
             None => {
@@ -560,6 +570,40 @@ impl Body {
                 force: touch.force,
             }
         })
+    }
+
+    /// How fast a point of its surface moves, m/s: about as the last step ended, up to half a substep before.
+    pub(crate) fn velocity_at(&self, contact: &Contact) -> Vec3 {
+        let velocities = self.state.velocities();
+        let of = |node: u32| {
+            let own = self.order.own(node);
+            self.bindings.as_ref().map_or_else(
+                || velocities.get(own as usize),
+                |bindings| bindings.vector(velocities, own as usize),
+            )
+        };
+        (0..3)
+            .map(|corner| of(contact.nodes[corner]) * contact.weights[corner])
+            .sum()
+    }
+
+    /// The mass that an impulse at a point of its surface moves, kg, where its nodes are free from each other; 0 where none can move.
+    pub(crate) fn mass_at(&self, contact: &Contact) -> f64 {
+        let own = |corner: usize| self.order.own(contact.nodes[corner]);
+        let answer = |node: u32, weight: f32| match f64::from(self.masses[node as usize]) {
+            0.0 => 0.0,
+            mass => f64::from(weight).powi(2) / mass,
+        };
+        let bound = |node: u32| self.bindings.as_ref().and_then(|bindings| bindings.get(node));
+        let of = |corner: usize| {
+            let weight = contact.weights[corner];
+            match bound(own(corner)) {
+                Some(bound) => bound.parts().map(|(node, part)| answer(node, weight * part)).sum(),
+                None => answer(own(corner), weight),
+            }
+        };
+        let answer: f64 = (0..3).map(of).sum();
+        if answer > 0.0 { 1.0 / answer } else { 0.0 }
     }
 
     /// The box about its nodes, in its own coordinates.
@@ -604,6 +648,7 @@ impl Body {
 
     /// Nothing is known any more of where the nodes were.
     fn forget_motion(&mut self) {
+        self.wake();
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
         if let Some(implicit) = &mut self.implicit {
@@ -637,6 +682,7 @@ impl Body {
             let place = local.get(bound.node as usize).as_dvec3() + self.origin;
             self.published.positions_mut()[self.order.caller(bound.node) as usize] = place.as_vec3();
         }
+        self.show(&Team::alone());
         self.grasp_anew();
         self.relax();
         self.forget_motion();
@@ -720,6 +766,7 @@ impl Body {
         if let Some(terms) = &mut self.terms {
             terms.move_origin(self.origin);
         }
+        self.wake();
         let positions = self.state.positions_mut();
         for node in 0..positions.len() {
             positions.set(node, (positions.get(node).as_dvec3() - shift).as_vec3());

@@ -33,6 +33,20 @@ impl Body {
         }
     }
 
+    /// What cuts left of how rings were deformed fades, over so many seconds.
+    pub(crate) fn fade(&mut self, time: f32, team: &Team) {
+        if let (Some(elements), Some(records)) = (&mut self.elements, &mut self.records)
+            && elements.wait(f64::from(time))
+        {
+            write_records(self.kernel, self.state.positions(), records, team);
+            elements.fade(self.kernel, records.as_slice(), team);
+            self.forces_current = false;
+            if let Some(implicit) = &mut self.implicit {
+                implicit.forget_energy();
+            }
+        }
+    }
+
     /// An equation is to be solved for the end of so many seconds.
     pub(crate) fn foresee(&mut self, time: f64) {
         if let Some(elements) = &mut self.elements {
@@ -66,6 +80,9 @@ impl Body {
 
     /// The same until [`Self::recall`].
     pub(crate) fn release(&mut self) {
+        if let Some(elements) = &mut self.elements {
+            elements.release_rings();
+        }
         if self.remembers() {
             self.lapse(|_| Course::FOREVER, false, &Team::alone());
         }

@@ -123,7 +123,7 @@ impl Body {
         velocities.as_ptr_range()
     }
 
-    /// Writes the positions for callers, and finds the box of each tile.
+    /// Writes the positions for callers and shows them to readers, and finds the box of each tile.
     pub(super) fn publish(&mut self, team: &Team) {
         let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
         let positions = self.state.positions();
@@ -132,7 +132,12 @@ impl Body {
         let is_callers = order.is_callers();
         let first = if is_callers { &mut *published } else { &mut *blank };
         let written = (Tiles::new(first, TILE), Items::new(&mut self.boxes));
+        let sleeper = self.sleeper.as_deref();
+        let is_asleep = |tile: usize| sleeper.is_some_and(|sleeper| sleeper.is_asleep(tile));
         team.pass(tile_count(count), written, |tile, (to, bounds): (_, &mut Bounds)| {
+            if is_asleep(tile) {
+                return;
+            }
             let from = positions.slices(tile_nodes(tile, count));
             *bounds = kernel.ranges(from).into();
             kernel.run(Publish { from, origin, to });
@@ -149,10 +154,13 @@ impl Body {
                     }
                 }
                 for (to, &own) in to.iter_mut().zip(own) {
-                    *to = blank[own as usize];
+                    if !is_asleep(own as usize / TILE) {
+                        *to = blank[own as usize];
+                    }
                 }
             });
         }
+        self.show(team);
     }
 }
 

@@ -34,7 +34,6 @@ impl Records {
         &self.0
     }
 
-    #[cfg(test)]
     pub fn as_mut_slice(&mut self) -> &mut [Record] {
         &mut self.0
     }

@@ -1,5 +1,9 @@
 //! What a step changes, kept so that a step that fails can be forgotten.
 
+use std::ops::Range;
+
+use glam::Vec3;
+
 use super::vectors::Vectors;
 use crate::error::Result;
 
@@ -163,6 +167,19 @@ impl State {
     pub fn next_is_finite(&self) -> bool {
         let velocities = &self.velocities[1 - self.settled];
         self.next_positions().largest_length().is_finite() && velocities.largest_length().is_finite()
+    }
+
+    /// Has these nodes stand where they are, in every place: a step that leaves them out changes nothing of them.
+    pub fn stand_still(&mut self, nodes: Range<usize>) {
+        for node in nodes {
+            let place = self.positions[self.current].get(node);
+            self.positions
+                .iter_mut()
+                .for_each(|positions| positions.set(node, place));
+            self.velocities
+                .iter_mut()
+                .for_each(|velocities| velocities.set(node, Vec3::ZERO));
+        }
     }
 
     /// Makes the step in progress the current state.

@@ -10,6 +10,9 @@ use crate::memory;
 /// Points that reach along less than this part of an edge do not tell how it turns.
 const LITTLE: f32 = 0.02;
 
+/// Tissue that goes over a blade at rest is cut by no less than this part of a cell at once.
+const AT_ONCE: f32 = 0.2;
+
 /// Where a blade stopped.
 #[derive(Debug)]
 pub(crate) struct Stroke {
@@ -47,6 +50,7 @@ impl Stroke {
         {
             hasher.write_floats(&point.to_array());
         }
+        self.of_solid.hash(hasher);
         for (end, _) in &self.ends {
             end.nodes.iter().for_each(|&node| hasher.write_u64(u64::from(node)));
             end.weights.iter().for_each(|weight| hasher.write_u64(weight.to_bits()));
@@ -87,6 +91,17 @@ impl Stroke {
         Some([0.0, length].map(|at| from + along * at + gone + turn * (at - place) - way * furthest))
     }
 
+    /// Whether the tissue where it stands has gone on by as much as is to be cut at once.
+    pub fn has_tissue_gone(&self, material: &CutMaterial, positions: &[Vec3]) -> bool {
+        let gone = |(end, before): &(CutEnd, Vec3)| {
+            // An edge that tissue goes along cuts nothing.
+            let [from, to] = self.edge.unwrap_or([*before; 2]);
+            let way = material.place_of(end, positions) - before;
+            way.reject_from_normalized((to - from).normalize_or(Vec3::X)).length() > AT_ONCE * end.size as f32
+        };
+        self.ends.iter().any(gone)
+    }
+
     /// Makes room for so many ends.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
         memory::reserve(&mut self.ends, count)
@@ -100,6 +115,18 @@ impl Stroke {
             self.ends.clear();
         }
         has_moved
+    }
+
+    /// Has the points of a solid be in their order along the edge.
+    pub fn sort_ends(&mut self) {
+        let Some([from, to]) = self.edge else {
+            return;
+        };
+        let along = |point: Vec3| (point - from).dot(to - from);
+        if self.ends.iter().all(|(end, _)| end.vertex.is_none()) {
+            self.ends
+                .sort_unstable_by(|a, b| along(a.1).total_cmp(&along(b.1)).then(a.0.nodes.cmp(&b.0.nodes)));
+        }
     }
 
     /// It stands in the tissue at this point.

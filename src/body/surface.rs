@@ -8,6 +8,9 @@ impl Body {
     /// Makes room for a change of its surface with which so many nodes come, and so many triangles change and are added.
     pub(crate) fn reserve_surface(&mut self, nodes: usize, changed: usize, added: usize) -> Result<()> {
         self.surface.try_reserve(added)?;
+        if let Some(shown) = self.shown.as_mut().filter(|_| changed + added > 0) {
+            shown.reserve_triangles(self.surface.capacity())?;
+        }
         let node_count = self.node_count() + nodes;
         self.bindings.get_or_insert_default().reserve(0, node_count)?;
         if let Some(contacts) = &mut self.contacts {
@@ -23,6 +26,9 @@ impl Body {
             self.surface[index as usize] = corners;
         }
         self.surface.extend_from_slice(change.added);
+        if let Some(shown) = &mut self.shown {
+            shown.forget_triangles();
+        }
         let bindings = self.bindings.get_or_insert_default();
         let order = &self.order;
         let own = |node: u32| order.own(node);

@@ -6,10 +6,11 @@ use super::cuttable::Cuttable;
 use super::definition::check_values;
 use super::tearing::{TearReport, Withheld};
 use super::{Body, CutReport, Values};
+use crate::contact::Skin;
 use crate::cutting::{CutSurface, Limits, Load};
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::springs::pull;
+use crate::springs::{Link, pull};
 use crate::threads::Team;
 
 /// What became of a spring that was to tear.
@@ -20,12 +21,12 @@ pub(crate) enum Torn {
 }
 
 impl Body {
-    /// Gives the springs of these pairs of nodes other limits than [`BodyDefinition::tearing`](crate::BodyDefinition::tearing): a strain, a
+    /// Gives the springs of these pairs of nodes, or edges of elements, which bear a strain alone, other limits than [`BodyDefinition::tearing`](crate::BodyDefinition::tearing): a strain, a
     /// force in N, or both; 0: any; `None` leaves them. Springs that are added later have none until they are given some. Of a pair that is
     /// named more than once the last counts.
     ///
     /// # Errors
-    /// [`Error::Unsupported`]: the body was made not to tear. [`Error::InvalidArgument`]: a pair has no spring, or a number is missing, negative
+    /// [`Error::Unsupported`]: the body was made not to tear. [`Error::InvalidArgument`]: a pair has neither, or a number is missing, negative
     /// or not finite. [`Error::OutOfMemory`].
     pub fn set_tear_limits(
         &mut self,
@@ -40,7 +41,7 @@ impl Body {
         }
         let mut springs = memory::reserved(pairs.len())?;
         for index in 0..pairs.len() {
-            springs.push(self.link_of_pair(pairs, index)?);
+            springs.push(self.borne_by_pair(pairs, index)?);
         }
         let Some(tears) = &mut self.tears else {
             return Err(Error::Unsupported(
@@ -53,6 +54,26 @@ impl Body {
             tears.set([node, link.neighbour], limits, &link);
         }
         Ok(())
+    }
+
+    /// What the first of two nodes sees of their spring, or of an edge of elements, which bears a strain alone.
+    fn borne_by_pair(&self, pairs: &[[u32; 2]], index: usize) -> Result<(u32, Link)> {
+        let found = self.link_of_pair(pairs, index);
+        let (Err(_), Some(tears), Some(cuttable)) = (&found, &self.tears, &self.cuttable) else {
+            return found;
+        };
+        let (callers, solid) = (pairs[index], cuttable.material.solid());
+        let is_known = callers.iter().all(|&node| (node as usize) < self.node_count());
+        let (Some(solid), true) = (solid, is_known) else {
+            return found;
+        };
+        let nodes = callers.map(|node| self.order.own(node));
+        if !tears.watches(nodes) {
+            return found;
+        }
+        let [a, b] = callers.map(|node| solid.rest(node));
+        let [node, neighbour] = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
+        Ok((node, Link::slack(neighbour, a.distance(b))))
     }
 
     /// What tore in the last step, and what did not; all 0 of a body that does not tear.
@@ -79,11 +100,11 @@ impl Body {
     ///
     /// # Errors
     /// As [`Body::cut`]. Then nothing has changed.
-    pub(crate) fn tear(&mut self, spring: [u32; 2]) -> Result<Torn> {
+    pub(crate) fn tear(&mut self, spring: [u32; 2], skin: Option<&mut Skin>) -> Result<Torn> {
         let Some(mut cuttable) = self.cuttable.take() else {
             return Ok(Torn::Not(Withheld::NoWay));
         };
-        let torn = self.tear_with(&mut cuttable, spring);
+        let torn = self.tear_with(&mut cuttable, spring, skin);
         self.cuttable = Some(cuttable);
         torn
     }
@@ -96,10 +117,13 @@ impl Body {
         }
     }
 
-    fn tear_with(&mut self, cuttable: &mut Cuttable, spring: [u32; 2]) -> Result<Torn> {
+    fn tear_with(&mut self, cuttable: &mut Cuttable, spring: [u32; 2], mut skin: Option<&mut Skin>) -> Result<Torn> {
+        if cuttable.material.solid().is_some() {
+            return self.tear_solid(cuttable, spring, skin);
+        }
         let mut why = Withheld::NoWay;
         for (vertex, load) in self.torn_apart(cuttable, spring)? {
-            match self.tear_through(cuttable, vertex, &load)? {
+            match self.tear_through(cuttable, vertex, &load, skin.as_deref_mut())? {
                 Torn::Made => return Ok(Torn::Made),
                 Torn::Not(Withheld::NoWay) => {}
                 Torn::Not(other) => why = other,
@@ -145,7 +169,13 @@ impl Body {
         Ok(found)
     }
 
-    fn tear_through(&mut self, cuttable: &mut Cuttable, vertex: u32, load: &Load) -> Result<Torn> {
+    fn tear_through(
+        &mut self,
+        cuttable: &mut Cuttable,
+        vertex: u32,
+        load: &Load,
+        skin: Option<&mut Skin>,
+    ) -> Result<Torn> {
         let Some(surface) = cuttable.material.surface() else {
             return Ok(Torn::Not(Withheld::NoWay));
         };
@@ -180,7 +210,7 @@ impl Body {
             Ok(None) => {
                 let beside = |surface: &CutSurface| surface.beside(&tear.triangles);
                 let near = cuttable.material.surface().map_or(Ok(Vec::new()), beside);
-                near.and_then(|near| self.apply(cuttable, &tear.way, &near, &changes, counts))
+                near.and_then(|near| self.apply(cuttable, skin, (&tear.way, &near), &changes, counts))
             }
             Ok(Some(why)) => {
                 cuttable.material.undo();

@@ -3,21 +3,27 @@
 use super::BodyDefinition;
 use super::definition::not_negative;
 use crate::error::{Error, Result};
+use crate::material::Model;
 
 /// When a body tears.
 ///
 /// A spring that a step has left beyond its limits tears the surface through one of its nodes, across what pulls that node apart (O'Brien,
 /// Hodgins 1999, equation 13); where a cut ends in a triangle next to the spring, that goes on instead. A tear goes as far as the next triangle
 /// that is simulated, and is a cut in all it does.
+///
+/// A solid tears at that of the spring's nodes about which its material is stretched more, by the mean of (F Fᵀ - 1) / 2 over the tetrahedra there, with
+/// the gradient F of the deformation: the tetrahedra about it whose middles lie on the two sides of the plane across the largest principal
+/// stretch part along their faces, as far as what is drawn stays a closed surface. Of tetrahedra that are elements each edge counts as a spring with a
+/// strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tearing {
     /// The part of its rest length by which a spring may become longer, at least 0; 0: any. A spring without a rest length has no strain.
     pub strain: f32,
-    /// How much a spring may pull, N, at least 0; 0: any. What a cut leaves of a spring bears its part.
+    /// How much a spring may pull, N, at least 0; 0: any. Edges of elements bear any force. What a cut leaves of a spring bears its part.
     pub force: f32,
     /// The most tears in a step, those of the most loaded springs; 0: the body does not tear, and pays nothing for it.
     pub most_per_step: u32,
-    /// A tear that would part a piece with less area in the rest shape, m², is not made; at least 0.
+    /// A tear that would part a piece with less area in the rest shape, m², of solids with less volume, m³, is not made; at least 0.
     pub smallest_piece: f32,
 }
 
@@ -66,12 +72,21 @@ impl Tearing {
                 "most_tears is {most}, and spare_nodes is 0: a tear needs nodes to come"
             )));
         }
-        if !definition.tetrahedra.is_empty() || !definition.cells.is_empty() {
+        if !definition.cells.is_empty() {
             return Err(Error::Unsupported(format!(
-                "most_tears is {most}: bodies with tetrahedra or cells do not tear"
+                "most_tears is {most}: bodies with cells do not tear"
             )));
         }
-        if definition.triangles.is_empty() {
+        let has_elements = definition
+            .material
+            .is_some_and(|material| material.model == Model::Tetrahedra);
+        if has_elements && self.force > 0.0 && definition.springs.is_none_or(<[_]>::is_empty) {
+            return Err(Error::Unsupported(format!(
+                "tear_force is {}: elements have no springs that pull, but a tear_strain",
+                self.force
+            )));
+        }
+        if definition.triangles.is_empty() && definition.tetrahedra.is_empty() {
             return Err(Error::Unsupported(format!(
                 "most_tears is {most}: bodies without triangles do not tear"
             )));

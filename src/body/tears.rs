@@ -37,12 +37,22 @@ pub(crate) struct Tears {
 }
 
 impl Tears {
-    /// With springs in the body's own numbers; `None`: the body is not to tear.
-    pub fn new(definition: &BodyDefinition, springs: &[Spring]) -> Result<Option<Box<Self>>> {
+    /// With springs in the body's own numbers; `None`: the body is not to tear. Of tetrahedra that are elements edges without a spring tear too.
+    pub fn new(
+        definition: &BodyDefinition,
+        springs: &[Spring],
+        has_elements: bool,
+        order: &NodeOrder,
+    ) -> Result<Option<Box<Self>>> {
         let asked = definition.tearing;
         if asked.most_per_step == 0 {
             return Ok(None);
         }
+        let mut all = memory::copied(springs)?;
+        if has_elements {
+            add_edges(definition, &mut all, order)?;
+        }
+        let springs = &all[..];
         let node_count = definition.positions.len();
         let room = node_count + definition.spare_nodes as usize;
         let mut tears = Self {
@@ -59,7 +69,12 @@ impl Tears {
         Ok(Some(Box::new(tears)))
     }
 
-    /// A tear that would part a piece with less area is not to be made, m².
+    /// Whether there are limits for the spring or edge between two nodes.
+    pub fn watches(&self, nodes: [u32; 2]) -> bool {
+        self.bearing.has(nodes)
+    }
+
+    /// A tear that would part a piece with less area is not to be made, m²; of solids with less volume, m³.
     pub fn smallest_piece(&self) -> f64 {
         f64::from(self.asked.smallest_piece)
     }
@@ -174,4 +189,27 @@ impl Tears {
         self.report.withhold(why);
         self.bearing.withhold(nodes, why, version);
     }
+}
+
+/// Adds the edges of tetrahedra along which there is no spring, as springs without stiffness.
+fn add_edges(definition: &BodyDefinition, springs: &mut Vec<Spring>, order: &NodeOrder) -> Result<()> {
+    let rest = definition.rest_positions.unwrap_or(definition.positions);
+    let mut known = memory::reserved(springs.len())?;
+    known.extend(springs.iter().map(|spring| sorted(spring.nodes)));
+    known.sort_unstable();
+    for edge in crate::mesh::edges(&[], definition.tetrahedra)? {
+        let nodes = sorted(edge.map(|node| order.own(node)));
+        if known.binary_search(&nodes).is_ok() {
+            continue;
+        }
+        let [a, b] = edge.map(|node| rest[node as usize]);
+        let spring = Spring {
+            nodes,
+            stiffness: 0.0,
+            rest_length: a.distance(b),
+            damping: 0.0,
+        };
+        memory::push(springs, spring)?;
+    }
+    Ok(())
 }

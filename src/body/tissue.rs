@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::Body;
 use super::bindings::parts;
 use crate::contact::{CollisionFilter, Moment};
+use crate::cutting::CutMaterial;
 use crate::error::Result;
 use crate::solver::close;
 
@@ -17,6 +18,7 @@ impl Body {
     /// Has tools and other bodies meet it as this filter says, from the next step on. What lies within it or them then is pushed out.
     pub fn set_collision_filter(&mut self, filter: CollisionFilter) {
         self.contact.filter = filter;
+        self.wake();
         if let Some(contacts) = &mut self.contacts {
             contacts.set_filter(filter);
         }
@@ -25,6 +27,32 @@ impl Body {
     /// Its surface in its own numbers.
     pub(crate) fn own_surface(&self) -> Result<Vec<[u32; 3]>> {
         self.order.own_triangles(&self.surface)
+    }
+
+    /// Whether cuts may change its surface.
+    pub(crate) fn can_be_cut(&self) -> bool {
+        self.cuttable.is_some()
+    }
+
+    /// Whether it is cut as a solid.
+    pub(crate) fn is_solid(&self) -> bool {
+        let cuttable = self.cuttable.as_ref();
+        cuttable.is_some_and(|cuttable| matches!(cuttable.material, CutMaterial::Solid(_)))
+    }
+
+    /// Its own number of one of the caller's.
+    pub(crate) fn own(&self, callers: u32) -> u32 {
+        self.order.own(callers)
+    }
+
+    /// How many nodes may come that there is room for.
+    pub(crate) fn spare_nodes(&self) -> usize {
+        self.node_room.saturating_sub(self.node_count())
+    }
+
+    /// The nodes that move one of its own numbers, with their parts: itself where it is bound to none.
+    pub(crate) fn movers(&self, own: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
+        parts(self.bindings.as_ref(), own)
     }
 
     /// Gives a node this mean velocity, m/s, in a substep: it has received `impulse`, N s, which a pinned node hands on.

@@ -278,15 +278,9 @@ impl Vectors {
 
 /// The root of the largest of `squares`; infinite where one is not finite.
 fn largest(squares: impl Iterator<Item = f32>) -> f32 {
-    // A NaN, once met, stays.
-    let larger = |largest: f32, square: f32| {
-        if largest.is_nan() || square <= largest {
-            largest
-        } else {
-            square
-        }
-    };
-    let largest = squares.fold(0.0, larger);
+    // Bits of numbers not below 0 are in their order, what is infinite and what is not a number above all others.
+    let bits = squares.map(|square| (square.to_bits() & (u32::MAX >> 1)) as i32);
+    let largest = f32::from_bits(bits.fold(0, i32::max) as u32);
     if largest.is_finite() {
         largest.sqrt()
     } else {

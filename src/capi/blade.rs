@@ -53,7 +53,7 @@ pub struct sinew_blade_report {
     pub torque: [f32; 3],
     /// What whoever moves it has spent on tissue in the step, J.
     pub work: f64,
-    /// How long the cuts are that it made at the end of the step, at rest, m.
+    /// How long the cuts are that it made at the end of the step, at rest, m; of solids on their skin.
     pub length: f64,
     /// How far it is ahead of where tissue is cut, m: 0 where nothing is in its way.
     pub lag: f64,
@@ -62,6 +62,8 @@ pub struct sinew_blade_report {
     pub status: sinew_status,
     /// 0.
     pub reserved0: u32,
+    /// Of solids: how large the faces are that have opened, at rest, m^2.
+    pub area: f64,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
@@ -133,13 +135,16 @@ pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_
 ///
 /// Tissue that the edge meets gives way until the edge is so far ahead, on the spring of the definition's stiffness, that this pulls as hard as the
 /// tissue resists: by its toughness for each metre that is cut, at rest. From then on its proxy follows, at the end of each step, as far as
-/// keeps both equal; so the work of the blade is the toughness times the length that is cut, and what the spring stores (Mahvash, Hayward 2001).
+/// keeps both equal; so the work of the blade is the toughness times the length that is cut, or the area in solids, and what the spring stores (Mahvash,
+/// Hayward 2001).
 /// What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself meets nothing, nor
 /// does one that goes back through its cut.
 ///
 /// The cut is made where the proxy went, by a fifth of a triangle's shortest edge at a time and to its end where it leaves the tissue; so a triangle that
 /// is passed through takes some ten spare_nodes. Tissue of toughness 0 is cut with each step, just where the edge went. Where a cut fails the
 /// proxy stays and pulls on, as hard as the tissue resisted: the report's status tells; the step itself succeeds.
+///
+/// Tissue that moves onto an edge is cut as if that had moved; a turn is followed in parts of half a radian.
 ///
 /// A body that a blade stands in takes its substeps as one that is attached does. A step in which a blade goes through tissue may allocate.
 ///
@@ -231,6 +236,7 @@ pub unsafe extern "C" fn sinew_blade_get_report(
                 lag: told.lag,
                 status: told.refused.as_ref().map_or(SINEW_STATUS_OK, status_of),
                 reserved0: 0,
+                area: told.area,
             });
             Ok(())
         })

@@ -30,7 +30,8 @@ pub struct sinew_body_id {
 }
 
 /// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
-/// set_positions, set_velocities or rest_state, the next change of topology of that body, or its end.
+/// set_positions, set_velocities or rest_state, the next change of topology of that body, or its end; in a sinew_frame as long
+/// as that says.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_vec3_view {
@@ -61,7 +62,7 @@ impl From<BodyId> for sinew_body_id {
 }
 
 impl sinew_vec3_view {
-    fn of(vectors: &[Vec3]) -> Self {
+    pub(super) fn of(vectors: &[Vec3]) -> Self {
         Self {
             data: vectors.as_ptr().cast(),
             count: vectors.len(),

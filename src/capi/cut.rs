@@ -127,6 +127,9 @@ const _: () = assert!(size_of::<sinew_rim_edge>() == size_of::<NewRimEdge>());
 /// drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none. It takes as long as the cut is
 /// large, but with NEWTON, which is made anew. Positions and triangles that were lent before are stale; sinew_body_get_topology_changes tells what has changed.
 ///
+/// Terms beside springs go on in parts: home springs with those of the nodes' masses, what goes by springs with those, fibres with the tetrahedra, and hinges of
+/// bending by area, where pieces of both triangles still share the edge. A hinge whose edge is cut along is gone, with its energy, and so is what a cavity had that is cut open.
+///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (spare_nodes was 0), SINEW_STATUS_CAPACITY (there are
 /// not as many spare nodes left, or FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY; then nothing has changed.
 ///

@@ -6,7 +6,7 @@ use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
-use crate::body::{BodyDefinition, Solver, Storage, Tearing, Values};
+use crate::body::{BodyDefinition, Sleep, Solver, Storage, Tearing, Values};
 use crate::contact::{BodyContact, CollisionFilter};
 use crate::error::{Error, Result};
 use crate::material::{Material, Model, Viscosity, Yielding};
@@ -196,7 +196,8 @@ pub struct sinew_body_def {
     /// volume V, V0 at rest, is enclosed_stiffness / 2 V0 (V/V0 - 1)^2 - pressure (V - V0). The surface is triangles, or where there are
     /// none the boundary of the tetrahedra or cells; each of its parts that hang together by edges must be closed and have a volume. Each is a
     /// cavity of its own, unless some are inside out, as the inner wall of a hollow organ is: then those alone are cavities.
-    /// sinew_body_remove_spring opens the cavities whose triangles have the edge, for good.
+    /// sinew_body_remove_spring opens the cavities whose triangles have the edge, for good, and a cut those of which it divides or parts
+    /// triangles, however little: what is open is neither kept nor pressed. A cut beside a cavity leaves it.
     pub enclosed_stiffness: f32,
     /// Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
     /// enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
@@ -208,7 +209,8 @@ pub struct sinew_body_def {
     pub contact_friction: f32,
     /// 1: it meets other bodies that have 1 here; 0, the default: it does not.
     pub meets_bodies: u32,
-    /// 1: it meets itself; 0, the default: it does not.
+    /// 1: it meets itself; 0, the default: it does not. The two sides of a cut meet from then on, at no distance: they part freely, and rest against
+    /// each other where they are pressed together again; the rims of a sheet may slide over each other until they have parted.
     pub meets_itself: u32,
     /// How it and other bodies find each other: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE, which one of two has to ask
     /// for: then both are drawn in each substep along three axes where their boxes overlap, and what is seen near each other is compared
@@ -229,21 +231,31 @@ pub struct sinew_body_def {
     /// will do. See sinew_body_cut.
     pub spare_nodes: u32,
     /// J/m, at least 0: what a blade (sinew_blade_create) spends for each metre of a cut, at rest: the fracture toughness of the material, J/m^2,
-    /// times the thickness of the surface; default 0: it is cut for nothing.
+    /// times the thickness of the surface. Of tetrahedra the toughness itself, J/m^2. Springs alone have none (SINEW_STATUS_UNSUPPORTED); default 0: it is cut for nothing.
     pub toughness: f32,
     /// The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
     /// limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
     /// force and as far as the next triangle (O'Brien, Hodgins 1999); where a cut ends in a triangle next to the spring, that goes on
-    /// instead. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
+    /// instead. A solid tears at that of them about which the material is stretched more, across that and along faces of its tetrahedra; of
+    /// tetrahedra that are elements each edge has the limit of a spring. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
     /// beyond its limits may allocate.
     pub tear_strain: f32,
-    /// N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part.
+    /// N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part. Edges of elements
+    /// have no such limit: SINEW_STATUS_UNSUPPORTED where a body has elements and no springs.
     pub tear_force: f32,
     /// The most tears in a step, those of the most loaded springs; 0, the default: the body does not tear, and pays nothing for it. Else
     /// spare_nodes is above 0.
     pub most_tears: u32,
-    /// m2, at least 0: a tear that would part a piece with less area at rest is not made; default 0.
+    /// m2, of solids m3, at least 0: a tear that would part a piece with less area or volume at rest is not made; default 0.
     pub smallest_piece: f32,
+    /// m/s, at least 0: what is slower is at rest; 0, the default: the body never sleeps, and pays nothing for it. Else parts of it that have
+    /// been at rest for sleep_time, and on which no force acts that would make them as fast in that time, stand still and are not stepped
+    /// until a neighbour, a force, a pin, a tool, a cut or a changed property reaches them. Speed by time is about how far off their places
+    /// may be. Parts of the body sleep by themselves with SINEW_SOLVER_VERLET, where it is made of springs and elements alone and was not cut; else
+    /// all of it does or nothing. What meets other tissue or is sewn to it does not sleep. See sinew_body_get_awake_share.
+    pub sleep_speed: f32,
+    /// s, above 0: some times what the tissue takes to settle; default 0.5.
+    pub sleep_time: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -256,6 +268,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, retardation_time),
         offset_of!(Self, contact_thickness),
         offset_of!(Self, spare_nodes),
+        offset_of!(Self, sleep_speed),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -334,6 +347,8 @@ impl sinew_body_def {
             tear_force: 0.0,
             most_tears: 0,
             smallest_piece: 0.0,
+            sleep_speed: Sleep::default().speed,
+            sleep_time: Sleep::default().time,
         }
     }
 
@@ -508,6 +523,10 @@ impl sinew_body_def {
                 enclosed_stiffness: self.enclosed_stiffness,
                 pressure: self.pressure,
                 contact: self.contact()?,
+                sleep: Sleep {
+                    speed: self.sleep_speed,
+                    time: self.sleep_time,
+                },
                 spare_nodes: self.spare_nodes,
                 toughness: self.toughness,
                 tearing: Tearing {

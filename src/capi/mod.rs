@@ -26,6 +26,8 @@ pub mod tear;
 
 pub mod strain;
 
+pub mod sleep;
+
 pub mod report;
 
 pub mod material;
@@ -42,10 +44,14 @@ pub mod suture;
 
 pub mod blade;
 
+pub mod haptic;
+
 pub mod mesh;
 
 pub mod picture;
 
 pub mod query;
+
+pub mod reader;
 
 pub mod detector;

@@ -63,11 +63,11 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
     }
 }
 
-/// Gives the springs of `count` pairs of nodes other limits than tear_strain and tear_force of the definition: `pairs` are 2 `count` indices,
+/// Gives the springs of `count` pairs of nodes, or edges of elements, other limits than tear_strain and tear_force of the definition: `pairs` are 2 `count` indices,
 /// `strains` and `forces`, N, `count` floats each, at least 0, 0: any; NULL: they stay. Springs that are added later have none until they are given
 /// some. Of a pair that is named more than once the last counts.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (most_tears was 0),
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has neither), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (most_tears was 0),
 /// SINEW_STATUS_OUT_OF_MEMORY; then no limit is changed.
 ///
 /// # Safety

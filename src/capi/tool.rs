@@ -239,8 +239,8 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
 /// NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way. What of its way a tool of limited force has
 /// not gone in that step is forgotten: it is sent again.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0 or the orientation is zero),
-/// SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0, the orientation is zero, or a haptic handle leads the
+/// tool), SINEW_STATUS_STALE_ID.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
@@ -334,6 +334,37 @@ pub unsafe extern "C" fn sinew_tool_get_pose(
     unsafe {
         with_world(world, |world| {
             let pose = world.pose(tool.id())?;
+            let position = memory::optional_output_array("position", position.cast(), 1)?;
+            let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
+            if let Some(place) = position {
+                place[0] = pose.position.to_array();
+            }
+            if let Some(place) = orientation {
+                place[0] = pose.orientation.to_array();
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Writes where the last step led a tool: where it is, but for one of limited force. Either may be NULL, as for sinew_tool_get_pose. Sent there by
+/// sinew_tool_set_pose step by step, it does the same in another world: so what a haptic handle did can be taken down and done again.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_target(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    position: *mut f32,
+    orientation: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let pose = world.tool_target(tool.id())?;
             let position = memory::optional_output_array("position", position.cast(), 1)?;
             let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
             if let Some(place) = position {

@@ -5,9 +5,14 @@ use glam::{DVec3, Vec3};
 use super::features::{Feature, Features};
 use super::filter::CollisionFilter;
 use super::path::{Placement, Solid, ToolPath};
+use super::room::{Room, sides_of};
+use super::sweep::Corners;
 use crate::body::{Bindings, Bounds, Vectors};
 use crate::error::Result;
 use crate::memory;
+
+/// A list that is good for so many substeps more is kept.
+const WORTH_KEEPING: f32 = 4.0;
 
 /// Features that can meet a tool before anything moves further than the slack that they were gathered with.
 ///
@@ -21,6 +26,26 @@ pub(super) struct Candidates {
     slack: f32,
     /// What is no further from a zone was gathered, m.
     reach: f32,
+    /// How far nodes might move since the list was made, m, and where they were then; below 0: it is not known.
+    whole_slack: f32,
+    firsts: Vectors,
+    /// The corners of what is near, each once; none where only planes are.
+    corners: Vec<Corner>,
+    /// No edge of what is near can be longer while the list is good, m.
+    longest: f32,
+    /// Of each node, while the list is made, on which sides of all that the zones reach it is, a bit for each; then, of those that are
+    /// corners, their place among them.
+    marks: Vec<u32>,
+}
+
+/// A corner of what is near, over a slice.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    node: u32,
+    /// On which sides of the room that is looked at it stays, a bit for each.
+    sides: u32,
+    start: Vec3,
+    step: Vec3,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -47,12 +72,19 @@ impl Candidates {
             zones: Vec::new(),
             slack: -1.0,
             reach: 0.0,
+            whole_slack: -1.0,
+            firsts: Vectors::zeros(features.node_count as usize)?,
+            longest: 0.0,
+            corners: memory::reserved(features.node_count as usize)?,
+            marks: memory::filled(0, features.node_count as usize)?,
         })
     }
 
-    /// Makes room for so many features.
-    pub fn reserve_features(&mut self, count: usize) -> Result<()> {
-        Ok(self.near.try_reserve(count.saturating_sub(self.near.len()))?)
+    /// Makes room for so many features, of so many nodes.
+    pub fn reserve_features(&mut self, count: usize, nodes: usize) -> Result<()> {
+        self.near.try_reserve(count.saturating_sub(self.near.len()))?;
+        self.corners.try_reserve(nodes.saturating_sub(self.corners.len()))?;
+        Ok(self.marks.try_reserve(nodes.saturating_sub(self.marks.len()))?)
     }
 
     /// Makes room for `tools` tools.
@@ -68,6 +100,7 @@ impl Candidates {
     /// Forgets the list.
     pub fn invalidate(&mut self) {
         self.slack = -1.0;
+        self.whole_slack = -1.0;
     }
 
     /// Whether the list is good for these tools on their ways and a body with this filter.
@@ -83,6 +116,19 @@ impl Candidates {
         self.slack >= 0.0
     }
 
+    /// Whether the list is still good, and for some time, by where the nodes have come to: what trembles spends much and goes nowhere.
+    pub fn renew(&mut self, positions: &Vectors, distance: f32) -> bool {
+        if self.whole_slack < 0.0 {
+            return false;
+        }
+        let slack = self.whole_slack - self.firsts.largest_distance(positions);
+        let is_good = slack >= WORTH_KEEPING * distance;
+        if is_good {
+            self.slack = slack - distance;
+        }
+        is_good
+    }
+
     /// Makes the list anew: all features that can come within `margin` of a tool while no node moves further than
     /// `slack` and no tool leaves its way by more than `slack`; `tools` are those that the body meets.
     pub fn gather<'a>(
@@ -94,6 +140,7 @@ impl Candidates {
         [margin, slack]: [f32; 2],
     ) {
         self.near.clear();
+        self.corners.clear();
         self.zones.clear();
         self.slack = slack;
         for tool in tools.clone() {
@@ -118,6 +165,11 @@ impl Candidates {
         }
         let reach = margin + slack;
         self.reach = reach;
+        self.whole_slack = -1.0;
+        if self.firsts.len() == positions.len() {
+            self.firsts.copy_from(positions);
+            self.whole_slack = slack;
+        }
         let everything = Bounds::of(positions.iter());
         if !self.zones.iter().any(|zone| zone.meets(&everything, reach)) {
             return;
@@ -129,10 +181,15 @@ impl Candidates {
         } else {
             features.node_count as usize
         };
+        let is_told = self.find_sides((positions, bindings), reach);
         for index in 0..count as u32 {
             let Some(feature) = features.get(index) else {
                 continue;
             };
+            let sides = |node: &u32| self.marks[*node as usize];
+            if is_told && feature.nodes().iter().map(sides).fold(!0, |all, one| all & one) != 0 {
+                continue;
+            }
             if is_hidden(feature, bindings) {
                 continue;
             }
@@ -148,6 +205,95 @@ impl Candidates {
                 self.near.push(index);
             }
         }
+        self.list_corners(features, (positions, bindings));
+    }
+
+    fn list_corners(&mut self, features: &Features, places: (&Vectors, Option<&Bindings>)) {
+        const NOT_LISTED: u32 = u32::MAX;
+        let Self {
+            near, corners, marks, ..
+        } = self;
+        corners.clear();
+        if !self.zones.iter().any(Zone::is_bounded) {
+            return;
+        }
+        let features = || near.iter().filter_map(|&index| features.get(index));
+        let mut longest = 0.0_f32;
+        for feature in features() {
+            feature
+                .nodes()
+                .iter()
+                .for_each(|&node| marks[node as usize] = NOT_LISTED);
+            let corners = corners_of(feature, places);
+            for (end, corner) in corners[..feature.nodes().len()].iter().enumerate() {
+                let edges = corners[..end].iter().map(|other| corner.distance_squared(*other));
+                longest = edges.fold(longest, f32::max);
+            }
+        }
+        for feature in features() {
+            for &node in feature.nodes() {
+                let mark = &mut marks[node as usize];
+                if *mark == NOT_LISTED {
+                    *mark = corners.len() as u32;
+                    corners.push(Corner {
+                        node,
+                        sides: 0,
+                        start: Vec3::ZERO,
+                        step: Vec3::ZERO,
+                    });
+                }
+            }
+        }
+        // Both of its ends may move.
+        self.longest = longest.sqrt() + 2.0 * self.reach;
+    }
+
+    /// Sees where in a slice the corners of what is near start and how far they go, and on which sides of the room they stay.
+    pub fn see_corners(&mut self, room: &Room, way_of: impl Fn(usize) -> (Vec3, Vec3)) {
+        for corner in &mut self.corners {
+            (corner.start, corner.step) = way_of(corner.node as usize);
+            corner.sides = room.sides(corner.start, corner.step, self.longest);
+        }
+    }
+
+    /// The corners of a feature that is near; `None` where all are on one side of the room: then it does not come there.
+    #[inline]
+    pub fn corners(&self, feature: Feature) -> Option<Corners> {
+        let mut corners = Corners {
+            points: [Vec3::ZERO; 3],
+            steps: [Vec3::ZERO; 3],
+            count: feature.nodes().len(),
+        };
+        let mut sides = !0;
+        for (place, &node) in feature.nodes().iter().enumerate() {
+            let corner = &self.corners[self.marks[node as usize] as usize];
+            sides &= corner.sides;
+            (corners.points[place], corners.steps[place]) = (corner.start, corner.step);
+        }
+        (sides == 0).then_some(corners)
+    }
+
+    /// Finds on which sides of a box about all zones nodes are: what has all of its corners on one side meets none. Not where a zone has no end, or
+    /// nodes have been added.
+    fn find_sides(&mut self, (positions, bindings): (&Vectors, Option<&Bindings>), reach: f32) -> bool {
+        let mut all = Bounds::EMPTY;
+        for zone in &self.zones {
+            let (Zone::Box { bounds, .. } | Zone::Mesh { bounds, .. }) = zone else {
+                return false;
+            };
+            all = all.and(&bounds.extended(reach));
+        }
+        if self.marks.len() != positions.len() {
+            return false;
+        }
+        for (node, sides) in self.marks.iter_mut().enumerate() {
+            let place = match bindings {
+                None => positions.get(node),
+                Some(bindings) => bindings.vector(positions, node),
+            };
+            *sides = sides_of(&all, place);
+        }
+        true
     }
 
     /// The features have changed, of which there were so many nodes, edges and faces, and these are `fresh`: the list stays as good as it
@@ -159,6 +305,8 @@ impl Candidates {
         fresh: &mut Vec<u32>,
         (positions, bindings): (&Vectors, &Bindings),
     ) {
+        self.whole_slack = -1.0;
+        self.marks.resize(features.node_count as usize, 0);
         if self.slack < 0.0 {
             return;
         }
@@ -186,6 +334,7 @@ impl Candidates {
             self.zones.iter().any(meets) && self.near.binary_search(&index).is_err()
         });
         memory::merge(&mut self.near, fresh, |&index| index);
+        self.list_corners(features, (positions, Some(bindings)));
     }
 }
 

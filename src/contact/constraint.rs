@@ -1,10 +1,11 @@
 //! One contact: a node, edge or face that a tool does not let pass.
 
-use glam::{BVec3, DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3, Vec3A};
 
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::impulses::LEVERAGE;
+use super::press::Press;
 use super::supports::{MOST, Supports};
 use crate::body::{Mobility, Vectors};
 
@@ -172,30 +173,32 @@ impl Constraint {
         after
     }
 
-    /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
-    pub fn solve(&mut self, velocities: &mut Vectors) -> f32 {
-        let velocity = self.velocity(velocities);
-        let missing = self.least_speed - velocity.dot(self.normal);
-        let impulse = (self.impulse * (1.0 - self.give) + missing * self.effective_mass).max(0.0);
-        let change = impulse - self.impulse;
-        self.impulse = impulse;
-        if change == 0.0 && self.friction == 0.0 {
-            return 0.0;
+    /// What it asks of the velocities at these places of its nodes.
+    pub fn press(&self, place_of: impl Fn(u32) -> u32) -> Press {
+        let mut places = [0; MOST];
+        for (place, &node) in places.iter_mut().zip(self.nodes()) {
+            *place = place_of(node);
         }
-        let mut given = self.normal * change;
-        if self.friction > 0.0 {
-            let slip = (velocity - self.surface_velocity).reject_from_normalized(self.normal);
-            let wanted = self.friction_impulse - slip * self.free_mass;
-            let friction = wanted.clamp_length_max(self.friction * impulse);
-            given += friction - self.friction_impulse;
-            self.friction_impulse = friction;
+        Press {
+            places,
+            shares: self.shares,
+            answers: self.answers.map(Vec3A::from),
+            normal: self.normal.into(),
+            surface_velocity: self.surface_velocity.into(),
+            least_speed: self.least_speed,
+            friction: self.friction,
+            effective_mass: self.effective_mass,
+            free_mass: self.free_mass,
+            give: self.give,
+            impulse: self.impulse,
+            friction_impulse: self.friction_impulse.into(),
         }
-        for (&node, answer) in self.nodes().iter().zip(self.answers) {
-            let node = node as usize;
-            let velocity = velocities.get(node) + given * answer;
-            velocities.set(node, velocity);
-        }
-        given.length() / self.free_mass
+    }
+
+    /// Takes over what it gave.
+    pub fn take(&mut self, press: &Press) {
+        self.impulse = press.impulse;
+        self.friction_impulse = press.friction_impulse.into();
     }
 
     /// What the tissue received, N s.

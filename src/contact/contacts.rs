@@ -11,11 +11,13 @@ use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::filter::{BodyContact, CollisionFilter};
 use super::holds::Holds;
-use super::impulses::{PUSHED_OUT, SWEEPS, relax};
+use super::impulses::{PUSHED_OUT, SWEEPS};
 use super::meet::{meet_mesh, meet_plane, meet_rounded};
 use super::path::{Motion, Solid, ToolPath};
+use super::press::{Presses, solve_alone};
 use super::report::Touch;
 use super::supports::{MOST, Supports};
+use super::sweep::Corners;
 use crate::body::{Bindings, Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
 use crate::memory;
@@ -52,6 +54,7 @@ pub(crate) struct Contacts {
     pub(super) features: Features,
     pub(super) candidates: Candidates,
     constraints: Vec<Constraint>,
+    presses: Presses,
     /// How many of them are solved together.
     together: usize,
     /// The first of them, which a solved equation has seen.
@@ -126,6 +129,7 @@ impl Contacts {
             filter: contact.filter,
             candidates: Candidates::new(&features)?,
             constraints: Vec::new(),
+            presses: Presses::default(),
             together: 0,
             holds: Holds::default(),
             features,
@@ -157,6 +161,7 @@ impl Contacts {
         let together = together.clamp(*TOGETHER.start(), *TOGETHER.end());
         self.constraints
             .try_reserve(together.saturating_sub(self.constraints.len()))?;
+        self.presses.reserve(together)?;
         self.touches.try_reserve(together.saturating_sub(self.touches.len()))?;
         self.together = together;
         Ok(())
@@ -211,6 +216,13 @@ impl Contacts {
     /// The step that was begun last is not taken: the body is where it was, and touches what it touched, but nothing pressed it.
     pub fn stay(&mut self) {
         self.touches.clear();
+        for pair in &mut self.touched {
+            *pair = [pair[0]; 2];
+        }
+    }
+
+    /// The step is over in which the body was asleep: it touches what it touched.
+    pub fn sleep_on(&mut self) {
         for pair in &mut self.touched {
             *pair = [pair[0]; 2];
         }
@@ -405,14 +417,24 @@ impl Contacts {
                 continue;
             }
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
+            let room = motion.room(meeting, slice);
+            if let Some(room) = &room {
+                self.candidates.see_corners(room, |corner| meeting.way(slice, corner));
+            }
             for candidate in 0..self.candidates.near().len() {
                 let Some(feature) = self.features.get(self.candidates.near()[candidate]) else {
                     continue;
                 };
-                if !slice.foresees && self.holds.know(place, feature) {
-                    continue;
+                let is_known = || !slice.foresees && self.holds.know(place, feature);
+                if room.is_some() {
+                    if let Some(corners) = self.candidates.corners(feature)
+                        && !is_known()
+                    {
+                        self.touch(meeting, slice, (place, &motion), (feature, &corners));
+                    }
+                } else if !is_known() {
+                    self.touch_plane(meeting, slice, (place, &motion), feature);
                 }
-                self.touch(meeting, slice, place, &motion, feature);
             }
         }
     }
@@ -441,7 +463,7 @@ impl Contacts {
         let speeds = tools.clone().map(|tool| tool.speed(meeting.dt));
         let tool_speed = speeds.fold(0.0, f32::max);
         let travel = meeting.substep * (meeting.fastest + tool_speed);
-        if self.candidates.spend(travel) {
+        if self.candidates.spend(travel) || self.candidates.renew(meeting.positions, travel) {
             return;
         }
         let bounds = meeting.bounds();
@@ -456,36 +478,49 @@ impl Contacts {
         self.candidates.spend(travel);
     }
 
-    /// Adds the contacts of one feature with one tool.
-    fn touch(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, motion: &Motion, feature: Feature) {
+    /// Adds the contact of one feature with a plane.
+    fn touch_plane(
+        &mut self,
+        meeting: &mut Meeting,
+        slice: &Slice,
+        (tool, motion): (usize, &Motion),
+        feature: Feature,
+    ) {
+        if let Solid::HalfSpace { point, .. } = motion.from
+            && feature.nodes().len() == 1
+            && !self.is_held(feature, meeting.tools[tool].slot, meeting.bindings)
+        {
+            let found = meet_plane(meeting, slice, motion, feature, point);
+            self.add(meeting, slice, tool, found);
+        }
+    }
+
+    /// Adds the contacts of one feature with a tool of any other shape.
+    fn touch(
+        &mut self,
+        meeting: &mut Meeting,
+        slice: &Slice,
+        (tool, motion): (usize, &Motion),
+        (feature, corners): (Feature, &Corners),
+    ) {
         if self.is_held(feature, meeting.tools[tool].slot, meeting.bindings) {
             return;
         }
-        match motion.from {
-            Solid::HalfSpace { point, .. } => {
-                if feature.nodes().len() == 1 {
-                    let found = meet_plane(meeting, slice, motion, feature, point);
-                    self.add(meeting, slice, tool, found);
-                }
+        let part = (feature, corners);
+        if let (Solid::Mesh(from), Solid::Mesh(to)) = (motion.from, motion.to) {
+            let found = meet_mesh(meeting, slice, motion, part, [&from, &to]);
+            self.add(meeting, slice, tool, found);
+            return;
+        }
+        let segment = motion.segment(meeting.drifts);
+        if corners.count == 3 && !segment.is_point() {
+            for end in 0..2 {
+                let found = meet_rounded(meeting, slice, motion, part, &segment.end(end));
+                self.add(meeting, slice, tool, found);
             }
-            Solid::Mesh(from) => {
-                if let Solid::Mesh(to) = motion.to {
-                    let found = meet_mesh(meeting, slice, motion, feature, [&from, &to]);
-                    self.add(meeting, slice, tool, found);
-                }
-            }
-            Solid::Rounded { .. } => {
-                let segment = motion.segment(meeting.drifts);
-                if feature.nodes().len() == 3 && !segment.is_point() {
-                    for end in 0..2 {
-                        let found = meet_rounded(meeting, slice, motion, feature, &segment.end(end));
-                        self.add(meeting, slice, tool, found);
-                    }
-                } else {
-                    let found = meet_rounded(meeting, slice, motion, feature, &segment);
-                    self.add(meeting, slice, tool, found);
-                }
-            }
+        } else {
+            let found = meet_rounded(meeting, slice, motion, part, &segment);
+            self.add(meeting, slice, tool, found);
         }
     }
 
@@ -497,19 +532,15 @@ impl Contacts {
         if self.constraints.len() < self.together {
             self.constraints.push(constraint);
         } else if !slice.foresees {
-            constraint.solve(meeting.velocities);
+            solve_alone(&mut constraint, meeting.velocities);
             self.settle(meeting, slice, &constraint, true);
         }
     }
 
     fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
-        let constraints = &mut self.constraints;
-        let first = relax(slice.sweeps, None, || {
-            let changes = constraints
-                .iter_mut()
-                .map(|constraint| constraint.solve(meeting.velocities));
-            changes.fold(0.0, f32::max)
-        });
+        let first = self
+            .presses
+            .solve(&mut self.constraints, meeting.velocities, slice.sweeps);
         // Where nothing was given beside what an equation found the nodes are where that has put them.
         let moves = first > 0.0 || self.holds.is_empty();
         for index in 0..self.constraints.len() {
@@ -599,6 +630,17 @@ impl Meeting<'_> {
         } else {
             self.vector(self.next_positions, corner) - self.vector(self.velocities, corner) * slice.remains
         }
+    }
+
+    /// Where a corner is when the slice begins, and how far it goes in it if nothing touches it; with the last half kick of a step it has come
+    /// to its end, and what is not touched there is a matter of the next.
+    fn way(&self, slice: &Slice, corner: usize) -> (Vec3, Vec3) {
+        let step = if self.drifts {
+            self.vector(self.velocities, corner) * slice.duration
+        } else {
+            Vec3::ZERO
+        };
+        (self.position(slice, corner), step)
     }
 
     /// That of these vectors which a corner has: its own, or what its nodes make of theirs.

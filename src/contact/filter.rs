@@ -50,6 +50,10 @@ pub struct BodyContact {
     /// Whether it meets other bodies that want it too.
     pub with_bodies: bool,
     /// Whether it meets itself.
+    ///
+    /// The two sides of a cut meet from then on, at no distance: they part freely, and where they are pressed together again they rest against each
+    /// other as before the cut, whatever the thickness. A solid's sides are told by their faces. The rims of a sheet lie in one place, and may slide
+    /// over each other until they have parted by a ten-thousandth of a short edge.
     pub with_itself: bool,
     /// How it and other bodies find each other: [`Detection::Exact`], or [`Detection::ImageSpace`], which one of two has to ask for; itself
     /// it always meets exactly. [`Detection::DistanceField`] is for rigid tools and refused.

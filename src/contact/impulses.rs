@@ -13,14 +13,34 @@ pub(super) const PUSHED_OUT: f32 = 0.2;
 /// need more, and cannot be had: where nothing gives way, the tool goes in.
 pub(super) const LEVERAGE: f32 = 4.0;
 
-/// Sweeps until one changes velocities by next to nothing beside `first`, m/s, or else beside what the first of them does: the most
-/// that it changed.
-pub(super) fn relax(sweeps: u32, first: Option<f32>, mut sweep: impl FnMut() -> f32) -> f32 {
+/// Between two sweeps over all contacts so many go over those that press: what does not press seldom begins to.
+const BETWEEN: u32 = 3;
+
+/// What a sweep goes over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sweep {
+    All,
+    /// Contacts that have given something.
+    Pressing,
+}
+
+/// Sweeps until one over all changes velocities by next to nothing beside `first`, m/s, or else beside what the first of them does: the
+/// most that it changed.
+pub(super) fn relax(sweeps: u32, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
     let mut first = first;
-    for _ in 0..sweeps {
-        let largest = sweep();
-        if !(largest > CONVERGED * *first.get_or_insert(largest)) {
+    let mut left = sweeps;
+    while left > 0 {
+        left -= 1;
+        let largest = sweep(Sweep::All);
+        let still = CONVERGED * *first.get_or_insert(largest);
+        if !(largest > still) {
             break;
+        }
+        for _ in 0..BETWEEN.min(left) {
+            left -= 1;
+            if !(sweep(Sweep::Pressing) > still) {
+                break;
+            }
         }
     }
     first.unwrap_or(0.0)

@@ -90,10 +90,9 @@ pub(super) fn meet_rounded(
     meeting: &Meeting,
     slice: &Slice,
     motion: &Motion,
-    feature: Feature,
+    (feature, corners): (Feature, &Corners),
     segment: &Segment,
 ) -> Option<Constraint> {
-    let corners = Corners::of(meeting, slice, feature);
     let around = Segment {
         radius: segment.radius + meeting.thickness,
         ..*segment
@@ -135,14 +134,13 @@ pub(super) fn meet_mesh(
     meeting: &Meeting,
     slice: &Slice,
     motion: &Motion,
-    feature: Feature,
+    (feature, corners): (Feature, &Corners),
     [from, to]: [&Placement; 2],
 ) -> Option<Constraint> {
     let solid = motion.mesh?;
-    let corners = Corners::of(meeting, slice, feature);
     let count = corners.count;
     // In the mesh's own frame, where it stands still.
-    let mut own = corners;
+    let mut own = *corners;
     let mut travel = 0.0_f32;
     for corner in 0..count {
         let (point, step) = (corners.points[corner], corners.steps[corner]);
@@ -196,24 +194,5 @@ impl Meeting<'_> {
         }
         let held = self.held_axes(&supports);
         Constraint::new((feature, weights), &supports, starts, normal, &self.mobility, held)
-    }
-}
-
-impl Corners {
-    /// Those of a feature over the slice, in the body's coordinates; with the last half kick of a step they have come to their end, and
-    /// what is not touched there is a matter of the next.
-    fn of(meeting: &Meeting, slice: &Slice, feature: Feature) -> Self {
-        let mut corners = Corners {
-            points: [Vec3::ZERO; 3],
-            steps: [Vec3::ZERO; 3],
-            count: feature.nodes().len(),
-        };
-        for (corner, &node) in feature.nodes().iter().enumerate() {
-            corners.points[corner] = meeting.position(slice, node as usize);
-            if meeting.drifts {
-                corners.steps[corner] = meeting.vector(meeting.velocities, node as usize) * slice.duration;
-            }
-        }
-        corners
     }
 }

@@ -103,6 +103,28 @@ impl ToolPath {
         }
     }
 
+    /// Whether it comes to within `margin` of something in these bounds in the step, as far as boxes tell.
+    pub fn is_near(&self, bounds: &Bounds, origin: DVec3, margin: f32) -> bool {
+        let bounds = bounds.extended(margin);
+        if let Some(sweep) = self.sweep(origin) {
+            return sweep.bounds.overlaps(&bounds);
+        }
+        [0.0, 1.0]
+            .into_iter()
+            .any(|fraction| match self.solid_at(fraction, origin) {
+                Solid::HalfSpace { point, normal } => {
+                    let lowest = Vec3::select(normal.cmpge(Vec3::ZERO), bounds.min, bounds.max);
+                    (lowest - point).dot(normal) <= 0.0
+                }
+                _ => true,
+            })
+    }
+
+    /// Whether it is elsewhere, or turned otherwise, after the step.
+    pub fn moves(&self) -> bool {
+        self.start != self.end
+    }
+
     /// Where the step leaves it.
     pub fn end(&self) -> Pose {
         self.end

@@ -25,7 +25,8 @@ impl Contacts {
         let features = self.features.count() + nodes + 4 * (changed + added);
         self.fresh.clear();
         self.fresh.try_reserve(fresh)?;
-        self.candidates.reserve_features(features)?;
+        let node_count = self.features.node_count as usize + nodes;
+        self.candidates.reserve_features(features, node_count)?;
         let tools = self.touched.len();
         self.reserve_together(features, tools)
     }

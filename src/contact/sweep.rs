@@ -8,7 +8,7 @@ use super::mesh_solid::MeshSolid;
 use super::distance::{closest_of_segments, closest_on_segment, closest_on_triangle};
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
-const TOUCHING: f32 = 1e-4;
+pub(super) const TOUCHING: f32 = 1e-4;
 
 /// A way of this part of half a mesh's least extent is not searched: it is too short to pass anything.
 const FLAT: f32 = 0.01;

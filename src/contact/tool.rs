@@ -170,6 +170,8 @@ pub(crate) struct Tool {
     pub pose: Pose,
     /// Where the next step moves it.
     pub target: Option<Pose>,
+    /// Where the last step was to move it.
+    pub led_to: Pose,
     /// How much of that way the step in progress takes, where it has a limit of force.
     pub reach: Option<Reach>,
     /// Mean force on it over the last step, N.
@@ -250,6 +252,7 @@ impl Tool {
             filter: definition.filter,
             pose,
             target: None,
+            led_to: pose,
             reach: None,
             force: Vec3::ZERO,
             torque: Vec3::ZERO,

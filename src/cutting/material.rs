@@ -4,8 +4,10 @@ use glam::{DVec3, Vec3};
 
 use super::changes::Changes;
 use super::cut::{Limits, Sweep};
+use super::met::Met;
 use super::solid::{CutSolid, SolidStroke};
 use super::surface::CutSurface;
+use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 
@@ -27,6 +29,14 @@ impl CutMaterial {
         }
     }
 
+    /// That of tetrahedra.
+    pub fn solid(&self) -> Option<&CutSolid> {
+        match self {
+            Self::Solid(solid) => Some(solid),
+            Self::Springs(_) | Self::Surface(_) => None,
+        }
+    }
+
     pub fn reserve(&mut self, nodes: u32) -> Result<()> {
         match self {
             Self::Springs(_) => Ok(()),
@@ -41,6 +51,15 @@ impl CutMaterial {
             Self::Springs(_) => Ok(Changes::default()),
             Self::Surface(surface) => surface.cut(sweep, positions, near, limits),
             Self::Solid(solid) => solid.cut(sweep, positions, near, limits),
+        }
+    }
+
+    /// See [`CutSurface::meet`] and [`CutSolid::meet`], with items as candidates.
+    pub fn meet(&self, sweep: &Sweep, positions: &[Vec3], near: &[u32], met: &mut Vec<Met>) -> Result<()> {
+        match self {
+            Self::Springs(_) => Ok(()),
+            Self::Surface(surface) => surface.meet(sweep, positions, near, met),
+            Self::Solid(solid) => solid.meet(sweep, positions, near, met),
         }
     }
 
@@ -78,6 +97,14 @@ impl CutMaterial {
         };
         let triangles = solid.map_or(&[][..], CutSolid::triangles);
         triangles.iter().map(|triangle| triangle.is_inner)
+    }
+
+    /// Whether a cut has bared a triangle of a solid.
+    pub fn is_bared(&self, triangle: u32) -> bool {
+        match self {
+            Self::Springs(_) | Self::Surface(_) => false,
+            Self::Solid(solid) => solid.triangles()[triangle as usize].is_inner,
+        }
     }
 
     /// The corners of a triangle, by their numbers among nodes.
@@ -136,6 +163,15 @@ impl CutMaterial {
         match self {
             Self::Surface(surface) => surface.triangles()[item as usize].cell,
             Self::Springs(_) | Self::Solid(_) => item,
+        }
+    }
+
+    /// The nodes of a triangle or tetrahedron.
+    pub fn nodes_of_cell(&self, cell: u32) -> &[u32] {
+        match self {
+            Self::Springs(springs) => &springs[cell as usize],
+            Self::Surface(surface) => &surface.cells()[cell as usize].nodes,
+            Self::Solid(solid) => &solid.cells()[cell as usize].nodes,
         }
     }
 
@@ -215,6 +251,7 @@ impl CutMaterial {
                         nodes: [a, b, c, a],
                         weights: [u, v, w, 0.0],
                         slack: 0.0,
+                        size: surface.size_at(vertex),
                     });
                 }
             }
@@ -242,6 +279,25 @@ impl CutMaterial {
         }
     }
 
+    /// The stroke of the next cut of a solid.
+    pub fn stroke(&self) -> Option<SolidStroke> {
+        self.solid().map(|solid| solid.stroke)
+    }
+
+    /// Has it be this again.
+    pub fn take_back(&mut self, stroke: Option<SolidStroke>) {
+        if let (Self::Solid(solid), Some(stroke)) = (self, stroke) {
+            solid.stroke = stroke;
+        }
+    }
+
+    /// Adds the bits that what a cut does depends on beside what is drawn.
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        if let Self::Solid(solid) = self {
+            solid.hash(hasher);
+        }
+    }
+
     /// The material has moved since the last cut: the blade's edge, which stopped there, is here in it now.
     pub fn carry(&mut self, edge: [Vec3; 2]) {
         if let Self::Solid(solid) = self {
@@ -263,4 +319,6 @@ pub(crate) struct CutEnd {
     pub weights: [f64; 4],
     /// How far from it what was cut may end, m: nothing where it is an end of that itself.
     pub slack: f64,
+    /// The shortest edge of a cell that it is in, in the rest shape, m.
+    pub size: f64,
 }

@@ -8,20 +8,31 @@ use super::surface::{CutSurface, SNAP, SurfaceTriangle};
 use crate::error::Result;
 use crate::memory;
 
-/// A part of a blade's way that lies in one triangle.
+/// A part of a blade's way that lies in one triangle of a surface, or in one tetrahedron of a solid's material.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Met {
-    /// The triangle that is drawn.
-    pub triangle: u32,
+    /// The triangle that is drawn, or the cell of a solid.
+    pub item: u32,
     /// Which parts of the way the blade has gone where it comes in and where it goes out, 0 to 1.
     pub times: [f64; 2],
-    /// Where that is, by weights of the triangle's corners, and in space, m.
-    pub weights: [[f64; 3]; 2],
+    /// Where that is, by weights of the triangle's corners or the cell's nodes, and in space, m.
+    pub weights: [[f64; 4]; 2],
     pub places: [DVec3; 2],
-    /// How far it is from one to the other in the rest shape, m.
-    pub length: f64,
+    /// How much is cut on it, in the rest shape: from one to the other, m; of solids the area that is passed over, m².
+    pub amount: f64,
+    /// How much of it is where the blade comes in and where it goes out, as multiples of the mean; it goes evenly from the one to the other.
+    pub profile: [f64; 2],
     /// The shortest edge of the cell in the rest shape, m.
     pub size: f64,
+    /// Whether it is of a solid.
+    pub is_area: bool,
+}
+
+impl Met {
+    /// How much is cut over the length of that edge, m; of solids over its square, m².
+    pub fn unit(&self) -> f64 {
+        if self.is_area { self.size * self.size } else { self.size }
+    }
 }
 
 impl CutSurface {
@@ -44,13 +55,16 @@ impl CutSurface {
                     continue;
                 }
                 let places = weights.map(|weights| weighed(weights, corner_places));
+                let size = self.cells[cell].snap / SNAP;
                 let mut part = Met {
-                    triangle,
+                    item: triangle,
                     times: places.map(|place| time_of(swept, is_last, place)),
-                    weights,
+                    weights: weights.map(|[a, b, c]| [a, b, c, 0.0]),
                     places,
-                    length: at_rest[0].distance(at_rest[1]),
-                    size: self.cells[cell].snap / SNAP,
+                    amount: at_rest[0].distance(at_rest[1]),
+                    size,
+                    is_area: false,
+                    profile: [1.0; 2],
                 };
                 if part.times[0] > part.times[1] {
                     part.times.reverse();

@@ -253,6 +253,11 @@ impl CutSurface {
         area_of(self.triangles[triangle].corners.map(|corner| self.rest_place(corner)))
     }
 
+    /// The shortest edge of a cell at a vertex in the rest shape, m.
+    pub(crate) fn size_at(&self, vertex: u32) -> f64 {
+        self.cells[self.triangles[self.vertices[vertex].around].cell].snap / SNAP
+    }
+
     /// The triangles about a vertex, counterclockwise, each with the vertex's number in it; of an open fan from its first triangle on.
     pub(crate) fn ring(&self, vertex: u32, ring: &mut Vec<(u32, usize)>) -> Result<()> {
         ring.clear();

@@ -93,6 +93,14 @@ impl Elements {
         for values in [&mut self.stiffnesses, &mut self.carried] {
             memory::reserve(values, count)?;
         }
+        if let Some(rings) = &mut self.rings {
+            memory::reserve(&mut rings.volumes, count)?;
+            self.offsets.make_room(rings.volumes.len(), count)?;
+            self.forces.pressures.reserve(count)?;
+            if let Some(memory) = &mut self.memory {
+                memory.reserve_rings(count)?;
+            }
+        }
         Ok(())
     }
 
@@ -120,8 +128,9 @@ impl Elements {
         }
         self.parts.try_reserve(more)?;
         self.starts.try_reserve(more)?;
+        let ring_count = if self.rings.is_some() { node_count } else { 0 };
         for sums in std::iter::once(&mut self.forces).chain(beside) {
-            sums.reserve(more * NODES, more)?;
+            sums.reserve(more * NODES, more, ring_count)?;
         }
         if let Some(memory) = &mut self.memory {
             memory.reserve_parts(more, GROUPS)?;
@@ -140,6 +149,7 @@ impl Elements {
     pub fn rewire(&mut self, pieces: &[PieceOfElement], node_count: usize, mut beside: Option<&mut Sums>) {
         self.stiffnesses.resize(node_count, 0.0);
         self.carried.resize(node_count, 0.0);
+        self.grow_rings(node_count, beside.as_deref_mut());
         // Sources change once their copies are made.
         for piece in pieces.iter().filter(|piece| piece.is_copy()) {
             let moved = self.moved(piece);
@@ -233,7 +243,7 @@ impl Elements {
     }
 
     /// The nodes of a tetrahedron, what it is like at rest, and where it is; `None` where it is none any more.
-    fn cell(&self, cell: u32) -> Option<([u32; 4], Rest, Place)> {
+    pub(super) fn cell(&self, cell: u32) -> Option<([u32; 4], Rest, Place)> {
         let place = *self.cells.as_ref()?.places.get(cell as usize)?;
         let part = &self.parts[place.part as usize];
         let [group, lane] = place.in_part();

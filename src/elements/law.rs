@@ -20,7 +20,7 @@ pub(crate) struct Law {
 }
 
 /// Poisson's ratio from which volume is kept by rings.
-pub(crate) const RINGS_FROM: f32 = 0.4;
+const RINGS_FROM: f32 = 0.4;
 
 impl Law {
     /// That of Young's modulus, Pa, and Poisson's ratio.

@@ -6,6 +6,7 @@
 
 mod cut;
 mod law;
+mod offsets;
 mod parts;
 mod past;
 mod rates;
@@ -23,7 +24,8 @@ use crate::memory;
 use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
 pub(crate) use cut::PieceOfElement;
-pub(crate) use law::{Deformed, Law, Load, RINGS_FROM, Rest};
+pub(crate) use law::{Deformed, Law, Load, Rest};
+use offsets::Offsets;
 use parts::{Copies, Part};
 use past::Memory;
 use rings::{Pressures, Rings};
@@ -55,6 +57,8 @@ pub(crate) struct Elements {
     carried: Vec<f32>,
     /// Whether the bounds at rest are those of the masses and springs there are.
     rates_known: bool,
+    /// Of rings that a cut has parted.
+    offsets: Offsets,
 }
 
 /// Sums of a kind on all copies of nodes.
@@ -81,8 +85,9 @@ impl Sums {
         })
     }
 
-    /// Makes room for more copies and parts.
-    fn reserve(&mut self, copies: usize, parts: usize) -> Result<()> {
+    /// Makes room for more copies and parts, and for rings of so many nodes in all, or none.
+    fn reserve(&mut self, copies: usize, parts: usize, ring_count: usize) -> Result<()> {
+        self.pressures.reserve(ring_count)?;
         if !self.ways.is_empty() {
             self.ways.try_reserve(copies)?;
         }
@@ -90,6 +95,14 @@ impl Sums {
             records.try_reserve(copies)?;
         }
         Ok(self.of_parts.try_reserve(parts)?)
+    }
+
+    /// Makes room for the rings of so many nodes in all, where there are any.
+    pub fn reserve_rings(&mut self, node_count: usize) -> Result<()> {
+        if self.pressures.of_nodes.is_empty() {
+            return Ok(());
+        }
+        self.pressures.reserve(node_count)
     }
 
     /// Becomes one of so many copies and parts, for which there is room.
@@ -173,6 +186,7 @@ impl Elements {
             settled: f32::INFINITY,
             most_damped: 0.0,
             rates_known: false,
+            offsets: Offsets::default(),
         };
         elements.find_stiffnesses();
         Ok(elements)
@@ -224,7 +238,7 @@ impl Elements {
                 part.groups.growths(kernel, copies, Some(copied_ways), sums);
             });
             sums.pressures
-                .find(rings, &self.copies, &sums.sums, law.kappa, &[], team);
+                .find(rings, &self.copies, &sums.sums, law.kappa, [&[]; 2], team);
         }
         let written = (
             Ragged::new(&mut sums.positions, starts),
@@ -283,8 +297,14 @@ impl Elements {
         let memory = self.memory.as_deref().filter(|_| loaded);
         let loads = memory.map_or(&[][..], |memory| &memory.rings.loads);
         let law = memory.map_or(self.law, |memory| memory.stiffened(self.law));
-        sums.pressures
-            .find(rings, &self.copies, &sums.sums, law.kappa, loads, team)
+        sums.pressures.find(
+            rings,
+            &self.copies,
+            &sums.sums,
+            law.kappa,
+            [self.offsets.get(), loads],
+            team,
+        )
     }
 
     /// Where forces were worked out last is the current state.
@@ -312,7 +332,9 @@ impl Elements {
             removed += part.remove_edge(a, b, |node, share| {
                 if let Some(rings) = &mut self.rings {
                     let volume = &mut rings.volumes[node as usize];
-                    *volume = (*volume - share).max(0.0);
+                    let left = (*volume - share).max(0.0);
+                    self.offsets.scale(node, left / *volume);
+                    *volume = left;
                 }
             });
         }
@@ -358,6 +380,16 @@ impl Elements {
         self.rings.as_ref().map_or(0, |rings| rings.volumes.len())
     }
 
+    /// The same once there are so many nodes.
+    pub fn ring_count_of(&self, node_count: usize) -> usize {
+        if self.rings.is_some() { node_count } else { 0 }
+    }
+
+    /// Whether rings may ever have loads.
+    pub fn may_load_rings(&self) -> bool {
+        self.remember() || self.cells.is_some()
+    }
+
     /// The energy with nodes at `positions`, J, worked out in `f64`; `growths` are for its use.
     pub fn exact_energy(&self, position: impl Fn(usize) -> DVec3, growths: &mut [f64]) -> f64 {
         let (mut energy, law) = (0.0, self.law);
@@ -381,6 +413,7 @@ impl Elements {
         let rings = self.rings.iter().flat_map(|rings| &rings.volumes).zip(&*growths);
         for (node, (&volume, growth)) in rings.enumerate().filter(|(_, (volume, _))| **volume > 0.0) {
             let volume = f64::from(volume);
+            let growth = growth - self.offsets.of(node);
             energy += 0.5 * kappa * growth * growth / volume;
             if let Some(memory) = memory {
                 energy += memory.energy_of_ring(law, node, kappa * growth / volume, volume);
@@ -401,7 +434,8 @@ impl Elements {
 
     /// A quarter of the volume of the tetrahedra about a node at rest, m³, where volume is kept by rings.
     pub fn ring_volume(&self, node: usize) -> Option<f64> {
-        self.rings.as_ref().map(|rings| f64::from(rings.volumes[node]))
+        let volume = self.rings.as_ref()?.volumes.get(node)?;
+        Some(f64::from(*volume))
     }
 
     /// The law of all of them in the equation that is being solved.
@@ -411,10 +445,16 @@ impl Elements {
             .map_or(self.law, |memory| memory.stiffened(self.law))
     }
 
-    /// The load on the ring of a node, Pa.
+    /// The load on the ring of a node, Pa: what is remembered, and what its offset makes of the pressure.
     pub fn load_of_ring(&self, node: usize) -> f64 {
         let memory = self.memory.as_ref();
-        memory.map_or(0.0, |memory| memory.load_of_ring(node))
+        let remembered = memory.map_or(0.0, |memory| memory.load_of_ring(node));
+        match self.ring_volume(node) {
+            Some(volume) if volume > 0.0 => {
+                remembered - f64::from(self.stiffened().kappa) * self.offsets.of(node) / volume
+            }
+            _ => remembered,
+        }
     }
 
     /// Whether they remember anything.
@@ -424,6 +464,7 @@ impl Elements {
 
     /// A step begins, from what is current.
     pub fn recall(&mut self) {
+        self.offsets.recall();
         if let Some(memory) = &mut self.memory {
             memory.recall();
         }
@@ -431,6 +472,7 @@ impl Elements {
 
     /// The step in progress is the current state.
     pub fn keep(&mut self) {
+        self.offsets.keep();
         if let Some(memory) = &mut self.memory {
             memory.keep();
         }
@@ -531,5 +573,6 @@ impl Elements {
         if let Some(memory) = &self.memory {
             memory.hash(hasher);
         }
+        self.offsets.hash(hasher);
     }
 }

@@ -117,6 +117,29 @@ impl<T: Numbers> Past<T> {
         }
     }
 
+    /// Makes room for so many in all.
+    fn reserve(&mut self, count: usize) -> Result<()> {
+        let mut all = self.fields_mut().into_iter();
+        all.try_for_each(|values| memory::reserve(values, count))
+    }
+
+    /// Becomes one of so many, for which there is room.
+    fn grow(&mut self, count: usize) {
+        self.fields_mut()
+            .into_iter()
+            .for_each(|values| values.resize(count, T::ZERO));
+    }
+
+    fn fields_mut(&mut self) -> [&mut Vec<T>; 5] {
+        [
+            &mut self.arms,
+            &mut self.elastic,
+            &mut self.loads,
+            &mut self.kept_arms,
+            &mut self.kept_elastic,
+        ]
+    }
+
     fn recall(&mut self) {
         self.arms.copy_from_slice(&self.kept_arms);
         self.elastic.copy_from_slice(&self.kept_elastic);
@@ -248,6 +271,42 @@ impl Memory {
                 for (lanes, number) in to_numbers.iter_mut().zip(numbers) {
                     lanes[usize::from(to.lane)] = number;
                 }
+            }
+        }
+    }
+
+    /// Makes room for the rings of so many nodes in all.
+    pub fn reserve_rings(&mut self, node_count: usize) -> Result<()> {
+        if self.viscosity.is_none() {
+            return Ok(());
+        }
+        self.rings.reserve(node_count)
+    }
+
+    /// Has rings of so many nodes, for which there is room.
+    pub fn grow_rings(&mut self, node_count: usize) {
+        if !self.viscosity.is_none() {
+            self.rings.grow(node_count);
+        }
+    }
+
+    /// Gives the ring of a node what another remembers.
+    pub fn copy_ring(&mut self, from: u32, to: u32) {
+        for values in self.rings.fields_mut() {
+            if !values.is_empty() {
+                values[to as usize] = values[from as usize];
+            }
+        }
+    }
+
+    /// The elastic pressure of a ring has become so much higher where it is, Pa, of which nothing was deformed.
+    pub fn shift_ring(&mut self, node: u32, more: f32) {
+        let Past {
+            elastic, kept_elastic, ..
+        } = &mut self.rings;
+        for values in [elastic, kept_elastic] {
+            if let Some(value) = values.get_mut(node as usize) {
+                *value += more;
             }
         }
     }

@@ -41,15 +41,27 @@ impl Pressures {
         })
     }
 
-    /// Those that growths of the copies, m³, lead to where volume resists with `kappa`, Pa, with `loads` on top where there are any: the
-    /// energy of all without those, J.
+    /// Makes room for so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.of_nodes, node_count)?;
+        memory::reserve(&mut self.energies, tile_count(node_count))
+    }
+
+    /// Becomes one of so many nodes, for which there is room.
+    pub fn grow(&mut self, node_count: usize) {
+        self.of_nodes.resize(node_count, 0.0);
+        self.energies.resize(tile_count(node_count), 0.0);
+    }
+
+    /// Those that growths of the copies, m³, lead to where volume resists with `kappa`, Pa, less the offsets, m³, and with the loads on top
+    /// where there are any: the energy of all without loads, J.
     pub fn find(
         &mut self,
         rings: &Rings,
         copies: &Copies,
         growths: &[Record],
         kappa: f32,
-        loads: &[f32],
+        [offsets, loads]: [&[f32]; 2],
         team: &Team,
     ) -> f64 {
         let node_count = self.of_nodes.len();
@@ -58,6 +70,13 @@ impl Pressures {
             pressures.fill(0.0);
             for copy in copies.of_tile(tile) {
                 pressures[usize::from(copy.place)] += growths[copy.at as usize].0[0];
+            }
+            if !offsets.is_empty() {
+                let offsets = &offsets[tile_nodes(tile, node_count)];
+                pressures
+                    .iter_mut()
+                    .zip(offsets)
+                    .for_each(|(growth, offset)| *growth -= offset);
             }
             *energy = 0.0;
             let volumes = &rings.volumes[tile_nodes(tile, node_count)];

@@ -121,11 +121,14 @@ impl Elements {
             stiffnesses,
             rings,
             parts,
+            offsets,
             ..
         } = self;
         for &node in region.nodes() {
             stiffnesses[node as usize] = 0.0;
             if let Some(rings) = rings {
+                // Of a volume of 1 m³, until it is known how large it is.
+                offsets.scale(node, 1.0 / rings.volumes[node as usize]);
                 rings.volumes[node as usize] = 0.0;
             }
         }
@@ -149,6 +152,11 @@ impl Elements {
                     }
                 }
             });
+        }
+        for &node in region.nodes() {
+            if let Some(rings) = rings {
+                offsets.scale(node, rings.volumes[node as usize]);
+            }
         }
     }
 }

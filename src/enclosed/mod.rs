@@ -255,6 +255,24 @@ impl Enclosed {
         opened
     }
 
+    /// Opens the cavities with a triangle of these nodes: whether any was closed.
+    pub fn open_at(&mut self, [a, b, c]: [u32; 3]) -> bool {
+        let mut opened = false;
+        let (surface, cavities) = (&self.surface, &mut self.cavities);
+        surface.visit_node(a as usize, &mut |cavity, triangles| {
+            let is_it = |&triangle: &u32| {
+                let corners = surface.triangles[triangle as usize];
+                corners.contains(&b) && corners.contains(&c)
+            };
+            let cavity = &mut cavities[cavity];
+            if !cavity.is_open && triangles.iter().any(is_it) {
+                cavity.is_open = true;
+                opened = true;
+            }
+        });
+        opened
+    }
+
     /// What may change of it.
     pub fn hash(&self, hasher: &mut StateHasher) {
         hasher.write_floats(&[self.stiffness, self.pressure]);

@@ -238,7 +238,11 @@ impl Surface {
     /// Shows those of a tile, by their places in it.
     #[inline(always)]
     pub fn visit_tile(&self, tile: usize, see: &mut impl FnMut(usize, usize, &[u32])) {
-        let members = self.tiles[tile] as usize..self.tiles[tile + 1] as usize;
+        // Nodes that cuts have added have none.
+        let Some(&[start, end]) = self.tiles.get(tile..tile + 2) else {
+            return;
+        };
+        let members = start as usize..end as usize;
         self.visit_members(members, |node, cavity, triangles| {
             see(node - tile * TILE, cavity, triangles);
         });

@@ -11,7 +11,7 @@ mod viscosity;
 mod yielding;
 
 use crate::body::{BodyDefinition, Values, not_negative};
-use crate::elements::{Law, RINGS_FROM};
+use crate::elements::Law;
 use crate::error::{Error, Result};
 use filled::Filled;
 pub(crate) use viscosity::Course;
@@ -71,11 +71,6 @@ pub struct Material {
 const SAME_RATIO: f32 = 1e-3;
 
 impl Material {
-    /// Whether elements of it keep their volume with those about them.
-    pub(crate) fn keeps_volume_by_rings(&self) -> bool {
-        self.model == Model::Tetrahedra && self.poisson_ratio >= RINGS_FROM
-    }
-
     /// Refuses numbers out of their ranges, and what a definition may not give beside a material.
     pub(crate) fn check(&self, definition: &BodyDefinition) -> Result<()> {
         if !(self.young_modulus > 0.0 && self.young_modulus.is_finite()) {

@@ -64,6 +64,8 @@ impl Carry {
 pub(crate) enum Outcome {
     /// The step is ready to be committed.
     Done { substeps: u32, carry: Carry, error: f32 },
+    /// All of the body sleeps: nothing of it changes.
+    Asleep,
     /// The step would have ended in infinity or NaN.
     NotFinite,
     /// More substeps would be needed than are allowed.
@@ -78,6 +80,10 @@ pub(crate) enum Outcome {
 
 /// Takes a step of `body` without making it current.
 pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+    body.rouse(request.tools);
+    if body.is_asleep() {
+        return Outcome::Asleep;
+    }
     if body.implicit.is_some() {
         return attempt_implicitly(body, request, team);
     }

@@ -13,6 +13,8 @@ use super::kick::{Kick, Survey, TileKick, look};
 use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors};
 use crate::elements::Shares;
 use crate::enclosed;
+use crate::error::Result;
+use crate::memory;
 use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
@@ -156,26 +158,63 @@ pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut 
 
 /// Brings the velocities of `body` up to the time of its positions, where they are older.
 pub(crate) fn close(body: &mut Body) {
-    let Some(closing) = body.carry.closing else {
-        return;
-    };
+    if let Some(closed) = close_beside(body) {
+        let Body {
+            pins,
+            springs,
+            state,
+            masses,
+            ..
+        } = body;
+        for pin in pins.iter_mut() {
+            pin.force = mean_force(pin, Some(&closed.closing), &**springs, state.positions(), masses);
+        }
+        closed.commit(body);
+    }
+}
+
+/// Velocities that were brought up to the time of the positions beside those that there are, until they are committed. What follows does not have to
+/// be: then nothing has changed.
+pub(crate) struct ClosedBeside {
+    closing: ClosingKick,
+    gravity: GravityKicks,
+}
+
+/// Makes them, where velocities are older.
+pub(crate) fn close_beside(body: &mut Body) -> Option<ClosedBeside> {
+    let closing = body.carry.closing?;
     let mut gravity = body.carry.gravity;
     body.state.begin();
     close_aside(body, &closing, &mut gravity, &Team::alone());
-    body.state.commit();
-    let Body {
-        pins,
-        springs,
-        state,
-        masses,
-        ..
-    } = body;
-    for pin in pins.iter_mut() {
-        pin.force = mean_force(pin, Some(&closing), &**springs, state.positions(), masses);
-        pin.closing_share = 0.0;
+    Some(ClosedBeside { closing, gravity })
+}
+
+impl ClosedBeside {
+    /// What holds each pin, mean over the last step, N; to be asked for while springs and masses are those of the step.
+    pub fn forces(&self, body: &Body) -> Result<Vec<Vec3>> {
+        let mut forces = memory::reserved(body.pins.iter().count())?;
+        let of_pin = |pin| {
+            mean_force(
+                pin,
+                Some(&self.closing),
+                &*body.springs,
+                body.state.positions(),
+                &body.masses,
+            )
+        };
+        forces.extend(body.pins.iter().map(of_pin));
+        Ok(forces)
     }
-    body.carry.gravity = gravity;
-    body.carry.closing = None;
+
+    /// Has them be those of the body, of which no step was begun since.
+    pub fn commit(self, body: &mut Body) {
+        body.state.commit();
+        for pin in body.pins.iter_mut() {
+            pin.closing_share = 0.0;
+        }
+        body.carry.gravity = self.gravity;
+        body.carry.closing = None;
+    }
 }
 
 /// What is shown some nodes and their velocities along each axis.
@@ -201,7 +240,10 @@ pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> 
     (0..tile_count(node_count)).all(|tile| {
         let nodes = tile_nodes(tile, node_count);
         let mut axes = axes.each_mut().map(|axis| &mut axis[..nodes.len()]);
-        closed.write(tile, nodes.clone(), &mut axes, body.pins.of_tile(tile));
+        axes.iter_mut().for_each(|axis| axis.fill(0.0));
+        if !body.sleeper.as_ref().is_some_and(|sleeper| sleeper.is_asleep(tile)) {
+            closed.write(tile, nodes.clone(), &mut axes, body.pins.of_tile(tile));
+        }
         let axes = axes.map(|axis| &*axis);
         let finite = look(closed.kernel, axes, Some(axes)).finite;
         if finite {

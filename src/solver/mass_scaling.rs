@@ -20,6 +20,9 @@ const RESERVE: f64 = 0.9;
 /// Bodies that could not take steps so many times as long are not prepared for it.
 const WORTH_KEEPING: f64 = 1.125;
 
+/// So many nodes are asked for what they need before the sum is looked at.
+const TOGETHER: usize = 256;
+
 /// A node that may be made heavier.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sliver {
@@ -166,9 +169,14 @@ impl MassScaling {
         let longest = f64::from(dt) / RESERVE;
         let fits = |substeps: u32| {
             let step = longest / f64::from(substeps);
-            step <= self.complete_to && self.would_add(step, masses, inverse_masses) <= self.most
+            step <= self.complete_to && self.has_mass_for(step, masses, inverse_masses)
         };
         let worth = (WORTH_ADDING * needed).floor().min(f64::from(u32::MAX)) as u32;
+        // Most steps are as the one before.
+        let known = (longest / f64::from(self.step)).round().min(f64::from(u32::MAX)) as u32;
+        if (1..=worth).contains(&known) && fits(known) && (known == 1 || !fits(known - 1)) {
+            return Some((known, (longest / f64::from(known)) as f32));
+        }
         if worth == 0 || !fits(worth) {
             return None;
         }
@@ -184,14 +192,22 @@ impl MassScaling {
         Some((enough, (longest / f64::from(enough)) as f32))
     }
 
-    /// What would be added for this substep, kg.
-    fn would_add(&self, step: f64, masses: &[f32], inverse_masses: &[f32]) -> f64 {
-        let free = self
-            .slivers
-            .iter()
-            .filter(|sliver| inverse_masses[sliver.node as usize] > 0.0);
-        free.map(|sliver| (sliver.needs(step) - f64::from(masses[sliver.node as usize])).max(0.0))
-            .sum()
+    /// Whether what would be added for this substep is no more than may be.
+    fn has_mass_for(&self, step: f64, masses: &[f32], inverse_masses: &[f32]) -> bool {
+        let mut added = 0.0;
+        self.slivers.chunks(TOGETHER).all(|slivers| {
+            let adds = slivers.iter().map(|sliver| {
+                let node = sliver.node as usize;
+                let lacks = sliver.needs(step) - f64::from(masses[node]);
+                if inverse_masses[node] > 0.0 {
+                    lacks.max(0.0)
+                } else {
+                    0.0
+                }
+            });
+            added += adds.sum::<f64>();
+            added <= self.most
+        })
     }
 
     /// Makes masses those for a substep of `step` seconds; 0: as they are.

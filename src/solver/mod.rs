@@ -17,7 +17,7 @@ mod verlet;
 mod watched;
 
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
-pub(crate) use closing::{close, make_up_for, mean_force, show_closed};
+pub(crate) use closing::{close, close_beside, make_up_for, mean_force, show_closed};
 pub(crate) use gravity::GravityKicks;
 pub(crate) use implicit::Implicit;
 pub(crate) use kick::Survey;

@@ -122,9 +122,11 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         ..part.kick(request.gravity, inertia, body.damping.as_ref())
     };
     let tiles = tile_count(node_count);
+    let sleeper = body.sleeper.as_deref();
+    let is_asleep = |tile: usize| sleeper.is_some_and(|sleeper| sleeper.is_asleep(tile));
     let forces_known = part.before == Before::Current && body.forces_current;
     if let Some(records) = body.records.as_mut().filter(|_| !forces_known) {
-        write_records(body.kernel, state.positions, records, team);
+        write_awake_records(body.kernel, state.positions, (records, &is_asleep), team);
     }
     if let (Some(elements), Some(records)) = (&mut body.elements, &body.records)
         && !forces_known
@@ -160,6 +162,10 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         };
         let written = (predicted.tiles_mut(), body.pins.tiles_mut());
         team.pass(tiles, written, |tile, (mut predicted, pins)| {
+            if is_asleep(tile) {
+                predicted.iter_mut().for_each(|axis| axis.fill(0.0));
+                return;
+            }
             closed.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
         });
     }
@@ -192,7 +198,11 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
     team.pass(
         tiles,
         written,
-        |tile, (velocities, next_positions, forces, pins, survey)| {
+        |tile, (velocities, next_positions, forces, pins, survey): (_, _, _, _, &mut Survey)| {
+            if is_asleep(tile) {
+                *survey = Survey::NOTHING;
+                return;
+            }
             let mut written = Written {
                 velocities,
                 next_positions,
@@ -208,8 +218,21 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
 
 /// Makes records of vectors, for springs that gather them.
 pub(crate) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &mut Records, team: &Team) {
+    write_awake_records(kernel, vectors, (records, &|_| false), team);
+}
+
+/// The same but of tiles that sleep, which have theirs.
+fn write_awake_records(
+    kernel: ChosenKernel,
+    vectors: &Vectors,
+    (records, is_asleep): (&mut Records, &(impl Fn(usize) -> bool + Sync)),
+    team: &Team,
+) {
     let node_count = vectors.len();
     team.pass(tile_count(node_count), records.tiles_mut(), |tile, records| {
+        if is_asleep(tile) {
+            return;
+        }
         let axes = vectors.slices(tile_nodes(tile, node_count));
         kernel.run(WriteRecords { axes, records });
     });

@@ -52,7 +52,7 @@ pub(super) fn run(
         ..Step::of(request, substeps, masses_for, team)
     };
     // What must be known between substeps cannot be known in a pipeline.
-    if substeps > 2 && may_stay_open(body) && body.contacts.is_none() {
+    if substeps > 2 && may_stay_open(body) && body.contacts.is_none() && !body.sleeps() {
         step.pipeline = Plan::of(&*body.springs, body.node_count());
     }
     if let Some(taken) = step.take(body, start)? {
@@ -310,6 +310,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
             damping: body.damping.as_ref(),
             substep: part.substep,
             half: part.half,
+            sleeper: body.sleeper.as_deref(),
         },
         positions: state.positions,
         velocities: state.velocities,

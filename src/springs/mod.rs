@@ -45,6 +45,16 @@ pub(crate) struct Link {
 }
 
 impl Link {
+    /// One that pulls at nothing, of this rest length.
+    pub fn slack(neighbour: u32, rest_length: f32) -> Self {
+        Self {
+            neighbour,
+            stiffness: 0.0,
+            rest_length,
+            damping: 0.0,
+        }
+    }
+
     /// A spring as each of its nodes sees it.
     pub fn ends(spring: &Spring) -> [Self; 2] {
         let [a, b] = spring.nodes;

@@ -18,7 +18,8 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencil, Stencils};
+use super::parting::Parting;
+use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::body::{BodyDefinition, NodeOrder, not_negative};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -237,6 +238,26 @@ impl Law<4> for Hinges {
 
     fn energy(&self, shape: &Shape, places: &[DVec3; 4]) -> f64 {
         0.5 * shape.bent(places).turn.length_squared()
+    }
+
+    /// Pieces of its two triangles that still have an edge together are hinges, as stiff as what they have of its area.
+    fn show_parts(&self, shape: &Shape, [a, b, c, d]: [u32; 4], parting: &Parting, see: &mut SeePart<4>) {
+        let areas = shape.inverse_heights.map(|inverse| 1.0 / f64::from(inverse));
+        let show = |see: &mut SeePart<4>| {
+            for first in parting.of_cell([a, b, c]) {
+                for second in parting.of_cell([a, b, d]) {
+                    let ([a, b, c], [other_a, other_b, d]) = (first.nodes, second.nodes);
+                    if [a, b] == [other_a, other_b] {
+                        let part = (areas[0] * first.part + areas[1] * second.part) / (areas[0] + areas[1]);
+                        see([a, b, c, d], part);
+                    }
+                }
+            }
+        };
+        // Pieces that hang together elsewhere may have the edge in common with the same one: in all they are no more than the whole.
+        let mut sum = 0.0_f64;
+        show(&mut |_, part| sum += part);
+        show(&mut |nodes, part| see(nodes, part / sum.max(1.0)));
     }
 
     fn change(&self, shape: &Shape, places: &[DVec3; 4], ways: &[DVec3; 4]) -> f64 {

@@ -8,7 +8,8 @@
 use glam::{DMat3, DVec3};
 
 use super::Term;
-use super::stencils::{Law, Stencil, Stencils, directed, lengthening, shares, weighted};
+use super::parting::Parting;
+use super::stencils::{Law, SeePart, Stencil, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, check_values, expect_count};
 use crate::error::{Error, Result};
@@ -119,6 +120,10 @@ impl Law<4> for Fibres {
     fn blocks(&self, weights: &[f32; 3], places: &[DVec3; 4], _is_exact: bool) -> [[DMat3; 4]; 4] {
         let (shares, stiffness) = (shares(weights), stiffness(weighted(weights, places)));
         shares.map(|a| shares.map(|b| stiffness * (a * b)))
+    }
+
+    fn show_parts(&self, _weights: &[f32; 3], nodes: [u32; 4], parting: &Parting, see: &mut SeePart<4>) {
+        parting.of_cell(nodes).for_each(|part| see(part.nodes, part.part));
     }
 
     fn scaled(&self, weights: &[f32; 3], length: f64) -> ([f32; 3], f64) {

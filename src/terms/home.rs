@@ -3,7 +3,8 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::Term;
-use super::stencils::{Law, Stencil, Stencils};
+use super::parting::Parting;
+use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::body::{BodyDefinition, NodeOrder, check_values};
 use crate::error::Result;
 use crate::memory;
@@ -62,6 +63,10 @@ impl Law<1> for Home {
 
     fn rate(&self, _shape: &Shape, [inverse_mass]: [f64; 1]) -> f64 {
         inverse_mass
+    }
+
+    fn show_parts(&self, _shape: &Shape, [node]: [u32; 1], parting: &Parting, see: &mut SeePart<1>) {
+        parting.of_node(node).for_each(|part| see(part.nodes, part.part));
     }
 
     fn scaled(&self, shape: &Shape, _length: f64) -> (Shape, f64) {

@@ -12,6 +12,7 @@ mod fibres;
 mod home;
 mod limit;
 mod nonlinear;
+mod parting;
 mod set;
 mod stencils;
 mod strings;
@@ -31,6 +32,7 @@ use crate::solver::{Masses, Rates};
 use crate::springs::{Change, ChosenKernel, Springs, TileForces, tile_count};
 use crate::threads::Team;
 pub use nonlinear::SpringLaw;
+pub(crate) use parting::Parting;
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
 pub(crate) type Blocks = [[DMat3; 4]; 4];
@@ -88,6 +90,19 @@ trait Term: Debug + Send + Sync {
 
     /// The spring between two nodes has another stiffness and rest length.
     fn set_spring(&mut self, _change: &Change) {}
+
+    /// Makes room for the parts that so many more nodes bring, beside so many.
+    fn reserve_nodes(&mut self, node_count: usize, more: usize) -> Result<()>;
+
+    /// Finds what a cut leaves, in a body of so many nodes then, and makes room for it; until [`Self::take_parts`] or
+    /// [`Self::forget_parts`] what it adds is shown among its nodes.
+    fn prepare_parts(&mut self, parting: &Parting, node_count: usize) -> Result<()>;
+
+    /// Becomes what a cut leaves.
+    fn take_parts(&mut self);
+
+    /// There is no cut.
+    fn forget_parts(&mut self);
 
     /// Refuses to scale what would have a number that is none. Terms of springs go with those.
     fn check_scale(&self, region: &Region, scale: Scale) -> Result<()>;
@@ -244,6 +259,34 @@ impl Terms {
     /// The spring between two nodes has another stiffness and rest length.
     pub fn set_spring(&mut self, change: &Change) {
         self.laws.iter_mut().for_each(|law| law.set_spring(change));
+    }
+
+    /// Makes room for so many nodes in all.
+    pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
+        let known = self.sums.len();
+        memory::reserve(&mut self.sums, count)?;
+        let more = count.saturating_sub(known);
+        self.laws.iter_mut().try_for_each(|law| law.reserve_nodes(known, more))
+    }
+
+    /// Finds what a cut leaves, in a body of so many nodes then, and makes room for it.
+    pub fn prepare_parts(&mut self, parting: &Parting, node_count: usize) -> Result<()> {
+        memory::reserve(&mut self.sums, node_count)?;
+        self.laws
+            .iter_mut()
+            .try_for_each(|law| law.prepare_parts(parting, node_count))
+    }
+
+    /// They are what a cut leaves, in a body of so many nodes.
+    pub fn take_parts(&mut self, node_count: usize) {
+        self.sums.resize(node_count, 0.0);
+        self.laws.iter_mut().for_each(|law| law.take_parts());
+        self.forget_rates();
+    }
+
+    /// There is no cut.
+    pub fn forget_parts(&mut self) {
+        self.laws.iter_mut().for_each(|law| law.forget_parts());
     }
 
     /// Refuses to scale what would have a number that is none. Terms of springs go with those.

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::parting::Parting;
 use super::strings::{Aging, OfTile, Tension};
 use super::{Blocks, Moment, Term};
 use crate::body::{NodeOrder, Region, Scale, Spring, Vectors, View};
@@ -81,6 +82,11 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
         None
     }
 
+    /// Shows the nodes of all parts of a term that a cut leaves, and what part of its stiffness each has. Springs' are known.
+    fn show_parts(&self, _shape: &Self::Shape, nodes: [u32; N], _parting: &Parting, see: &mut SeePart<N>) {
+        see(nodes, 1.0);
+    }
+
     /// Nodes are given from here on.
     fn move_origin(&self, _shape: &mut Self::Shape, _origin: DVec3) {}
 
@@ -120,6 +126,9 @@ pub(super) trait Law<const N: usize>: Debug + Send + Sync {
     fn hash(&self, _shape: &Self::Shape, _hasher: &mut StateHasher) {}
 }
 
+/// What is shown the nodes of a part of a term, and its part of the stiffness.
+pub(super) type SeePart<'a, const N: usize> = dyn FnMut([u32; N], f64) + 'a;
+
 /// A term: some nodes, how stiff it is, and what it is at rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stencil<T, const N: usize> {
@@ -155,12 +164,17 @@ pub(super) fn of_springs<T>(
 #[derive(Debug)]
 pub(super) struct Stencils<L: Law<N>, const N: usize> {
     law: L,
-    /// By the first of their tiles.
+    /// By the first of their tiles, but for those of cuts, which follow them.
     all: Vec<Stencil<L::Shape, N>>,
     /// Where the terms of each tile begin among those that begin in it, and those that only end in it.
     starts: Vec<usize>,
     visitor_starts: Vec<usize>,
     visitors: Vec<u32>,
+    /// Those that cuts have added, by all tiles that have a node of them; of no tiles before a cut.
+    later: Vec<Vec<u32>>,
+    /// What a cut is to do: stiffnesses of terms there are, and others.
+    changed: Vec<(u32, f32)>,
+    added: Vec<Stencil<L::Shape, N>>,
 }
 
 fn tile_of(node: u32) -> usize {
@@ -207,23 +221,53 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
             starts,
             visitor_starts,
             visitors,
+            later: Vec::new(),
+            changed: Vec::new(),
+            added: Vec::new(),
         })
     }
 
-    /// Those that begin in a tile.
-    fn beginning(&self, tile: usize) -> Range<usize> {
-        self.starts[tile]..self.starts[tile + 1]
+    /// Those of the first that begin in a tile.
+    fn first(&self, tile: usize) -> Range<usize> {
+        match self.starts.get(tile..tile + 2) {
+            Some(ends) => ends[0]..ends[1],
+            None => 0..0,
+        }
     }
 
-    /// Those that only end in it.
+    /// Those of the first that only end in it.
     fn visitors(&self, tile: usize) -> &[u32] {
-        &self.visitors[self.visitor_starts[tile]..self.visitor_starts[tile + 1]]
+        match self.visitor_starts.get(tile..tile + 2) {
+            Some(ends) => &self.visitors[ends[0]..ends[1]],
+            None => &[],
+        }
+    }
+
+    /// Those of cuts that have a node of it.
+    fn later(&self, tile: usize) -> &[u32] {
+        self.later.get(tile).map_or(&[], |later| later)
+    }
+
+    /// Those that begin in a tile.
+    fn beginning(&self, tile: usize) -> impl Iterator<Item = usize> {
+        let begins = move |index: &usize| self.all[*index].first_tile() == tile;
+        let later = self.later(tile).iter().map(|&index| index as usize);
+        self.first(tile).chain(later.filter(begins))
     }
 
     /// All that have a node of a tile.
     fn of_tile(&self, tile: usize) -> impl Iterator<Item = usize> {
-        let visitors = self.visitors(tile).iter().map(|&index| index as usize);
-        self.beginning(tile).chain(visitors)
+        let others = self.visitors(tile).iter().chain(self.later(tile));
+        self.first(tile).chain(others.map(|&index| index as usize))
+    }
+
+    /// The one between these nodes, in order, where there is one.
+    fn find(&self, nodes: &[u32]) -> Option<usize> {
+        let later = self.later(tile_of(nodes[0])).iter().map(|&index| index as usize);
+        let is_it = |index: &usize| self.all[*index].nodes == nodes && self.all[*index].stiffness >= 0.0;
+        let first = &self.all[..self.starts.last().copied().unwrap_or(0)];
+        let first = first.binary_search_by(|stencil| stencil.nodes[..].cmp(nodes));
+        first.ok().into_iter().chain(later).find(is_it)
     }
 
     fn strings<'a>(
@@ -236,8 +280,9 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
         OfTile {
             law: &self.law,
             all: &self.all,
-            beginning: self.beginning(tile),
+            beginning: self.first(tile),
             visitors: self.visitors(tile),
+            later: self.later(tile),
             nodes,
             positions,
             ways,
@@ -272,6 +317,10 @@ impl<L: Law<N>, const N: usize> Stencils<L, N> {
 }
 
 impl<T, const N: usize> Stencil<T, N> {
+    fn first_tile(&self) -> usize {
+        self.nodes.into_iter().map(tile_of).min().unwrap_or(0)
+    }
+
     #[inline(always)]
     fn seen(&self, vectors: &View) -> [DVec3; N] {
         self.nodes.map(|node| vectors.get(node as usize).as_dvec3())
@@ -339,7 +388,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
     }
 
     fn energy(&self, tile: usize, at: &dyn Fn(usize) -> DVec3) -> f64 {
-        let there = self.all[self.beginning(tile)].iter();
+        let there = self.beginning(tile).map(|index| &self.all[index]);
         there
             .filter(|stencil| stencil.stiffness > 0.0)
             .map(|stencil| f64::from(stencil.stiffness) * self.law.energy(&stencil.shape, &stencil.at(at)))
@@ -377,7 +426,8 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
     }
 
     fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32)) {
-        let kept = self.all.iter().filter(|stencil| stencil.stiffness >= 0.0);
+        let all = self.all.iter().chain(&self.added);
+        let kept = all.filter(|stencil| stencil.stiffness >= 0.0);
         kept.for_each(|stencil| see(&stencil.nodes, stencil.stiffness));
     }
 
@@ -401,12 +451,16 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn remove_edge(&mut self, a: u32, b: u32) -> usize {
         let tile = tile_of(a);
-        let beginning = self.beginning(tile);
-        let visitors = self.visitor_starts[tile]..self.visitor_starts[tile + 1];
+        let first = self.first(tile);
+        let visitors = match self.visitor_starts.get(tile..tile + 2) {
+            Some(ends) => ends[0]..ends[1],
+            None => 0..0,
+        };
         let Self {
             law,
             all,
             visitors: of_tiles,
+            later,
             ..
         } = self;
         let mut removed = 0;
@@ -420,10 +474,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
                 removed += 1;
             }
         };
-        all[beginning].iter_mut().for_each(&mut look);
-        of_tiles[visitors]
-            .iter()
-            .for_each(|&index| look(&mut all[index as usize]));
+        all[first].iter_mut().for_each(&mut look);
+        let others = of_tiles[visitors].iter().chain(later.get(tile).into_iter().flatten());
+        others.for_each(|&index| look(&mut all[index as usize]));
         removed
     }
 
@@ -431,17 +484,114 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         if !L::IS_OF_SPRINGS {
             return;
         }
-        let nodes = [change.node, change.after.neighbour];
-        let place = self.all.binary_search_by(|stencil| stencil.nodes[..].cmp(&nodes));
-        if let Ok(place) = place
-            && let stencil = &mut self.all[place]
-            && stencil.stiffness >= 0.0
-        {
+        let mut nodes = [change.node, change.after.neighbour];
+        nodes.sort_unstable();
+        if let Some(place) = self.find(&nodes) {
+            let stencil = &mut self.all[place];
             match self.law.shape_of_spring(&stencil.shape, change.after.rest_length) {
                 Some(shape) => (stencil.stiffness, stencil.shape) = (change.after.stiffness, shape),
                 None => stencil.stiffness = 0.0,
             }
         }
+    }
+
+    fn reserve_nodes(&mut self, node_count: usize, more: usize) -> Result<()> {
+        // A new node has about as many terms as those there are.
+        let of_node = (N * self.all.len()).div_ceil(node_count.max(1));
+        Ok(self.all.try_reserve(of_node.saturating_mul(more))?)
+    }
+
+    fn prepare_parts(&mut self, parting: &Parting, node_count: usize) -> Result<()> {
+        self.forget_parts();
+        let mut tiles = memory::copied(parting.touched())?;
+        tiles.iter_mut().for_each(|node| *node = tile_of(*node) as u32);
+        tiles.dedup();
+        let mut near: Vec<u32> = Vec::new();
+        for &tile in &tiles {
+            for index in self.of_tile(tile as usize) {
+                let stencil = &self.all[index];
+                if stencil.stiffness >= 0.0 && parting.touches(&stencil.nodes) {
+                    memory::push(&mut near, index as u32)?;
+                }
+            }
+        }
+        memory::sort_once(&mut near);
+        let Self {
+            law,
+            all,
+            changed,
+            added,
+            ..
+        } = self;
+        for index in near {
+            let stencil = &all[index as usize];
+            let mut room = Ok(());
+            let mut left = -1.0;
+            let mut see = |nodes: [u32; N], part: f64| {
+                let stiffness = (f64::from(stencil.stiffness) * part) as f32;
+                if nodes == stencil.nodes {
+                    left = stiffness;
+                } else if room.is_ok() {
+                    let of_part = Stencil {
+                        nodes,
+                        stiffness,
+                        shape: stencil.shape,
+                    };
+                    room = memory::push(added, of_part);
+                }
+            };
+            if L::IS_OF_SPRINGS {
+                for part in parting.of_spring([stencil.nodes[0], stencil.nodes[N - 1]]) {
+                    see(std::array::from_fn(|end| part.nodes[end]), part.part);
+                }
+            } else {
+                law.show_parts(&stencil.shape, stencil.nodes, parting, &mut see);
+            }
+            room?;
+            if left != stencil.stiffness {
+                memory::push(changed, (index, left))?;
+            }
+        }
+        if self.added.is_empty() {
+            return Ok(());
+        }
+        self.all.try_reserve(self.added.len())?;
+        let more = tile_count(node_count).saturating_sub(self.later.len());
+        self.later.try_reserve(more)?;
+        self.later.resize_with(self.later.len() + more, Vec::new);
+        tiles.clear();
+        tiles.try_reserve(N * self.added.len())?;
+        tiles.extend(
+            self.added
+                .iter()
+                .flat_map(|stencil| stencil.nodes.map(|node| tile_of(node) as u32)),
+        );
+        tiles.sort_unstable();
+        for at_tile in tiles.chunk_by(|a, b| a == b) {
+            self.later[at_tile[0] as usize].try_reserve(at_tile.len())?;
+        }
+        Ok(())
+    }
+
+    fn take_parts(&mut self) {
+        for (index, stiffness) in self.changed.drain(..) {
+            self.all[index as usize].stiffness = stiffness;
+        }
+        for stencil in self.added.drain(..) {
+            let mut tiles = stencil.nodes.map(tile_of);
+            tiles.sort_unstable();
+            for (place, &tile) in tiles.iter().enumerate() {
+                if place == 0 || tiles[place - 1] != tile {
+                    self.later[tile].push(self.all.len() as u32);
+                }
+            }
+            self.all.push(stencil);
+        }
+    }
+
+    fn forget_parts(&mut self) {
+        self.changed.clear();
+        self.added.clear();
     }
 
     fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
@@ -460,9 +610,15 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
     fn scale(&mut self, region: &Region, scale: Scale) -> usize {
         let mut count = 0;
         for tile in region.tiles().filter(|_| !L::IS_OF_SPRINGS) {
-            for index in self.beginning(tile) {
+            for place in 0..self.first(tile).len() + self.later(tile).len() {
+                let first = self.first(tile);
+                let index = match place.checked_sub(first.len()) {
+                    None => first.start + place,
+                    Some(place) => self.later(tile)[place] as usize,
+                };
                 let stencil = &self.all[index];
-                if stencil.stiffness > 0.0 && region.has_all(&stencil.nodes) {
+                let is_here = place < first.len() || stencil.first_tile() == tile;
+                if is_here && stencil.stiffness > 0.0 && region.has_all(&stencil.nodes) {
                     self.all[index] = self.scaled(index, scale);
                     count += 1;
                 }
@@ -479,11 +635,10 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
 
     fn holds(&self, node: usize) -> bool {
         // A term of a single node is one between it and the world.
-        let springs = &self.all[self.beginning(tile_of(node as u32))];
         N == 1
-            && springs
-                .binary_search_by_key(&(node as u32), |stencil| stencil.nodes[0])
-                .is_ok_and(|place| springs[place].stiffness > 0.0)
+            && self
+                .find(&[node as u32])
+                .is_some_and(|place| self.all[place].stiffness > 0.0)
     }
 
     fn remembers(&self) -> bool {

@@ -38,6 +38,8 @@ pub(super) struct OfTile<'a, L: Law<N>, const N: usize> {
     /// Those that begin in it, and those that only end in it.
     pub beginning: Range<usize>,
     pub visitors: &'a [u32],
+    /// Those of cuts that do either.
+    pub later: &'a [u32],
     pub nodes: Range<usize>,
     pub positions: View<'a>,
     /// Given where changes are wanted of the forces, not the forces.
@@ -209,8 +211,8 @@ impl<L: Law<N>, const N: usize> OfTile<'_, L, N> {
     fn add<const RECORDS: bool>(&self, sums: &mut [Vec4; TILE + 1]) -> f64 {
         let mut block = Block::EMPTY;
         let mut stiffest = 1.0_f32.to_bits();
-        let visitors = self.visitors.iter().map(|&index| index as usize);
-        let mut indices = self.beginning.clone().chain(visitors);
+        let others = self.visitors.iter().chain(self.later);
+        let mut indices = self.beginning.clone().chain(others.map(|&index| index as usize));
         loop {
             self.gather::<RECORDS>(&mut indices, &mut block);
             if block.count == 0 {

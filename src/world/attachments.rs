@@ -306,8 +306,20 @@ impl World {
         }
         Ok(Bound {
             body: self.bodies.place(id.0)?,
-            anchor: *anchor,
+            anchor: Some(*anchor),
             nodes,
+        })
+    }
+
+    /// A point between the nodes of a cell of a body, in the caller's numbers.
+    pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<Bound> {
+        let body = self.bodies.get(id.0)?;
+        let sum: f64 = weights.iter().sum();
+        let own = |node: u32| body.parts_of(node).next().map_or(0, |(own, _)| own);
+        Ok(Bound {
+            body: self.bodies.place(id.0)?,
+            anchor: None,
+            nodes: std::array::from_fn(|k| (own(nodes[k]), (weights[k] / sum) as f32)),
         })
     }
 
@@ -442,8 +454,8 @@ pub(super) fn refuse_one_point(pair: &[Bound; 2], [first, second]: [Which; 2]) -
         return Ok(());
     }
     let [one, many] = match pair[0].anchor {
-        Anchor::Node(_) => ["node", "nodes"],
-        Anchor::Point(_) => ["triangle", "triangles"],
+        Some(Anchor::Point(_)) => ["triangle", "triangles"],
+        Some(Anchor::Node(_)) | None => ["node", "nodes"],
     };
     Err(Error::invalid(format!(
         "{} and {} are one point of one body",

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::BodyId;
 use super::resistance::Knot;
-use crate::body::{Stroke, finite_vector};
+use crate::body::{CutReport, Stroke, finite_vector};
 use crate::contact::{CollisionFilter, Lead, Pose};
 use crate::cutting::Met;
 use crate::diagnostics::StateHasher;
@@ -21,6 +21,9 @@ const ROOM: usize = 256;
 
 /// Points that lie closer to each other along an edge, as a part of it, do not tell how it is turned.
 const SPREAD: f64 = 0.05;
+
+/// A blade that turns by more than this in a step, rad, is followed in parts of it.
+const MOST_TURN: f32 = 0.5;
 
 /// What a blade is. Plain data, used only during [`World::create_blade`](crate::World::create_blade).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,12 +60,22 @@ pub struct BladeReport {
     pub torque: Vec3,
     /// What whoever moves it has spent on tissue in the step, J.
     pub work: f64,
-    /// How long the cuts are that it made at the end of the step, in the rest shape, m.
+    /// How long the cuts are that it made at the end of the step, in the rest shape, m; of solids on their skin.
     pub length: f64,
     /// How far it is ahead of where tissue is cut, m: 0 where nothing is in its way.
     pub lag: f64,
     /// Why what it went through was not cut: [`Error::Capacity`] or [`Error::OutOfMemory`]. It is tried again with the next step.
     pub refused: Option<Error>,
+    /// Of solids: how large the faces are that have opened, in the rest shape, m².
+    pub area: f64,
+}
+
+impl BladeReport {
+    /// It has made a cut.
+    pub(super) fn add(&mut self, cut: &CutReport) {
+        self.length += cut.length;
+        self.area += cut.area;
+    }
 }
 
 /// A blade of a world.
@@ -100,6 +113,8 @@ pub(super) struct Proxy {
     /// What resists, N, and where to.
     pub force: f64,
     pub forward: DVec3,
+    /// Whether the true edge was outside of the tissue as the last step ended; `None`: it is not known.
+    pub was_outside: Option<bool>,
 }
 
 /// A thread between tissue and the true edge.
@@ -168,6 +183,28 @@ impl Blade {
         poses.map(|pose| self.edge.map(|end| pose.position + pose.orientation * end))
     }
 
+    /// Its edge at places of the next step, which goes straight and turns evenly, from its beginning to its end: so many that it turns little
+    /// from each to the next.
+    pub fn ways(&self) -> (usize, impl Fn(usize) -> [Vec3; 2] + use<>) {
+        let (edge, from, to) = (self.edge, self.pose, self.target.unwrap_or(self.pose));
+        let turn = from.orientation.angle_between(to.orientation);
+        // Of what is no number none is more.
+        let count = ((turn / MOST_TURN).ceil() as usize).max(1);
+        let [first, last] = self.edges();
+        let at = move |index: usize| {
+            if index == 0 {
+                return first;
+            }
+            if index == count {
+                return last;
+            }
+            let part = index as f32 / count as f32;
+            let orientation = from.orientation.slerp(to.orientation, part);
+            edge.map(|end| from.position.lerp(to.position, part) + orientation * end)
+        };
+        (count, at)
+    }
+
     /// The proxy of a body, made where there is none; what it is held by has room.
     pub fn proxy(&mut self, body: BodyId) -> Result<usize> {
         if let Some(known) = self.proxies.iter().position(|proxy| proxy.body == body) {
@@ -205,6 +242,7 @@ impl Blade {
                     hasher.write_u64(value.to_bits());
                 }
             }
+            hasher.write_u64(proxy.was_outside.map_or(2, u64::from));
             for value in [proxy.force, proxy.uncut, proxy.size] {
                 hasher.write_u64(value.to_bits());
             }

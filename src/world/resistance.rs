@@ -11,18 +11,25 @@ const BRIDGED: f64 = 0.1;
 /// An edge that meets a triangle all along at once opens it over no less than this part of its length.
 const STEEPEST: f64 = 0.1;
 
-/// What resists along the way of an edge: the spring that it is on, N/m, and the tissue, J/m.
+/// In solids what holds is drawn after what is measured over this part of a cell.
+const DRAWN: f64 = 0.2;
+
+/// What of a way is less than this part of a cell is rounding.
+const ROUNDING: f64 = 1e-4;
+
+/// What resists along the way of an edge: the spring that it is on, N/m, and the tissue, J/m or J/m².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resistance {
     pub stiffness: f64,
     pub toughness: f64,
 }
 
-/// Where what is met begins or ends, m along the way, and by how much more resists from there on, N.
+/// Where what is met begins or ends, m along the way, and by how much more resists from there on, N, and with each metre, N/m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knot {
     at: f64,
     change: f64,
+    slope: f64,
     begins: bool,
 }
 
@@ -41,7 +48,8 @@ impl Resistance {
     /// Lets the proxy go along a way of so many metres, on which, and on to its `reach`, it meets this, until the spring pulls no harder than the tissue resists there; so
     /// what the spring gives is the toughness times what is cut. `held`: what resisted where it stands.
     ///
-    /// Triangles are strained each for itself, so that resistance jumps between them; what holds is drawn after that over the length of a cell.
+    /// Triangles are strained each for itself, so that resistance jumps between them; what holds is drawn after that over the length of a cell, or
+    /// less in solids, where an edge is in many cells.
     pub fn advance(
         &self,
         (met, reach): (&[Met], f64),
@@ -50,14 +58,23 @@ impl Resistance {
         knots: &mut Vec<Knot>,
     ) -> Result<Advance> {
         knots.clear();
-        let mut size = 0.0_f64;
-        for part in met.iter().filter(|part| part.length > 0.0) {
+        let (mut size, mut drawn) = (0.0_f64, 0.0_f64);
+        for part in met.iter().filter(|part| part.amount > 0.0) {
             size = size.max(part.size);
+            drawn = drawn.max(if part.is_area { DRAWN * part.size } else { part.size });
             let [from, to] = part.times.map(|time| time * reach);
-            let width = (to - from).max(STEEPEST * part.length);
-            let change = self.toughness * part.length / width;
-            for (at, change, begins) in [(from, change, true), (from + width, -change, false)] {
-                memory::push(knots, Knot { at, change, begins })?;
+            let width = (to - from).max(STEEPEST * part.size * part.amount / part.unit());
+            let mean = self.toughness * part.amount / width;
+            let [first, last] = part.profile.map(|part| part * mean);
+            let slope = (last - first) / width;
+            for (at, change, slope, begins) in [(from, first, slope, true), (from + width, -last, -slope, false)] {
+                let knot = Knot {
+                    at,
+                    change,
+                    slope,
+                    begins,
+                };
+                memory::push(knots, knot)?;
             }
         }
         knots.sort_unstable_by(|a, b| a.at.total_cmp(&b.at).then(a.change.total_cmp(&b.change)));
@@ -72,17 +89,28 @@ impl Resistance {
             });
         }
         let (mut at, mut force, mut cuts) = (0.0, held, false);
-        let (mut level, mut open) = (0.0_f64, 0_u32);
+        let (mut level, mut slope, mut open) = (0.0_f64, 0.0, 0_u32);
         for index in 0..=knots.len() {
             let knot = knots.get(index);
             let end = knot.map_or(way, |knot| knot.at.min(way));
+            if force.is_none() && open > 0 && knot.is_some() && end - at <= ROUNDING * size {
+                // An edge that comes to a flat side all along meets all that is there at once.
+                level += slope * (end - at);
+                at = end;
+            }
             if end > at {
                 let bridged = force.filter(|_| knot.is_some() && end - at <= BRIDGED * size);
                 match (open > 0).then(|| level.max(0.0)).or(bridged) {
                     None => force = None,
                     Some(measured) => {
                         let begun = force.unwrap_or(measured);
-                        let resisting = |place: f64| measured + (begun - measured) * (-(place - at) / size).exp();
+                        // What f' = (measured - f) / drawn makes of it.
+                        let behind = slope * drawn;
+                        let resisting = |place: f64| {
+                            let gone = place - at;
+                            let left = (begun - measured + behind) * (-gone / drawn).exp();
+                            (measured + slope * gone - behind + left).max(0.0)
+                        };
                         let pulling = |place: f64| self.stiffness * (way - place);
                         if pulling(at) <= begun {
                             return Ok(stopped(at, way, begun, cuts));
@@ -95,11 +123,16 @@ impl Resistance {
                         force = Some(resisting(end));
                     }
                 }
+                level += slope * (end - at);
                 at = end;
             }
             if let Some(knot) = knot {
                 open = if knot.begins { open + 1 } else { open - 1 };
-                level = if open > 0 { level + knot.change } else { 0.0 };
+                (level, slope) = if open > 0 {
+                    (level + knot.change, slope + knot.slope)
+                } else {
+                    (0.0, 0.0)
+                };
             }
         }
         Ok(Advance {

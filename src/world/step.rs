@@ -52,11 +52,13 @@ impl World {
             self.step_with(dt, &Team::alone())?
         };
         self.tear();
+        self.publish_to_hands(dt);
         Ok(report)
     }
 
     /// The step, with the threads that help.
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
+        self.lead_by_hand();
         for (_, tool) in self.tools.iter_mut() {
             tool.set_out();
         }
@@ -82,7 +84,7 @@ impl World {
         };
         let report = report(&self.bodies, &self.outcomes, crossings);
         self.commit(dt, team);
-        self.move_blades();
+        self.move_blades(dt);
         Ok(report)
     }
 
@@ -116,6 +118,12 @@ impl World {
             return reported(bodies, outcomes).map(|()| 0);
         };
         tissue.plan(bodies, dt);
+        // What meets other tissue, or is joined to it, does not sleep.
+        for (place, body) in bodies.iter_mut() {
+            if tissue.group(place).is_some() {
+                body.wake();
+            }
+        }
         attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);
         loop {
             tissue.find_crossings(bodies, false);
@@ -141,7 +149,10 @@ impl World {
 
     /// Makes the step that was tried the current state.
     fn commit(&mut self, dt: f32, team: &Team) {
-        commit_bodies(&mut self.bodies, &self.outcomes, &self.paths, team);
+        self.clock.tick(dt);
+        self.bodies.iter_mut().for_each(|(_, body)| body.set_clock(self.clock));
+        let moved_by = (&*self.paths, self.definition.gravity);
+        commit_bodies(&mut self.bodies, &self.outcomes, moved_by, dt, team);
         let Self {
             bodies,
             tools,
@@ -156,7 +167,7 @@ impl World {
             tool.force = force.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             tool.torque = torque.as_vec3().clamp(Vec3::MIN, Vec3::MAX);
             tool.pose = paths[index].end();
-            tool.target = None;
+            tool.led_to = tool.target.take().unwrap_or(tool.pose);
             tool.reach = None;
         }
         if let Some(tissue) = tissue {
@@ -201,6 +212,11 @@ fn wrench(
 ) -> [DVec3; 2] {
     let mut wrench = [DVec3::ZERO; 2];
     for (place, body) in bodies.iter() {
+        if let (Some(Outcome::Asleep), Some(contacts)) = (&outcomes[place], &body.contacts) {
+            let load = contacts.loads()[index];
+            wrench[0] += load.impulse / f64::from(body.last_step());
+            wrench[1] += load.angular_impulse / f64::from(body.last_step());
+        }
         if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.contacts) {
             let load = contacts.loads()[index];
             let [force, torque] = body.pull_of(path.slot, *substeps);
@@ -222,7 +238,8 @@ fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::
 
 /// Whether there is work for more than one thread.
 fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
-    let sizes = || bodies.iter().map(|(_, body)| body.node_count());
+    let awake = || bodies.iter().filter(|(_, body)| !body.is_asleep());
+    let sizes = || awake().map(|(_, body)| body.node_count());
     sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
 }
 
@@ -286,6 +303,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
                 report.error_estimate = report.error_estimate.max(error);
                 Some(stable_substep)
             }
+            Some(Outcome::Asleep) => body.carry.limit(),
             Some(Outcome::NotFinite) | None => {
                 report.bodies_restored += 1;
                 body.carry.limit()
@@ -296,15 +314,24 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
     report
 }
 
-fn commit_bodies(bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>], tools: &[ToolPath], team: &Team) {
+fn commit_bodies(
+    bodies: &mut Slots<Body>,
+    outcomes: &[Option<Outcome>],
+    (tools, gravity): (&[ToolPath], Vec3),
+    dt: f32,
+    team: &Team,
+) {
     for (place, body) in bodies.iter_mut() {
         match outcomes[place] {
             Some(Outcome::Done { substeps, carry, .. }) => {
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit(substeps, carry, tools, team);
+                body.fade(dt, team);
+                body.doze(dt, (tools, gravity), team);
                 body.find_tears(team);
             }
+            Some(Outcome::Asleep) => body.sleep_on(),
             _ => {
                 body.stay();
                 body.find_tears(team);

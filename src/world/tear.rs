@@ -19,6 +19,9 @@ impl World {
                     body.withhold_tear(spring, why);
                 }
             }
+            if let Some(body) = self.bodies.at_mut(place) {
+                body.show_topology();
+            }
         }
     }
 
@@ -27,7 +30,7 @@ impl World {
         let id = ids.find(|id| id.index() == place);
         drop(ids);
         match id {
-            Some(id) => self.change_topology(BodyId(id), |body| body.tear(spring)),
+            Some(id) => self.change_topology(BodyId(id), |body, skin| body.tear(spring, skin)),
             None => Ok(Torn::Not(Withheld::NoWay)),
         }
     }

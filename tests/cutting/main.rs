@@ -4,10 +4,12 @@
 mod sheet;
 
 mod curved;
+mod enclosed;
 mod motion;
 mod random;
 mod refused;
 mod shapes;
 mod springs_alone;
+mod terms;
 mod touch;
 mod wounds;

@@ -13,10 +13,21 @@ const STORAGES: [Storage; 4] = [
     Storage::DynamicBulk,
 ];
 
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
+pub const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 /// An unstructured sheet of `n` x `n` cells of 1 cm, 1 kg/m², springs of 50 N/m, in flight without gravity, spinning and swinging.
 fn in_flight(n: usize, solver: Solver, storage: Storage, damping: f32) -> (World, BodyId) {
+    in_flight_with(n, solver, storage, damping, |definition| definition)
+}
+
+/// The same of a definition with more.
+pub fn in_flight_with(
+    n: usize,
+    solver: Solver,
+    storage: Storage,
+    damping: f32,
+    with: impl for<'a> Fn(BodyDefinition<'a>) -> BodyDefinition<'a>,
+) -> (World, BodyId) {
     let (rest, cells) = unstructured(n, 5);
     let positions: Vec<Vec3> = rest.iter().map(|place| 0.01 * *place).collect();
     let mut random = Random(3);
@@ -32,7 +43,7 @@ fn in_flight(n: usize, solver: Solver, storage: Storage, damping: f32) -> (World
     })
     .unwrap();
     let body = world
-        .create_body(&BodyDefinition {
+        .create_body(&with(BodyDefinition {
             positions: &positions,
             masses: Values::Each(&masses),
             triangles: &cells,
@@ -44,7 +55,7 @@ fn in_flight(n: usize, solver: Solver, storage: Storage, damping: f32) -> (World
             solver,
             storage,
             ..Default::default()
-        })
+        }))
         .unwrap();
     let centre = positions.iter().sum::<Vec3>() / positions.len() as f32;
     let velocities: Vec<Vec3> = positions
@@ -63,14 +74,14 @@ fn in_flight(n: usize, solver: Solver, storage: Storage, damping: f32) -> (World
 }
 
 /// Mass, momentum, angular momentum about the origin, energy, in `f64`.
-struct Kept {
-    mass: f64,
-    momentum: DVec3,
-    spin: DVec3,
-    energy: f64,
+pub struct Kept {
+    pub mass: f64,
+    pub momentum: DVec3,
+    pub spin: DVec3,
+    pub energy: f64,
 }
 
-fn kept(world: &World, body: BodyId) -> Kept {
+pub fn kept(world: &World, body: BodyId) -> Kept {
     let it = world.body(body).unwrap();
     let mut kept = Kept {
         mass: 0.0,
@@ -89,7 +100,7 @@ fn kept(world: &World, body: BodyId) -> Kept {
 }
 
 /// A blade that stands upright, from one point of the rest shape to another, where the sheet is now.
-fn across(body: &Body, from: Vec3, to: Vec3) -> Sweep {
+pub fn across(body: &Body, from: Vec3, to: Vec3) -> Sweep {
     let positions = body.positions();
     let normal = (positions[20] - positions[0])
         .cross(positions[20 * 21] - positions[0])

@@ -3,7 +3,11 @@
 
 mod blade;
 mod block;
+mod hollow;
 mod motion;
 mod random;
 mod refused;
+mod rings;
 mod shapes;
+mod strokes;
+mod toughness;

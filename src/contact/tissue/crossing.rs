@@ -1,7 +1,7 @@
 //! Edges of one surface that pass through triangles of another: what contact is to prevent, and what it left.
 
 use super::search::shift;
-use super::skin::Skin;
+use super::skin::{NONE, Skin};
 use crate::body::Bounds;
 use crate::contact::predicates::crosses;
 
@@ -15,7 +15,8 @@ pub(super) fn mark(
 ) -> u32 {
     let mut count = 0;
     let shift = shift(first, second);
-    for (edge, pierces) in first.edges.iter().zip(pierces) {
+    let edges = first.edges.iter().zip(pierces);
+    for (edge, pierces) in edges.filter(|(edge, _)| edge[0] != NONE) {
         let ends = edge.map(|node| first.starts.get(node as usize) + shift);
         let mut passes = false;
         second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {
@@ -24,7 +25,14 @@ pub(super) fn mark(
                 return;
             }
             let corners = nodes.map(|node| second.starts.get(node as usize));
-            passes = crosses(ends[0], ends[1], corners, 0.0);
+            // What a cut has parted touches.
+            let is_of_one = std::ptr::eq(first, second);
+            let depth = if is_of_one {
+                first.crossing_depth(*edge, &nodes)
+            } else {
+                0.0
+            };
+            passes = crosses(ends[0], ends[1], corners, depth);
         });
         if passes {
             *pierces = true;

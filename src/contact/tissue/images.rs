@@ -24,9 +24,25 @@ pub(super) struct Images {
 impl Images {
     /// Room for those of a surface.
     pub fn new(skin: &Skin) -> Result<Self> {
-        let triangles = (0..skin.triangles.len()).map(|place| skin.tree.placed(place).corners);
-        let drawn = Drawn::reserved(skin.resolution, &skin.tree.bounds(), triangles)?;
-        let mut edges = memory::reserved(skin.triangles.len())?;
+        let triangles = skin.forest.placed().map(|placed| placed.corners);
+        // Those that may come lie where others do.
+        let room = if skin.changing.is_some() {
+            skin.triangles.capacity()
+        } else {
+            0
+        };
+        let spare = room.saturating_sub(skin.triangles.len());
+        let triangles = triangles.chain(std::iter::repeat_n([Vec3::ZERO; 3], spare));
+        let drawn = Drawn::reserved(skin.resolution, &skin.forest.bounds(), triangles)?;
+        let mut edges = memory::reserved(skin.triangles.len() + spare)?;
+        if let Some(changing) = &skin.changing {
+            edges.extend_from_slice(changing.sides());
+            return Ok(Self {
+                drawn,
+                edges,
+                pixel: skin.resolution,
+            });
+        }
         let number = |a: u32, b: u32| {
             skin.edges
                 .binary_search(&[a.min(b), a.max(b)])
@@ -44,11 +60,24 @@ impl Images {
         })
     }
 
+    /// Makes room for so many triangles more.
+    pub fn reserve(&mut self, triangles: usize) -> Result<()> {
+        Ok(self.edges.try_reserve(triangles)?)
+    }
+
+    /// A triangle, known or the next one, has these edges now.
+    pub fn set_edges(&mut self, triangle: usize, edges: [u32; 3]) {
+        match self.edges.get_mut(triangle) {
+            Some(known) => *known = edges,
+            None => self.edges.push(edges),
+        }
+    }
+
     /// Draws what of the surface lies within `part`, where it is as a substep begins.
     pub fn draw(&mut self, skin: &Skin, part: &Bounds) {
         let corners = |triangle: usize| skin.triangles[triangle].map(|node| skin.starts.get(node as usize));
         self.drawn
-            .draw(&skin.tree.bounds(), part, skin.triangles.len(), corners);
+            .draw(&skin.forest.bounds(), part, skin.triangles.len(), corners);
     }
 
     /// Shows the triangles that are seen within `reach` of a box, and come so near.

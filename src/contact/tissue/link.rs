@@ -5,6 +5,7 @@ use glam::{BVec3, Vec3};
 use super::skin::Skin;
 use crate::body::Body;
 use crate::contact::impulses::LEVERAGE;
+use crate::contact::supports::MOST;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +28,11 @@ pub(super) struct Link {
     /// How much closer than they may be they were when the step began, m.
     pub depth: f32,
     pub friction: f32,
-    /// How much faster each node of each side becomes for an impulse, 1/kg.
-    answers: [[Vec3; 3]; 2],
+    /// The nodes that move each side, with their parts of it; of those that there are not the part is 0. They are the side's own but where
+    /// it is bound to others.
+    movers: [[(u32, f32); MOST]; 2],
+    /// How much faster each of these becomes for an impulse, 1/kg.
+    answers: [[Vec3; MOST]; 2],
     mass: f32,
     /// What it has given so far, N s.
     impulse: f32,
@@ -41,26 +45,46 @@ impl Side {
         (self.body, self.nodes)
     }
 
-    pub fn used(&self) -> impl Iterator<Item = (usize, f32)> {
-        let pairs = self.nodes.into_iter().zip(self.weights);
-        pairs
-            .filter(|(_, weight)| *weight > 0.0)
-            .map(|(node, weight)| (node as usize, weight))
+    /// The nodes that move it, with their parts: its own, or what those are bound to.
+    fn movers(&self, body: &Body) -> [(u32, f32); MOST] {
+        let mut movers = [(0, 0.0); MOST];
+        let own = self.nodes.into_iter().zip(self.weights);
+        let Some(bindings) = &body.bindings else {
+            movers.iter_mut().zip(own).for_each(|(mover, own)| *mover = own);
+            return movers;
+        };
+        let mut count = 0;
+        for (node, weight) in own.filter(|(_, weight)| *weight > 0.0) {
+            for (node, part) in bindings.parts(node) {
+                let known = movers[..count].iter().position(|mover| mover.0 == node);
+                // A triangle lies in one cell. No impulse is lost in any case.
+                let place = known.unwrap_or(count.min(MOST - 1));
+                count = count.max(place + 1);
+                movers[place] = (node, movers[place].1 + weight * part);
+            }
+        }
+        movers
     }
 
     /// The point's part of what nodes have.
     pub fn weighted(&self, vector_of: impl Fn(usize) -> Vec3) -> Vec3 {
-        self.used().map(|(node, weight)| vector_of(node) * weight).sum()
+        weighted(self.nodes.into_iter().zip(self.weights), vector_of)
     }
+}
+
+fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -> Vec3) -> Vec3 {
+    let used = parts.filter(|(_, weight)| *weight > 0.0);
+    used.map(|(node, weight)| vector_of(node as usize) * weight).sum()
 }
 
 impl Link {
     /// A contact that has given nothing yet; `None` where neither side can move.
     pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2]) -> Option<Self> {
-        let mut answers = [[Vec3::ZERO; 3]; 2];
+        let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
-        for (side, (body, answers)) in sides.iter().zip(bodies.into_iter().zip(&mut answers)) {
-            for (answer, (&node, weight)) in answers.iter_mut().zip(side.nodes.iter().zip(side.weights)) {
+        let movers = [0, 1].map(|side| sides[side].movers(bodies[side]));
+        for (movers, (body, answers)) in movers.iter().zip(bodies.into_iter().zip(&mut answers)) {
+            for (answer, &(node, weight)) in answers.iter_mut().zip(movers) {
                 let mobility = body.inverse_masses[node as usize] * weight;
                 let held: BVec3 = body.pins.partial_axes_of(node);
                 *answer = Vec3::select(held, Vec3::ZERO, Vec3::splat(mobility));
@@ -74,6 +98,7 @@ impl Link {
             least_speed: 0.0,
             depth: 0.0,
             friction: 0.0,
+            movers,
             answers,
             mass: 1.0 / whole.max(leverage),
             impulse: 0.0,
@@ -85,6 +110,11 @@ impl Link {
     pub fn allow_gap(&mut self, gap: f32, duration: f32) {
         self.depth = -gap;
         self.least_speed = -gap.max(0.0) / duration;
+    }
+
+    /// Whether it has given anything.
+    pub fn presses(&self) -> bool {
+        self.impulse > 0.0
     }
 
     /// Gives what is missing, or takes back what was too much: how much faster the sides move against each other for it, m/s.
@@ -105,9 +135,9 @@ impl Link {
     }
 
     fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>]) {
-        for (side, (answers, sign)) in self.sides.iter().zip(self.answers.iter().zip([1.0, -1.0])) {
-            if let Some(skin) = &mut skins[side.body] {
-                for (&node, answer) in side.nodes.iter().zip(answers) {
+        for (index, sign) in [1.0, -1.0].into_iter().enumerate() {
+            if let Some(skin) = &mut skins[self.sides[index].body] {
+                for (&(node, _), answer) in self.movers[index].iter().zip(&self.answers[index]) {
                     if *answer != Vec3::ZERO {
                         let mean = skin.velocities.get(node as usize) + impulse * *answer * sign;
                         skin.velocities.set(node as usize, mean);
@@ -122,9 +152,14 @@ impl Link {
         let push = self.normal * (self.depth.max(0.0) * part * self.mass);
         (0..2).flat_map(move |side| {
             let sign = [1.0, -1.0][side];
-            let Side { body, nodes, .. } = self.sides[side];
-            (0..3).map(move |corner| (body, nodes[corner] as usize, push * self.answers[side][corner] * sign))
+            let (body, movers) = (self.sides[side].body, self.movers[side]);
+            (0..MOST).map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
         })
+    }
+
+    /// The nodes that move a side, with their parts of it.
+    pub fn movers(&self, side: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
+        self.movers[side].iter().copied().filter(|(_, part)| *part > 0.0)
     }
 
     /// What the first side received, N s.
@@ -134,8 +169,8 @@ impl Link {
 
     /// Of the first side against the second, m/s.
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
-        let [first, second] = self.sides.map(|side| match &skins[side.body] {
-            Some(skin) => side.weighted(|node| skin.velocities.get(node)),
+        let [first, second] = [0, 1].map(|side| match &skins[self.sides[side].body] {
+            Some(skin) => weighted(self.movers[side].into_iter(), |node| skin.velocities.get(node)),
             None => Vec3::ZERO,
         });
         first - second

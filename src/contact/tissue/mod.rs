@@ -6,22 +6,27 @@
 //! impulse, with opposite signs, in the same place: no momentum is made.
 
 mod bonds;
+mod change;
 mod crossing;
+mod forest;
 mod groups;
 mod images;
 mod link;
 mod search;
 mod skin;
+mod wound;
 
 pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
+pub(crate) use self::change::{SkinChange, SurfaceToBe};
 use self::groups::Groups;
 use self::link::Link;
+use self::link::Side;
 use self::search::{Party, Search};
-use self::skin::Skin;
+pub(crate) use self::skin::Skin;
 use glam::Vec3;
 
 use crate::body::{Body, Bounds};
-use crate::contact::impulses::{PUSHED_OUT, SWEEPS, relax};
+use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
 use crate::error::Result;
 use crate::memory;
 use crate::slots::Slots;
@@ -40,6 +45,9 @@ const TRAVEL: f32 = 0.5;
 
 /// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
+
+/// What moves three corners, each of them bound to four nodes at most.
+const MOST_MOVERS: usize = 12;
 
 /// Contacts that there is room for, for each node, edge and face of the surfaces.
 const ROOM: usize = 1;
@@ -79,7 +87,7 @@ impl Tissue {
         let mut skin = Skin::new(body)?;
         self.add_images(&mut skin)?;
         self.groups.make_place(place)?;
-        let more = ROOM * (skin.nodes.len() + skin.edges.len() + skin.triangles.len());
+        let more = ROOM * skin.room;
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
@@ -113,6 +121,11 @@ impl Tissue {
         Ok(())
     }
 
+    /// The skin of the body at this place, if it meets tissue.
+    pub fn skin_mut(&mut self, place: usize) -> Option<&mut Skin> {
+        self.skins.get_mut(place)?.as_mut()
+    }
+
     /// A body is gone.
     pub fn leave(&mut self, bodies: &mut Slots<Body>, place: usize) {
         self.bonds.leave(bodies, place);
@@ -122,8 +135,8 @@ impl Tissue {
     }
 
     fn room(&self) -> usize {
-        let of = |skin: &Skin| ROOM * (skin.nodes.len() + skin.edges.len() + skin.triangles.len());
-        self.skins.iter().flatten().map(of).sum()
+        let of_skins = self.skins.iter().flatten();
+        of_skins.map(|skin| ROOM * skin.room).sum()
     }
 
     /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
@@ -194,7 +207,9 @@ impl Tissue {
             let mut pierces = std::mem::take(&mut first.pierces);
             pierces.fill(false);
             if let (Some(body), true) = (bodies.at(a), self.groups.of(a).is_some()) {
-                let join = |b: usize, edge: &[u32], triangle: &[u32]| self.bonds.join([a, b], [edge, triangle]);
+                let join = |b: usize, edge: &[u32], triangle: &[u32]| {
+                    !self.bonds.are_none() && join_movers(&self.bonds, bodies, [a, b], [edge, triangle])
+                };
                 if body.contact.with_itself {
                     let are_joined = |edge: &[u32], triangle: &[u32]| {
                         edge.iter().any(|node| triangle.contains(node)) || join(a, edge, triangle)
@@ -254,12 +269,13 @@ impl Tissue {
         self.draw(group, bodies, moment);
         self.solve(group, bodies, moment);
         for link in &self.links {
-            for (side, sign) in link.sides.iter().zip([1.0, -1.0]) {
+            for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
-                    for (node, weight) in side.used() {
+                    for (node, part) in link.movers(index) {
+                        let node = node as usize;
                         let velocity = skin.velocities.get(node);
                         skin.given = skin.given.with(velocity);
-                        body.nudge(node, velocity, link.given() * (sign * weight), moment);
+                        body.nudge(node, velocity, link.given() * (sign * part), moment);
                     }
                 }
             }
@@ -307,6 +323,9 @@ impl Tissue {
         let mut first = None;
         for _ in 0..SEARCHES {
             let known = self.links.len();
+            if first.is_some() {
+                self.go_on(group, bodies, moment);
+            }
             self.find(group, bodies, moment);
             if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
                 break;
@@ -314,10 +333,23 @@ impl Tissue {
             let Self {
                 links, skins, bonds, ..
             } = self;
-            first = Some(relax(SWEEPS, first, || {
-                let changes = links.iter_mut().map(|link| link.solve(skins));
+            first = Some(relax(SWEEPS, first, |sweep| {
+                let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
+                let changes = links.map(|link| link.solve(skins));
                 changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment))
             }));
+        }
+    }
+
+    /// Has what impulses did to nodes be seen in what is bound to them.
+    fn go_on(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
+        for (place, skin) in self.skins.iter_mut().enumerate() {
+            if let (Some(skin), Some(body)) = (skin, bodies.at(place))
+                && self.groups.of(place) == Some(group)
+                && moment.concerns(body)
+            {
+                skin.go_on(body);
+            }
         }
     }
 
@@ -373,9 +405,7 @@ impl Tissue {
                     let is_known = known
                         .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
                         .is_ok();
-                    let [of_a, of_b] = &touch.sides;
-                    let are_joined = || bonds.join([of_a.body, of_b.body], [&of_a.nodes, &of_b.nodes]);
-                    if is_known || links.len() == links.capacity() || are_joined() {
+                    if is_known || links.len() == links.capacity() || are_joined(bonds, bodies, &touch.sides) {
                         return;
                     }
                     let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
@@ -388,6 +418,29 @@ impl Tissue {
             }
         }
     }
+}
+
+/// Whether a bond makes one point of nodes of both sides.
+fn are_joined(bonds: &Bonds, bodies: &Slots<Body>, sides: &[Side; 2]) -> bool {
+    let [a, b] = sides;
+    !bonds.are_none() && join_movers(bonds, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
+}
+
+/// The same of corners of surfaces: what those are bound to counts.
+fn join_movers(bonds: &Bonds, bodies: &Slots<Body>, places: [usize; 2], corners: [&[u32]; 2]) -> bool {
+    let mut movers = [[0; MOST_MOVERS]; 2];
+    let mut counts = [0; 2];
+    for side in 0..2 {
+        let body = bodies.at(places[side]);
+        let all = corners[side]
+            .iter()
+            .flat_map(|&corner| body.into_iter().flat_map(move |body| body.movers(corner)));
+        for (to, (node, _)) in movers[side].iter_mut().zip(all) {
+            *to = node;
+            counts[side] += 1;
+        }
+    }
+    bonds.join(places, [0, 1].map(|side| &movers[side][..counts[side]]))
 }
 
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
@@ -410,7 +463,7 @@ fn meet_in_images(first: &Skin, second: &Skin) -> bool {
 fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
     let margin = radius + skin.short + FASTER * (skin.travel + other.travel);
     let shift = search::shift(other, skin);
-    let (own, others) = (skin.tree.bounds(), other.tree.bounds());
+    let (own, others) = (skin.forest.bounds(), other.forest.bounds());
     Bounds {
         min: (others.min + shift - margin).max(own.min),
         max: (others.max + shift + margin).min(own.max),

@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::link::Side;
-use super::skin::Skin;
+use super::skin::{NONE, PARTED, Skin};
 use crate::body::Bounds;
 use crate::contact::sweep::{Corners, Segment, Separation};
 
@@ -50,9 +50,13 @@ impl Search<'_> {
             self.nodes_with_faces(second, first, &mut see);
         }
         self.edges_with_edges(first, second, &mut see);
+        if self.is_of_one() {
+            self.across_wounds(&mut see);
+            self.edges_across_wounds(&mut see);
+        }
     }
 
-    fn is_of_one(&self) -> bool {
+    pub(super) fn is_of_one(&self) -> bool {
         self.parties[0].place == self.parties[1].place
     }
 
@@ -73,7 +77,7 @@ impl Search<'_> {
                 steps: [step; 2],
                 radius: self.radius,
             };
-            let mut touched: Option<(f32, usize, Separation)> = None;
+            let mut touched: Option<(f32, usize, (Separation, f32))> = None;
             // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
             let mut nearest = (f32::INFINITY, 0.0_f32);
             let mut behind: Option<(usize, Separation)> = None;
@@ -83,7 +87,7 @@ impl Search<'_> {
             let reach = self.radius.max(depth) + of_faces.skin.spread;
             self.near(of_faces.skin, &around, reach, |triangle| {
                 let nodes = of_faces.skin.triangles[triangle];
-                if self.is_of_one() && nodes.contains(&node) {
+                if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
                     return;
                 }
                 let corners = self.corners(of_faces, &nodes);
@@ -98,8 +102,7 @@ impl Search<'_> {
                 }
                 if height >= 0.0
                     && touched.is_none_or(|(least, ..)| distance < least)
-                    && let Some(found) = corners.approach(&segment, 0.0)
-                    && !(self.is_of_one() && of_faces.skin.were_near([node; 2], &nodes, self.radius))
+                    && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners))
                 {
                     touched = Some((distance, triangle, found));
                 }
@@ -107,10 +110,12 @@ impl Search<'_> {
             // On the wrong side it is led out, or let out where it is deep.
             let is_behind = behind.is_some();
             let closest = match behind {
-                Some((triangle, start)) => (nearest.0 < self.radius.max(depth)).then_some((triangle, start)),
+                Some((triangle, start)) => {
+                    (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, self.radius)))
+                }
                 None => touched.map(|(_, triangle, found)| (triangle, found)),
             };
-            if let Some((triangle, found)) = closest {
+            if let Some((triangle, (found, radius))) = closest {
                 let nodes = of_faces.skin.triangles[triangle];
                 let sides = [
                     Side {
@@ -124,7 +129,8 @@ impl Search<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, if is_behind { found.offset } else { -found.offset }, shift, see);
+                let offset = if is_behind { found.offset } else { -found.offset };
+                self.show(sides, offset, (radius, shift), see);
             }
         }
     }
@@ -132,7 +138,7 @@ impl Search<'_> {
     fn edges_with_edges(&self, first: Party, second: Party, see: &mut impl FnMut(Touch)) {
         let shift = shift(first.skin, second.skin);
         for (index, &edge) in first.skin.edges.iter().enumerate() {
-            if first.skin.pierces[index] {
+            if first.skin.pierces[index] || edge[0] == NONE {
                 continue;
             }
             let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
@@ -141,27 +147,25 @@ impl Search<'_> {
                 steps: ways.map(|(_, step)| step),
                 radius: self.radius,
             };
-            let mut closest: Option<(f32, [u32; 2], Separation)> = None;
+            let mut closest: Option<(f32, [u32; 2], (Separation, f32))> = None;
             let mut see_edges = |edges: [u32; 3]| {
                 for other in second.skin.sound(edges) {
                     if self.is_of_one()
-                        && (other <= first.skin.edges[index] || other.iter().any(|node| edge.contains(node)))
+                        && (other <= edge
+                            || other.iter().any(|node| edge.contains(node))
+                            || first.skin.are_of_wound(edge, &other))
                     {
                         continue;
                     }
                     let corners = self.corners(second, &other);
-                    let Some(found) = corners.approach(&segment, 0.0) else {
+                    let Some((found, radius)) = self.approach(second.skin, (edge, &segment), (&other, &corners)) else {
                         continue;
                     };
                     // At an end of either it is a node that meets.
-                    if found.inside
-                        && found.along > 0.0
-                        && found.along < 1.0
-                        && !(self.is_of_one() && second.skin.were_near(edge, &other, self.radius))
-                    {
+                    if found.inside && found.along > 0.0 && found.along < 1.0 {
                         let start = corners.separation(&segment, 0.0).offset.length_squared();
                         if closest.is_none_or(|(least, ..)| start < least) {
-                            closest = Some((start, other, found));
+                            closest = Some((start, other, (found, radius)));
                         }
                     }
                 }
@@ -187,7 +191,7 @@ impl Search<'_> {
                     skin.near(&around, reach, |triangle| see_edges(skin.owned(triangle)));
                 }
             }
-            if let Some((_, other, found)) = closest {
+            if let Some((_, other, (found, radius))) = closest {
                 let sides = [
                     Side {
                         body: first.place,
@@ -200,18 +204,49 @@ impl Search<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, -found.offset, shift, see);
+                self.show(sides, -found.offset, (radius, shift), see);
             }
         }
     }
 
-    fn show(&self, sides: [Side; 2], offset: Vec3, shift: Vec3, see: &mut impl FnMut(Touch)) {
+    /// Where a node or an edge comes too close to a face or an edge, and how far they keep apart.
+    fn approach(
+        &self,
+        skin: &Skin,
+        (nodes, segment): ([u32; 2], &Segment),
+        (others, corners): (&[u32], &Corners),
+    ) -> Option<(Separation, f32)> {
+        let found = corners.approach(segment, 0.0)?;
+        if !self.is_of_one() {
+            return Some((found, self.radius));
+        }
+        let radius = skin.keeps(nodes, (others, found.weights), self.radius)?;
+        if radius == self.radius {
+            return Some((found, radius));
+        }
+        // What was one place has no side yet.
+        let start = corners.separation(segment, 0.0).offset.length_squared();
+        if start < (PARTED * radius) * (PARTED * radius) {
+            return None;
+        }
+        let segment = Segment { radius, ..*segment };
+        Some((corners.approach(&segment, 0.0)?, radius))
+    }
+
+    /// Shows what meets in this direction, of sides that keep so far apart, and in coordinates so far apart.
+    pub(super) fn show(
+        &self,
+        sides: [Side; 2],
+        offset: Vec3,
+        (radius, shift): (f32, Vec3),
+        see: &mut impl FnMut(Touch),
+    ) {
         if let Some(normal) = offset.try_normalize() {
             let apart = self.apart(&sides, shift);
             see(Touch {
                 sides,
                 normal,
-                gap: apart.dot(normal) - self.radius,
+                gap: apart.dot(normal) - radius,
             });
         }
     }
@@ -230,14 +265,14 @@ impl Search<'_> {
     }
 
     /// Where a node begins and how far it goes, as seen from the other body, which goes with `drift`.
-    fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> (Vec3, Vec3) {
+    pub(super) fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> (Vec3, Vec3) {
         let node = node as usize;
         let place = party.skin.starts.get(node) + shift;
         (place, (party.skin.velocities.get(node) - drift) * self.dt)
     }
 
     /// The corners of an edge or a face in its own body's coordinates, and how far they leave its drift.
-    fn corners(&self, party: Party, nodes: &[u32]) -> Corners {
+    pub(super) fn corners(&self, party: Party, nodes: &[u32]) -> Corners {
         let mut corners = Corners {
             points: [Vec3::ZERO; 3],
             steps: [Vec3::ZERO; 3],

@@ -2,25 +2,30 @@
 
 use glam::{DVec3, Vec3};
 
+use super::LEAST_THICKNESS;
+use super::change::Changing;
+use super::forest::Forest;
 use super::images::Images;
-use crate::body::{Body, Bounds, Vectors};
+use super::wound::Wound;
+use crate::body::{Bindings, Body, Bounds, Vectors};
 use crate::contact::sweep::{Corners, Segment};
 use crate::contact::tool::Detection;
-use crate::contact::tree::Tree;
 use crate::error::Result;
 use crate::memory;
 use crate::mesh;
 
 /// Where the nodes of a body may go in a step, and the tree of its triangles as the step begins.
 #[derive(Debug)]
-pub(super) struct Skin {
-    /// The nodes of the surface, in the body's own numbers.
+pub(crate) struct Skin {
+    /// The corners of the surface, in the body's own numbers: nodes, and points that are bound to nodes. In order where it does not change.
     pub nodes: Vec<u32>,
     pub edges: Vec<[u32; 2]>,
     pub triangles: Vec<[u32; 3]>,
     /// The edges that are looked at with a triangle: each with one.
-    owned: Vec<[u32; 3]>,
-    pub tree: Tree,
+    pub(super) owned: Vec<[u32; 3]>,
+    pub(super) forest: Forest,
+    /// How many nodes, edges and triangles it has, and cuts may add to it.
+    pub room: usize,
     /// Whether it encloses something.
     pub is_closed: bool,
     /// The edges that pass through other tissue, or the body's own, as the step begins.
@@ -38,7 +43,7 @@ pub(super) struct Skin {
     /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
     pub short: f32,
     /// Where nodes were at first, in the body's coordinates, where it meets itself.
-    firsts: Option<Vectors>,
+    pub(super) firsts: Option<Vectors>,
     /// How far any node goes, m.
     pub travel: f32,
     /// Whether it meets other bodies, and asks to find them in images.
@@ -47,8 +52,16 @@ pub(super) struct Skin {
     /// The side of a pixel of its images, m.
     pub resolution: f32,
     /// Where others find it, or it others, in images.
-    pub images: Option<Images>,
+    pub(super) images: Option<Images>,
+    /// What it takes to change, where its body may be cut.
+    pub(super) changing: Option<Box<Changing>>,
 }
+
+/// Features that were no further apart at first than this part of the least thickness were one, and are parted.
+pub(super) const PARTED: f32 = 0.1;
+
+/// Sides of a cut pass through each other where edges do by more than this part of a short edge.
+const CROSSING: f32 = 0.01;
 
 /// No edge.
 pub(super) const NONE: u32 = u32::MAX;
@@ -80,25 +93,36 @@ impl Skin {
         nodes.dedup();
         let positions = body.state.positions();
         let at = |node: u32| positions.get(node as usize);
-        let tree = Tree::new(triangles.len(), |triangle| triangles[triangle as usize].map(at))?;
+        let forest = Forest::new(triangles.len(), |triangle| triangles[triangle as usize].map(at))?;
         let lengths = || edges.iter().map(|&[a, b]| at(a).distance(at(b)));
         let contact = &body.contact;
         let mut firsts = None;
         if contact.with_itself {
-            let firsts = firsts.insert(Vectors::zeros(body.node_count())?);
-            nodes.iter().for_each(|&node| firsts.set(node as usize, at(node)));
+            let firsts = firsts.insert(body.zeros()?);
+            if body.can_be_cut() {
+                // What is inside may come to the surface.
+                (0..body.node_count()).for_each(|node| firsts.set(node, positions.get(node)));
+            } else {
+                nodes.iter().for_each(|&node| firsts.set(node as usize, at(node)));
+            }
         }
+        let changing = if body.can_be_cut() {
+            Some(Box::new(Changing::new(body, &nodes, &edges, &triangles)?))
+        } else {
+            None
+        };
         let asks_for_images = contact.with_bodies && contact.detection == Detection::ImageSpace;
         let resolution = if asks_for_images && contact.resolution > 0.0 {
             contact.resolution
         } else {
-            let bounds = tree.bounds();
+            let bounds = forest.bounds();
             let chosen = lengths().sum::<f32>() / (edges.len() as f32 * PIXELS_OF_EDGE);
             chosen
                 .max((bounds.max - bounds.min).max_element() / PIXELS)
                 .max(f32::MIN_POSITIVE)
         };
-        Ok(Self {
+        let mut skin = Self {
+            room: nodes.len() + edges.len() + triangles.len(),
             short: short_of(lengths(), edges.len())?,
             firsts,
             travel: 0.0,
@@ -109,27 +133,99 @@ impl Skin {
             nodes,
             edges,
             owned,
-            tree,
+            forest,
             is_closed: mesh::is_closed(&triangles)?,
             pierces,
             origin: body.origin,
-            starts: Vectors::zeros(body.node_count())?,
-            velocities: Vectors::zeros(body.node_count())?,
+            starts: body.zeros()?,
+            velocities: body.zeros()?,
             drift: Vec3::ZERO,
             spread: 0.0,
             given: Bounds::EMPTY,
             triangles,
+            changing,
+        };
+        let spare = body.spare_nodes();
+        skin.nodes.try_reserve_exact(spare)?;
+        for values in [&mut skin.triangles, &mut skin.owned] {
+            values.try_reserve_exact(2 * spare)?;
+        }
+        skin.edges.try_reserve_exact(3 * spare)?;
+        skin.pierces.try_reserve_exact(3 * spare)?;
+        skin.room += 6 * spare;
+        Ok(skin)
+    }
+
+    /// Whether it knows of a node: of a corner, or of one that moves some.
+    pub fn has(&self, node: u32) -> bool {
+        match &self.changing {
+            Some(changing) => changing.has(node),
+            None => self.nodes.binary_search(&node).is_ok(),
+        }
+    }
+
+    /// What cuts have bared, where it is a solid that meets itself.
+    pub(super) fn wound(&self) -> Option<&Wound> {
+        self.changing.as_ref()?.wound.as_ref()
+    }
+
+    /// How far a node or an edge, and the point of an edge or a face of the same body with these weights, keep apart that would keep apart
+    /// `radius`, m; `None`: they do not meet. What was as near as that at first is exempt, or neighbours would meet; but what is there since a cut
+    /// meets as a surface without thickness, as what was parted has nothing between it.
+    pub fn keeps(&self, nodes: [u32; 2], (others, weights): (&[u32], [f32; 3]), radius: f32) -> Option<f32> {
+        let apart = self.first_distance(nodes, others)?;
+        let Some(changing) = &self.changing else {
+            return (apart > radius).then_some(radius);
+        };
+        let mut used = others.iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
+        if let Some(wound) = &changing.wound
+            && wound.has(nodes.into_iter().chain(used.clone().map(|(&other, _)| other)))
+        {
+            return None;
+        }
+        if apart > radius {
+            return Some(radius);
+        }
+        let is_later = |node: u32| node >= changing.first_later;
+        if !nodes.into_iter().any(is_later) && !used.any(|(&other, _)| is_later(other)) {
+            return None;
+        }
+        let least = self.least_thickness();
+        Some(if apart <= PARTED * least {
+            least
+        } else {
+            least.min(0.5 * apart)
         })
     }
 
-    /// Whether a node or an edge, and an edge or a face of the same body, were no further from each other at first than `radius`, m.
-    pub fn were_near(&self, nodes: [u32; 2], others: &[u32], radius: f32) -> bool {
-        self.firsts.as_ref().is_some_and(|firsts| {
+    /// Whether a node or an edge and others of the same body lie in what cuts have bared: they meet there, and not here.
+    pub fn are_of_wound(&self, nodes: [u32; 2], others: &[u32]) -> bool {
+        let wound = self.wound();
+        wound.is_some_and(|wound| wound.has(nodes.into_iter().chain(others.iter().copied())))
+    }
+
+    /// What keeps off it where it has no thickness, m.
+    pub fn least_thickness(&self) -> f32 {
+        LEAST_THICKNESS * self.short
+    }
+
+    /// How deep an edge is to pass through a triangle of the same body to be on its other side, m: where a cut has parted them they touch.
+    pub fn crossing_depth(&self, edge: [u32; 2], triangle: &[u32]) -> f64 {
+        let is_parted = |first: u32| edge.iter().chain(triangle).any(|&node| node >= first);
+        match &self.changing {
+            Some(changing) if is_parted(changing.first_later) => f64::from(CROSSING * self.short),
+            _ => 0.0,
+        }
+    }
+
+    /// How far a node or an edge, and an edge or a face of the same body, were from each other at first, m; `None` where it does not meet itself.
+    fn first_distance(&self, nodes: [u32; 2], others: &[u32]) -> Option<f32> {
+        self.firsts.as_ref().map(|firsts| {
             let at = |node: &u32| firsts.get(*node as usize);
             let segment = Segment {
                 ends: nodes.map(|node| at(&node)),
                 steps: [Vec3::ZERO; 2],
-                radius,
+                radius: 0.0,
             };
             let mut corners = Corners {
                 points: [Vec3::ZERO; 3],
@@ -139,7 +235,7 @@ impl Skin {
             for (point, other) in corners.points.iter_mut().zip(others) {
                 *point = at(other);
             }
-            corners.separation(&segment, 0.0).offset.length_squared() <= radius * radius
+            corners.separation(&segment, 0.0).offset.length()
         })
     }
 
@@ -149,9 +245,35 @@ impl Skin {
         self.is_closed &= !body.is_cut_open;
         let state = body.state.substep();
         let (starts, velocities) = (state.positions, &*state.velocities);
+        let bindings = body.bindings.as_ref();
         match &body.implicit {
-            None => self.take(origin, duration, |node| (starts.get(node), velocities.get(node))),
-            Some(implicit) => self.take(origin, duration, |node| (starts.get(node), implicit.mean(node))),
+            None => self.take(origin, bindings, duration, |node| {
+                (starts.get(node), velocities.get(node))
+            }),
+            Some(implicit) => self.take(origin, bindings, duration, |node| {
+                (starts.get(node), implicit.mean(node))
+            }),
+        }
+        let Self {
+            changing,
+            triangles,
+            starts,
+            ..
+        } = self;
+        if let Some(wound) = changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
+            wound.turn(triangles, starts);
+        }
+    }
+
+    /// Takes points that are bound to nodes to go as those do by now.
+    pub fn go_on(&mut self, body: &Body) {
+        let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
+        for bound in bindings
+            .into_iter()
+            .flat_map(|bindings| self.nodes.iter().filter_map(|&node| bindings.get(node)))
+        {
+            let velocity = bound.of(|node| self.velocities.get(node));
+            self.velocities.set(bound.node as usize, velocity);
         }
     }
 
@@ -162,15 +284,33 @@ impl Skin {
         } else {
             body.state.positions()
         };
-        self.take(body.origin, 0.0, |node| (positions.get(node), Vec3::ZERO));
+        self.take(body.origin, body.bindings.as_ref(), 0.0, |node| {
+            (positions.get(node), Vec3::ZERO)
+        });
     }
 
-    fn take(&mut self, origin: DVec3, duration: f32, motion_of: impl Fn(usize) -> (Vec3, Vec3)) {
+    fn take(
+        &mut self,
+        origin: DVec3,
+        bindings: Option<&Bindings>,
+        duration: f32,
+        motion_of: impl Fn(usize) -> (Vec3, Vec3),
+    ) {
         self.origin = origin;
         self.given = Bounds::EMPTY;
         let mut all = Bounds::EMPTY;
-        for &node in &self.nodes {
+        for &node in self.changing.iter().flat_map(|changing| &changing.movers) {
             let (start, velocity) = motion_of(node as usize);
+            self.starts.set(node as usize, start);
+            self.velocities.set(node as usize, velocity);
+        }
+        let bindings = bindings.filter(|_| self.changing.is_some());
+        let bound = |node: u32| bindings.and_then(|bindings| bindings.get(node));
+        for &node in &self.nodes {
+            let (start, velocity) = match bound(node) {
+                None => motion_of(node as usize),
+                Some(bound) => [bound.of(|node| motion_of(node).0), bound.of(|node| motion_of(node).1)].into(),
+            };
             self.starts.set(node as usize, start);
             self.velocities.set(node as usize, velocity);
             all = all.with(velocity);
@@ -179,7 +319,7 @@ impl Skin {
         self.travel = duration * all.min.abs().max(all.max.abs()).length();
         self.spread = 0.5 * duration * (all.max - all.min).length();
         let (triangles, starts) = (&self.triangles, &self.starts);
-        self.tree
+        self.forest
             .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
     }
 
@@ -200,11 +340,8 @@ impl Skin {
     }
 
     /// Shows the triangles that a box comes within `reach` of.
-    pub fn near(&self, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
-        self.tree.near(bounds, reach * reach, |place| {
-            see(self.tree.triangle(place) as usize);
-            reach * reach
-        });
+    pub fn near(&self, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
+        self.forest.near(bounds, reach, see);
     }
 
     /// The edges that are looked at with a triangle, as numbers.

@@ -87,8 +87,9 @@ pub struct SolidVertex {
     pub point: u32,
     /// One of the tetrahedra about it.
     pub(crate) around: u32,
-    /// Where the blade passed through it.
+    /// Where the blade passed through it, in the stroke that came near it last, and in the one before.
     pub(crate) mark: Mark,
+    pub(crate) other_mark: Mark,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -31,6 +31,7 @@ impl CutSolid {
             point: node,
             around: NONE,
             mark: Mark::NONE,
+            other_mark: Mark::NONE,
         }));
         let mut made = memory::reserved(cells.len())?;
         let mut tetrahedra = memory::reserved(cells.len())?;

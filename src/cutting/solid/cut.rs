@@ -18,6 +18,8 @@ pub(crate) struct Cut<'a> {
     pub(crate) marked: Vec<u32>,
     /// The vertices of which this step has told the side anew.
     pub(crate) beside: Vec<u32>,
+    /// Whether it is a tear: sides are not told by a blade.
+    pub(crate) is_tear: bool,
 }
 
 impl CutSolid {
@@ -50,6 +52,7 @@ impl CutSolid {
             },
             marked: Vec::new(),
             beside: Vec::new(),
+            is_tear: false,
             solid: self,
         };
         let changes = cut.make(sweep, positions, candidates);
@@ -69,7 +72,7 @@ impl CutSolid {
         (self.strokes, self.stroke) = self.before;
     }
 
-    fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.nodes.begin();
         self.cells.begin();
         self.tetrahedra.begin();
@@ -135,14 +138,15 @@ impl Cut<'_> {
         }
         self.sever()?;
         let faces = self.ready()?;
-        let cells = self.open(&faces)?;
-        let nodes = self.part_cells(&cells)?;
-        self.part_nodes(&nodes)?;
-        self.finish()
+        self.finish(&faces)
     }
 
-    /// The lists that only the end can tell.
-    fn finish(mut self) -> Result<Changes> {
+    /// Opens faces that are ready, and what follows from that.
+    pub(crate) fn finish(mut self, faces: &[(u32, usize)]) -> Result<Changes> {
+        let cells = self.open(faces)?;
+        let nodes = self.part_cells(&cells)?;
+        self.part_nodes(&nodes)?;
+        // The lists that only the end can tell.
         self.changes.triangles = self.solid.triangles.touched()?;
         self.number_points()?;
         for edge in &mut self.changes.rim {

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::body::CutSolid;
+use super::body::{CutSolid, SNAP};
 use crate::cutting::cut::Sweep;
 use crate::cutting::material::CutEnd;
 
@@ -36,6 +36,7 @@ impl CutSolid {
             weights: std::array::from_fn(|k| weights[0][k] + middle * (weights[1][k] - weights[0][k])),
             // What was snapped may lie on either side; a step that begins too early finds what is open already.
             slack: 3.0 * self.cells[cell].snap,
+            size: self.cells[cell].snap / SNAP,
         })
     }
 

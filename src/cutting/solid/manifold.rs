@@ -69,7 +69,7 @@ impl Cut<'_> {
         while let Some(&vertex) = vertices.get(at) {
             at += 1;
             self.closed_at(vertex, &mut closed)?;
-            if self.turn_tip(vertex, &closed, faces, &mut vertices)? {
+            if !self.is_tear && self.turn_tip(vertex, &closed, faces, &mut vertices)? {
                 closed.clear();
                 memory::push(&mut vertices, vertex)?;
                 continue;

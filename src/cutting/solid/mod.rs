@@ -21,12 +21,14 @@ mod crumbs;
 mod cut;
 mod ends;
 mod manifold;
+mod met;
 mod open;
 mod parted;
 mod pieces;
 mod points;
 mod sever;
 mod split;
+mod tear;
 
 pub use body::{CutSolid, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
 pub(crate) use sever::Stroke as SolidStroke;

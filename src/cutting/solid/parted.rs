@@ -47,6 +47,46 @@ impl CutSolid {
     }
 }
 
+impl CutSolid {
+    /// Whether the last cut, which has opened `faces`, has parted a piece of less volume than `least` in the rest shape, m³.
+    ///
+    /// From both sides of the faces it goes on until all meet, or have been over as much, or all over their piece.
+    pub(crate) fn has_parted_less(&self, faces: &[CutFace], least: f64) -> Result<bool> {
+        let sides_of = |face: &CutFace| face.triangles.map(|triangle| self.triangles[triangle].tetrahedron);
+        let mut floods = Floods::default();
+        for side in faces.iter().flat_map(sides_of) {
+            floods.start(side)?;
+        }
+        floods.met.reset(floods.open.len())?;
+        let mut volumes = memory::filled(0.0, floods.open.len())?;
+        let mut is_done = false;
+        while !is_done {
+            is_done = true;
+            for flood in 0..floods.open.len() {
+                if floods.sum(flood, &volumes) >= least {
+                    continue;
+                }
+                if let Some(tetrahedron) = floods.open[flood].pop() {
+                    is_done = false;
+                    volumes[flood] += self.tetrahedra[tetrahedron].volume;
+                    for across in self.tetrahedra[tetrahedron].neighbours {
+                        if across != NONE {
+                            floods.reach(across, flood)?;
+                        }
+                    }
+                }
+            }
+        }
+        for [one, other] in faces.iter().map(sides_of) {
+            let [a, b] = [one, other].map(|side| floods.met.lowest(floods.reached[&side]));
+            if a != b && floods.sum(a, &volumes).min(floods.sum(b, &volumes)) < least {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
 /// Sets of tetrahedra that hang together, each growing.
 #[derive(Default)]
 struct Floods {
@@ -74,6 +114,15 @@ impl Floods {
         (0..self.open.len())
             .filter(|&flood| self.met.lowest(flood) == flood)
             .count() as u32
+    }
+
+    /// What all floods that have met with this one have.
+    fn sum(&mut self, flood: usize, values: &[f64]) -> f64 {
+        let lowest = self.met.lowest(flood);
+        (0..values.len())
+            .filter(|&other| self.met.lowest(other) == lowest)
+            .map(|other| values[other])
+            .sum()
     }
 
     fn reach(&mut self, tetrahedron: u32, flood: usize) -> Result<()> {

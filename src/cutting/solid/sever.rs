@@ -2,9 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::body::{Face, NONE};
+use super::body::{CutSolid, Face, NONE, SolidVertex};
 use super::cut::Cut;
 use crate::cutting::cut::Sweep;
+use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 
@@ -30,6 +31,11 @@ impl Stroke {
         turns_up: false,
     };
 
+    /// What tears without a blade.
+    pub(crate) fn of_tear(number: u32) -> Self {
+        Self { number, ..Self::NONE }
+    }
+
     /// Goes on with a step, or begins again with it, as the next of so many strokes.
     pub(crate) fn go_on(&mut self, sweep: &Sweep, strokes: &mut u32) {
         if self.end != sweep.start {
@@ -43,6 +49,17 @@ impl Stroke {
             self.turns_up = up > 0.0;
         }
         self.end = sweep.end;
+    }
+
+    /// Adds its bits.
+    pub(crate) fn hash(&self, hasher: &mut StateHasher) {
+        hasher.write_u64(u64::from(self.number) << 1 | u64::from(self.turns_up));
+        for end in self.end {
+            hasher.write_floats(&end.to_array());
+        }
+        for value in self.normal.to_array() {
+            hasher.write_u64(value.to_bits());
+        }
     }
 
     /// What was cut has moved since: the edge is here now.
@@ -111,8 +128,53 @@ impl Mark {
         plane: Plane::NONE,
     };
 
+    /// Adds its bits, with which of so many vertices it is of, if there is one.
+    fn hash(&self, vertex: usize, hasher: &mut StateHasher) {
+        if self.stroke == 0 {
+            return;
+        }
+        hasher.write_u64((vertex as u64) << 32 | u64::from(self.stroke));
+        hasher.write_u64(self.side as u64);
+        for value in self.plane.normal.to_array().into_iter().chain([self.plane.offset]) {
+            hasher.write_u64(value.to_bits());
+        }
+    }
+
     fn is_on(&self) -> bool {
         matches!(self.side, Side::On | Side::OnBend)
+    }
+}
+
+impl CutSolid {
+    /// What the stroke that goes on has found of a vertex, or else the last that came near it.
+    fn mark_of(&self, vertex: u32) -> Mark {
+        let SolidVertex { mark, other_mark, .. } = self.vertices[vertex];
+        if other_mark.stroke == self.stroke.number {
+            other_mark
+        } else {
+            mark
+        }
+    }
+
+    /// Adds the bits that what the next cut does depends on: strokes, and what they have left.
+    pub(crate) fn hash(&self, hasher: &mut StateHasher) {
+        if self.strokes == 0 {
+            return;
+        }
+        hasher.write_u64(u64::from(self.strokes));
+        self.stroke.hash(hasher);
+        for (number, vertex) in self.vertices().iter().enumerate() {
+            vertex.mark.hash(number, hasher);
+            vertex.other_mark.hash(number, hasher);
+        }
+        for (number, tetrahedron) in self.tetrahedra().iter().enumerate() {
+            let severed = (0..4).filter(|&face| tetrahedron.faces[face] == Face::Severed);
+            let severed: u64 = severed.map(|face| 1 << face).sum();
+            if severed != 0 || tetrahedron.turned != 0 {
+                hasher.write_u64((number as u64) << 4 | severed);
+                hasher.write_u64(u64::from(tetrahedron.turned));
+            }
+        }
     }
 }
 
@@ -137,14 +199,25 @@ const BACK: f64 = -0.9;
 impl Cut<'_> {
     /// Whether a vertex was found on the blade in this stroke.
     pub(crate) fn is_on(&self, vertex: u32) -> bool {
-        let mark = &self.solid.vertices[vertex].mark;
+        let mark = self.solid.mark_of(vertex);
         mark.stroke == self.solid.stroke.number && mark.is_on()
+    }
+
+    /// What a vertex between two has of a stroke that goes on after this one: it lies on that blade if both do.
+    pub(crate) fn mark_between(&self, edge: [u32; 2]) -> Mark {
+        let [a, b] = edge.map(|end| {
+            let SolidVertex { mark, other_mark, .. } = self.solid.vertices[end];
+            let is_open = |mark: &Mark| mark.stroke != self.solid.stroke.number && mark.is_on();
+            [mark, other_mark].map(|mark| Some(mark).filter(is_open))
+        });
+        let of_both = |mark: &Mark| b.iter().flatten().any(|other| other.stroke == mark.stroke);
+        a.into_iter().flatten().find(of_both).unwrap_or(Mark::NONE)
     }
 
     /// Whether a vertex that was found on the blade, in this stroke or before, lies on it again if that has gone on to a plane: near that plane, or
     /// as far off as it was from the same plane before, when it was snapped. Of a blade that goes straight on rounding alone tells.
     pub(crate) fn is_on_again(&self, vertex: u32, plane: Plane, snap: f64) -> bool {
-        let mark = self.solid.vertices[vertex].mark;
+        let mark = self.solid.mark_of(vertex);
         let place = self.solid.rest_place(vertex);
         let (height, turn) = (plane.height(place), plane.normal.dot(mark.plane.normal));
         if !mark.is_on() || height.abs() > snap {
@@ -165,7 +238,7 @@ impl Cut<'_> {
             plane,
         };
         if self.is_on(vertex) {
-            let mark = self.solid.vertices[vertex].mark;
+            let mark = self.solid.mark_of(vertex);
             new.plane = mark.plane;
             if mark.side == Side::OnBend || mark.plane.normal.dot(plane.normal) < BENT {
                 new.side = Side::OnBend;
@@ -185,17 +258,22 @@ impl Cut<'_> {
             side: if is_above { Side::Above } else { Side::Below },
             plane: Plane::NONE,
         };
-        if self.solid.vertices[vertex].mark != mark {
+        if self.solid.mark_of(vertex) != mark {
             memory::push(&mut self.beside, vertex)?;
         }
         self.set_mark(vertex, mark)
     }
 
     fn set_mark(&mut self, vertex: u32, mark: Mark) -> Result<()> {
-        if self.solid.vertices[vertex].mark == mark {
+        if self.solid.mark_of(vertex) == mark {
             return Ok(());
         }
-        self.solid.vertices.edit(vertex, |vertex| vertex.mark = mark)
+        self.solid.vertices.edit(vertex, |vertex| {
+            if vertex.mark.stroke != mark.stroke && vertex.mark.stroke != 0 {
+                vertex.other_mark = vertex.mark;
+            }
+            vertex.mark = mark;
+        })
     }
 
     /// Marks the faces as severed of which all corners are on the blade, and that lie between its two sides.
@@ -248,14 +326,14 @@ impl Cut<'_> {
 
     /// Vertices beside one on the blade that an earlier stroke left in the same plane are of this stroke too.
     fn adopt(&mut self, vertex: u32, star: &[(u32, usize)], adopted: &mut Vec<u32>) -> Result<()> {
-        let Mark { stroke, plane, .. } = self.solid.vertices[vertex].mark;
+        let Mark { stroke, plane, .. } = self.solid.mark_of(vertex);
         let place = self.solid.rest_place(vertex);
         for &(tetrahedron, _) in star {
             let it = self.solid.tetrahedra[tetrahedron];
             let snap = self.solid.cells[it.cell].snap;
             for corner in it.corners {
-                let mark = self.solid.vertices[corner].mark;
-                if mark.stroke == stroke || mark.stroke == 0 || !mark.is_on() {
+                let SolidVertex { mark, other_mark, .. } = self.solid.vertices[corner];
+                if [mark, other_mark].iter().any(|mark| mark.stroke == stroke) || mark.stroke == 0 || !mark.is_on() {
                     continue;
                 }
                 let turn = mark.plane.normal.dot(plane.normal);
@@ -298,7 +376,7 @@ impl Cut<'_> {
             for other in (0..4).filter(|&other| other != corner) {
                 let other = self.solid.tetrahedra[tetrahedron].corners[other];
                 if self.is_on(other) {
-                    let mark = self.solid.vertices[other].mark;
+                    let mark = self.solid.mark_of(other);
                     let distance = self.solid.rest_place(other).distance(place);
                     let term = mark.plane.height(place) / distance.powi(3);
                     if mark.side == Side::On {
@@ -309,7 +387,7 @@ impl Cut<'_> {
                 }
             }
         }
-        let mark = self.solid.vertices[vertex].mark;
+        let mark = self.solid.mark_of(vertex);
         let is_above = if size > 0.0 && flat.abs() <= SURE * size {
             if mark.stroke == self.solid.stroke.number {
                 return Ok(false);
@@ -326,7 +404,7 @@ impl Cut<'_> {
             side: if is_above { Side::Above } else { Side::Below },
             plane: Plane::NONE,
         };
-        let is_news = self.solid.vertices[vertex].mark != mark;
+        let is_news = self.solid.mark_of(vertex) != mark;
         self.set_mark(vertex, mark)?;
         Ok(is_news)
     }
@@ -334,8 +412,8 @@ impl Cut<'_> {
     /// Whether a tetrahedron with three corners or more on the blade lies above it.
     pub(crate) fn is_above(&self, tetrahedron: u32) -> bool {
         match self.tip(tetrahedron) {
-            Some(tip) if self.solid.vertices[tip].mark.stroke == self.solid.stroke.number => {
-                self.solid.vertices[tip].mark.side == Side::Above
+            Some(tip) if self.solid.mark_of(tip).stroke == self.solid.stroke.number => {
+                self.solid.mark_of(tip).side == Side::Above
             }
             Some(tip) => self.is_place_above(tetrahedron, self.solid.rest_place(tip)),
             None => {
@@ -351,7 +429,7 @@ impl Cut<'_> {
     fn is_place_above(&self, tetrahedron: u32, place: DVec3) -> bool {
         let (mut flat, mut bent) = (0.0, 0.0);
         for corner in self.solid.tetrahedra[tetrahedron].corners {
-            let mark = self.solid.vertices[corner].mark;
+            let mark = self.solid.mark_of(corner);
             if self.is_on(corner) {
                 let sum = if mark.side == Side::On { &mut flat } else { &mut bent };
                 *sum += mark.plane.height(place);

@@ -90,6 +90,7 @@ impl Cut<'_> {
             point: NONE,
             around,
             mark: Mark::NONE,
+            other_mark: self.mark_between(edge),
         };
         let shares = [1.0 - along, along];
         for (source, share) in edge.into_iter().zip(shares) {

@@ -120,6 +120,7 @@ impl Substep<'_> {
                 damping: None,
                 substep: self.step as f32,
                 half: false,
+                sleeper: None,
             },
             positions: state.positions,
             velocities,

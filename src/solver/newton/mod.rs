@@ -52,7 +52,7 @@ impl Newton {
         Ok(Self {
             descent: Descent::new(node_count, springs, elements, beside)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
-            growths: memory::filled(0.0, elements.map_or(0, Elements::ring_count))?,
+            growths: memory::filled(0.0, elements.map_or(0, |elements| elements.ring_count_of(node_count)))?,
         })
     }
 

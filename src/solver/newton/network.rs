@@ -84,14 +84,15 @@ impl Network {
         let mut pair_count = 6 * elements.map_or(0, Elements::count);
         show_pairs(beside, &mut |_| pair_count += 1);
         let tetrahedron_count = elements.map_or(0, Elements::count);
-        let ring_count = elements.map_or(0, Elements::ring_count);
+        let ring_count = elements.map_or(0, |elements| elements.ring_count_of(node_count));
+        let may_load_rings = elements.is_some_and(Elements::may_load_rings);
         let remember = elements.is_some_and(Elements::remember);
         let mut network = Self {
             starts: memory::filled(0, node_count + 1)?,
             links: memory::reserved(springs.spring_count() + pair_count)?,
             tetrahedra: memory::reserved(tetrahedron_count)?,
             loads: memory::reserved(if remember { tetrahedron_count } else { 0 })?,
-            ring_loads: memory::reserved(if remember { ring_count } else { 0 })?,
+            ring_loads: memory::reserved(if may_load_rings { ring_count } else { 0 })?,
             terms: None,
             enclosed: None,
             edges: memory::reserved(pair_count)?,
@@ -192,7 +193,7 @@ impl Network {
         for (node, volume) in self.volumes.iter_mut().enumerate() {
             *volume = elements.ring_volume(node).unwrap_or(0.0);
         }
-        if elements.remember() {
+        if elements.may_load_rings() {
             let nodes = 0..self.volumes.len();
             self.ring_loads.extend(nodes.map(|node| elements.load_of_ring(node)));
         }

@@ -40,8 +40,8 @@ const CLOSING_SPEED: f64 = 0.25;
 pub(crate) struct Bound {
     /// By the body's place in the world.
     pub body: usize,
-    /// In the caller's numbers.
-    pub anchor: Anchor,
+    /// In the caller's numbers; `None`: what a blade stands in inside of a solid.
+    pub anchor: Option<Anchor>,
     /// Nodes in the body's own numbers, with their parts in the point, 1 in sum; 0 where there is none.
     pub nodes: [(u32, f32); OF_POINT],
 }
@@ -177,6 +177,11 @@ impl Bonds {
     /// Whether any acts in this moment.
     pub(super) fn act(&self) -> bool {
         self.bonds.iter().any(|bond| bond.acts)
+    }
+
+    /// Whether there are none.
+    pub(super) fn are_none(&self) -> bool {
+        self.bonds.is_empty()
     }
 
     /// The two bodies of each, by their places, or one twice.
@@ -488,10 +493,10 @@ mod tests {
     fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
         let mut all = [(0, 0.0); OF_POINT];
         all[..nodes.len()].copy_from_slice(nodes);
-        let anchor = Anchor::Point(SurfacePoint {
+        let anchor = Some(Anchor::Point(SurfacePoint {
             triangle,
             weights: [0.5, 0.25, 0.25],
-        });
+        }));
         Bound {
             body,
             anchor,
@@ -536,7 +541,7 @@ mod tests {
         assert_eq!(corners(&bonds, 1), [(2, 10, 0.5), (2, 11, -0.25), (2, 13, -0.25)]);
         // The cell of triangle 4 is a copy now, of which a triangle has another number; the point lies in a tetrahedron.
         let cut = bound(2, 40, &[(30, 0.5), (11, 0.25), (31, 0.125), (1, 0.125)]);
-        let is_cut = |point: &Bound| matches!(point.anchor, Anchor::Point(SurfacePoint { triangle: 4, .. }));
+        let is_cut = |point: &Bound| matches!(point.anchor, Some(Anchor::Point(SurfacePoint { triangle: 4, .. })));
         bonds.reserve_rebinding(2).expect("memory");
         bonds.rebind(5, |point| is_cut(point).then_some(cut));
         assert_eq!(
@@ -564,7 +569,7 @@ mod tests {
         assert_eq!(ends, [(2, 1), (2, 11), (2, 12), (2, 13), (2, 30), (2, 31), (5, 3)]);
         assert!(matches!(
             bonds.bonds[0].points[0].anchor,
-            Anchor::Point(SurfacePoint { triangle: 40, .. })
+            Some(Anchor::Point(SurfacePoint { triangle: 40, .. }))
         ));
     }
 }

@@ -112,8 +112,7 @@ impl Bonds {
         for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
             let Some(body) = bodies.at_mut(end.body) else { continue };
             let skin = skins.get(end.body).and_then(Option::as_ref);
-            end.is_on_skin =
-                moment.concerns(body) && skin.is_some_and(|skin| skin.nodes.binary_search(&end.node).is_ok());
+            end.is_on_skin = moment.concerns(body) && skin.is_some_and(|skin| skin.has(end.node));
             end.velocity = body.mean_velocity(end.node as usize);
             end.answer = body.answer_of(end.node) * body.left_by_damping(end.node, moment);
             end.place = body.state.newest().0.get(end.node as usize).as_dvec3() + body.origin;

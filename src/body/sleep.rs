@@ -1,0 +1,442 @@
+//! Tissue at rest is left alone, tile by tile, until something reaches it.
+//!
+//! The nodes of a tile that sleeps stand still in every place that the solver writes, so that a pass only has to leave it out.
+//! Forces that would make a tile as fast as the speed of rest within the time of rest, or move a node of it by about as far as that speed
+//! leads in that time, wake it: neighbours of what is awake are asked for them after each step.
+
+use glam::Vec3;
+
+use super::definition::not_negative;
+use super::{Body, Bounds, WriteRecords};
+use crate::contact::ToolPath;
+use crate::diagnostics::StateHasher;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::springs::{Motion, TILE, TileForces, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
+
+/// When tissue at rest is left alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sleep {
+    /// What is slower is at rest, m/s, at least 0; 0: the body never sleeps, and pays nothing for it.
+    pub speed: f32,
+    /// For how long it has to be at rest, s, above 0: some times what the tissue takes to settle.
+    pub time: f32,
+}
+
+impl Default for Sleep {
+    /// Never; after half a second.
+    fn default() -> Self {
+        Self { speed: 0.0, time: 0.5 }
+    }
+}
+
+impl Sleep {
+    pub(crate) fn check(&self) -> Result<()> {
+        not_negative("sleep_speed", self.speed)?;
+        if !(self.time > 0.0 && self.time.is_finite()) {
+            return Err(Error::invalid(format!(
+                "sleep_time is {}: must be above 0 and finite",
+                self.time
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Forces on what falls asleep are so much less than those that wake it: it does not wake at once.
+const SOUNDLY: f32 = 0.5;
+
+/// The mean of what rounding makes of the forces on a tile, as a part of that on one of its nodes.
+const NOISE: f32 = 0.05;
+
+/// A node is drawn by as many neighbours: where one of them goes a way, it is drawn by this part of that.
+const FEW: f32 = 0.25;
+
+/// Tools wake what they come near to, by this part of the body's extent.
+const NEAR: f32 = 0.02;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Tile {
+    /// For how long it has been at rest, s.
+    quiet: f32,
+    /// Whether a tool is near.
+    is_touched: bool,
+    /// What the forces on its nodes come to, as a part of what wakes it: as far as that was asked for in this step.
+    pull: f32,
+}
+
+/// What of a body sleeps.
+#[derive(Debug)]
+pub(crate) struct Sleeper {
+    sleep: Sleep,
+    tiles: Vec<Tile>,
+    /// Which of them sleep, and how many.
+    asleep: Vec<bool>,
+    asleep_count: usize,
+    /// The tiles that springs and elements join to each, from one start to the next.
+    neighbours: Vec<u32>,
+    starts: Vec<u32>,
+    /// Whether tiles may sleep by themselves: not where what moves any node is asked for all of them.
+    in_parts: bool,
+    /// The box that tools wake it in, and how far about a tile they do, m.
+    bounds: Bounds,
+    margin: f32,
+    /// The length of the last step that was taken, s: what tools felt in it they feel for as long as the body sleeps.
+    step: f32,
+}
+
+impl Sleeper {
+    #[inline]
+    pub fn is_asleep(&self, tile: usize) -> bool {
+        self.asleep[tile]
+    }
+
+    fn all(&self) -> bool {
+        self.asleep_count == self.tiles.len()
+    }
+
+    /// Wakes a tile; whether it slept.
+    fn wake(&mut self, tile: usize) -> bool {
+        self.tiles[tile].quiet = 0.0;
+        let slept = std::mem::replace(&mut self.asleep[tile], false);
+        self.asleep_count -= usize::from(slept);
+        slept
+    }
+
+    /// Lets a tile sleep that is awake.
+    fn rest(&mut self, tile: usize) {
+        self.asleep[tile] = true;
+        self.asleep_count += 1;
+    }
+
+    /// Makes room for so many tiles.
+    pub fn reserve(&mut self, tiles: usize) -> Result<()> {
+        memory::reserve(&mut self.tiles, tiles)?;
+        memory::reserve(&mut self.asleep, tiles)
+    }
+
+    /// The body has so many tiles now, for which there is room, joined otherwise than before, and all of them awake: from now on it sleeps as a
+    /// whole.
+    pub fn grow(&mut self, tiles: usize) {
+        self.tiles.resize(tiles, Tile::default());
+        self.asleep.resize(tiles, false);
+        self.in_parts = false;
+    }
+
+    /// A spring joins these of its own nodes now. Where tiles become neighbours that were not, the body sleeps as a whole.
+    pub fn join(&mut self, nodes: [u32; 2]) {
+        let [a, b] = nodes.map(|node| node as usize / TILE);
+        self.in_parts = self.in_parts && (a == b || self.neighbours(a).contains(&(b as u32)));
+    }
+
+    fn neighbours(&self, tile: usize) -> &[u32] {
+        &self.neighbours[self.starts[tile] as usize..self.starts[tile + 1] as usize]
+    }
+
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for (tile, &is_asleep) in self.tiles.iter().zip(&self.asleep) {
+            hasher.write_floats(&[tile.quiet]);
+            hasher.write_u64(u64::from(is_asleep));
+        }
+    }
+}
+
+impl Body {
+    /// What part of its nodes is awake, 0 to 1: stepped. 1 for bodies that never sleep.
+    pub fn awake_share(&self) -> f32 {
+        let Some(sleeper) = &self.sleeper else {
+            return 1.0;
+        };
+        let count = self.node_count();
+        let asleep = (0..sleeper.tiles.len()).filter(|&tile| sleeper.is_asleep(tile));
+        let asleep: usize = asleep.map(|tile| tile_nodes(tile, count).len()).sum();
+        1.0 - asleep as f32 / count as f32
+    }
+
+    /// Has all of it be stepped again, until it has been at rest for as long as it takes.
+    pub fn wake(&mut self) {
+        let Some(sleeper) = &mut self.sleeper else {
+            return;
+        };
+        let mut woken = false;
+        for tile in 0..sleeper.tiles.len() {
+            woken |= sleeper.wake(tile);
+        }
+        if woken {
+            self.forces_current = false;
+        }
+    }
+
+    /// The same for what is about one of its own nodes.
+    pub(crate) fn wake_at(&mut self, own: u32) {
+        let Some(sleeper) = &mut self.sleeper else {
+            return;
+        };
+        if !sleeper.in_parts {
+            self.wake();
+        } else if sleeper.wake(own as usize / TILE) {
+            self.forces_current = false;
+            self.wake_touched();
+        }
+    }
+
+    /// What tools hold up is awake as long as anything is: what they feel is worked out anew.
+    fn wake_touched(&mut self) {
+        if let Some(sleeper) = &mut self.sleeper {
+            for tile in 0..sleeper.tiles.len() {
+                if sleeper.tiles[tile].is_touched {
+                    sleeper.wake(tile);
+                }
+            }
+        }
+    }
+
+    /// Whether no part of it is awake.
+    pub(crate) fn is_asleep(&self) -> bool {
+        self.sleeper.as_ref().is_some_and(|sleeper| sleeper.all())
+    }
+
+    /// Whether a part of it sleeps.
+    pub(crate) fn sleeps(&self) -> bool {
+        self.sleeper.as_ref().is_some_and(|sleeper| sleeper.asleep_count > 0)
+    }
+
+    /// The step is over in which nothing of it changed.
+    pub(crate) fn sleep_on(&mut self) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.sleep_on();
+        }
+    }
+
+    /// The length of the step that sleeping bodies took last, s.
+    pub(crate) fn last_step(&self) -> f32 {
+        self.sleeper.as_ref().map_or(0.0, |sleeper| sleeper.step)
+    }
+
+    /// Makes it one that sleeps.
+    pub(super) fn make_sleeper(&mut self, sleep: Sleep) -> Result<()> {
+        if sleep.speed > 0.0 {
+            let tiles = tile_count(self.node_count());
+            let mut sleeper = Sleeper {
+                sleep,
+                tiles: memory::filled(Tile::default(), tiles)?,
+                asleep: memory::filled(false, tiles)?,
+                asleep_count: 0,
+                neighbours: Vec::new(),
+                starts: Vec::new(),
+                in_parts: self.implicit.is_none() && self.enclosed.is_none() && self.terms.is_none(),
+                bounds: Bounds::EMPTY,
+                margin: 0.0,
+                step: 0.0,
+            };
+            self.join_tiles(&mut sleeper)?;
+            self.sleeper = Some(Box::new(sleeper));
+        }
+        Ok(())
+    }
+
+    /// Finds which tiles act on which.
+    fn join_tiles(&self, sleeper: &mut Sleeper) -> Result<()> {
+        let mut pairs: Vec<[u32; 2]> = Vec::new();
+        let mut join = |a: u32, b: u32| -> Result<()> {
+            let pair = [a, b].map(|node| node / TILE as u32);
+            if pair[0] != pair[1] {
+                pairs.try_reserve(2)?;
+                pairs.extend([pair, [pair[1], pair[0]]]);
+            }
+            Ok(())
+        };
+        for node in 0..self.node_count() as u32 {
+            let mut result = Ok(());
+            self.springs.visit(node as usize, &mut |link| {
+                if result.is_ok() && link.neighbour > node {
+                    result = join(node, link.neighbour);
+                }
+            });
+            result?;
+        }
+        let mut result = Ok(());
+        if let Some(elements) = &self.elements {
+            elements.visit(&mut |corners, _| {
+                for (place, &a) in corners.iter().enumerate() {
+                    for &b in &corners[..place] {
+                        if result.is_ok() {
+                            result = join(a, b);
+                        }
+                    }
+                }
+            });
+        }
+        result?;
+        memory::sort_once(&mut pairs);
+        sleeper.starts = memory::reserved(sleeper.tiles.len() + 1)?;
+        let start = |tile: usize| pairs.partition_point(|pair| (pair[0] as usize) < tile) as u32;
+        sleeper.starts.extend((0..=sleeper.tiles.len()).map(start));
+        sleeper.neighbours = memory::reserved(pairs.len())?;
+        sleeper.neighbours.extend(pairs.iter().map(|pair| pair[1]));
+        Ok(())
+    }
+
+    /// Wakes what tools come near to in the step that begins.
+    pub(crate) fn rouse(&mut self, tools: &[ToolPath]) {
+        if !self.sleeps() {
+            return;
+        }
+        if self.is_grasped() {
+            self.wake();
+            return;
+        }
+        let Some((margin, bounds)) = self.sleeper.as_ref().map(|sleeper| (sleeper.margin, sleeper.bounds)) else {
+            return;
+        };
+        for tool in tools {
+            if !tool.filter.meets(self.contact.filter) || !tool.moves() {
+                continue;
+            }
+            if !tool.is_near(&bounds, self.origin, 0.0) {
+                continue;
+            }
+            let Some(sleeper) = &mut self.sleeper else {
+                return;
+            };
+            let mut woken = false;
+            for (tile, bounds) in self.boxes.iter().enumerate() {
+                woken |= sleeper.is_asleep(tile) && tool.is_near(bounds, self.origin, margin) && sleeper.wake(tile);
+            }
+            if woken && sleeper.in_parts {
+                self.forces_current = false;
+                self.wake_touched();
+            } else if woken {
+                self.wake();
+            }
+        }
+    }
+
+    /// After a step of `dt` seconds: what has been at rest for long enough falls asleep, and what its neighbours pull at wakes.
+    pub(crate) fn doze(&mut self, dt: f32, (tools, gravity): (&[ToolPath], Vec3), team: &Team) {
+        let Some(mut sleeper) = self.sleeper.take() else {
+            return;
+        };
+        sleeper.step = dt;
+        sleeper.margin = self.contact.thickness + NEAR * self.extent();
+        sleeper.bounds = self.local_bounds().extended(sleeper.margin);
+        self.touch(&mut sleeper, tools);
+        self.see_rest(&mut sleeper, dt);
+        self.feel(&mut sleeper, gravity, team);
+        let time = sleeper.sleep.time;
+        let mut woken = false;
+        for tile in 0..sleeper.tiles.len() {
+            let it = sleeper.tiles[tile];
+            if sleeper.is_asleep(tile) && (it.is_touched || it.pull > 1.0) {
+                woken |= sleeper.wake(tile);
+            }
+        }
+        let is_calm = |it: &Tile| it.quiet >= time && it.pull <= SOUNDLY;
+        let goes_on = sleeper.tiles.iter().zip(&sleeper.asleep);
+        let all = { goes_on }.all(|(it, &is_asleep)| is_asleep || is_calm(it) || it.is_touched && it.quiet >= time);
+        for tile in 0..sleeper.tiles.len() {
+            let it = sleeper.tiles[tile];
+            if sleeper.is_asleep(tile) {
+                continue;
+            }
+            if all || sleeper.in_parts && !it.is_touched && is_calm(&it) {
+                self.stand_still(tile);
+                sleeper.rest(tile);
+            } else if it.quiet >= time && it.pull > SOUNDLY && !it.is_touched {
+                // It is asked again after as long a time.
+                sleeper.tiles[tile].quiet = 0.0;
+            }
+        }
+        if woken {
+            self.forces_current = false;
+        }
+        self.sleeper = Some(sleeper);
+    }
+
+    /// Has the nodes of a tile stand still in all that a step reads.
+    fn stand_still(&mut self, tile: usize) {
+        let nodes = tile_nodes(tile, self.node_count());
+        self.state.stand_still(nodes.clone());
+        if let Some(records) = &mut self.records {
+            let axes = self.state.positions().slices(nodes.clone());
+            let records = &mut records.as_mut_slice()[nodes];
+            self.kernel.run(WriteRecords { axes, records });
+        }
+    }
+
+    /// Finds the tiles that tools are near to.
+    fn touch(&self, sleeper: &mut Sleeper, tools: &[ToolPath]) {
+        for (tile, bounds) in sleeper.tiles.iter_mut().zip(&self.boxes) {
+            let mut met = tools.iter().filter(|tool| tool.filter.meets(self.contact.filter));
+            tile.is_touched = met.any(|tool| tool.is_near(bounds, self.origin, sleeper.margin));
+        }
+    }
+
+    /// For how long tiles that are awake have been at rest.
+    fn see_rest(&self, sleeper: &mut Sleeper, dt: f32) {
+        let velocities = self.state.velocities();
+        let Sleeper {
+            sleep, tiles, asleep, ..
+        } = sleeper;
+        for (tile, it) in tiles.iter_mut().enumerate().filter(|&(tile, _)| !asleep[tile]) {
+            let nodes = tile_nodes(tile, velocities.len());
+            let bounds = Bounds::from(self.kernel.ranges(velocities.slices(nodes)));
+            let fastest = bounds.min.abs().max(bounds.max.abs()).length();
+            it.quiet = if fastest < sleep.speed { it.quiet + dt } else { 0.0 };
+        }
+    }
+
+    /// Finds what forces would make of nodes whose tiles sleep beside some that are awake, or may fall asleep.
+    fn feel(&self, sleeper: &mut Sleeper, gravity: Vec3, team: &Team) {
+        if self.implicit.is_some() {
+            return;
+        }
+        let mut tiles = std::mem::take(&mut sleeper.tiles);
+        let sleeper_now = &*sleeper;
+        team.pass(tiles.len(), Items::new(&mut tiles), |tile, it: &mut Tile| {
+            let is_asked = if sleeper_now.is_asleep(tile) {
+                let mut neighbours = sleeper_now.neighbours(tile).iter();
+                neighbours.any(|&other| !sleeper_now.is_asleep(other as usize))
+            } else {
+                it.quiet >= sleeper_now.sleep.time
+            };
+            if is_asked {
+                it.pull = self.pull_at(tile, sleeper_now.sleep, gravity);
+            }
+        });
+        sleeper.tiles = tiles;
+    }
+
+    /// What forces on the free nodes of a tile come to, as a part of what wakes it.
+    fn pull_at(&self, tile: usize, sleep: Sleep, gravity: Vec3) -> f32 {
+        let nodes = tile_nodes(tile, self.node_count());
+        let mut forces = TileForces::ZERO;
+        let velocities = self.springs.damped().then(|| self.state.velocities());
+        self.springs
+            .forces(tile, &Motion::at(self.state.positions(), velocities), &mut forces);
+        if let Some(elements) = &self.elements {
+            elements.shares().add(tile, &mut forces);
+        }
+        let (mut largest, mut sum, mut count) = (0.0_f32, Vec3::ZERO, 0.0);
+        for (place, node) in nodes.enumerate() {
+            let inverse_mass = self.inverse_masses[node];
+            if inverse_mass > 0.0 {
+                let pull = forces.get(place) * inverse_mass + gravity * (self.masses[node] * inverse_mass);
+                let held = self.pins.partial_axes_of(node as u32);
+                let pull = Vec3::select(held, Vec3::ZERO, pull);
+                largest = largest.max(pull.length());
+                sum += pull;
+                count += 1.0;
+            }
+        }
+        // By 4 over the square of the longest stable substep a node is drawn back to its place, at most.
+        let of_springs = self.carry.limit().unwrap_or(f32::INFINITY);
+        let substep = of_springs.min(self.newest_limit_beside_springs());
+        let stiffest = 4.0 / (substep * substep);
+        let least = sleep.speed / sleep.time + NOISE * stiffest * self.extent() * f32::EPSILON;
+        // Where nothing is drawn back it is the mean that counts.
+        let way = if stiffest > 0.0 { largest / stiffest } else { 0.0 };
+        (sum.length() / f32::max(count, 1.0) / least).max(way / (FEW * sleep.speed * sleep.time))
+    }
+}

@@ -1,0 +1,106 @@
+//! Tears of solids, along faces of their material.
+
+use super::cuttable::Cuttable;
+use super::tear::Torn;
+use super::tearing::Withheld;
+use super::{Body, CutReport};
+use crate::contact::Skin;
+use crate::cutting::{CutMaterial, Limits, Load};
+use crate::error::Result;
+use crate::memory;
+
+impl Body {
+    /// Tears a solid at a spring, or an edge of elements: through that of its nodes which is stretched more, else the other, or else one beside it.
+    pub(super) fn tear_solid(
+        &mut self,
+        cuttable: &mut Cuttable,
+        spring: [u32; 2],
+        mut skin: Option<&mut Skin>,
+    ) -> Result<Torn> {
+        let mut why = Withheld::NoWay;
+        for (node, load) in self.stretched_at(cuttable, spring)? {
+            match self.tear_node(cuttable, node, &load, skin.as_deref_mut())? {
+                Torn::Made => return Ok(Torn::Made),
+                Torn::Not(Withheld::NoWay) => {}
+                Torn::Not(other) => why = other,
+            }
+        }
+        Ok(Torn::Not(why))
+    }
+
+    /// The nodes at which a spring may tear its solid, in the order in which they are to be tried.
+    fn stretched_at(&self, cuttable: &Cuttable, spring: [u32; 2]) -> Result<Vec<(u32, Load)>> {
+        let Some(solid) = cuttable.material.solid() else {
+            return Ok(Vec::new());
+        };
+        let callers = spring.map(|node| self.order.caller(node));
+        let beside = solid.nodes_beside(callers)?;
+        let mut found = memory::reserved(2 + beside.len())?;
+        // What holds a node would hold its copies too.
+        let load_at = |&node: &u32| {
+            let is_free = self.inverse_masses[self.order.own(node) as usize] > 0.0;
+            let load = is_free.then(|| solid.load_at(node, self.positions())).flatten()?;
+            Some((node, load))
+        };
+        let more = |a: &(u32, Load), b: &(u32, Load)| b.1.tension.total_cmp(&a.1.tension).then(a.0.cmp(&b.0));
+        found.extend(callers.iter().filter_map(load_at));
+        found.sort_unstable_by(more);
+        let ends = found.len();
+        found.extend(beside.iter().filter_map(load_at));
+        found[ends..].sort_unstable_by(more);
+        Ok(found)
+    }
+
+    fn tear_node(&mut self, cuttable: &mut Cuttable, node: u32, load: &Load, skin: Option<&mut Skin>) -> Result<Torn> {
+        let limits = Limits {
+            nodes: self.node_room as u32,
+            ..Limits::NONE
+        };
+        let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
+        let CutMaterial::Solid(solid) = &mut cuttable.material else {
+            return Ok(Torn::Not(Withheld::NoWay));
+        };
+        let Some(vertex) = solid.vertex_of(node) else {
+            return Ok(Torn::Not(Withheld::NoWay));
+        };
+        let mut near = Vec::new();
+        for cell in solid.cells_at(node) {
+            memory::push(&mut near, cell)?;
+        }
+        let mut nodes = memory::reserved(4 * near.len())?;
+        nodes.extend(near.iter().flat_map(|&cell| solid.cells()[cell as usize].nodes));
+        memory::sort_once(&mut nodes);
+        let positions = self.positions();
+        let way = solid.way_of(vertex, load, positions)?;
+        let Some(changes) = solid.tear(vertex, load, positions, limits)? else {
+            return Ok(Torn::Not(Withheld::NoWay));
+        };
+        let least = self.tears.as_ref().map_or(0.0, |tears| tears.smallest_piece());
+        let is_less = if least > 0.0 {
+            solid.has_parted_less(&changes.faces, least)
+        } else {
+            Ok(false)
+        };
+        let applied = match is_less {
+            Ok(false) => self.apply(cuttable, skin, (&way, &near), &changes, counts),
+            Ok(true) => {
+                cuttable.material.undo();
+                return Ok(Torn::Not(Withheld::SmallPiece));
+            }
+            Err(error) => Err(error),
+        };
+        match applied {
+            Ok(CutReport { pieces_parted, .. }) => {
+                let order = &self.order;
+                if let Some(tears) = &mut self.tears {
+                    tears.made(pieces_parted, nodes.into_iter().map(|node| order.own(node)));
+                }
+                Ok(Torn::Made)
+            }
+            Err(error) => {
+                cuttable.material.undo();
+                Err(error)
+            }
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Bodies that sleep where they rest, as C asks for them: sinew_body_def.sleep_speed.
+
+use super::body::{sinew_body_id, with_body, with_body_mut};
+use super::memory;
+use super::status::sinew_status;
+use super::world::sinew_world;
+
+/// Writes what part of a body's nodes is awake, 0 to 1: stepped. 1 for a body that never sleeps, 0 where all of it is at rest, and a step
+/// costs next to nothing.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_awake_share(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = body.awake_share();
+            Ok(())
+        })
+    }
+}
+
+/// Has all of a body be stepped again, until it has been at rest for as long as it takes: whatever reaches it does so by itself.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_wake(world: *mut sinew_world, body: sinew_body_id) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.wake();
+            Ok(())
+        })
+    }
+}

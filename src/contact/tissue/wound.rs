@@ -1,0 +1,296 @@
+//! The two sides of a cut through a solid: faces that lie in one place when they are bared, and are to meet from then on without a thickness.
+//!
+//! What lies in one place has no distance to tell the sides by. Their faces do: tissue is behind them. So a corner of one side is to stay
+//! before the faces of the other that look at it, at no distance at all: nothing is pushed apart when it is cut, and a wound that closes is as
+//! it was before it was cut.
+
+use glam::Vec3;
+
+use super::link::Side;
+use super::search::{Search, Touch};
+use super::skin::{NONE, Skin};
+use crate::body::{Body, Bounds, Vectors};
+use crate::contact::sweep::{Corners, Segment, Separation};
+use crate::error::Result;
+use crate::memory;
+
+/// Edges meet that both look across the gap by this much at least, as the cosine of an angle.
+const SQUARELY: f32 = 0.5;
+
+/// A corner is behind a face where it is no deeper than this part of a short edge.
+const DEPTH: f32 = 1.0;
+
+/// The border of a wound holds corners that are beside it and behind it by no more than this part of a short edge: at first they lie on it.
+const BORDER: f32 = 0.05;
+
+/// What was behind a face at first, within so many times that depth, belongs to it.
+const BELONGS: f32 = 4.0;
+
+/// How deep behind a face is nothing yet, as a part of the least thickness.
+const NOTHING: f32 = 0.01;
+
+/// What cuts have bared of a solid's surface.
+#[derive(Debug)]
+pub(super) struct Wound {
+    /// The bared triangles, and by their numbers whether they are.
+    faces: Vec<u32>,
+    is_bared: Vec<bool>,
+    /// Their corners, and by their numbers whether they are.
+    nodes: Vec<u32>,
+    is_corner: Vec<bool>,
+    /// Which way is out at each, the sum of its bared triangles.
+    normals: Vectors,
+}
+
+impl Wound {
+    /// None yet, of a body with so many triangles.
+    pub fn new(body: &Body, triangles: usize) -> Result<Self> {
+        let spare = body.spare_nodes();
+        let mut is_bared = memory::reserved(triangles + 2 * spare)?;
+        is_bared.resize(triangles, false);
+        let mut is_corner = memory::reserved(body.node_count() + spare)?;
+        is_corner.resize(body.node_count(), false);
+        Ok(Self {
+            faces: memory::reserved(2 * spare)?,
+            is_bared,
+            nodes: memory::reserved(spare)?,
+            is_corner,
+            normals: body.zeros()?,
+        })
+    }
+
+    /// Makes room for so many triangles more, and so many that are bared.
+    pub fn reserve(&mut self, triangles: usize, bared: usize) -> Result<()> {
+        self.is_bared.try_reserve(triangles)?;
+        self.faces.try_reserve(bared)?;
+        Ok(self.nodes.try_reserve(3 * bared)?)
+    }
+
+    /// These triangles are bared, of those that there are now, with so many nodes.
+    pub fn bare(&mut self, bared: &[u32], triangles: &[[u32; 3]], node_count: usize) {
+        self.is_bared.resize(triangles.len(), false);
+        self.is_corner.resize(node_count.max(self.is_corner.len()), false);
+        self.normals.grow(node_count);
+        for &triangle in bared {
+            if !std::mem::replace(&mut self.is_bared[triangle as usize], true) {
+                self.faces.push(triangle);
+            }
+            for corner in triangles[triangle as usize] {
+                if !std::mem::replace(&mut self.is_corner[corner as usize], true) {
+                    self.nodes.push(corner);
+                }
+            }
+        }
+    }
+
+    /// Finds which way is out, with nodes at `starts`.
+    pub fn turn(&mut self, triangles: &[[u32; 3]], starts: &Vectors) {
+        for &node in &self.nodes {
+            self.normals.set(node as usize, Vec3::ZERO);
+        }
+        for &face in &self.faces {
+            let corners = triangles[face as usize];
+            let normal = normal(corners.map(|corner| starts.get(corner as usize)));
+            for corner in corners {
+                let sum = self.normals.get(corner as usize) + normal;
+                self.normals.set(corner as usize, sum);
+            }
+        }
+    }
+
+    /// Whether a triangle is bared.
+    pub fn is_bared(&self, triangle: usize) -> bool {
+        self.is_bared[triangle]
+    }
+
+    /// Whether all these are corners of what was bared.
+    pub fn has(&self, mut numbers: impl Iterator<Item = u32>) -> bool {
+        numbers.all(|number| self.is_corner[number as usize])
+    }
+}
+
+impl Search<'_> {
+    /// Shows the corners of a wound that come behind faces of its other side.
+    pub fn across_wounds(&self, see: &mut impl FnMut(Touch)) {
+        let party = self.parties[0];
+        let skin = party.skin;
+        let Some(wound) = skin.wound().filter(|_| self.is_of_one()) else {
+            return;
+        };
+        let depth = DEPTH * skin.short;
+        for &node in &wound.nodes {
+            let outward = wound.normals.get(node as usize);
+            let (start, step) = self.way(party, node, Vec3::ZERO, skin.drift);
+            let end = start + step;
+            let around = Bounds::of([start, end].into_iter());
+            let mut nearest: Option<((bool, f32), Over, usize, Vec3)> = None;
+            skin.near(&around, depth + skin.spread, |triangle| {
+                let nodes = skin.triangles[triangle];
+                if !wound.is_bared(triangle) || nodes.contains(&node) {
+                    return;
+                }
+                let corners = self.corners(party, &nodes);
+                let places = corners.at(1.0);
+                let normal = normal(places).normalize_or_zero();
+                if !(normal.dot(outward) < 0.0) {
+                    return;
+                }
+                let over = Over::new(end, places, normal);
+                let is_beside = over.beside > skin.least_thickness();
+                let border = BORDER * skin.short;
+                let within = if is_beside { border } else { depth };
+                // What lies on a face counts before what is beside one.
+                let key = (is_beside, over.height.abs());
+                if over.height.abs() < within
+                    && over.beside < border
+                    && nearest.is_none_or(|(least, ..)| key < least)
+                    && !skin.was_behind(node, nodes, BELONGS * depth)
+                {
+                    nearest = Some((key, over, triangle, normal));
+                }
+            });
+            if let Some((_, over, triangle, normal)) = nearest
+                && over.height < -NOTHING * skin.least_thickness()
+            {
+                let sides = [
+                    Side {
+                        body: party.place,
+                        nodes: [node; 3],
+                        weights: [1.0, 0.0, 0.0],
+                    },
+                    Side {
+                        body: party.place,
+                        nodes: skin.triangles[triangle],
+                        weights: over.weights,
+                    },
+                ];
+                self.show(sides, normal, (0.0, Vec3::ZERO), see);
+            }
+        }
+    }
+}
+
+impl Search<'_> {
+    /// Shows the edges of a wound that pass behind edges of its other side.
+    pub fn edges_across_wounds(&self, see: &mut impl FnMut(Touch)) {
+        let party = self.parties[0];
+        let skin = party.skin;
+        let Some(wound) = skin.wound().filter(|wound| !wound.faces.is_empty()) else {
+            return;
+        };
+        let border = BORDER * skin.short;
+        let outward = |[a, b]: [u32; 2]| wound.normals.get(a as usize) + wound.normals.get(b as usize);
+        for &edge in &skin.edges {
+            if edge[0] == NONE || !wound.has(edge.into_iter()) {
+                continue;
+            }
+            let ways = edge.map(|node| self.way(party, node, Vec3::ZERO, skin.drift));
+            let ends = ways.map(|(start, step)| start + step);
+            let segment = Segment {
+                ends,
+                steps: [Vec3::ZERO; 2],
+                radius: 0.0,
+            };
+            let around = Bounds::of(ends.into_iter());
+            let mut deepest: Option<(f32, [u32; 2], Separation, Vec3)> = None;
+            skin.near(&around, border + skin.spread, |triangle| {
+                for other in skin.owned(triangle).into_iter().filter(|&other| other != NONE) {
+                    let other = skin.edges[other as usize];
+                    let is_other = other > edge && !other.iter().any(|node| edge.contains(node));
+                    if !(is_other && wound.has(other.into_iter())) {
+                        continue;
+                    }
+                    let mut corners = self.corners(party, &other);
+                    corners.points = corners.at(1.0);
+                    corners.steps = [Vec3::ZERO; 3];
+                    let found = corners.separation(&segment, 0.0);
+                    let is_inside = found.inside && found.along > 0.0 && found.along < 1.0;
+                    let depth = found.offset.length();
+                    if !is_inside || depth > border || depth < NOTHING * skin.least_thickness() {
+                        continue;
+                    }
+                    // From the first edge to the other is out of the other, where the first is behind it.
+                    let normal = found.offset / depth;
+                    let looks = |along: Vec3| normal.dot(along.normalize_or_zero());
+                    let is_behind = looks(outward(other)) > SQUARELY && looks(outward(edge)) < -SQUARELY;
+                    if is_behind && deepest.is_none_or(|(most, ..)| depth > most) {
+                        deepest = Some((depth, other, found, normal));
+                    }
+                }
+            });
+            if let Some((_, other, found, normal)) = deepest {
+                let sides = [
+                    Side {
+                        body: party.place,
+                        nodes: [edge[0], edge[1], edge[1]],
+                        weights: [1.0 - found.along, found.along, 0.0],
+                    },
+                    Side {
+                        body: party.place,
+                        nodes: [other[0], other[1], other[1]],
+                        weights: found.weights,
+                    },
+                ];
+                self.show(sides, normal, (0.0, Vec3::ZERO), see);
+            }
+        }
+    }
+}
+
+impl Skin {
+    /// Whether a number was behind a triangle of the same body at first, as near as this, m: the tissue behind it is its own.
+    fn was_behind(&self, number: u32, triangle: [u32; 3], near: f32) -> bool {
+        self.firsts.as_ref().is_some_and(|firsts| {
+            let at = |number: u32| firsts.get(number as usize);
+            let places = triangle.map(at);
+            let normal = normal(places).normalize_or_zero();
+            let from = at(number) - places[0];
+            let separation = separation(at(number), places);
+            from.dot(normal) < -self.least_thickness() && separation.0.length_squared() < near * near
+        })
+    }
+}
+
+/// Where a point is, as a triangle sees it.
+#[derive(Clone, Copy)]
+struct Over {
+    /// How far above it, m.
+    height: f32,
+    /// How far beside it, m.
+    beside: f32,
+    /// The triangle's closest point.
+    weights: [f32; 3],
+}
+
+impl Over {
+    fn new(point: Vec3, triangle: [Vec3; 3], normal: Vec3) -> Self {
+        let (offset, weights) = separation(point, triangle);
+        let height = offset.dot(normal);
+        Self {
+            height,
+            beside: (offset - normal * height).length(),
+            weights,
+        }
+    }
+}
+
+/// From the closest point of a triangle to a point, and the parts of its corners in it.
+fn separation(point: Vec3, triangle: [Vec3; 3]) -> (Vec3, [f32; 3]) {
+    let segment = Segment {
+        ends: [point; 2],
+        steps: [Vec3::ZERO; 2],
+        radius: 0.0,
+    };
+    let corners = Corners {
+        points: triangle,
+        steps: [Vec3::ZERO; 3],
+        count: 3,
+    };
+    let found = corners.separation(&segment, 0.0);
+    (-found.offset, found.weights)
+}
+
+/// As long as twice the area.
+fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}

@@ -1,0 +1,221 @@
+//! Blades and tissue that moves, and blades that turn far in a step.
+#![allow(clippy::unwrap_used)]
+
+use std::f32::consts::PI;
+
+use glam::{DVec3, Quat, Vec3, vec3};
+use sinew::{BladeDefinition, BladeId, BodyDefinition, BodyId, Pose, Solver, Values, World, WorldDefinition};
+
+/// m: a square sheet in the plane z = 0, from the origin, in so many cells a side, of 1 kg/m².
+const SIZE: f32 = 0.1;
+const CELLS: usize = 20;
+
+fn sheet(toughness: f32, velocity: Vec3, solver: Solver, is_held: bool) -> (World, BodyId) {
+    let side = SIZE / CELLS as f32;
+    let mut positions = Vec::new();
+    let mut masses = Vec::new();
+    for y in 0..=CELLS {
+        for x in 0..=CELLS {
+            let is_border = x == 0 || y == 0 || x == CELLS || y == CELLS;
+            let off = if is_border {
+                0.0
+            } else {
+                0.15 * ((7 * x + 5 * y) as f32).sin()
+            };
+            positions.push(side * vec3(x as f32 + off, y as f32 - off, 0.0));
+            masses.push(if is_held && is_border { 0.0 } else { side * side });
+        }
+    }
+    let at = |x: usize, y: usize| (y * (CELLS + 1) + x) as u32;
+    let cells = (0..CELLS).flat_map(|y| (0..CELLS).map(move |x| (x, y)));
+    let triangles: Vec<[u32; 3]> = cells
+        .flat_map(|(x, y)| {
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            [[a, b, d], [a, d, c]]
+        })
+        .collect();
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        ..Default::default()
+    })
+    .unwrap();
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &positions,
+            masses: Values::Each(&masses),
+            triangles: &triangles,
+            stiffnesses: Values::Uniform(100.0),
+            spare_nodes: 4000,
+            toughness,
+            solver,
+            mass_scaling: 0.0,
+            ..Default::default()
+        })
+        .unwrap();
+    let velocities = vec![velocity; positions.len()];
+    world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
+    (world, body)
+}
+
+fn blade(world: &mut World, edge: [Vec3; 2], at: Vec3) -> BladeId {
+    world
+        .create_blade(&BladeDefinition {
+            stiffness: 500.0,
+            pose: Pose {
+                position: at,
+                ..Pose::IDENTITY
+            },
+            ..BladeDefinition::new(edge)
+        })
+        .unwrap()
+}
+
+const UPRIGHT: [Vec3; 2] = [vec3(0.0, 0.0, -0.02), vec3(0.0, 0.0, 0.02)];
+
+fn momentum(world: &World, body: BodyId) -> DVec3 {
+    let it = world.body(body).unwrap();
+    let of_node = |(node, velocity): (u32, &Vec3)| f64::from(it.node_mass(node).unwrap()) * velocity.as_dvec3();
+    (0..).zip(it.velocities()).map(of_node).sum()
+}
+
+fn energy(world: &World, body: BodyId) -> f64 {
+    let energy = world.body(body).unwrap().energy(Vec3::ZERO);
+    energy.kinetic + energy.elastic
+}
+
+#[test]
+fn tissue_that_moves_onto_a_resting_blade_is_cut() {
+    for (toughness, solver, dt) in [
+        (0.0, Solver::Verlet, 1e-3),
+        (0.0, Solver::Verlet, 8e-3),
+        (0.0, Solver::Implicit, 1e-3),
+        (0.005, Solver::Verlet, 0.5e-3),
+        (0.005, Solver::Implicit, 0.5e-3),
+    ] {
+        let (mut world, body) = sheet(toughness, vec3(-1.0, 0.1, 0.0), solver, false);
+        let knife = blade(&mut world, UPRIGHT, vec3(-0.012, 0.048, 0.0));
+        let (mut length, mut impulse, mut work) = (0.0, DVec3::ZERO, 0.0);
+        let before = (momentum(&world, body), energy(&world, body));
+        for _ in 0..(0.17 / dt) as usize {
+            world.step(dt).unwrap();
+            let report = world.blade_report(knife).unwrap();
+            assert_eq!(report.refused, None);
+            length += report.length;
+            impulse -= report.force.as_dvec3() * f64::from(dt);
+            work += report.work;
+        }
+        let lost = before.1 - energy(&world, body);
+        let gained = momentum(&world, body) - before.0;
+        let spent = f64::from(toughness) * length;
+        let what = format!(
+            "{toughness} J/m, {solver:?}, {dt} s: {length} m cut; {lost:.2e} J lost, {spent:.2e} spent, {work:.1e} work; {gained:?}, {impulse:?}"
+        );
+        assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2, "{what}");
+        assert!((length / 0.1005 - 1.0).abs() < 0.04, "{what}");
+        assert!(gained.distance(impulse) <= 1e-5 * before.0.length(), "{what}");
+        assert!(work.abs() < 1e-9, "{what}");
+        assert!(lost >= 0.95 * spent - 1e-6 * before.1, "{what}");
+    }
+}
+
+#[test]
+fn a_sheet_that_rests_on_a_blade_is_not_cut() {
+    let (mut world, body) = sheet(0.0, Vec3::ZERO, Solver::Verlet, false);
+    let knife = blade(&mut world, UPRIGHT, vec3(-0.001, 0.048, 0.0));
+    for _ in 0..20 {
+        world.step(1e-3).unwrap();
+    }
+    // Along its edge tissue goes freely.
+    world.set_blade_pose(knife, vec3(0.03, 0.048, 0.0), None).unwrap();
+    world.step(1e-3).unwrap();
+    let cut = world.blade_report(knife).unwrap().length;
+    assert!((cut / 0.03 - 1.0).abs() < 0.05, "{cut} m");
+    let velocities = vec![0.5 * Vec3::Z; world.body(body).unwrap().velocities().len()];
+    world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
+    let version = world.body(body).unwrap().topology_version();
+    for _ in 0..30 {
+        world.step(1e-3).unwrap();
+    }
+    assert_eq!(world.body(body).unwrap().topology_version(), version);
+}
+
+#[test]
+fn a_blade_that_turns_far_in_a_step_cuts_an_arc() {
+    for toughness in [0.0, 0.002] {
+        let (mut world, body) = sheet(toughness, Vec3::ZERO, Solver::Verlet, true);
+        let count = world.body(body).unwrap().surface().len();
+        let (centre, radius) = (vec3(0.051, 0.049, 0.0), 0.03);
+        let edge = UPRIGHT.map(|end| end + radius * Vec3::X);
+        let knife = blade(&mut world, edge, centre);
+        let mut length = 0.0;
+        for step in 1..=2 {
+            let turn = Quat::from_rotation_z(step as f32 * 0.7 * PI);
+            world.set_blade_pose(knife, centre, Some(turn)).unwrap();
+            world.step(1e-2).unwrap();
+            length += world.blade_report(knife).unwrap().length;
+        }
+        assert_eq!(world.blade_report(knife).unwrap().refused, None);
+        let way = f64::from(radius * 1.4 * PI);
+        // What resists keeps it a little behind.
+        assert!(
+            length > 0.85 * way && length < 1.03 * way,
+            "{toughness}: {length} of {way} m"
+        );
+        let it = world.body(body).unwrap();
+        assert!(it.surface().len() > count);
+        let changes = it.changes_since(0).unwrap();
+        let rim: Vec<u32> = changes.rim.iter().flat_map(|edge| edge.nodes).collect();
+        assert!(!rim.is_empty());
+        if toughness == 0.0 {
+            for point in rim {
+                let off = (it.positions()[point as usize].distance(centre) - radius).abs();
+                // As an arc is from the chord of half a radian, and what is snapped.
+                assert!(off < 0.0013, "{off} m off the arc");
+            }
+        }
+    }
+}
+
+#[test]
+fn blades_that_meet_in_one_instant_leave_no_bridge() {
+    for toughness in [0.0, 0.001] {
+        for steps in [30, 100, 240] {
+            for is_head_on in [false, true] {
+                let (mut world, body) = sheet(toughness, Vec3::ZERO, Solver::Verlet, true);
+                let middle = vec3(0.0512, 0.0487, 0.0);
+                let ways = if is_head_on {
+                    // Along one line, to the middle.
+                    [[vec3(-0.02, 0.0487, 0.0), middle], [vec3(0.1224, 0.0487, 0.0), middle]]
+                } else {
+                    [[-1.0, 1.0], [-1.0, 1.0]]
+                        .map(|ends| ends.map(|end| end * vec3(0.065, 0.006, 0.0)))
+                        .map(|ends| ends.map(|end| middle + end))
+                };
+                let ways = if is_head_on {
+                    ways
+                } else {
+                    let turn = Quat::from_rotation_z(0.5 * PI);
+                    [ways[0], ways[1].map(|end| middle + turn * (end - middle))]
+                };
+                let knives = ways.map(|[start, _]| blade(&mut world, UPRIGHT, start));
+                for step in 1..=steps {
+                    for (&knife, [start, end]) in knives.iter().zip(&ways) {
+                        let place = start.lerp(*end, step as f32 / steps as f32);
+                        world.set_blade_pose(knife, place, None).unwrap();
+                    }
+                    world.step(2e-3).unwrap();
+                    for knife in knives {
+                        assert_eq!(world.blade_report(knife).unwrap().refused, None);
+                    }
+                }
+                let pieces = world.body(body).unwrap().pieces().unwrap().count;
+                let what = format!("{toughness} J/m, {steps} steps, head on {is_head_on}");
+                if !is_head_on {
+                    assert_eq!(pieces, 4, "{what}");
+                } else if toughness == 0.0 {
+                    assert_eq!(pieces, 2, "{what}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Closed surfaces that are cut open: what was inside is lost, with what it took to keep it there.
+
+use glam::{DVec3, Vec3, vec3};
+use sinew::cutting::Sweep;
+use sinew::{BodyDefinition, Values, World, WorldDefinition};
+
+use super::motion::{SOLVERS, kept};
+
+/// An octahedron, each triangle divided in four so many times, on a sphere of 5 cm.
+fn ball(times: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
+    let mut triangles: Vec<[u32; 3]> = vec![
+        [0, 1, 2],
+        [1, 3, 2],
+        [3, 4, 2],
+        [4, 0, 2],
+        [1, 0, 5],
+        [3, 1, 5],
+        [4, 3, 5],
+        [0, 4, 5],
+    ];
+    for _ in 0..times {
+        let mut middles = std::collections::BTreeMap::new();
+        let mut finer = Vec::new();
+        for [a, b, c] in triangles {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
+                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    points.push((points[a as usize] + points[b as usize]).normalize());
+                    points.len() as u32 - 1
+                })
+            });
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    (points.iter().map(|&point| 0.05 * point).collect(), triangles)
+}
+
+#[test]
+fn a_balloon_that_is_pricked_has_no_pressure() {
+    for solver in SOLVERS {
+        for (pressure, squeezed) in [(0.0, 0.9), (50.0, 1.0)] {
+            let what = format!("{solver:?}, {pressure} Pa");
+            let (rest, triangles) = ball(3);
+            let positions: Vec<Vec3> = rest.iter().map(|place| *place * squeezed).collect();
+            let mut world = World::new(WorldDefinition {
+                gravity: Vec3::ZERO,
+                ..Default::default()
+            })
+            .unwrap();
+            let definition = BodyDefinition {
+                positions: &positions,
+                rest_positions: Some(&rest),
+                masses: Values::Uniform(1e-4),
+                triangles: &triangles,
+                stiffnesses: Values::Uniform(20.0),
+                enclosed_stiffness: 2000.0,
+                pressure,
+                // The last nodes are in a tile that the body had none in.
+                spare_nodes: 1000,
+                solver,
+                ..Default::default()
+            };
+            let body = world.create_body(&definition).unwrap();
+            let spin: Vec<Vec3> = positions
+                .iter()
+                .map(|&place| vec3(0.1, 0.2, 3.0).cross(place))
+                .collect();
+            world.body_mut(body).unwrap().set_velocities(&spin).unwrap();
+            for _ in 0..3 {
+                world.step(1e-3).unwrap();
+            }
+            let enclosed = world.body(body).unwrap().enclosed();
+            assert_eq!(enclosed.cavity_count, 1);
+            assert!(enclosed.pressure > 10.0, "{what}: {enclosed:?}");
+            let before = kept(&world, body);
+            let edge = |x: f32| [vec3(x, 0.001, 0.02), vec3(x, 0.0015, 0.08)];
+            let sweep = Sweep {
+                start: edge(-0.011),
+                end: edge(0.012),
+            };
+            let report = world.cut(body, &sweep).unwrap();
+            assert!(
+                report.pieces_parted == 0 && report.new_triangles > 0,
+                "{what}: {report:?}"
+            );
+            let after = kept(&world, body);
+            assert_eq!(world.body(body).unwrap().enclosed().cavity_count, 0, "{what}");
+            assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}");
+            let size: f64 = spin.iter().map(|speed| 1e-4 * f64::from(speed.length())).sum();
+            assert!(before.momentum.distance(after.momentum) < 1e-6 * size, "{what}");
+            assert!(before.spin.distance(after.spin) < 1e-6 * before.spin.length(), "{what}");
+            // Just what the cavity had is gone.
+            let (volume, rest_volume) = (enclosed.volume, enclosed.rest_volume);
+            let of_cavity = 1000.0 * rest_volume * (volume / rest_volume - 1.0).powi(2)
+                - f64::from(pressure) * (volume - rest_volume);
+            let off = before.energy - after.energy - of_cavity;
+            assert!(
+                off.abs() < 1e-5 * before.energy.abs().max(of_cavity.abs()),
+                "{what}: {off} J of {of_cavity}"
+            );
+            let at_last = after.energy;
+            for _ in 0..100 {
+                world.step(1e-3).unwrap();
+            }
+            let later = kept(&world, body);
+            assert!(later.energy < 1.02 * at_last, "{what}: {at_last} {}", later.energy);
+            let centre: DVec3 = later.momentum / later.mass;
+            assert!(centre.length() < 1e-3, "{what}: what was inside pushes it by {centre}");
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! Blades in solids that resist them: what a stroke costs, and what it gives.
+
+use glam::{DVec3, Vec3, vec3};
+use sinew::{
+    BladeDefinition, BladeId, BodyDefinition, BodyId, Material, Model, Pose, Solver, Values, World, WorldDefinition,
+};
+
+use super::block::{shaken, upright};
+use super::motion::kept;
+
+/// J/m².
+const TOUGHNESS: f32 = 2.0;
+
+/// A block of 6, 5 and 4 cm in cells of 1 cm, that weighs 1000 kg/m³.
+#[derive(Clone, Copy)]
+struct Block {
+    solver: Solver,
+    has_elements: bool,
+    /// At its sides along y.
+    is_held: bool,
+    toughness: f32,
+    spare: u32,
+    damping: f32,
+    thread_count: u32,
+}
+
+impl Block {
+    const HELD: Self = Self {
+        solver: Solver::Verlet,
+        has_elements: true,
+        is_held: true,
+        toughness: TOUGHNESS,
+        spare: 6000,
+        damping: 40.0,
+        thread_count: 1,
+    };
+
+    fn world(&self) -> (World, BodyId) {
+        let (rest, cells) = shaken([6, 5, 4], 3);
+        let cells: Vec<[u32; 4]> = cells.iter().map(|&cell| upright(&rest, cell)).collect();
+        let positions: Vec<Vec3> = rest.iter().map(|&place| 0.01 * place).collect();
+        let node_mass = 0.12 / positions.len() as f32;
+        let is_side = |place: &Vec3| place.y < 1e-4 || place.y > 0.0499;
+        let masses: Vec<f32> = positions
+            .iter()
+            .map(|place| if self.is_held && is_side(place) { 0.0 } else { node_mass })
+            .collect();
+        let mut world = World::new(WorldDefinition {
+            gravity: Vec3::ZERO,
+            thread_count: self.thread_count,
+            ..Default::default()
+        })
+        .unwrap();
+        let definition = BodyDefinition {
+            positions: &positions,
+            masses: Values::Each(&masses),
+            node_dampings: Values::Uniform(self.damping * node_mass),
+            tetrahedra: &cells,
+            spare_nodes: self.spare,
+            toughness: self.toughness,
+            solver: self.solver,
+            mass_scaling: 0.0,
+            ..Default::default()
+        };
+        let definition = if self.has_elements {
+            BodyDefinition {
+                material: Some(Material {
+                    model: Model::Tetrahedra,
+                    young_modulus: 3000.0,
+                    poisson_ratio: 0.3,
+                    ..Default::default()
+                }),
+                ..definition
+            }
+        } else {
+            BodyDefinition {
+                stiffnesses: Values::Uniform(20.0),
+                ..definition
+            }
+        };
+        let body = world.create_body(&definition).unwrap();
+        (world, body)
+    }
+}
+
+/// An edge of 8 cm along z about its own origin, at the level of the block's middle.
+fn blade_at(world: &mut World, stiffness: f32, at: Vec3, edge: [Vec3; 2]) -> BladeId {
+    let pose = Pose {
+        position: at,
+        ..Pose::IDENTITY
+    };
+    world
+        .create_blade(&BladeDefinition {
+            stiffness,
+            pose,
+            ..BladeDefinition::new(edge)
+        })
+        .unwrap()
+}
+
+const THROUGH: [Vec3; 2] = [vec3(0.0, 0.0, -0.04), vec3(0.0, 0.0, 0.04)];
+
+/// What a stroke came to.
+#[derive(Default)]
+struct Stroke {
+    /// The work of the hand by force and displacement, and as it was reported, J.
+    work: f64,
+    told: f64,
+    /// m².
+    area: f64,
+    forces: Vec<Vec3>,
+    refused: usize,
+    impulse: DVec3,
+    spin: DVec3,
+}
+
+impl Stroke {
+    fn draw(&mut self, world: &mut World, blade: BladeId, [from, to]: [Vec3; 2], steps: usize, dt: f32) {
+        let mut before = from;
+        for step in 1..=steps {
+            let place = from.lerp(to, step as f32 / steps as f32);
+            world.set_blade_pose(blade, place, None).unwrap();
+            world.step(dt).unwrap();
+            let report = world.blade_report(blade).unwrap();
+            let (force, torque) = (report.force.as_dvec3(), report.torque.as_dvec3());
+            self.work -= force.dot((place - before).as_dvec3());
+            self.told += report.work;
+            self.area += report.area;
+            self.forces.push(report.force);
+            self.refused += usize::from(report.refused.is_some());
+            self.impulse -= force * f64::from(dt);
+            self.spin -= (torque + (0.5 * (before + place)).as_dvec3().cross(force)) * f64::from(dt);
+            before = place;
+        }
+    }
+
+    fn largest_jump(&self) -> f32 {
+        let jumps = self.forces.windows(2).map(|pair| pair[0].distance(pair[1]));
+        jumps.fold(0.0, f32::max)
+    }
+}
+
+#[test]
+fn the_work_of_a_stroke_is_toughness_times_area() {
+    for (solver, has_elements, steps) in [
+        (Solver::Verlet, true, 60),
+        (Solver::Verlet, true, 250),
+        (Solver::Verlet, true, 1000),
+        (Solver::Verlet, false, 250),
+        (Solver::Implicit, true, 250),
+        (Solver::Implicit, false, 250),
+    ] {
+        let block = Block {
+            solver,
+            has_elements,
+            ..Block::HELD
+        };
+        let (mut world, body) = block.world();
+        let way = [vec3(-0.01, 0.023, 0.021), vec3(0.08, 0.027, 0.021)];
+        let blade = blade_at(&mut world, 100.0, way[0], THROUGH);
+        let mut stroke = Stroke::default();
+        stroke.draw(&mut world, blade, way, steps, 1.5 / steps as f32);
+        let spent = f64::from(TOUGHNESS) * stroke.area;
+        let what = format!(
+            "{solver:?}, elements {has_elements}, {steps} steps: work {:.6} J, told {:.6}, opened {:.6} m², ratio {:.4}, jump {:.4}",
+            stroke.work,
+            stroke.told,
+            stroke.area,
+            stroke.work / spent,
+            stroke.largest_jump(),
+        );
+        assert!((stroke.work / spent - 1.0).abs() < 0.05, "{what}");
+        assert!((stroke.told / stroke.work - 1.0).abs() < 1e-3, "{what}");
+        assert!((stroke.area / 2.4e-3 - 1.0).abs() < 0.05, "{what}");
+        assert_eq!(stroke.refused, 0);
+        assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2, "{what}");
+        assert_eq!(*stroke.forces.last().unwrap(), Vec3::ZERO, "{what}");
+    }
+}
+
+#[test]
+fn the_jumps_of_the_force_halve_with_the_step() {
+    // Soft enough for some steps of 8 ms before it cuts, and at the skin at the end of a step of each length.
+    let jumps: Vec<f32> = [8e-3, 4e-3, 2e-3, 1e-3]
+        .into_iter()
+        .map(|dt: f32| {
+            let (mut world, _) = Block::HELD.world();
+            let start = -0.05 * 0.024 + 1e-6;
+            let way = [vec3(start, 0.023, 0.021), vec3(start + 0.04, 0.026, 0.021)];
+            let blade = blade_at(&mut world, 10.0, way[0], THROUGH);
+            let mut stroke = Stroke::default();
+            stroke.draw(&mut world, blade, way, (0.8 / dt).round() as usize, dt);
+            assert!(stroke.area > 5e-4, "{} m²", stroke.area);
+            stroke.largest_jump()
+        })
+        .collect();
+    for pair in jumps.windows(2) {
+        assert!(pair[1] < 0.6 * pair[0], "{jumps:?} N");
+    }
+}
+
+#[test]
+fn a_free_block_gets_the_momentum_and_no_more_than_the_work() {
+    for (solver, has_elements) in [
+        (Solver::Verlet, true),
+        (Solver::Verlet, false),
+        (Solver::Implicit, true),
+        (Solver::Newton, true),
+    ] {
+        let block = Block {
+            is_held: false,
+            toughness: 0.5,
+            damping: 0.0,
+            solver,
+            has_elements,
+            ..Block::HELD
+        };
+        let (mut world, body) = block.world();
+        let way = [vec3(-0.01, 0.018, 0.035), vec3(0.05, 0.022, 0.035)];
+        // Not all the way through.
+        let edge = [vec3(0.0, 0.0, -0.02), vec3(0.0, 0.0, 0.03)];
+        let blade = blade_at(&mut world, 100.0, way[0], edge);
+        let mut stroke = Stroke::default();
+        stroke.draw(&mut world, blade, way, 150, 0.5e-3);
+        let kept = kept(&world, body);
+        let spent = f64::from(block.toughness) * stroke.area;
+        let what = format!(
+            "{solver:?}, elements {has_elements}: work {:.3e} J, {spent:.3e} cut, {:.3e} kept; momentum {:?}, impulse {:?}; {:?} {:?}",
+            stroke.work, kept.energy, kept.momentum, stroke.impulse, kept.spin, stroke.spin,
+        );
+        assert!(
+            kept.momentum.distance(stroke.impulse) <= 1e-4 * stroke.impulse.length(),
+            "{what}"
+        );
+        assert!(kept.spin.distance(stroke.spin) <= 1e-2 * stroke.spin.length(), "{what}");
+        // What has opened lags behind what is paid for.
+        assert!(
+            stroke.area > 2e-4 && stroke.work >= 0.95 * spent + kept.energy,
+            "{what}"
+        );
+    }
+}
+
+#[test]
+fn what_resists_a_blade_is_the_same_with_any_number_of_threads() {
+    let [one, three] = [1, 3].map(|thread_count| {
+        let (mut world, body) = Block {
+            thread_count,
+            ..Block::HELD
+        }
+        .world();
+        let way = [vec3(-0.01, 0.023, 0.021), vec3(0.04, 0.027, 0.021)];
+        let blade = blade_at(&mut world, 100.0, way[0], THROUGH);
+        let mut stroke = Stroke::default();
+        stroke.draw(&mut world, blade, way, 60, 5e-3);
+        (
+            world.state_hash(),
+            stroke.forces,
+            world.body(body).unwrap().positions().to_vec(),
+        )
+    });
+    assert_eq!(one, three);
+}
+
+#[test]
+fn without_room_a_blade_stays_and_the_block_is_as_it_was() {
+    let (mut world, body) = Block {
+        spare: 5,
+        ..Block::HELD
+    }
+    .world();
+    let triangles = world.body(body).unwrap().surface().to_vec();
+    let way = [vec3(-0.01, 0.023, 0.021), vec3(0.05, 0.027, 0.021)];
+    let blade = blade_at(&mut world, 20.0, way[0], THROUGH);
+    let mut stroke = Stroke::default();
+    stroke.draw(&mut world, blade, way, 100, 5e-3);
+    assert!(stroke.refused > 20 && stroke.area == 0.0);
+    assert_eq!(world.body(body).unwrap().surface(), triangles);
+    // It still resists, no harder than it would if it gave way.
+    let force = stroke.forces.last().unwrap().length();
+    let most = 0.04 * TOUGHNESS;
+    assert!(force > 0.2 * most && force < 1.3 * most, "{force} N");
+}

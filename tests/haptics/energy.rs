@@ -1,0 +1,75 @@
+//! A hand in the loop gains no energy.
+
+use crate::bench::*;
+use glam::{DVec3, dvec3};
+use sinew::Solver;
+
+/// J: what a spring of 1000 N/m stores where it is drawn out by 0.06 mm.
+const UNFELT: f64 = 2e-6;
+
+/// A mass on a spring, whose motion under a force that is constant for a tick is exact.
+struct Hand {
+    /// kg.
+    mass: f64,
+    /// N/m, and where it pulls to.
+    stiffness: f64,
+    home: DVec3,
+    position: DVec3,
+    velocity: DVec3,
+}
+
+impl Hand {
+    fn tick(&mut self, force: DVec3, dt: f64) {
+        if self.stiffness == 0.0 {
+            let acceleration = force / self.mass;
+            self.position += self.velocity * dt + 0.5 * acceleration * dt * dt;
+            self.velocity += acceleration * dt;
+            return;
+        }
+        let omega = (self.stiffness / self.mass).sqrt();
+        let rest = self.home + force / self.stiffness;
+        let (sine, cosine) = (omega * dt).sin_cos();
+        let off = self.position - rest;
+        self.position = rest + off * cosine + self.velocity * (sine / omega);
+        self.velocity = self.velocity * cosine - off * (omega * sine);
+    }
+
+    fn energy(&self) -> f64 {
+        0.5 * self.mass * self.velocity.length_squared()
+            + 0.5 * self.stiffness * (self.position - self.home).length_squared()
+    }
+}
+
+/// A hand that strikes the tissue: what it had at first and at most, and what hand and tissue have in the end, J.
+fn strike(bench: &mut Bench, mut hand: Hand, ticks: u32) -> [f64; 3] {
+    let first = hand.energy();
+    let mut most = 0.0_f64;
+    for _ in 0..ticks {
+        let record = bench.tick(hand.position, hand.velocity);
+        hand.tick(record.tick.force.as_dvec3(), f64::from(TICK));
+        most = most.max(hand.energy());
+    }
+    [first, most, hand.energy() + bench.energy()]
+}
+
+#[test]
+fn a_hand_that_strikes_tissue_gains_nothing() {
+    for (solver, every) in [(Solver::Verlet, 1), (Solver::Verlet, 16), (Solver::Implicit, 1)] {
+        for (mass, stiffness) in [(0.05, 0.0), (0.3, 0.0), (0.1, 200.0), (0.1, 3000.0)] {
+            for speed in [0.05, 0.2] {
+                let mut bench = Bench::new(solver, every);
+                let hand = Hand {
+                    mass,
+                    stiffness,
+                    home: dvec3(0.0, f64::from(RADIUS) - 1e-3, 0.0),
+                    position: dvec3(0.0, f64::from(RADIUS) + 5e-4, 0.0),
+                    velocity: dvec3(0.0, -speed, 0.0),
+                };
+                let [first, most, left] = strike(&mut bench, hand, 700);
+                let case = format!("{solver:?}, a step for {every} ticks, {mass} kg, {stiffness} N/m, {speed} m/s");
+                assert!(most <= first + UNFELT, "{case}: {most} J of {first} J");
+                assert!(left < 0.9 * first, "{case}: {left} J are left of {first} J");
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! What is felt is what the world says, no later than two of its steps.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::bench::*;
+use glam::{DVec3, Vec3, dvec3};
+use sinew::Solver;
+
+const TOP: f64 = RADIUS as f64;
+const START: f64 = (RADIUS + CLEAR) as f64;
+
+/// The most that forces along the same path differ, as a part of the greater, where there is something to feel.
+fn difference(one: &[Record], other: &[Record]) -> f64 {
+    let pairs = one.iter().zip(other);
+    let felt = pairs.filter_map(|(one, other)| {
+        let [a, b] = [one, other].map(|record| record.tick.force.as_dvec3());
+        let larger = a.length().max(b.length());
+        (larger > 0.1).then(|| (a - b).length() / larger)
+    });
+    felt.fold(0.0, f64::max)
+}
+
+#[test]
+fn slow_motions_feel_as_if_every_tick_were_a_step() {
+    // A press, a stroke along the surface and back, and a way out, at 8 mm/s at most.
+    let path = |t: f64| match t {
+        t if t < 1.6 => dvec3(0.0, START - 0.0025 * (1.0 - (PI * t / 1.6).cos()) * 1.6, 0.0),
+        t if t < 3.2 => dvec3(0.004 * (1.0 - (TAU * (t - 1.6) / 1.6).cos()) * 0.5, START - 0.008, 0.0),
+        t => dvec3(
+            0.0,
+            START - 0.008 + 0.0025 * (1.0 - (PI * (t - 3.2) / 1.6).cos()) * 1.6,
+            0.0,
+        ),
+    };
+    let [full, local] = [1, 16].map(|every| Bench::fine(Solver::Verlet, every).follow(4.8, path));
+    let most = full.iter().map(|record| record.tick.force.length()).fold(0.0, f32::max);
+    assert!(most > 0.3, "{most} N at most");
+    let off = difference(&full, &local);
+    assert!(off < 0.02, "{off} off");
+}
+
+#[test]
+fn a_hand_at_rest_feels_what_the_world_tells() {
+    let mut bench = Bench::new(Solver::Verlet, 16);
+    bench.follow(0.6, |t| dvec3(0.0, TOP - 0.01 * t.min(0.4), 0.0));
+    let still = bench.follow(0.5, |_| dvec3(0.0, TOP - 0.004, 0.0));
+    let felt = still.last().unwrap().tick;
+    let (told, _) = bench.world.wrench(bench.tool).unwrap();
+    assert!((felt.force - told).length() < 1e-3 * told.length(), "{felt:?} {told}");
+    // The spring between device and proxy is drawn out by it.
+    let drawn = felt.proxy.position - still.last().unwrap().position.as_vec3();
+    assert!((1000.0 * drawn - felt.force).length() < 1e-3 * felt.force.length());
+    assert!(felt.contact_count > 0);
+    let mut pressed = Vec3::ZERO;
+    bench.handle.contacts(|contact| {
+        assert!(
+            contact.normal.y < -0.5 && contact.velocity.length() < 1e-3,
+            "{contact:?}"
+        );
+        pressed += contact.force;
+    });
+    assert!((pressed - told).length() < 0.01 * told.length(), "{pressed} {told}");
+}
+
+#[test]
+fn what_is_felt_is_two_steps_old_at_most() {
+    let mut bench = Bench::new(Solver::Implicit, 16);
+    // As slow as a model is good for, and then still: what is felt then settles.
+    let speed = 0.02;
+    let moved = bench.follow(0.3, |t| dvec3(0.0, TOP - speed * t, 0.0));
+    let ages = moved.iter().skip(32).map(|record| record.tick.age);
+    assert!(ages.fold(0.0, f32::max) <= 2.0 * 16.0 * TICK, "{:?}", moved.last());
+    let stop = TOP - speed * 0.3;
+    let still = bench.follow(0.5, |_| dvec3(0.0, stop, 0.0));
+    let end = still.last().unwrap().tick.force.as_dvec3();
+    let late = still[32].tick.force.as_dvec3();
+    assert!((late - end).length() < 0.02 * end.length(), "{late} {end}");
+}
+
+#[test]
+fn a_stale_model_is_felt_no_more() {
+    let mut bench = Bench::new(Solver::Verlet, 16);
+    bench.follow(0.5, |t| dvec3(0.0, TOP - 0.01 * t.min(0.4), 0.0));
+    let here = dvec3(0.0, TOP - 0.004, 0.0);
+    let before = bench.tick(here, DVec3::ZERO).tick.force;
+    assert!(before.y > 0.1);
+    bench.every = 0;
+    let stalled = bench.follow(0.5, |_| here);
+    // Until it is stale it stays.
+    let soon = stalled[60].tick;
+    assert!(
+        soon.gain == 1.0 && (soon.force - before).length() < 0.02 * before.length(),
+        "{soon:?}"
+    );
+    let end = stalled.last().unwrap().tick;
+    assert!(
+        end.gain == 0.0 && end.force == Vec3::ZERO && end.torque == Vec3::ZERO,
+        "{end:?}"
+    );
+    // As it goes it only falls, and it comes back.
+    let falls = |pair: &[Record]| pair[1].tick.force.y <= pair[0].tick.force.y + 1e-6;
+    assert!(stalled[80..].windows(2).all(falls));
+    bench.every = 16;
+    let again = bench.follow(0.5, |_| here);
+    let end = again.last().unwrap().tick;
+    assert!(
+        end.gain == 1.0 && (end.force - before).length() < 0.02 * before.length(),
+        "{end:?} {before}"
+    );
+}
+
+#[test]
+fn limits_are_kept() {
+    let path = |t: f64| dvec3(0.0, TOP - 0.2 * t.min(0.04) + 1e-3, 0.0);
+    let free = Bench::new(Solver::Verlet, 16).follow(0.5, path);
+    let most = free.iter().map(|record| record.tick.force.length()).fold(0.0, f32::max);
+    let mut limited = Bench::with(Solver::Verlet, 16, |definition| {
+        definition.force_limit = 0.2;
+        definition.force_rate_limit = 3.0;
+    });
+    let felt = limited.follow(0.5, path);
+    assert!(most > 0.4, "{most}");
+    let mut before = Vec3::ZERO;
+    for Record { tick, .. } in &felt {
+        assert!(tick.force.length() <= 0.2 * (1.0 + 1e-6), "{tick:?}");
+        assert!((tick.force - before).length() <= 3.0 * TICK * (1.0 + 1e-3), "{tick:?}");
+        before = tick.force;
+    }
+    assert!(before.length() > 0.199, "{before}");
+}

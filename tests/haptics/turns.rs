@@ -1,0 +1,178 @@
+//! What turns: a capsule that lies on the tissue, led by a hand that turns it too.
+
+use crate::bench::*;
+use glam::{DQuat, DVec3, Quat, Vec3, dvec3, vec3};
+use sinew::{HapticDefinition, HapticTick, Pose, Shape, Solver, ToolDefinition};
+use std::f64::consts::FRAC_PI_2;
+
+const HALF: f32 = 0.02;
+
+/// A bench whose tool is a capsule along x, this far above where it touches.
+fn lying(solver: Solver, every: u32, above: f32, change: impl FnOnce(&mut HapticDefinition)) -> Bench {
+    let mut bench = Bench::new(solver, every);
+    bench.world.destroy_tool(bench.tool).unwrap();
+    let capsule = ToolDefinition {
+        pose: Pose {
+            position: vec3(0.0, RADIUS + above, 0.0),
+            orientation: Quat::from_rotation_z(FRAC_PI_2 as f32),
+        },
+        ..ToolDefinition::new(Shape::Capsule {
+            radius: RADIUS,
+            half_length: HALF,
+        })
+    };
+    bench.tool = bench.world.create_tool(&capsule).unwrap();
+    let mut definition = HapticDefinition::new(bench.tool);
+    change(&mut definition);
+    bench.handle = bench.world.create_haptic(&definition).unwrap();
+    bench
+}
+
+/// Ticks of a hand that stays there, turned so from lying.
+fn hold(bench: &mut Bench, ticks: u32, position: Vec3, turned: impl Fn(u32) -> Quat) -> HapticTick {
+    let lying = Quat::from_rotation_z(FRAC_PI_2 as f32);
+    let mut last = None;
+    for tick in 1..=ticks {
+        let pose = Pose {
+            position,
+            orientation: turned(tick) * lying,
+        };
+        last = Some(bench.handle.tick(pose, None, None, TICK).unwrap());
+        if tick % bench.every == 0 {
+            bench.world.step(bench.every as f32 * TICK).unwrap();
+        }
+    }
+    last.unwrap()
+}
+
+#[test]
+fn a_torque_turns_the_hand_back() {
+    for sign in [1.0, -1.0] {
+        let mut bench = lying(Solver::Implicit, 16, 0.0, |_| ());
+        let place = vec3(0.0, RADIUS - 2e-3, 0.0);
+        // About z the end at +x goes up, the other down into the tissue. Either sign of a quaternion is the same turn.
+        let felt = hold(&mut bench, 600, place, |tick| {
+            Quat::from_rotation_z(sign * 0.15 * (tick as f32 / 300.0).min(1.0)) * if tick % 2 == 0 { 1.0 } else { -1.0 }
+        });
+        let (force, torque) = bench.world.wrench(bench.tool).unwrap();
+        assert!(sign * felt.torque.z < -1e-3, "{felt:?}");
+        assert!(
+            (felt.torque - torque).length() < 2e-3 * torque.length(),
+            "{felt:?} {torque}"
+        );
+        assert!(
+            (felt.force - force).length() < 2e-3 * force.length(),
+            "{felt:?} {force}"
+        );
+        // The tool is turned back by what the torque draws the spring out.
+        let wanted = Quat::from_rotation_z(sign * 0.15 + FRAC_PI_2 as f32);
+        let drawn = (felt.proxy.orientation * wanted.conjugate()).to_scaled_axis();
+        let lever = RADIUS + HALF;
+        assert!(
+            (drawn * 1000.0 * lever * lever - felt.torque).length() < 5e-3 * felt.torque.length(),
+            "{drawn}"
+        );
+    }
+}
+
+#[test]
+fn turning_may_be_soft_or_hard() {
+    for (stiffness, furthest) in [(1e-3, 1.0), (1e38, 1e-6)] {
+        let mut bench = lying(Solver::Implicit, 16, 0.0, |it| it.angular_stiffness = stiffness);
+        for tick in 1..=250 {
+            let t = tick as f32 * TICK;
+            let turned = Quat::from_rotation_z(0.2 * (11.0 * t).sin());
+            let place = vec3(0.01 * (3.0 * t).sin(), RADIUS - 4e-3 * (7.0 * t).sin(), 0.0);
+            let felt = hold(&mut bench, 1, place, |_| turned);
+            if tick % 16 == 0 {
+                bench.world.step(16.0 * TICK).unwrap();
+            }
+            let wanted = turned * Quat::from_rotation_z(FRAC_PI_2 as f32);
+            let off = (felt.proxy.orientation * wanted.conjugate()).to_scaled_axis().length();
+            assert!(off <= furthest * 1.001, "{off} rad: {felt:?}");
+            assert!(felt.torque.length() < 0.1, "{felt:?}");
+        }
+    }
+}
+
+/// A rigid hand that holds the tool, on a spring or free.
+struct Hand {
+    /// kg, kg m^2 and N/m.
+    mass: f64,
+    inertia: f64,
+    stiffness: f64,
+    home: DVec3,
+    position: DVec3,
+    orientation: DQuat,
+    velocity: DVec3,
+    spin: DVec3,
+}
+
+impl Hand {
+    fn energy(&self) -> f64 {
+        0.5 * self.mass * self.velocity.length_squared()
+            + 0.5 * self.inertia * self.spin.length_squared()
+            + 0.5 * self.stiffness * (self.position - self.home).length_squared()
+    }
+
+    /// Exact where it is free, else with a hundred parts of a tick.
+    fn tick(&mut self, felt: &HapticTick) {
+        let parts = if self.stiffness == 0.0 { 1 } else { 100 };
+        let dt = f64::from(TICK) / f64::from(parts);
+        let turning = felt.torque.as_dvec3() / self.inertia;
+        for _ in 0..parts {
+            let pull = |position: DVec3| self.stiffness * (self.home - position) + felt.force.as_dvec3();
+            let before = pull(self.position) / self.mass;
+            self.position += self.velocity * dt + 0.5 * dt * dt * before;
+            self.velocity += 0.5 * dt * (before + pull(self.position) / self.mass);
+            let turned = self.spin * dt + 0.5 * dt * dt * turning;
+            self.spin += turning * dt;
+            self.orientation = (DQuat::from_scaled_axis(turned) * self.orientation).normalize();
+        }
+    }
+}
+
+#[test]
+fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
+    // J: what a spring of 1000 N/m stores where it is drawn out by 0.06 mm.
+    let unfelt = 2e-6;
+    for (mass, stiffness, speed, spin, ratio) in [
+        (0.1, 0.0, 0.2, 4.0, 1.0),
+        (0.3, 0.0, 0.05, 2.0, 0.0),
+        (0.1, 3000.0, 0.1, 4.0, 0.0),
+    ] {
+        for phase in 1..3 {
+            // Contact begins at any time between two steps.
+            let above = 1e-4 + f64::from(phase) / 4.0 * speed * 0.016;
+            let mut bench = lying(Solver::Verlet, 16, above as f32, |it| it.damping_ratio = ratio);
+            let start = dvec3(0.0, f64::from(RADIUS) + above, 0.0);
+            let mut hand = Hand {
+                mass,
+                inertia: mass * 4.5e-4,
+                stiffness,
+                home: start,
+                position: start,
+                orientation: DQuat::from_rotation_z(FRAC_PI_2),
+                velocity: dvec3(0.0, -speed, 0.0),
+                spin: dvec3(0.0, 0.0, spin),
+            };
+            let first = hand.energy();
+            let mut most = 0.0_f64;
+            for tick in 1..=200 {
+                let pose = Pose {
+                    position: hand.position.as_vec3(),
+                    orientation: hand.orientation.as_quat(),
+                };
+                let [velocity, turning] = [hand.velocity, hand.spin].map(|it| Some(it.as_vec3()));
+                let felt = bench.handle.tick(pose, velocity, turning, TICK).unwrap();
+                if tick % bench.every == 0 {
+                    bench.world.step(bench.every as f32 * TICK).unwrap();
+                }
+                hand.tick(&felt);
+                most = most.max(hand.energy());
+            }
+            let case = format!("{mass} kg, {stiffness} N/m, {speed} m/s, {spin} rad/s, damped {ratio}, phase {phase}");
+            assert!(most <= first + unfelt, "{case}: {most} J of {first} J");
+        }
+    }
+}
