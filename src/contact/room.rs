@@ -35,8 +35,9 @@ impl Motion<'_> {
                 let corners = [from, to].map(|placement| solid.corners().map(|corner| placement.placed(corner)));
                 // A corner that turns goes outside the box of its ends by less than its way.
                 let travel = from.centre.distance(to.centre) + self.spin.length() * slice.duration * solid.reach();
+                let touching = TOUCHING * solid.thickness();
                 Some(Room {
-                    bounds: Bounds::of(corners.into_iter().flatten()).extended(2.0 * travel + margin),
+                    bounds: Bounds::of(corners.into_iter().flatten()).extended(2.0 * travel + touching + margin),
                     rounded: None,
                 })
             }
