@@ -456,7 +456,11 @@ fn whatever_is_asked_of_it_stays_finite() {
             assert!(report.force.length() <= 20.0 * TOUGHNESS, "{shape}: {report:?}");
             let it = world.body(body).unwrap();
             assert!(it.positions().iter().all(|place| place.is_finite()), "{shape}");
-            assert!(energy(&world, body) < 0.1, "{shape}: {} J", energy(&world, body));
+            // Tissue without inertia jumps further than it is pulled where it folds, as IMPLICIT solves one linear equation a step, and back in
+            // the next: no further than to twice the length of its some 200 springs.
+            let stretched = 200.0 * 0.5 * 100.0 * f64::from(SIZE / sheet.cells as f32).powi(2);
+            let most = if mass < 1e-6 { stretched } else { 0.1 };
+            assert!(energy(&world, body) < most, "{shape}: {} J", energy(&world, body));
         }
     }
 }
