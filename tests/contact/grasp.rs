@@ -572,8 +572,9 @@ fn what_is_held_does_not_touch_its_holder() {
         }
         for jaw in jaws {
             let (force, torque) = world.wrench(jaw).expect("a tool");
+            // Springs have what rounding makes of coordinates of 0.1 m: some 1e-8 m.
             assert!(
-                force.length() < 1e-6 && torque.length() < 1e-7,
+                force.length() < 1e-5 && torque.length() < 1e-7,
                 "{solver:?}: {force} N, {torque} N m"
             );
         }
