@@ -3,6 +3,7 @@
 mod support;
 
 use glam::{Affine3A, DMat3, DVec3, Mat3A, Quat, Vec3, vec3};
+use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
     BodyDefinition, BodyId, Embedding, EmbeddingDefinition, Error, Material, Model, Pose, Shape, ToolDefinition,
@@ -486,29 +487,157 @@ fn what_is_no_surface_makes_no_body() {
     refused(&wrong, 0.01, "stiffness");
 }
 
-#[test]
-fn a_cut_body_is_not_followed_and_says_so() {
-    let mut world = world();
-    let drawn = ball(0.03, 2);
-    let (body, mut embedding) = world
+/// Tissue of springs made of a ball, that may be cut, in free fall.
+fn to_be_cut(world: &mut World, times: u32) -> (Mesh, BodyId, Embedding) {
+    let drawn = ball(0.03, times);
+    let (body, embedding) = world
         .create_body_from_surface(
             &BodyDefinition {
                 positions: &drawn.positions,
                 triangles: &drawn.triangles,
                 masses: Values::Uniform(1e-3),
                 stiffnesses: Values::Uniform(20.0),
-                spare_nodes: 2000,
+                spare_nodes: 4000,
                 ..BodyDefinition::default()
             },
             0.01,
         )
         .unwrap();
-    let before = embedding.positions().to_vec();
-    let sweep = sinew::cutting::Sweep {
-        start: [vec3(0.0, 0.05, -0.05), vec3(0.0, 0.05, 0.05)],
-        end: [vec3(0.0, -0.05, -0.05), vec3(0.0, -0.05, 0.05)],
+    (drawn, body, embedding)
+}
+
+/// An edge that goes down along x = 0, turned about z by this much, as far as `depth`.
+fn sweep(turn: f32, depth: f32) -> Sweep {
+    let at = |y: f32, z: f32| Quat::from_rotation_z(turn) * vec3(0.0003, y, z);
+    Sweep {
+        start: [at(0.05, -0.05), at(0.05, 0.05)],
+        end: [at(depth, -0.05), at(depth, 0.05)],
+    }
+}
+
+#[test]
+fn each_vertex_goes_with_its_side_of_a_cut() {
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        ..WorldDefinition::default()
+    })
+    .unwrap();
+    let (drawn, body, mut embedding) = to_be_cut(&mut world, 4);
+    // Into quarters.
+    let turns = [0.0, 1.2];
+    for turn in turns {
+        world.cut(body, &sweep(turn, -0.05)).unwrap();
+    }
+    let pieces = world.body(body).unwrap().pieces().unwrap();
+    let drawn_pieces: std::collections::BTreeSet<u32> = world
+        .body(body)
+        .unwrap()
+        .surface()
+        .iter()
+        .map(|triangle| pieces.of_nodes[triangle[0] as usize])
+        .collect();
+    assert_eq!(drawn_pieces.len(), 4);
+    // What has not been read yet is as before, and that there are more nodes is not known.
+    let places = world.body(body).unwrap().positions().to_vec();
+    assert!(embedding.update_from(&places).is_err());
+    embedding.update(&world).unwrap();
+    vertices_within(embedding.positions(), &drawn.positions, 1e-6);
+    assert_eq!(embedding.body(), body);
+    // Each piece is put somewhere else: so is each vertex, with the piece that has its quarter.
+    let shift = |piece: u32| vec3(0.0, 0.0, 0.2 * (1 + piece) as f32);
+    let apart: Vec<Vec3> = places
+        .iter()
+        .zip(&pieces.of_nodes)
+        .map(|(&place, &piece)| place + shift(piece))
+        .collect();
+    world.body_mut(body).unwrap().set_positions(&apart).unwrap();
+    embedding.update(&world).unwrap();
+    let mut piece_of_quarter = [None; 4];
+    let mut counted = 0;
+    for (&place, &from) in embedding.positions().iter().zip(&drawn.positions) {
+        let piece = drawn_pieces
+            .iter()
+            .find(|&&piece| (place - from).distance(shift(piece)) < 1e-5);
+        let piece = *piece.unwrap_or_else(|| panic!("{from} is torn apart: {place}"));
+        let beyond = turns.map(|turn| (Quat::from_rotation_z(-turn) * from).x - 0.0003);
+        // What is snapped to the blade's way lies up to a twentieth of an edge beside it.
+        if beyond.iter().all(|beyond| beyond.abs() > 0.001) {
+            let quarter = usize::from(beyond[0] > 0.0) + 2 * usize::from(beyond[1] > 0.0);
+            assert_eq!(*piece_of_quarter[quarter].get_or_insert(piece), piece, "{from}");
+            counted += 1;
+        }
+    }
+    assert!(counted > 2000, "{counted}");
+    // No triangle reaches across, and only such are gone.
+    let longest = |triangle: &[u32; 3], places: &[Vec3]| {
+        let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
     };
-    world.cut(body, &sweep).unwrap();
+    let left = embedding.triangles().to_vec();
+    assert!(
+        left.iter()
+            .all(|triangle| longest(triangle, embedding.positions()) < 0.01)
+    );
+    let is_left = |triangle: &[u32; 3]| longest(triangle, embedding.positions()) < 0.01;
+    assert_eq!(
+        left,
+        drawn.triangles.iter().copied().filter(is_left).collect::<Vec<_>>()
+    );
+    assert!(left.len() < drawn.triangles.len() && 20 * left.len() > 17 * drawn.triangles.len());
+    // Who comes after the cut is told that the tetrahedra are others.
+    let late = EmbeddingDefinition {
+        vertices: &drawn.positions,
+        tetrahedra: &[[0, 1, 2, 3]],
+        ..EmbeddingDefinition::default()
+    };
+    let error = world.create_embedding(body, &late).unwrap_err();
+    assert!(matches!(error, Error::Unsupported(_)), "{error}");
+}
+
+#[test]
+fn a_cut_that_ends_within_leaves_the_rest_whole() {
+    let mut world = world();
+    let (drawn, body, mut embedding) = to_be_cut(&mut world, 4);
+    world.cut(body, &sweep(0.0, 0.004)).unwrap();
+    for _ in 0..30 {
+        world.step(0.002).unwrap();
+        embedding.update(&world).unwrap();
+    }
+    let left = embedding.triangles();
+    let below = |triangle: &[u32; 3]| {
+        triangle
+            .iter()
+            .all(|&vertex| drawn.positions[vertex as usize].y < -0.008)
+    };
+    let whole = drawn.triangles.iter().filter(|triangle| below(triangle));
+    assert!(whole.clone().count() > 500);
+    assert_eq!(whole.count(), left.iter().filter(|triangle| below(triangle)).count());
+    assert!(left.len() < drawn.triangles.len());
+    assert!(embedding.positions().iter().all(|place| place.is_finite()));
+    // The normal of a vertex is that of the triangles that are left about it.
+    let left = left.to_vec();
+    let places: Vec<DVec3> = embedding.positions().iter().map(|place| place.as_dvec3()).collect();
+    let mut has_some = vec![false; places.len()];
+    left.iter()
+        .flatten()
+        .for_each(|&vertex| has_some[vertex as usize] = true);
+    let normals = embedding.normals();
+    for (normal, has_some) in normals.iter().zip(has_some) {
+        assert_eq!(normal.length() > 0.5, has_some);
+    }
+}
+
+#[test]
+fn over_triangles_cuts_are_not_followed_and_that_is_said() {
+    let mut world = world();
+    let (drawn, body, _) = to_be_cut(&mut world, 2);
+    let over = EmbeddingDefinition {
+        vertices: &drawn.positions,
+        ..EmbeddingDefinition::default()
+    };
+    let mut embedding = world.create_embedding(body, &over).unwrap();
+    let before = embedding.positions().to_vec();
+    world.cut(body, &sweep(0.0, -0.05)).unwrap();
     let error = embedding.update(&world).unwrap_err();
     assert!(matches!(error, Error::Unsupported(_)), "{error}");
     assert_eq!(embedding.positions(), before);

@@ -36,11 +36,13 @@ pub(super) enum Binding {
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 impl Binding {
-    /// Each vertex to the tetrahedron that it is in, the one that is nearest, or among several the one that it is deepest in.
-    pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<Self> {
+    /// Each vertex to the tetrahedron that it is in, the one that is nearest, or among several the one that it is deepest in; and which that is.
+    pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<(Self, Vec<u32>)> {
         let corners = |place: u32| tetrahedra[place as usize].map(|node| positions[node as usize]);
         let mut solids: Vec<Solid> = memory::reserved(tetrahedra.len())?;
-        solids.extend((0..tetrahedra.len() as u32).map(|place| Solid::new(corners(place))));
+        solids.extend(
+            (0..tetrahedra.len() as u32).map(|place| Solid::of(corners(place).map(|corner| corner.as_dvec3()))),
+        );
         if !solids.iter().any(Solid::has_volume) {
             return Err(Error::invalid("tetrahedra: none of them has a volume"));
         }
@@ -50,6 +52,7 @@ impl Binding {
             [bounds.min, bounds.max, bounds.min]
         })?;
         let mut bound = memory::reserved(vertices.len())?;
+        let mut homes = memory::reserved(vertices.len())?;
         for &vertex in vertices {
             let point = vertex.as_dvec3();
             // Squared distance, depth and number of the best so far.
@@ -72,13 +75,14 @@ impl Binding {
                 }
                 best.0 as f32
             });
+            homes.push(best.2);
             let number = best.2 as usize;
             bound.push(InTetrahedron {
                 nodes: tetrahedra[number],
                 weights: solids[number].weights(point).as_vec3().to_array(),
             });
         }
-        Ok(Self::Tetrahedra(bound))
+        Ok((Self::Tetrahedra(bound), homes))
     }
 
     /// Each vertex to the nearest triangle.
@@ -136,15 +140,14 @@ fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
 }
 
 /// A tetrahedron where it is.
-struct Solid {
+pub(super) struct Solid {
     corners: [DVec3; 4],
     /// From the way from the first corner to the weights of the others.
     inverse: DMat3,
 }
 
 impl Solid {
-    fn new(corners: [Vec3; 4]) -> Self {
-        let corners = corners.map(|corner| corner.as_dvec3());
+    pub fn of(corners: [DVec3; 4]) -> Self {
         let [a, b, c, d] = corners;
         Self {
             corners,
@@ -161,7 +164,7 @@ impl Solid {
     }
 
     /// The least barycentric weight: below 0 outside.
-    fn depth(&self, point: DVec3) -> f64 {
+    pub fn depth(&self, point: DVec3) -> f64 {
         let weights = self.weights(point);
         weights.min_element().min(1.0 - weights.element_sum())
     }

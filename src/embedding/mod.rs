@@ -1,17 +1,19 @@
 //! What is drawn of a body need not be what is solved: a fine surface that goes with a coarse body.
 
 mod bind;
+mod follow;
 mod read;
 
 use glam::Vec3;
 
-use crate::body::{BodyDefinition, Values};
+use crate::body::{Body, BodyDefinition, Values};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::world::{BodyId, World};
 
 use bind::Binding;
+use follow::Follower;
 
 /// A surface that is drawn, and what of a body it goes with. Plain data, used only during [`World::create_embedding`].
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,12 +30,16 @@ pub struct EmbeddingDefinition<'a> {
 /// A fine surface bound to a coarse body, and where its vertices are. It belongs to the caller; the body knows nothing of it and pays nothing.
 ///
 /// In a tetrahedron a vertex keeps its barycentric weights, so that an affine motion of the body is one of the surface; over a triangle it keeps
-/// its place in it and its distance along the normal.
+/// its place in it and its distance along the normal. It follows cuts and tears of tetrahedra: each vertex goes on with its own side, and triangles
+/// that would reach across are left out.
 #[derive(Debug)]
 pub struct Embedding {
     body: BodyId,
-    /// How many nodes the body had.
+    /// How many nodes the body has, and which version its topology.
     node_count: usize,
+    topology: u64,
+    /// For bodies that may be cut.
+    follower: Option<Box<Follower>>,
     binding: Binding,
     triangles: Vec<[u32; 3]>,
     positions: Vec<Vec3>,
@@ -45,21 +51,24 @@ pub struct Embedding {
 }
 
 impl Embedding {
-    fn new(body: BodyId, definition: &EmbeddingDefinition, positions: &[Vec3], drawn: &[[u32; 3]]) -> Result<Self> {
+    /// Of a body with its nodes at `positions`, of which these triangles are drawn.
+    fn new(definition: &EmbeddingDefinition, positions: &[Vec3], drawn: &[[u32; 3]]) -> Result<(Self, Vec<u32>)> {
         let EmbeddingDefinition {
             vertices,
             triangles,
             tetrahedra,
         } = *definition;
         check(definition, positions.len())?;
-        let binding = if tetrahedra.is_empty() {
-            Binding::to_triangles(vertices, positions, drawn)?
+        let (binding, homes) = if tetrahedra.is_empty() {
+            (Binding::to_triangles(vertices, positions, drawn)?, Vec::new())
         } else {
             Binding::to_tetrahedra(vertices, positions, tetrahedra)?
         };
         let mut embedding = Self {
-            body,
+            body: BodyId::default(),
             node_count: positions.len(),
+            topology: 0,
+            follower: None,
             binding,
             triangles: memory::copied(triangles)?,
             positions: memory::filled(Vec3::ZERO, vertices.len())?,
@@ -68,7 +77,19 @@ impl Embedding {
             scale: scale(vertices, triangles),
         };
         embedding.update_from(positions)?;
-        Ok(embedding)
+        Ok((embedding, homes))
+    }
+
+    /// Has it go with this body.
+    fn join(&mut self, id: BodyId, body: &Body, definition: &EmbeddingDefinition, homes: Vec<u32>) -> Result<()> {
+        self.body = id;
+        self.topology = body.topology_version();
+        if let Some(solid) = body.solid()
+            && !homes.is_empty()
+        {
+            self.follower = Follower::new(solid, definition.tetrahedra, homes, definition.triangles)?;
+        }
+        Ok(())
     }
 
     /// The body it goes with.
@@ -76,31 +97,38 @@ impl Embedding {
         self.body
     }
 
-    /// Puts the vertices where the body is now. Nothing is allocated.
+    /// Puts the vertices where the body is now. Nothing is allocated, but when the body has been cut or torn since: then the vertices are bound anew.
     ///
     /// # Errors
-    /// [`Error::StaleId`]: the body is gone. [`Error::Unsupported`]: it has been cut or torn since, which an embedding does not follow:
-    /// the vertices stay where they were.
+    /// [`Error::StaleId`]: the body is gone. [`Error::Unsupported`]: it has been cut or torn since, and the vertices are bound to its triangles, or not
+    /// to all of the tetrahedra of which it was made. [`Error::OutOfMemory`]. The vertices stay where they were.
     pub fn update(&mut self, world: &World) -> Result<()> {
-        let positions = world.body(self.body)?.positions();
-        if positions.len() != self.node_count {
-            return Err(Error::Unsupported(format!(
-                "the body has {} nodes, and had {} when the embedding was made: cuts are not followed",
-                positions.len(),
-                self.node_count
-            )));
+        let body = world.body(self.body)?;
+        if body.topology_version() != self.topology {
+            let (Binding::Tetrahedra(bound), Some(follower), Some(solid)) =
+                (&mut self.binding, &self.follower, body.solid())
+            else {
+                return Err(Error::Unsupported(format!(
+                    "the body has been cut or torn since the embedding was made (its topology has version {}): that is followed by vertices bound to \
+                     all of its tetrahedra alone",
+                    body.topology_version()
+                )));
+            };
+            follower.follow(solid, bound, &mut self.triangles)?;
+            self.topology = body.topology_version();
+            self.node_count = body.node_count();
         }
-        self.update_from(positions)
+        self.update_from(body.positions())
     }
 
     /// The same with the body's nodes at `positions`, m, such as [`Frame::positions`](crate::Frame::positions): on any thread, whatever the world does.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: there are not as many positions as the body has nodes.
+    /// [`Error::InvalidArgument`]: there are not as many positions as the body had nodes at the last [`update`](Self::update), which follows its cuts.
     pub fn update_from(&mut self, positions: &[Vec3]) -> Result<()> {
         if positions.len() != self.node_count {
             return Err(Error::invalid(format!(
-                "{} positions are given: the embedding was made for {} nodes",
+                "{} positions are given: the embedding knows of {} nodes",
                 positions.len(),
                 self.node_count
             )));
@@ -115,10 +143,15 @@ impl Embedding {
         &self.positions
     }
 
+    /// The triangles, in the order given, less those that reach across a cut: they change with updates after cuts alone.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
     /// The normal of each vertex, outward, of unit length: the mean of its triangles' by area; 0 where that is 0, and no list without triangles.
     /// The first call after an update works them out; the list stays in its place.
     pub fn normals(&mut self) -> &[Vec3] {
-        if !self.are_normals_new && !self.triangles.is_empty() {
+        if !self.are_normals_new && !self.normals.is_empty() {
             read::normals(&self.positions, &self.triangles, self.scale, &mut self.normals);
         }
         self.are_normals_new = true;
@@ -131,10 +164,18 @@ impl World {
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there are no vertices; one is not finite or further than 1e9 m from the origin; an index is
-    /// that of no vertex or node; no tetrahedron has a volume; there are none, and nothing is drawn of the body. [`Error::OutOfMemory`].
+    /// that of no vertex or node; no tetrahedron has a volume; there are none, and nothing is drawn of the body. [`Error::Unsupported`]: the body has been
+    /// cut or torn, and tetrahedra are given. [`Error::OutOfMemory`].
     pub fn create_embedding(&self, body: BodyId, definition: &EmbeddingDefinition) -> Result<Embedding> {
         let host = self.body(body)?;
-        Embedding::new(body, definition, host.positions(), host.surface())
+        if host.topology_version() > 0 && !definition.tetrahedra.is_empty() {
+            return Err(Error::Unsupported(
+                "tetrahedra are given, and the body has been cut or torn: they are others now".into(),
+            ));
+        }
+        let (mut embedding, homes) = Embedding::new(definition, host.positions(), host.surface())?;
+        embedding.join(body, host, definition, homes)?;
+        Ok(embedding)
     }
 
     /// Makes a body of a closed surface, which [`Mesh::filled`] fills with tetrahedra of edges `spacing` metres long in the mean, and binds the
@@ -161,14 +202,21 @@ impl World {
             triangles: &drawn.triangles,
             tetrahedra: &mesh.tetrahedra,
         };
-        let mut embedding = Embedding::new(BodyId::default(), &surface, &mesh.positions, &[])?;
-        embedding.body = self.create_body(&BodyDefinition {
+        let (mut embedding, homes) = Embedding::new(&surface, &mesh.positions, &[])?;
+        let body = self.create_body(&BodyDefinition {
             positions: &mesh.positions,
             triangles: &[],
             tetrahedra: &mesh.tetrahedra,
             ..*definition
         })?;
-        Ok((embedding.body, embedding))
+        let joined = self
+            .body(body)
+            .and_then(|host| embedding.join(body, host, &surface, homes));
+        if let Err(error) = joined {
+            self.destroy_body(body)?;
+            return Err(error);
+        }
+        Ok((body, embedding))
     }
 }
 
