@@ -3738,7 +3738,7 @@ sinew_status sinew_embedding_def_init(struct sinew_embedding_def *def, size_t st
  * where it is bound to tetrahedra.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where no tetrahedron has a volume, or nothing is drawn of the body), SINEW_STATUS_STALE_ID,
- * SINEW_STATUS_OUT_OF_MEMORY.
+ * SINEW_STATUS_UNSUPPORTED (tetrahedra are given of a body that has been cut or torn: they are others now), SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
@@ -3758,10 +3758,13 @@ sinew_status sinew_embedding_create(const struct sinew_world *world,
 void sinew_embedding_destroy(struct sinew_embedding *embedding);
 
 /**
- * Puts the vertices where the body is now, in the place where they are read. Nothing is allocated.
+ * Puts the vertices where the body is now, in the place where they are read. Nothing is allocated, but when the body has been cut or torn since:
+ * then each vertex in a tetrahedron is bound to the copy on its side, and triangles that would reach across are left out of
+ * sinew_embedding_get_triangles.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_UNSUPPORTED (it has been cut or torn since, which is
- * not followed: the vertices stay where they were).
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
+ * cut or torn, and the vertices are bound to its triangles, or not to all of the tetrahedra of which it was made). The vertices stay where they were
+ * then.
  *
  * # Safety
  * `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
@@ -3773,7 +3776,8 @@ sinew_status sinew_embedding_update(struct sinew_embedding *embedding,
  * The same with the body's nodes at `positions`, m, 3 node_count packed floats, such as a reader's frame has them: on any thread, whatever the world
  * does meanwhile.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body had another number of nodes).
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body had another number of nodes at the last sinew_embedding_update, which alone follows
+ * cuts).
  *
  * # Safety
  * `embedding` is NULL or an embedding nobody else uses; `positions` is NULL or 3 `node_count` floats.
@@ -3792,6 +3796,17 @@ sinew_status sinew_embedding_update_from(struct sinew_embedding *embedding,
  */
 sinew_status sinew_embedding_get_positions(const struct sinew_embedding *embedding,
                                            struct sinew_vec3_view *out);
+
+/**
+ * Writes a view of the triangles, in the order given, less those that reach across a cut. It changes with updates after cuts alone, and lives until then.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_embedding_get_triangles(const struct sinew_embedding *embedding,
+                                           struct sinew_triangle_view *out);
 
 /**
  * Works out the normals, where that was not done since the last update, and writes a view of them: of unit length, outward, the mean of a

@@ -1,6 +1,7 @@
 //! Fine surfaces that go with coarse bodies, and bodies made from surfaces.
 
 use super::body::{sinew_body_id, sinew_vec3_view};
+use super::cut::sinew_triangle_view;
 use super::definition::sinew_body_def;
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
@@ -84,7 +85,7 @@ pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def,
 /// where it is bound to tetrahedra.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where no tetrahedron has a volume, or nothing is drawn of the body), SINEW_STATUS_STALE_ID,
-/// SINEW_STATUS_OUT_OF_MEMORY.
+/// SINEW_STATUS_UNSUPPORTED (tetrahedra are given of a body that has been cut or torn: they are others now), SINEW_STATUS_OUT_OF_MEMORY.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
@@ -123,10 +124,13 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
     }
 }
 
-/// Puts the vertices where the body is now, in the place where they are read. Nothing is allocated.
+/// Puts the vertices where the body is now, in the place where they are read. Nothing is allocated, but when the body has been cut or torn since:
+/// then each vertex in a tetrahedron is bound to the copy on its side, and triangles that would reach across are left out of
+/// sinew_embedding_get_triangles.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_UNSUPPORTED (it has been cut or torn since, which is
-/// not followed: the vertices stay where they were).
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
+/// cut or torn, and the vertices are bound to its triangles, or not to all of the tetrahedra of which it was made). The vertices stay where they were
+/// then.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
@@ -147,7 +151,8 @@ pub unsafe extern "C" fn sinew_embedding_update(
 /// The same with the body's nodes at `positions`, m, 3 node_count packed floats, such as a reader's frame has them: on any thread, whatever the world
 /// does meanwhile.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body had another number of nodes).
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body had another number of nodes at the last sinew_embedding_update, which alone follows
+/// cuts).
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody else uses; `positions` is NULL or 3 `node_count` floats.
@@ -183,6 +188,30 @@ pub unsafe extern "C" fn sinew_embedding_get_positions(
         unsafe {
             let embedding = memory::reference("embedding", embedding)?;
             *memory::output("out", out)? = sinew_vec3_view::of(embedding.embedding.positions());
+            Ok(())
+        }
+    })
+}
+
+/// Writes a view of the triangles, in the order given, less those that reach across a cut. It changes with updates after cuts alone, and lives until then.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+///
+/// # Safety
+/// `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_embedding_get_triangles(
+    embedding: *const sinew_embedding,
+    out: *mut sinew_triangle_view,
+) -> sinew_status {
+    guard(|| {
+        // SAFETY: the same contract.
+        unsafe {
+            let triangles = memory::reference("embedding", embedding)?.embedding.triangles();
+            *memory::output("out", out)? = sinew_triangle_view {
+                data: triangles.as_ptr().cast(),
+                count: triangles.len(),
+            };
             Ok(())
         }
     })
