@@ -293,6 +293,12 @@
 typedef struct sinew_detector sinew_detector;
 
 /**
+ * A fine surface, drawn, bound to a coarse body, simulated. It belongs to the caller, who uses it on one thread at a time; the body knows nothing of it
+ * and pays nothing.
+ */
+typedef struct sinew_embedding sinew_embedding;
+
+/**
  * The device's side of a tool of a world, for one thread, the device's own: it may tick while another thread steps the world, or uses it otherwise.
  */
 typedef struct sinew_haptic sinew_haptic;
@@ -2041,6 +2047,41 @@ typedef struct sinew_dvec3_view {
 } sinew_dvec3_view;
 
 /**
+ * A surface that is drawn, and what of a body it goes with.
+ */
+typedef struct sinew_embedding_def {
+  /**
+   * Set by sinew_embedding_def_init.
+   */
+  size_t struct_size;
+  /**
+   * 3 vertex_count floats: where each vertex is while the body is where it is, m, within 1e9 m of the origin; no default.
+   */
+  const float *vertices;
+  /**
+   * At least 1.
+   */
+  size_t vertex_count;
+  /**
+   * 3 triangle_count vertices, outward by the right-hand rule: what normals come from; nullable: there are none.
+   */
+  const uint32_t *triangles;
+  /**
+   * Triangles.
+   */
+  size_t triangle_count;
+  /**
+   * 4 tetrahedron_count nodes: the tetrahedra of the body, as it was created with. Each vertex keeps its barycentric weights in the one that it
+   * is in, or nearest to. Nullable: each goes with the nearest triangle that is drawn of the body, and keeps its distance from that.
+   */
+  const uint32_t *tetrahedra;
+  /**
+   * Tetrahedra.
+   */
+  size_t tetrahedron_count;
+} sinew_embedding_def;
+
+/**
  * Done.
  */
 #define SINEW_STATUS_OK 0
@@ -3680,6 +3721,125 @@ sinew_status sinew_detector_get_gradient(const struct sinew_detector *detector,
  * `detector` is NULL or a detector that is not destroyed and that nobody uses any more.
  */
 void sinew_detector_destroy(struct sinew_detector *detector);
+
+/**
+ * Writes the defaults of the `struct_size` bytes that the caller compiled.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `def` is NULL or writable for `struct_size` bytes.
+ */
+sinew_status sinew_embedding_def_init(struct sinew_embedding_def *def, size_t struct_size);
+
+/**
+ * Binds a fine surface to a body, where both are now, in a time as long as some hundred updates; copies what `def` points to. The caller destroys it
+ * with sinew_embedding_destroy, before or after the body and its world. Of an affine motion of the body the surface takes part to within rounding,
+ * where it is bound to tetrahedra.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where no tetrahedron has a volume, or nothing is drawn of the body), SINEW_STATUS_STALE_ID,
+ * SINEW_STATUS_UNSUPPORTED (tetrahedra are given of a body that has been cut or torn: they are others now), SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
+ * `out` is NULL or writable.
+ */
+sinew_status sinew_embedding_create(const struct sinew_world *world,
+                                    struct sinew_body_id body,
+                                    const struct sinew_embedding_def *def,
+                                    struct sinew_embedding **out);
+
+/**
+ * Destroys an embedding; its views end. NULL: nothing.
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding that is not destroyed and that nobody uses any more.
+ */
+void sinew_embedding_destroy(struct sinew_embedding *embedding);
+
+/**
+ * Puts the vertices where the body is now, in the place where they are read. Nothing is allocated, but when the body has been cut or torn since:
+ * then each vertex in a tetrahedron is bound to the copy on its side, and triangles that would reach across are left out of
+ * sinew_embedding_get_triangles.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
+ * cut or torn, and the vertices are bound to its triangles, or not to all of the tetrahedra of which it was made). The vertices stay where they were
+ * then.
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
+ */
+sinew_status sinew_embedding_update(struct sinew_embedding *embedding,
+                                    const struct sinew_world *world);
+
+/**
+ * The same with the body's nodes at `positions`, m, 3 node_count packed floats, such as a reader's frame has them: on any thread, whatever the world
+ * does meanwhile.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body had another number of nodes at the last sinew_embedding_update, which alone follows
+ * cuts).
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding nobody else uses; `positions` is NULL or 3 `node_count` floats.
+ */
+sinew_status sinew_embedding_update_from(struct sinew_embedding *embedding,
+                                         const float *positions,
+                                         size_t node_count);
+
+/**
+ * Writes a view of where each vertex is, m, in the order given. It stays the same until the embedding's end; updates change what it shows.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_embedding_get_positions(const struct sinew_embedding *embedding,
+                                           struct sinew_vec3_view *out);
+
+/**
+ * Writes a view of the triangles, in the order given, less those that reach across a cut. It changes with updates after cuts alone, and lives until then.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_embedding_get_triangles(const struct sinew_embedding *embedding,
+                                           struct sinew_triangle_view *out);
+
+/**
+ * Works out the normals, where that was not done since the last update, and writes a view of them: of unit length, outward, the mean of a
+ * vertex's triangles by area, 0 where that is 0; an empty view without triangles. The view lives like that of the positions.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ *
+ * # Safety
+ * `embedding` is NULL or an embedding nobody else uses; `out` is NULL or writable.
+ */
+sinew_status sinew_embedding_get_normals(struct sinew_embedding *embedding,
+                                         struct sinew_vec3_view *out);
+
+/**
+ * Makes a body of a closed surface, and binds the surface to it: tissue from what is drawn, in one call. `positions` and `triangles` of `def` are the
+ * surface, outward, with vertices that may be repeated as in STL files; it is filled with tetrahedra whose edges are `spacing` metres long in the
+ * mean (isosurface stuffing, Labelle and Shewchuk 2007), which are the nodes and elements of the body: its own surface follows the one given where that is
+ * not finer than the spacing, and what is thinner than about half of it is lost. All else in `def` is as for sinew_body_create, with one value for
+ * all nodes and springs. `out_embedding` is nullable; the caller destroys what it is given there.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (the surface is open or inside out; spacing is not above 0, too fine to count the nodes, or so coarse that
+ * nothing is filled; tetrahedra, cells, springs, rest positions or lists of values are given), SINEW_STATUS_UNSUPPORTED as sinew_body_create,
+ * SINEW_STATUS_CAPACITY, SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
+ * `out_body` is NULL or writable, and so is `out_embedding`.
+ */
+sinew_status sinew_body_create_from_surface(struct sinew_world *world,
+                                            const struct sinew_body_def *def,
+                                            float spacing,
+                                            struct sinew_body_id *out_body,
+                                            struct sinew_embedding **out_embedding);
 
 #ifdef __cplusplus
 }  // extern "C"

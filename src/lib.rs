@@ -7,6 +7,7 @@ pub mod cutting;
 pub mod detection;
 mod diagnostics;
 mod elements;
+mod embedding;
 mod enclosed;
 mod error;
 mod handover;
@@ -35,6 +36,7 @@ pub use body::{
 };
 pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
 pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
+pub use embedding::{Embedding, EmbeddingDefinition};
 pub use error::{Error, Result};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
 pub use material::{Material, Model, Viscosity, Yielding};

@@ -55,3 +55,5 @@ pub mod query;
 pub mod reader;
 
 pub mod detector;
+
+pub mod embedding;

@@ -81,6 +81,18 @@ impl ClosedSurface {
         Ok(surface)
     }
 
+    /// The same of what may cross itself, and have triangles without an area: it is closed, and encloses something.
+    pub(super) fn loose(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self> {
+        let mut surface = Self {
+            positions,
+            triangles,
+            volume: 0.0,
+        };
+        surface.parts()?;
+        surface.check_volume()?;
+        Ok(surface)
+    }
+
     /// Where each node is, as given.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions

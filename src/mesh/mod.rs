@@ -5,9 +5,11 @@
 
 mod closed;
 mod file;
+mod filled;
 pub(crate) mod order;
 mod organ;
 mod shapes;
+mod stuffing;
 mod tidy;
 mod topology;
 

@@ -4,6 +4,7 @@
 mod support;
 
 mod files;
+mod filled;
 mod picture_values;
 mod raster;
 mod shapes;

@@ -1,0 +1,126 @@
+//! What is drawn beside what is solved: to bind a fine surface, to read it, to fill it. Throughput is in vertices.
+
+use std::collections::HashMap;
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::{Quat, Vec3};
+use sinew::mesh::{Mesh, boundary};
+use sinew::{BodyDefinition, BodyId, Embedding, EmbeddingDefinition, Values, World, WorldDefinition};
+
+/// A liver-like organ of 5000 nodes, or so.
+fn organ() -> Mesh {
+    Mesh::organ(0.2, 0.005).expect("an organ")
+}
+
+/// The organ's surface with each triangle in four, so many times.
+fn drawn(organ: &Mesh, times: u32) -> Mesh {
+    let mut positions = organ.positions.clone();
+    let mut triangles = boundary(&organ.tetrahedra).expect("a boundary");
+    for _ in 0..times {
+        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut finer = Vec::with_capacity(4 * triangles.len());
+        for [a, b, c] in triangles {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
+                *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                    positions.push((positions[a as usize] + positions[b as usize]) / 2.0);
+                    positions.len() as u32 - 1
+                })
+            });
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    let mesh = Mesh {
+        positions,
+        triangles,
+        ..Mesh::default()
+    };
+    // Without the nodes within.
+    sinew::mesh::tidy(&mesh).expect("a mesh").mesh
+}
+
+fn bound(organ: &Mesh, drawn: &Mesh) -> (World, BodyId, Embedding) {
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &organ.positions,
+            tetrahedra: &organ.tetrahedra,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(50.0),
+            ..BodyDefinition::default()
+        })
+        .expect("a body");
+    let definition = EmbeddingDefinition {
+        vertices: &drawn.positions,
+        triangles: &drawn.triangles,
+        tetrahedra: &organ.tetrahedra,
+    };
+    let embedding = world.create_embedding(body, &definition).expect("an embedding");
+    (world, body, embedding)
+}
+
+fn read(criterion: &mut Criterion) {
+    let organ = organ();
+    let mut group = criterion.benchmark_group("embedding");
+    for times in [1, 3] {
+        let drawn = drawn(&organ, times);
+        let count = drawn.positions.len();
+        let (mut world, body, mut embedding) = bound(&organ, &drawn);
+        // Elsewhere than at rest.
+        let turn = Quat::from_rotation_x(0.3);
+        let moved: Vec<Vec3> = organ.positions.iter().map(|&place| turn * place).collect();
+        let host = world.body_mut(body).expect("the body");
+        host.set_positions(&moved).expect("positions");
+        group.throughput(Throughput::Elements(count as u64));
+        group.bench_function(BenchmarkId::new("positions", count), |bench| {
+            bench.iter(|| {
+                embedding.update(&world).expect("an update");
+                black_box(embedding.positions());
+            });
+        });
+        group.bench_function(BenchmarkId::new("positions and normals", count), |bench| {
+            bench.iter(|| {
+                embedding.update(&world).expect("an update");
+                black_box(embedding.normals());
+            });
+        });
+        // What it must move at least: its bindings in, its positions out.
+        let from = vec![[0_u32; 7]; count];
+        let mut to = vec![Vec3::ZERO; count];
+        group.bench_function(BenchmarkId::new("as many bytes", count), |bench| {
+            bench.iter(|| {
+                for (to, from) in to.iter_mut().zip(black_box(&from)) {
+                    let sum = from.iter().fold(0_u32, |sum, value| sum ^ value);
+                    *to = Vec3::splat(f32::from_bits(sum));
+                }
+                black_box(&to);
+            });
+        });
+    }
+    group.finish();
+}
+
+fn make(criterion: &mut Criterion) {
+    let organ = organ();
+    let mut group = criterion.benchmark_group("embedding made");
+    group.sample_size(10).measurement_time(Duration::from_secs(5));
+    for times in [1, 3] {
+        let drawn = drawn(&organ, times);
+        group.throughput(Throughput::Elements(drawn.positions.len() as u64));
+        group.bench_function(BenchmarkId::new("bound", drawn.positions.len()), |bench| {
+            bench.iter(|| black_box(bound(&organ, &drawn)));
+        });
+        for spacing in [0.02, 0.008] {
+            let name = format!("filled at {} mm", 1e3 * spacing);
+            group.bench_function(BenchmarkId::new(name, drawn.positions.len()), |bench| {
+                bench.iter(|| black_box(Mesh::filled(&drawn, spacing).expect("a mesh")));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, read, make);
+criterion_main!(benches);

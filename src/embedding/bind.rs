@@ -1,0 +1,179 @@
+//! To what of a body each vertex of a fine surface belongs.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::body::Bounds;
+use crate::contact::nearest::nearest_on_triangle;
+use crate::contact::tree::Tree;
+use crate::error::{Error, Result};
+use crate::memory;
+
+/// A vertex in a tetrahedron, or beside one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InTetrahedron {
+    pub nodes: [u32; 4],
+    /// The barycentric weights of all but the first.
+    pub weights: [f32; 3],
+}
+
+/// A vertex over a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OverTriangle {
+    pub nodes: [u32; 3],
+    /// The barycentric weights of all but the first.
+    pub weights: [f32; 2],
+    /// Along the normal, m.
+    pub offset: f32,
+}
+
+/// What each vertex goes with, in the order of the vertices.
+#[derive(Debug)]
+pub(super) enum Binding {
+    Tetrahedra(Vec<InTetrahedron>),
+    Triangles(Vec<OverTriangle>),
+}
+
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+
+impl Binding {
+    /// Each vertex to the tetrahedron that it is in, the one that is nearest, or among several the one that it is deepest in; and which that is.
+    pub fn to_tetrahedra(vertices: &[Vec3], positions: &[Vec3], tetrahedra: &[[u32; 4]]) -> Result<(Self, Vec<u32>)> {
+        let corners = |place: u32| tetrahedra[place as usize].map(|node| positions[node as usize]);
+        let mut solids: Vec<Solid> = memory::reserved(tetrahedra.len())?;
+        solids.extend(
+            (0..tetrahedra.len() as u32).map(|place| Solid::of(corners(place).map(|corner| corner.as_dvec3()))),
+        );
+        if !solids.iter().any(Solid::has_volume) {
+            return Err(Error::invalid("tetrahedra: none of them has a volume"));
+        }
+        // The box of these three corners is that of the tetrahedron.
+        let tree = Tree::new(tetrahedra.len(), |place| {
+            let bounds = Bounds::of(corners(place).into_iter());
+            [bounds.min, bounds.max, bounds.min]
+        })?;
+        let mut bound = memory::reserved(vertices.len())?;
+        let mut homes = memory::reserved(vertices.len())?;
+        for &vertex in vertices {
+            let point = vertex.as_dvec3();
+            // Squared distance, depth and number of the best so far.
+            let mut best = (f64::INFINITY, f64::NEG_INFINITY, 0);
+            tree.near(&Bounds::of(std::iter::once(vertex)), f32::INFINITY, |place| {
+                let number = tree.triangle(place);
+                let solid = &solids[number as usize];
+                if solid.has_volume() {
+                    let depth = solid.depth(point);
+                    let distance = if depth >= 0.0 {
+                        0.0
+                    } else {
+                        solid.distance_squared(point)
+                    };
+                    let is_better = distance < best.0
+                        || distance == best.0 && (depth > best.1 || depth == best.1 && number < best.2);
+                    if is_better {
+                        best = (distance, depth, number);
+                    }
+                }
+                best.0 as f32
+            });
+            homes.push(best.2);
+            let number = best.2 as usize;
+            bound.push(InTetrahedron {
+                nodes: tetrahedra[number],
+                weights: solids[number].weights(point).as_vec3().to_array(),
+            });
+        }
+        Ok((Self::Tetrahedra(bound), homes))
+    }
+
+    /// Each vertex to the nearest triangle.
+    pub fn to_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
+        if triangles.is_empty() {
+            return Err(Error::invalid(
+                "tetrahedra are 0, and nothing is drawn of the body: there is nothing to bind to",
+            ));
+        }
+        let corners = |triangle: u32| triangles[triangle as usize].map(|node| positions[node as usize]);
+        let tree = Tree::new(triangles.len(), corners)?;
+        let mut bound = memory::reserved(vertices.len())?;
+        for &vertex in vertices {
+            let point = vertex.as_dvec3();
+            let mut best = (f64::INFINITY, 0, [1.0, 0.0, 0.0]);
+            tree.near(&Bounds::of(std::iter::once(vertex)), f32::INFINITY, |place| {
+                let number = tree.triangle(place);
+                let exact = tree.placed(place).exact();
+                let (weights, _) = nearest_on_triangle(point, exact);
+                let distance = point.distance_squared(weighted(exact, weights));
+                if distance < best.0 || distance == best.0 && number < best.1 {
+                    best = (distance, number, weights);
+                }
+                best.0 as f32
+            });
+            bound.push(over(point, triangles[best.1 as usize], corners(best.1), best.2));
+        }
+        Ok(Self::Triangles(bound))
+    }
+}
+
+/// A vertex over a triangle: its foot in the plane, which may lie beside the triangle, and its height; over one that lies along a line at the
+/// nearest point, with none.
+fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3], nearest: [f64; 3]) -> OverTriangle {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    let normal = (b - a).cross(c - a).normalize_or_zero();
+    let inverse = DMat3::from_cols(b - a, c - a, normal).inverse();
+    if normal == DVec3::ZERO || !inverse.is_finite() {
+        return OverTriangle {
+            nodes,
+            weights: [nearest[1] as f32, nearest[2] as f32],
+            offset: 0.0,
+        };
+    }
+    let [along_b, along_c, offset] = (inverse * (point - a)).as_vec3().to_array();
+    OverTriangle {
+        nodes,
+        weights: [along_b, along_c],
+        offset,
+    }
+}
+
+fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
+    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
+}
+
+/// A tetrahedron where it is.
+pub(super) struct Solid {
+    corners: [DVec3; 4],
+    /// From the way from the first corner to the weights of the others.
+    inverse: DMat3,
+}
+
+impl Solid {
+    pub fn of(corners: [DVec3; 4]) -> Self {
+        let [a, b, c, d] = corners;
+        Self {
+            corners,
+            inverse: DMat3::from_cols(b - a, c - a, d - a).inverse(),
+        }
+    }
+
+    fn has_volume(&self) -> bool {
+        self.inverse.is_finite()
+    }
+
+    fn weights(&self, point: DVec3) -> DVec3 {
+        self.inverse * (point - self.corners[0])
+    }
+
+    /// The least barycentric weight: below 0 outside.
+    pub fn depth(&self, point: DVec3) -> f64 {
+        let weights = self.weights(point);
+        weights.min_element().min(1.0 - weights.element_sum())
+    }
+
+    fn distance_squared(&self, point: DVec3) -> f64 {
+        let faces = FACES.iter().map(|face| {
+            let corners = face.map(|corner| self.corners[corner]);
+            point.distance_squared(weighted(corners, nearest_on_triangle(point, corners).0))
+        });
+        faces.fold(f64::INFINITY, f64::min)
+    }
+}
