@@ -1,6 +1,5 @@
 //! Fine surfaces that go with coarse bodies.
-
-mod support;
+#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use glam::{Affine3A, DMat3, DVec3, Mat3A, Quat, Vec3, vec3};
 use sinew::cutting::Sweep;

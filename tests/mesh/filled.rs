@@ -17,9 +17,14 @@ fn angles(mesh: &Mesh) -> [f64; 2] {
     let mut range = [180.0_f64, 0.0];
     for tetrahedron in &mesh.tetrahedra {
         let p = tetrahedron.map(|node| mesh.positions[node as usize].as_dvec3());
-        for (a, b) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-            let mut others = (0..4).filter(|&corner| corner != a && corner != b);
-            let (c, d) = (others.next().unwrap(), others.next().unwrap());
+        for [a, b, c, d] in [
+            [0, 1, 2, 3],
+            [0, 2, 1, 3],
+            [0, 3, 1, 2],
+            [1, 2, 0, 3],
+            [1, 3, 0, 2],
+            [2, 3, 0, 1],
+        ] {
             let axis = (p[b] - p[a]).normalize();
             let flat = |q: DVec3| (q - p[a]).reject_from_normalized(axis).normalize();
             let angle = flat(p[c]).dot(flat(p[d])).clamp(-1.0, 1.0).acos().to_degrees();
