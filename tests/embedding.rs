@@ -1,5 +1,5 @@
 //! Fine surfaces that go with coarse bodies.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+#![allow(clippy::unwrap_used)]
 
 use glam::{Affine3A, DMat3, DVec3, Mat3A, Quat, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -152,7 +152,7 @@ fn an_affine_motion_of_the_body_is_one_of_the_surface() {
     embedding.update(&world).unwrap();
     let exact = |place: Vec3| {
         let shape = DMat3::from_cols_array(&motion.matrix3.to_cols_array().map(f64::from));
-        shape * place.as_dvec3() + DVec3::from(motion.translation.as_dvec3())
+        shape * place.as_dvec3() + motion.translation.as_dvec3()
     };
     // Beside the size of what moves: 0.4 m from the origin, with rounding of the nodes themselves.
     for (place, &from) in embedding.positions().iter().zip(&drawn.positions) {
