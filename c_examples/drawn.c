@@ -53,7 +53,7 @@ static void make_surface(void) {
 static void show(sinew_world *world, sinew_vec3_view places, sinew_triangle_view faces, float x) {
   sinew_body_def def;
   sinew_body_id body;
-  float *positions = allocate(3 * places.count, sizeof *positions);
+  float *positions = (float *)allocate(3 * places.count, sizeof *positions);
   size_t i;
   for (i = 0; i < places.count; i++) {
     memcpy(&positions[3 * i], node(places, i), 3 * sizeof *positions);

@@ -169,7 +169,7 @@ impl Solid {
         weights.min_element().min(1.0 - weights.element_sum())
     }
 
-    fn distance_squared(&self, point: DVec3) -> f64 {
+    pub fn distance_squared(&self, point: DVec3) -> f64 {
         let faces = FACES.iter().map(|face| {
             let corners = face.map(|corner| self.corners[corner]);
             point.distance_squared(weighted(corners, nearest_on_triangle(point, corners).0))

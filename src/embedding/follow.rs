@@ -53,8 +53,21 @@ impl Follower {
                 1 => pieces.map(|piece| piece.nodes).next().unwrap_or(vertex.nodes),
                 _ => {
                     let place = self.rest_place(solid, vertex, home);
-                    let deepest = pieces.max_by(|a, b| a.solid.depth(place).total_cmp(&b.solid.depth(place)));
-                    deepest.map_or(vertex.nodes, |piece| piece.nodes)
+                    // Of a vertex outside of the body all depths are below 0, and may be the same on both sides.
+                    let fit = |piece: &&Piece| {
+                        let depth = piece.solid.depth(place);
+                        let distance = if depth < 0.0 {
+                            piece.solid.distance_squared(place)
+                        } else {
+                            0.0
+                        };
+                        (distance, -depth)
+                    };
+                    let fits = |a: &&Piece, b: &&Piece| {
+                        let (a, b) = (fit(a), fit(b));
+                        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+                    };
+                    pieces.min_by(fits).map_or(vertex.nodes, |piece| piece.nodes)
                 }
             });
         }
