@@ -29,7 +29,8 @@ pub struct sinew_embedding_def {
     /// Triangles.
     pub triangle_count: usize,
     /// 4 tetrahedron_count nodes: the tetrahedra of the body, as it was created with. Each vertex keeps its barycentric weights in the one that it
-    /// is in, or nearest to. Where the body has been cut or torn, those that it has now are taken instead. Nullable: each goes with the nearest triangle that is drawn of the body, and keeps its distance from that.
+    /// is in, or nearest to. Where the body has been cut or torn, those that it has now are taken instead. Nullable: each goes with the nearest
+    /// triangle that is drawn of the body, and keeps its distance from that.
     pub tetrahedra: *const u32,
     /// Tetrahedra.
     pub tetrahedron_count: usize,
@@ -129,7 +130,8 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
 /// sinew_embedding_get_triangles.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
-/// cut or torn, and the vertices are bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The vertices stay where they were
+/// cut or torn, and the vertices are bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The
+/// vertices stay where they were
 /// then.
 ///
 /// # Safety
