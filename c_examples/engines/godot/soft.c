@@ -45,8 +45,10 @@ static const core *godot;
 #define PRINT_ERROR GODOT(741, void (*)(const char *, const char *, const char *, int))
 
 /* Of pool arrays, of ints and of vectors. */
-enum { INTS_NEW = 171, INTS_RESIZE = 180, INTS_WRITE = 182, INTS_DESTROY = 186, INTS_POINTER = 300, INTS_WRITTEN = 302 };
-enum { VECTORS_NEW = 235, VECTORS_RESIZE = 244, VECTORS_WRITE = 246, VECTORS_DESTROY = 250, VECTORS_POINTER = 316, VECTORS_WRITTEN = 318 };
+enum {
+  INTS_NEW = 171, INTS_RESIZE = 180, INTS_WRITE = 182, INTS_DESTROY = 186, INTS_POINTER = 300, INTS_WRITTEN = 302,
+  VECTORS_NEW = 235, VECTORS_RESIZE = 244, VECTORS_WRITE = 246, VECTORS_DESTROY = 250, VECTORS_POINTER = 316, VECTORS_WRITTEN = 318
+};
 
 static struct { sinew_world *world; sinew_body_id cloth; sinew_tool_id ball; } soft;
 

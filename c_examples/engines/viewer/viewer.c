@@ -21,7 +21,7 @@
 static const char *const STORAGES[] = {"PACKED", "EFFICIENT", "FAST LINK", "DYNAMIC BULK"};
 static const char *const SOLVERS[] = {"VERLET", "IMPLICIT", "NEWTON"};
 
-typedef enum hand { IDLE, PULLS, PRESSES, CUTS } hand;
+typedef enum deed { IDLE, PULLS, PRESSES, CUTS } deed;
 
 static struct {
   sinew_world *world;
@@ -30,7 +30,7 @@ static struct {
   uint32_t storage, solver;
   sinew_tool_id tool;            /* while something is held or pressed */
   sinew_attachment_id held;
-  hand hand;
+  deed hand;
   int stopped, over;
   float reach, depth;            /* m: from the eye to what the mouse met, and how far the ball is in */
   float turn, tilt, away;        /* rad, rad, m: the camera */
@@ -117,7 +117,7 @@ static int create_tool(const float place[3], float radius, uint32_t mask) {
   return asked(sinew_tool_create(view.world, &def, &view.tool));
 }
 
-static void mouse_down(hand does, int x, int y) {
+static void mouse_down(deed does, int x, int y) {
   float ray[3], place[3];
   sinew_surface_point met;
   release();
@@ -421,7 +421,7 @@ int main(int argc, char **argv) {
   if (SDL_Init(SDL_INIT_VIDEO) != 0) fail("no display:", SDL_GetError());
   SDL_GL_SetAttribute(SDL_GL_MULTISAMPLEBUFFERS, 1), SDL_GL_SetAttribute(SDL_GL_MULTISAMPLESAMPLES, 4);
   window = SDL_CreateWindow("sinew", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, WIDTH, HEIGHT,
-                            SDL_WINDOW_OPENGL | (alone ? SDL_WINDOW_HIDDEN : 0u));
+                            SDL_WINDOW_OPENGL | (alone ? (Uint32)SDL_WINDOW_HIDDEN : 0u));
   context = window == NULL ? NULL : SDL_GL_CreateContext(window);
   if (context == NULL) fail("no OpenGL:", SDL_GetError());
   glEnable(GL_LIGHT0), glEnable(GL_LIGHT1), glEnable(GL_COLOR_MATERIAL), glEnable(GL_NORMALIZE), glEnable(GL_BLEND);
