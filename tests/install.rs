@@ -1,5 +1,5 @@
-//! What `make install` leaves: C and C++ programs, by the header of each, built against the installed tree alone, with pkg-config and with CMake, shared and
-//! static, also after the tree has been moved; and what `uninstall` takes away.
+//! What `make install` leaves: C and C++ programs, by the header of each, built against the installed tree alone, with pkg-config and
+//! with CMake, shared and static, also after the tree has been moved; and what `uninstall` takes away.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
