@@ -112,6 +112,7 @@ impl Play {
     fn create_body(&mut self) {
         let dice = &mut self.dice;
         let is_solid = dice.below(3) == 0;
+        let spare_nodes = [0, 150][dice.below(2)];
         let mesh = if is_solid {
             Mesh::block([0.06; 3], [2, 1, 2])
         } else {
@@ -129,9 +130,13 @@ impl Play {
             node_dampings: Values::Uniform(2e-3),
             solver: [Solver::Verlet, Solver::Verlet, Solver::Implicit][dice.below(3)],
             storage: [Storage::Packed, Storage::FastLink][dice.below(2)],
-            spare_nodes: [0, 150][dice.below(2)],
+            spare_nodes,
             tearing: Tearing {
-                strain: if is_solid { f32::INFINITY } else { 1.5 },
+                strain: if is_solid || spare_nodes == 0 {
+                    f32::INFINITY
+                } else {
+                    1.5
+                },
                 ..Tearing::default()
             },
             sleep: Sleep {
@@ -144,10 +149,7 @@ impl Play {
             },
             ..BodyDefinition::default()
         });
-        let Ok(id) = created else {
-            self.counts.refused += 1;
-            return;
-        };
+        let id = created.expect("a body");
         for _ in 0..2 {
             let node = self.dice.below(mesh.positions.len()) as u32;
             self.world.body_mut(id).and_then(|body| body.pin(node)).expect("a pin");

@@ -10,8 +10,8 @@ use libfuzzer_sys::fuzz_target;
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
-    AttachmentId, BodyContact, BodyDefinition, BodyId, Error, Pose, Shape, Sleep, Solver, Storage, ToolDefinition, ToolId, Values,
-    World, WorldDefinition,
+    AttachmentId, BodyContact, BodyDefinition, BodyId, Error, Pose, Shape, Sleep, Solver, Storage, ToolDefinition,
+    ToolId, Values, World, WorldDefinition,
 };
 
 /// What is known of a body.
@@ -133,7 +133,11 @@ impl Model {
         let hash = self.world.state_hash();
         match self.world.create_body(&definition) {
             Ok(id) => {
-                let springs = self.world.body(id).and_then(|body| body.spring_pairs()).expect("its springs");
+                let springs = self
+                    .world
+                    .body(id)
+                    .and_then(|body| body.spring_pairs())
+                    .expect("its springs");
                 self.bodies.push(Known {
                     id,
                     is_there: true,
@@ -169,16 +173,24 @@ impl Model {
             1 if input.ratio(1, 4)? => world.destroy_body(id).inspect(|()| known.is_there = false),
             1 | 2 => {
                 let (stiffness, length) = (amount(input, 100.0)?, input.ratio(1, 2)?.then_some(0.05));
-                let added = world.body_mut(id).and_then(|body| body.add_spring(a, b, stiffness, length));
+                let added = world
+                    .body_mut(id)
+                    .and_then(|body| body.add_spring(a, b, stiffness, length));
                 added.inspect(|()| {
-                    let is_new = known.springs.as_mut().is_none_or(|springs| springs.insert(ordered([a, b])));
+                    let is_new = known
+                        .springs
+                        .as_mut()
+                        .is_none_or(|springs| springs.insert(ordered([a, b])));
                     assert!(is_new, "a spring that there was is refused");
                 })
             }
             3 => {
                 let removed = world.body_mut(id).and_then(|body| body.remove_spring(a, b));
                 removed.inspect(|()| {
-                    let was_there = known.springs.as_mut().is_none_or(|springs| springs.remove(&ordered([a, b])));
+                    let was_there = known
+                        .springs
+                        .as_mut()
+                        .is_none_or(|springs| springs.remove(&ordered([a, b])));
                     assert!(was_there, "a spring that there was not is refused");
                     assert!(!(cfg!(planted) && !known.pins.is_empty()), "the planted fault");
                 })
@@ -207,7 +219,9 @@ impl Model {
             }
             9 => {
                 let (velocity, count) = (vector(input)?, nodes as usize - usize::from(input.ratio(1, 20)?));
-                world.body_mut(id).and_then(|body| body.set_velocities(&vec![velocity; count]))
+                world
+                    .body_mut(id)
+                    .and_then(|body| body.set_velocities(&vec![velocity; count]))
             }
             10 | 11 => {
                 let sweep = Sweep {
@@ -233,7 +247,11 @@ impl Model {
                         ..Pose::IDENTITY
                     },
                     friction: if input.ratio(1, 2)? { amount(input, 1.0)? } else { 0.0 },
-                    force_limit: if input.ratio(1, 6)? { amount(input, 1.0)? } else { f32::INFINITY },
+                    force_limit: if input.ratio(1, 6)? {
+                        amount(input, 1.0)?
+                    } else {
+                        f32::INFINITY
+                    },
                     ..ToolDefinition::new(shape)
                 };
                 if self.tools.len() > 3 {
@@ -254,7 +272,11 @@ impl Model {
             }
             14 | 15 => {
                 let Some(tool) = tool else { return Ok(()) };
-                let limit = if input.ratio(1, 2)? { f32::INFINITY } else { amount(input, 1.0)? };
+                let limit = if input.ratio(1, 2)? {
+                    f32::INFINITY
+                } else {
+                    amount(input, 1.0)?
+                };
                 let attached = world.attach_node(id, a, self.tools[tool].0, limit);
                 attached.map(|attachment| self.attachments.push(attachment))
             }
@@ -269,11 +291,18 @@ impl Model {
             }
         };
         if let Err(error) = &answer {
-            assert_eq!(self.world.state_hash(), hash, "refused ({error}), and something changed");
+            assert_eq!(
+                self.world.state_hash(),
+                hash,
+                "refused ({error}), and something changed"
+            );
             assert!(!error.to_string().is_empty());
         }
         if !is_there && (1..=11).contains(&kind) {
-            assert!(matches!(answer, Err(Error::StaleId(_))), "{answer:?} of a body that is gone");
+            assert!(
+                matches!(answer, Err(Error::StaleId(_))),
+                "{answer:?} of a body that is gone"
+            );
         }
         self.check();
         Ok(())
@@ -285,9 +314,13 @@ impl Model {
             let body = self.world.body(known.id);
             assert_eq!(body.is_ok(), known.is_there, "an id stays what it was");
             let Ok(body) = body else { continue };
-            assert!(body.positions().iter().all(|place| place.is_finite()), "a position is not finite");
+            assert!(
+                body.positions().iter().all(|place| place.is_finite()),
+                "a position is not finite"
+            );
             if let Some(springs) = &known.springs {
-                let found: BTreeSet<[u32; 2]> = body.spring_pairs().expect("springs").into_iter().map(ordered).collect();
+                let found: BTreeSet<[u32; 2]> =
+                    body.spring_pairs().expect("springs").into_iter().map(ordered).collect();
                 assert_eq!(&found, springs, "springs are those that were made");
             }
             for &pin in &known.pins {
