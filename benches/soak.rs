@@ -22,7 +22,7 @@ const FRAMES: u32 = 1_000_000;
 const TENTHS: u32 = 10;
 
 /// How many bodies there are at once, and tools.
-const BODIES: usize = 6;
+const BODIES: usize = 4;
 const TOOLS: usize = 3;
 
 /// The system's allocator, counting what is held.
@@ -113,6 +113,15 @@ impl Play {
         let dice = &mut self.dice;
         let is_solid = dice.below(3) == 0;
         let spare_nodes = [0, 150][dice.below(2)];
+        let tearing = if spare_nodes > 0 {
+            Tearing {
+                strain: 1.5,
+                most_per_step: 2,
+                ..Tearing::default()
+            }
+        } else {
+            Tearing::default()
+        };
         let mesh = if is_solid {
             Mesh::block([0.06; 3], [2, 1, 2])
         } else {
@@ -131,20 +140,13 @@ impl Play {
             solver: [Solver::Verlet, Solver::Verlet, Solver::Implicit][dice.below(3)],
             storage: [Storage::Packed, Storage::FastLink][dice.below(2)],
             spare_nodes,
-            tearing: Tearing {
-                strain: if is_solid || spare_nodes == 0 {
-                    f32::INFINITY
-                } else {
-                    1.5
-                },
-                ..Tearing::default()
-            },
+            tearing,
             sleep: Sleep {
                 speed: [0.0, 0.005][dice.below(2)],
                 time: 0.1,
             },
             contact: BodyContact {
-                with_bodies: dice.below(4) == 0,
+                with_bodies: dice.below(2) == 0,
                 ..BodyContact::default()
             },
             ..BodyDefinition::default()
@@ -181,6 +183,12 @@ impl Play {
 
     /// What somebody does before a frame.
     fn act(&mut self) {
+        while self.bodies.len() < BODIES {
+            self.create_body();
+        }
+        while self.tools.len() < TOOLS {
+            self.create_tool();
+        }
         match self.dice.below(100) {
             0 if self.bodies.len() == BODIES => {
                 let gone = self.bodies.swap_remove(self.dice.below(BODIES));
@@ -223,16 +231,10 @@ impl Play {
             }
             _ => (),
         }
-        while self.bodies.len() < BODIES {
-            self.create_body();
-        }
-        while self.tools.len() < TOOLS {
-            self.create_tool();
-        }
-        for place in 0..TOOLS {
-            let pose = self.world.pose(self.tools[place]).expect("a pose");
+        for &tool in &self.tools {
+            let pose = self.world.pose(tool).expect("a pose");
             let to = (pose.position + self.dice.vector(0.004)).clamp(Vec3::splat(-0.2), Vec3::splat(0.2));
-            self.world.set_pose(self.tools[place], to, None).expect("a pose");
+            self.world.set_pose(tool, to, None).expect("a pose");
         }
     }
 

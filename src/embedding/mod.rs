@@ -95,7 +95,7 @@ impl Embedding {
         self.topology = body.topology_version();
         if let Some(material) = body.material()
             && !homes.is_empty()
-            && (self.topology > 0 || is_made_of(material, definition.tetrahedra))
+            && is_made_of(material, definition.tetrahedra, self.topology > 0)
         {
             self.follower = Follower::new(material, homes, definition.triangles)?;
         }
@@ -230,14 +230,14 @@ impl World {
     }
 }
 
-/// Whether these tetrahedra, where there are some, are the cells of a material that was not cut.
-fn is_made_of(material: &CutMaterial, tetrahedra: &[[u32; 4]]) -> bool {
+/// Whether vertices bound to these tetrahedra, where there are some, are bound to cells of the material: once it was changed, its own were taken.
+fn is_made_of(material: &CutMaterial, tetrahedra: &[[u32; 4]], was_changed: bool) -> bool {
     match material {
         CutMaterial::Springs(_) => false,
         CutMaterial::Surface(_) => tetrahedra.is_empty(),
         CutMaterial::Solid(solid) => {
             let cells = solid.cells().iter().map(|cell| cell.nodes);
-            cells.eq(tetrahedra.iter().copied())
+            was_changed || cells.eq(tetrahedra.iter().copied())
         }
     }
 }
