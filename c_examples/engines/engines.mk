@@ -4,8 +4,7 @@
 
 ENGINES := love viewer mono bullet godot
 ENGINE_BUILD := $(BUILD)/engines
-LIBRARY := $(abspath $(TARGET))/release/$(SHARED)
-ENGINE_LINK := $(TARGET)/release/$(SHARED) '-Wl,-rpath,$(abspath $(BUILD))' -lm
+ENGINE_LINK := $(LIBRARY) '-Wl,-rpath,$(abspath $(BUILD))' -lm
 # A display where there is none.
 DISPLAYED := $(if $(DISPLAY),,xvfb-run -a -s '-screen 0 1280x1024x24')
 
@@ -20,7 +19,7 @@ engines: engine_folders
 # love, xvfb, xauth
 love: engine_folders
 	$(DISPLAYED) env XDG_DATA_HOME=$(abspath $(ENGINE_BUILD)/home) \
-	  love engines/love $(abspath ../include/sinew.h) $(LIBRARY) $(abspath $(PICTURES))/love.png 100
+	  love engines/love $(abspath ../include/sinew.h $(LIBRARY)) $(abspath $(PICTURES))/love.png 100
 
 # libsdl2-dev, libgl-dev, pkg-config, libgl1-mesa-dri, xvfb, xauth
 viewer: engine_folders
