@@ -73,6 +73,7 @@ use crate::error::{Error, Result};
 use crate::material::Made;
 use crate::memory;
 use crate::readers::Shown;
+use crate::snapshot::saved;
 use crate::solver::{
     Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close,
     write_records,
@@ -164,6 +165,8 @@ pub struct Body {
     /// For bodies that sleep.
     pub(crate) sleeper: Option<Box<Sleeper>>,
 }
+
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None });
 
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]

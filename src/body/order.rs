@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::definition::Spring;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Rounding, costs};
 
 /// Where each node is kept, for bodies that do not keep them in the caller's order.
@@ -19,6 +20,8 @@ pub(crate) struct NodeOrder {
     /// The reverse.
     caller: Vec<u32>,
 }
+
+saved!(NodeOrder { own, caller });
 
 impl NodeOrder {
     /// The order that suits these springs best.

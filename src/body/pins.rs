@@ -5,6 +5,7 @@ use glam::{BVec3, DVec3, Vec3};
 use super::vectors::Vectors;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::TILE;
 use crate::threads::Ragged;
 
@@ -29,6 +30,18 @@ pub(crate) struct Pin {
     /// The axes along which it is held, at least one; along the others it moves as free nodes do.
     pub axes: BVec3,
 }
+
+saved!(Pin {
+    node,
+    target,
+    force,
+    closing_share,
+    goal,
+    travel,
+    force_sum,
+    solved,
+    axes
+});
 
 impl Pin {
     fn new(node: u32, axes: BVec3) -> Self {
@@ -95,6 +108,12 @@ pub(crate) struct Pins {
     /// How many are held along some axes alone.
     partial_count: usize,
 }
+
+saved!(Pins {
+    pins,
+    tiles,
+    partial_count
+});
 
 impl Pins {
     pub fn iter(&self) -> std::slice::Iter<'_, Pin> {

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::vectors::Vectors;
 use crate::error::Result;
+use crate::snapshot::saved;
 
 /// Positions, velocities and spring forces of all nodes, with room for a step in progress.
 ///
@@ -23,6 +24,15 @@ pub(crate) struct State {
     /// The place of the current velocities and forces.
     settled: usize,
 }
+
+saved!(State {
+    positions,
+    velocities,
+    forces,
+    current,
+    latest,
+    settled
+});
 
 /// What a substep reads and writes.
 pub(crate) struct Substep<'a> {

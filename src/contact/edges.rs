@@ -7,6 +7,7 @@ use super::features::HOLE;
 use crate::error::Result;
 use crate::memory;
 use crate::mesh::TRIANGLE_EDGES;
+use crate::snapshot::{Reader, Saved, Writer, shape_of_name};
 
 /// How many triangles have each edge of a surface.
 #[derive(Debug)]
@@ -22,6 +23,41 @@ pub(super) struct EdgeUses {
 }
 
 const MANY: u8 = u8::MAX;
+
+impl Saved for EdgeUses {
+    const SHAPE: u64 = shape_of_name("EdgeUses { starts, counts, added, holes }");
+    const LEAST: usize = 56;
+
+    fn save(&self, to: &mut Writer) {
+        let Self {
+            starts,
+            counts,
+            added,
+            holes,
+        } = self;
+        starts.save(to);
+        counts.save(to);
+        // In an order that says nothing of what came when.
+        let mut edges: Vec<([u32; 2], u32)> = added.iter().map(|(ends, edge)| (*ends, *edge)).collect();
+        edges.sort_unstable();
+        edges.into_boxed_slice().save(to);
+        holes.save(to);
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let (starts, counts) = (Saved::load(from)?, Saved::load(from)?);
+        let edges: Box<[([u32; 2], u32)]> = Saved::load(from)?;
+        let mut added = HashMap::default();
+        added.try_reserve(edges.len())?;
+        added.extend(edges);
+        Ok(Self {
+            starts,
+            counts,
+            added,
+            holes: Saved::load(from)?,
+        })
+    }
+}
 
 impl EdgeUses {
     /// Of a surface with these edges, in order, and faces.

@@ -13,11 +13,12 @@ use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
+use crate::snapshot::saved;
 use crate::terms::SpringLaw;
 
 /// Beside springs of a law.
 #[derive(Debug)]
-struct Arms {
+pub(super) struct Arms {
     law: SpringLaw,
     curve: Curve,
     viscosity: Viscosity,
@@ -25,6 +26,14 @@ struct Arms {
     /// Of the equation that is being solved; nothing where there is none.
     course: Course,
 }
+
+saved!(Arms {
+    law,
+    curve,
+    viscosity,
+    stiffening,
+    course
+});
 
 /// Stresses are pulls over the spring's stiffness, m.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +45,15 @@ struct Arm {
     kept_stress: f32,
     kept_elastic: f32,
 }
+
+saved!(Arm {
+    rest_length,
+    load,
+    stress,
+    elastic,
+    kept_stress,
+    kept_elastic
+});
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let viscosity = definition.viscosity;
@@ -115,6 +133,8 @@ impl Arms {
 }
 
 impl Law<2> for Arms {
+    const SAVED_AS: u8 = 1;
+
     type Shape = Arm;
 
     const IS_OF_SPRINGS: bool = true;

@@ -23,10 +23,13 @@ use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::body::{BodyDefinition, NodeOrder, not_negative};
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Hinges: the two nodes of the edge, then those opposite.
 #[derive(Debug)]
-struct Hinges;
+pub(super) struct Hinges;
+
+saved!(Hinges {});
 
 /// A hinge at rest.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +43,13 @@ struct Shape {
     /// That of half the angle, over the length of the edge, 1/m; 0: flat.
     sine: f32,
 }
+
+saved!(Shape {
+    feet,
+    inverse_heights,
+    cosine,
+    sine
+});
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let rigidity = definition.bending_stiffness;
@@ -234,6 +244,8 @@ fn cross(vector: DVec3) -> DMat3 {
 const EDGE: [f64; 4] = [-1.0, 1.0, 0.0, 0.0];
 
 impl Law<4> for Hinges {
+    const SAVED_AS: u8 = 4;
+
     type Shape = Shape;
 
     fn energy(&self, shape: &Shape, places: &[DVec3; 4]) -> f64 {

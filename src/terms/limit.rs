@@ -10,14 +10,17 @@ use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
 use crate::error::{Error, Result};
+use crate::snapshot::saved;
 
 /// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.
 #[derive(Debug)]
-struct Limit {
+pub(super) struct Limit {
     strain: f64,
     /// How much stiffer they are beyond it.
     stiffening: f64,
 }
+
+saved!(Limit { strain, stiffening });
 
 /// A spring is never stiffer than this many times.
 const STIFFEST: f32 = 1e6;
@@ -65,6 +68,8 @@ impl Limit {
 }
 
 impl Law<2> for Limit {
+    const SAVED_AS: u8 = 2;
+
     type Shape = f32;
 
     const IS_OF_SPRINGS: bool = true;

@@ -14,14 +14,17 @@ use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::material::{Course, Yielding};
+use crate::snapshot::saved;
 use crate::terms::SpringLaw;
 
 /// What springs pull less than before they yielded, over their stiffness.
 #[derive(Debug)]
-struct Sets {
+pub(super) struct Sets {
     yield_strain: f64,
     largest: f64,
 }
+
+saved!(Sets { yield_strain, largest });
 
 /// m
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +34,12 @@ struct Set {
     longer: f32,
     kept: f32,
 }
+
+saved!(Set {
+    rest_length,
+    longer,
+    kept
+});
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let Yielding { strain, largest } = definition.yielding;
@@ -96,6 +105,8 @@ impl Sets {
 }
 
 impl Law<2> for Sets {
+    const SAVED_AS: u8 = 3;
+
     type Shape = Set;
 
     const IS_OF_SPRINGS: bool = true;

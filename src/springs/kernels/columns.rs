@@ -12,6 +12,7 @@ use super::strays::Strays;
 use crate::body::MARGIN;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Link, TILE};
 
 /// Lanes of a column.
@@ -37,6 +38,12 @@ pub(crate) struct Material {
     pub damping: f32,
 }
 
+saved!(Material {
+    stiffness,
+    rest_length,
+    damping
+});
+
 impl Material {
     /// Half the force with which a spring would be pressed to length 0, N.
     #[inline(always)]
@@ -49,6 +56,8 @@ impl Material {
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line(pub [f32; LANES]);
+
+saved!(Line { 0 });
 
 impl Line {
     pub const ZERO: Self = Self([0.0; LANES]);
@@ -96,12 +105,22 @@ pub(super) struct Run {
     pub half_tension: f32,
 }
 
+saved!(Run {
+    offset,
+    lanes,
+    material,
+    stiffness,
+    half_tension
+});
+
 /// A column of neighbours that lie side by side, of springs that bring their own parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnRun {
     pub offset: i32,
     pub lanes: u16,
 }
+
+saved!(OwnRun { offset, lanes });
 
 /// What there is to know of a gather beside its neighbours.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +129,8 @@ pub(super) struct Gather {
     /// Its place in the table of materials; [`OWN`].
     material: u16,
 }
+
+saved!(Gather { lanes, material });
 
 impl Gather {
     /// Its place in the table of materials, where its springs share their parameters.
@@ -129,15 +150,27 @@ pub(super) struct Ends {
     pub own: u32,
 }
 
+saved!(Ends {
+    runs,
+    own_runs,
+    near,
+    far,
+    own
+});
+
 /// Small indices of a column.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NearIndices(pub [u16; LANES]);
 
+saved!(NearIndices { 0 });
+
 /// Indices of a column.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FarIndices(pub [u32; LANES]);
+
+saved!(FarIndices { 0 });
 
 /// The links of the nodes of one tile.
 #[derive(Debug)]
@@ -169,6 +202,27 @@ pub(crate) struct Columns {
     pub(super) damped: bool,
     pub(super) strays: Strays,
 }
+
+saved!(Columns {
+    first,
+    count,
+    node_count,
+    reads,
+    window,
+    blocks,
+    runs,
+    own_runs,
+    near,
+    near_indices,
+    far,
+    far_indices,
+    own_rest_lengths,
+    own_stiffnesses,
+    own_stiffness,
+    own_dampings,
+    damped,
+    strays
+});
 
 /// A link's place.
 #[derive(Clone, Copy)]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::columns::{LANES, Line};
 use crate::error::Result;
+use crate::snapshot::saved;
 use crate::springs::Link;
 
 /// Links beside the columns of a tile.
@@ -21,6 +22,17 @@ pub(crate) struct Strays {
     rest_lengths: Vec<f32>,
     dampings: Vec<f32>,
 }
+
+saved!(Strays {
+    first,
+    node_count,
+    damped,
+    places,
+    neighbours,
+    stiffnesses,
+    rest_lengths,
+    dampings
+});
 
 /// Sixteen strays, or fewer at the end, as the kernel takes them.
 pub(super) struct Batch {

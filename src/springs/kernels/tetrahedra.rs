@@ -15,6 +15,7 @@ use super::lanes::Lanes;
 use super::{ChosenKernel, WithLanes};
 use crate::body::Record;
 use crate::elements::Law;
+use crate::snapshot::saved;
 
 /// Tetrahedra side by side.
 pub(crate) const GROUP: usize = 16;
@@ -33,6 +34,13 @@ pub(crate) struct Group {
     pub rates: [f32; GROUP],
 }
 
+saved!(Group {
+    corners,
+    inverse,
+    volumes,
+    rates
+});
+
 impl Group {
     pub const EMPTY: Self = Self {
         corners: [[0; GROUP]; 4],
@@ -47,6 +55,8 @@ impl Group {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stresses(pub [[f32; GROUP]; 7]);
 
+saved!(Stresses { 0 });
+
 impl Stresses {
     pub const ZERO: Self = Self([[0.0; GROUP]; 7]);
 }
@@ -57,6 +67,8 @@ pub(crate) struct Groups {
     groups: Vec<Group>,
     node_count: usize,
 }
+
+saved!(Groups { groups, node_count });
 
 impl Groups {
     /// # Panics

@@ -1,0 +1,177 @@
+//! A world to bytes and back.
+
+use super::{World, WorldDefinition};
+use crate::body::Body;
+use crate::contact::{Tissue, Tool};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::readers::Clock;
+use crate::slots::Slots;
+use crate::snapshot::{
+    Reader, Saved, Writer, at_end, begin, opened, saved, seal, section, shape_of_name, shape_with, write_section,
+};
+use crate::springs::{ChosenKernel, Kernel, TILE};
+use crate::threads::{RunTasks, Threads};
+
+use super::attachments::{Attachment, AttachmentId};
+use super::blade::Blade;
+use super::blades::BladeId;
+
+saved!(WorldDefinition { gravity, substeps, max_substeps, tolerance, kernel } leaves { thread_count: 1, tasks: None });
+
+/// Of everything that is written.
+const SHAPE: u64 = {
+    let shape = shape_with(WorldDefinition::SHAPE, Body::SHAPE);
+    let shape = shape_with(shape, Tool::SHAPE);
+    let shape = shape_with(shape, Attachment::SHAPE);
+    let shape = shape_with(shape, Blade::SHAPE);
+    let shape = shape_with(shape, Tissue::SHAPE);
+    shape_with(shape, TILE as u64)
+};
+
+impl World {
+    /// The world as bytes, of which [`World::load`] makes one that goes on just as this one does, to the bit: with bodies as they were cut and torn,
+    /// contacts, what is held and sewn, blades in mid stroke, what was applied for the next step, and ids, which name the same things there.
+    ///
+    /// What is not of the world is not in it: threads, [`BodyReader`](crate::BodyReader)s and [`Embedding`](crate::Embedding)s, which are made again.
+    /// The bytes are for this version of the library alone, and are the same for any number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) leads a tool, or more room is kept for what may come than bytes can ask for.
+    /// [`Error::OutOfMemory`].
+    pub fn save(&self) -> Result<Vec<u8>> {
+        let size = self.saved_size()?;
+        let mut bytes = memory::filled(0, size)?;
+        self.save_into(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// How many bytes [`World::save_into`] writes.
+    ///
+    /// # Errors
+    /// As [`World::save`].
+    pub fn saved_size(&self) -> Result<usize> {
+        if let Some(link) = self.haptics.first() {
+            return Err(Error::Unsupported(format!(
+                "a haptic handle leads {}: its thread cannot be saved, destroy the handle first",
+                link.led()
+            )));
+        }
+        let mut count = Writer::new(None);
+        self.write(&mut count);
+        if count.is_too_large() {
+            return Err(Error::Unsupported(format!(
+                "a world of {} bytes keeps more room for what may come than bytes can ask for",
+                count.size()
+            )));
+        }
+        Ok(count.size())
+    }
+
+    /// The same as [`World::save`] into the first of `bytes`: how many.
+    ///
+    /// # Errors
+    /// As [`World::save`], and [`Error::InvalidArgument`]: there are too few bytes. Then nothing is written.
+    pub fn save_into(&self, bytes: &mut [u8]) -> Result<usize> {
+        let size = self.saved_size()?;
+        let capacity = bytes.len();
+        let Some(bytes) = bytes.get_mut(..size) else {
+            return Err(Error::invalid(format!(
+                "capacity is {capacity}: the world takes {size} bytes"
+            )));
+        };
+        self.write(&mut Writer::new(Some(bytes)));
+        seal(bytes);
+        Ok(size)
+    }
+
+    fn write(&self, to: &mut Writer) {
+        let Self {
+            definition,
+            kernel,
+            threads: _,
+            bodies,
+            tools,
+            paths: _,
+            tissue,
+            walks,
+            outcomes: _,
+            attachments,
+            slipped,
+            blades,
+            holds_made,
+            haptics: _,
+            clock,
+        } = self;
+        begin(to, SHAPE);
+        write_section(to, *b"WRLD", |to| {
+            definition.save(to);
+            kernel.kernel().save(to);
+            walks.len().save(to);
+            slipped.save(to);
+            holds_made.save(to);
+            clock.save(to);
+        });
+        write_section(to, *b"BODY", |to| bodies.save(to));
+        write_section(to, *b"TOOL", |to| tools.save(to));
+        write_section(to, *b"ATTA", |to| attachments.save(to));
+        write_section(to, *b"BLAD", |to| blades.save(to));
+        write_section(to, *b"TISS", |to| tissue.save(to));
+    }
+
+    /// A world of the bytes that [`World::save`] made, with so many threads, or the caller's job system, as in [`WorldDefinition`].
+    ///
+    /// Bytes are not trusted: what was cut short, has changed or never was a world is refused as a whole.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: the bytes are no world, or there are too many threads. [`Error::Unsupported`]: they are of another version of the
+    /// library, or this processor does not offer the kernel that the world was stepped with, or the system not so many threads.
+    /// [`Error::OutOfMemory`].
+    pub fn load(bytes: &[u8], thread_count: u32, tasks: Option<RunTasks>) -> Result<Self> {
+        let portable = Kernel::Portable.choose()?;
+        let mut bytes = opened(bytes, SHAPE)?;
+        let mut from = section(&mut bytes, *b"WRLD", portable)?;
+        let definition = WorldDefinition {
+            thread_count,
+            tasks,
+            ..Saved::load(&mut from)?
+        };
+        let kernel = Kernel::load(&mut from)?.choose()?;
+        let mut world = Self::new(WorldDefinition {
+            kernel: kernel.kernel(),
+            ..definition
+        })?;
+        world.definition.kernel = definition.kernel;
+        let walk_count = usize::load(&mut from)?;
+        world.slipped = Saved::load(&mut from)?;
+        world.holds_made = Saved::load(&mut from)?;
+        world.clock = Saved::load(&mut from)?;
+        at_end(&from)?;
+        let mut read = |tag: [u8; 4], read: &mut dyn FnMut(&mut Reader) -> Result<()>| {
+            let mut from = section(&mut bytes, tag, kernel)?;
+            read(&mut from)?;
+            at_end(&from)
+        };
+        read(*b"BODY", &mut |from| Ok(world.bodies = Slots::load("body", from)?))?;
+        read(*b"TOOL", &mut |from| Ok(world.tools = Slots::load("tool", from)?))?;
+        read(*b"ATTA", &mut |from| {
+            Ok(world.attachments = Slots::load("attachment", from)?)
+        })?;
+        read(*b"BLAD", &mut |from| Ok(world.blades = Slots::load("blade", from)?))?;
+        read(*b"TISS", &mut |from| Ok(world.tissue = Saved::load(from)?))?;
+        if !bytes.is_empty() {
+            return Err(Error::invalid(
+                "bytes are no world: something is behind its last section",
+            ));
+        }
+        if walk_count > world.bodies.places() {
+            return Err(Error::invalid(
+                "bytes are no world: bodies that are not there go together",
+            ));
+        }
+        world.walks = memory::filled(None, walk_count)?;
+        world.outcomes = memory::reserved(world.bodies.places() + 1)?;
+        world.paths = memory::reserved(world.tools.places() + 1)?;
+        Ok(world)
+    }
+}
