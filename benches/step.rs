@@ -289,7 +289,8 @@ fn haptics(criterion: &mut Criterion) {
     let mass_of = |place: &Vec3| if is_rim(place) { 0.0 } else { 1e-5 };
     let masses: Vec<f32> = mesh.positions.iter().map(mass_of).collect();
     for is_led in [false, true] {
-        let mut world = world();
+        // As many substeps as it needs: a step is that of a tick.
+        let mut world = World::new(WorldDefinition::default()).expect("a valid definition");
         let body = BodyDefinition {
             positions: &mesh.positions,
             triangles: &mesh.triangles,

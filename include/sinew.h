@@ -2072,7 +2072,8 @@ typedef struct sinew_embedding_def {
   size_t triangle_count;
   /**
    * 4 tetrahedron_count nodes: the tetrahedra of the body, as it was created with. Each vertex keeps its barycentric weights in the one that it
-   * is in, or nearest to. Nullable: each goes with the nearest triangle that is drawn of the body, and keeps its distance from that.
+   * is in, or nearest to. Where the body has been cut or torn, those that it has now are taken instead. Nullable: each goes with the nearest
+   * triangle that is drawn of the body, and keeps its distance from that.
    */
   const uint32_t *tetrahedra;
   /**
@@ -3738,7 +3739,7 @@ sinew_status sinew_embedding_def_init(struct sinew_embedding_def *def, size_t st
  * where it is bound to tetrahedra.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where no tetrahedron has a volume, or nothing is drawn of the body), SINEW_STATUS_STALE_ID,
- * SINEW_STATUS_UNSUPPORTED (tetrahedra are given of a body that has been cut or torn: they are others now), SINEW_STATUS_OUT_OF_MEMORY.
+ * SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
@@ -3759,11 +3760,12 @@ void sinew_embedding_destroy(struct sinew_embedding *embedding);
 
 /**
  * Puts the vertices where the body is now, in the place where they are read. Nothing is allocated, but when the body has been cut or torn since:
- * then each vertex in a tetrahedron is bound to the copy on its side, and triangles that would reach across are left out of
+ * then each vertex is bound to the copy on its side, and triangles that would reach across are left out of
  * sinew_embedding_get_triangles.
  *
  * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
- * cut or torn, and the vertices are bound to its triangles, or not to all of the tetrahedra of which it was made). The vertices stay where they were
+ * cut or torn, and the vertices are bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The
+ * vertices stay where they were
  * then.
  *
  * # Safety

@@ -117,3 +117,27 @@ fn every_function_says_what_it_does_and_how_it_fails() {
         );
     }
 }
+
+#[test]
+fn the_documents_list_every_function_beside_its_counterpart_in_rust() {
+    let page = fs::read_to_string(root().join("src/capi/functions.md")).expect("src/capi/functions.md");
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| [`sinew_"));
+    let listed: Vec<String> = rows
+        .map(|row| {
+            let (name, rest) = row.split_once('`').expect("a name ends");
+            let beside = rest.split(" | ").nth(1).expect("a second column");
+            // rustdoc sees to it that what is linked is there.
+            assert!(
+                beside.contains("](crate::") || beside.contains("of the crate"),
+                "sinew_{name}: {beside}"
+            );
+            format!("sinew_{name}")
+        })
+        .collect();
+    let declared: Vec<String> = functions(committed())
+        .into_iter()
+        .filter(|(_, line)| !line.starts_with("typedef"))
+        .filter_map(|(_, line)| Some(line.split_once('(')?.0.rsplit([' ', '*']).next()?.to_owned()))
+        .collect();
+    assert_eq!(listed, declared, "in the order of the header");
+}

@@ -4,7 +4,7 @@ use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::Cuttable;
 use super::{Body, Bound, NewNode, NodeOrder};
 use crate::contact::{Skin, SkinChange, SurfaceChange, SurfaceToBe};
-use crate::cutting::{BoundPoint, Changes, CutMaterial, CutSolid, Limits, Sweep};
+use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -59,9 +59,9 @@ impl Body {
         material.into_iter().flat_map(CutMaterial::bared)
     }
 
-    /// The material of a body of tetrahedra that may be cut.
-    pub(crate) fn solid(&self) -> Option<&CutSolid> {
-        self.cuttable.as_ref().and_then(|cuttable| cuttable.material.solid())
+    /// What a body is made of that may be cut.
+    pub(crate) fn material(&self) -> Option<&CutMaterial> {
+        self.cuttable.as_ref().map(|cuttable| &cuttable.material)
     }
 
     /// Which version its topology has: 0 when it was made.

@@ -2,6 +2,8 @@
 //!
 //! `include/sinew.h` is generated from here. Every function checks its pointers, catches what might panic, and writes
 //! its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).
+//!
+#![doc = include_str!("functions.md")]
 #![allow(unsafe_code)]
 #![allow(non_camel_case_types)]
 

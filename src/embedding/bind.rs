@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3, Vec3};
 use crate::body::Bounds;
 use crate::contact::nearest::nearest_on_triangle;
 use crate::contact::tree::Tree;
+use crate::cutting::{CutSolid, CutSurface};
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -85,6 +86,48 @@ impl Binding {
         Ok((Self::Tetrahedra(bound), homes))
     }
 
+    /// The same with the cells of a solid that has been cut: the one whose material is there or nearest.
+    pub fn to_solid(vertices: &[Vec3], positions: &[Vec3], solid: &CutSolid) -> Result<(Self, Vec<u32>)> {
+        let count = solid.vertices().len() as u32;
+        let mut places: Vec<Vec3> = memory::reserved(count as usize)?;
+        places.extend((0..count).map(|vertex| solid.place(vertex, positions)));
+        let mut pieces: Vec<[u32; 4]> = memory::reserved(solid.tetrahedra().len())?;
+        pieces.extend(solid.tetrahedra().iter().map(|tetrahedron| tetrahedron.corners));
+        let (_, mut homes) = Self::to_tetrahedra(vertices, &places, &pieces)?;
+        let mut bound = memory::reserved(vertices.len())?;
+        for (vertex, home) in vertices.iter().zip(&mut homes) {
+            *home = solid.tetrahedra()[*home as usize].cell;
+            let nodes = solid.cells()[*home as usize].nodes;
+            let cell = Solid::of(nodes.map(|node| positions[node as usize].as_dvec3()));
+            bound.push(InTetrahedron {
+                nodes,
+                weights: cell.weights(vertex.as_dvec3()).as_vec3().to_array(),
+            });
+        }
+        Ok((Self::Tetrahedra(bound), homes))
+    }
+
+    /// Each vertex to the cell of a surface that may be cut whose material is nearest, and which that is.
+    pub fn to_surface(vertices: &[Vec3], positions: &[Vec3], surface: &CutSurface) -> Result<(Self, Vec<u32>)> {
+        let count = surface.vertices().len() as u32;
+        let mut places: Vec<Vec3> = memory::reserved(count as usize)?;
+        places.extend((0..count).map(|vertex| surface.place(vertex, positions)));
+        let mut pieces: Vec<[u32; 3]> = memory::reserved(surface.triangles().len())?;
+        pieces.extend(surface.triangles().iter().map(|triangle| triangle.corners));
+        let mut homes = nearest_triangles(vertices, &places, &pieces)?;
+        let mut bound = memory::reserved(vertices.len())?;
+        for (vertex, home) in vertices.iter().zip(&mut homes) {
+            *home = surface.triangles()[*home as usize].cell;
+            let nodes = surface.cells()[*home as usize].nodes;
+            bound.push(over(
+                vertex.as_dvec3(),
+                nodes,
+                nodes.map(|node| positions[node as usize]),
+            ));
+        }
+        Ok((Self::Triangles(bound), homes))
+    }
+
     /// Each vertex to the nearest triangle.
     pub fn to_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self> {
         if triangles.is_empty() {
@@ -92,35 +135,46 @@ impl Binding {
                 "tetrahedra are 0, and nothing is drawn of the body: there is nothing to bind to",
             ));
         }
-        let corners = |triangle: u32| triangles[triangle as usize].map(|node| positions[node as usize]);
-        let tree = Tree::new(triangles.len(), corners)?;
+        let homes = nearest_triangles(vertices, positions, triangles)?;
         let mut bound = memory::reserved(vertices.len())?;
-        for &vertex in vertices {
-            let point = vertex.as_dvec3();
-            let mut best = (f64::INFINITY, 0, [1.0, 0.0, 0.0]);
-            tree.near(&Bounds::of(std::iter::once(vertex)), f32::INFINITY, |place| {
-                let number = tree.triangle(place);
-                let exact = tree.placed(place).exact();
-                let (weights, _) = nearest_on_triangle(point, exact);
-                let distance = point.distance_squared(weighted(exact, weights));
-                if distance < best.0 || distance == best.0 && number < best.1 {
-                    best = (distance, number, weights);
-                }
-                best.0 as f32
-            });
-            bound.push(over(point, triangles[best.1 as usize], corners(best.1), best.2));
-        }
+        bound.extend(vertices.iter().zip(homes).map(|(vertex, home)| {
+            let nodes = triangles[home as usize];
+            over(vertex.as_dvec3(), nodes, nodes.map(|node| positions[node as usize]))
+        }));
         Ok(Self::Triangles(bound))
     }
 }
 
+/// The triangle that is nearest to each vertex, the first among several.
+fn nearest_triangles(vertices: &[Vec3], positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Vec<u32>> {
+    let corners = |triangle: u32| triangles[triangle as usize].map(|node| positions[node as usize]);
+    let tree = Tree::new(triangles.len(), corners)?;
+    let mut nearest = memory::reserved(vertices.len())?;
+    for &vertex in vertices {
+        let point = vertex.as_dvec3();
+        let mut best = (f64::INFINITY, 0);
+        tree.near(&Bounds::of(std::iter::once(vertex)), f32::INFINITY, |place| {
+            let number = tree.triangle(place);
+            let exact = tree.placed(place).exact();
+            let distance = point.distance_squared(weighted(exact, nearest_on_triangle(point, exact).0));
+            if distance < best.0 || distance == best.0 && number < best.1 {
+                best = (distance, number);
+            }
+            best.0 as f32
+        });
+        nearest.push(best.1);
+    }
+    Ok(nearest)
+}
+
 /// A vertex over a triangle: its foot in the plane, which may lie beside the triangle, and its height; over one that lies along a line at the
 /// nearest point, with none.
-fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3], nearest: [f64; 3]) -> OverTriangle {
+fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3]) -> OverTriangle {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let inverse = DMat3::from_cols(b - a, c - a, normal).inverse();
     if normal == DVec3::ZERO || !inverse.is_finite() {
+        let (nearest, _) = nearest_on_triangle(point, [a, b, c]);
         return OverTriangle {
             nodes,
             weights: [nearest[1] as f32, nearest[2] as f32],
@@ -135,7 +189,7 @@ fn over(point: DVec3, nodes: [u32; 3], corners: [Vec3; 3], nearest: [f64; 3]) ->
     }
 }
 
-fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
+pub(super) fn weighted(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
 }
 

@@ -2,131 +2,242 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::bind::{InTetrahedron, Solid};
-use crate::cutting::CutSolid;
+use super::bind::{Binding, Solid, weighted};
+use crate::contact::nearest::nearest_on_triangle;
+use crate::cutting::{CutMaterial, CutSolid, CutSurface};
 use crate::error::Result;
 use crate::memory;
 
 /// What following cuts asks for: kept for bodies that may be cut.
 #[derive(Debug)]
-pub(super) struct Follower {
-    /// The cells as the body was made.
-    cells: Vec<[u32; 4]>,
-    /// The cell that each vertex was bound to.
-    homes: Vec<u32>,
+pub(super) enum Follower {
+    Surface(Homes<3>),
+    Solid(Homes<4>),
+}
+
+/// The cells that vertices were bound to.
+#[derive(Debug)]
+pub(super) struct Homes<const N: usize> {
+    /// Their nodes; for copies of a node one of them.
+    cells: Vec<[u32; N]>,
+    /// The first of those that lay where the vertex's did: copies of a cell were one.
+    of_vertices: Vec<u32>,
     /// All triangles.
     triangles: Vec<[u32; 3]>,
 }
 
 impl Follower {
-    /// For vertices in these cells, if they are those of the solid, which has not been cut.
-    pub fn new(
-        solid: &CutSolid,
-        cells: &[[u32; 4]],
-        homes: Vec<u32>,
-        triangles: &[[u32; 3]],
-    ) -> Result<Option<Box<Self>>> {
-        let own = solid.cells().iter().map(|cell| cell.nodes);
-        if !own.eq(cells.iter().copied()) {
-            return Ok(None);
-        }
-        Ok(Some(Box::new(Self {
-            cells: memory::copied(cells)?,
-            homes,
-            triangles: memory::copied(triangles)?,
-        })))
-    }
-
-    /// Binds each vertex to the copy of its cell that has the material where it is, and keeps the triangles whose corners hang together.
-    /// Nothing is changed where memory is short.
-    pub fn follow(&self, solid: &CutSolid, bound: &mut [InTetrahedron], triangles: &mut Vec<[u32; 3]>) -> Result<()> {
-        let material = self.material(solid)?;
-        let mut nodes: Vec<[u32; 4]> = memory::reserved(bound.len())?;
-        for (vertex, &home) in bound.iter().zip(&self.homes) {
-            let first = material.partition_point(|piece| piece.home < home);
-            let pieces = material[first..].iter().take_while(|piece| piece.home == home);
-            nodes.push(match pieces.clone().count() {
-                // All of its material was taken away: it stays with what it was bound to.
-                0 => vertex.nodes,
-                1 => pieces.map(|piece| piece.nodes).next().unwrap_or(vertex.nodes),
-                _ => {
-                    let place = self.rest_place(solid, vertex, home);
-                    // Of a vertex outside of the body all depths are below 0, and may be the same on both sides.
-                    let fit = |piece: &&Piece| {
-                        let depth = piece.solid.depth(place);
-                        let distance = if depth < 0.0 {
-                            piece.solid.distance_squared(place)
-                        } else {
-                            0.0
-                        };
-                        (distance, -depth)
-                    };
-                    let fits = |a: &&Piece, b: &&Piece| {
-                        let (a, b) = (fit(a), fit(b));
-                        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-                    };
-                    pieces.min_by(fits).map_or(vertex.nodes, |piece| piece.nodes)
-                }
-            });
-        }
-        let mut whole: Vec<[u32; 3]> = memory::reserved(self.triangles.len())?;
-        whole.extend(self.triangles.iter().filter(|[a, b, c]| {
-            let hangs = |u: u32, v: u32| self.hang_together([u, v].map(|vertex| vertex as usize), &nodes);
-            hangs(*a, *b) && hangs(*b, *c) && hangs(*c, *a)
-        }));
-        for (vertex, nodes) in bound.iter_mut().zip(nodes) {
-            vertex.nodes = nodes;
-        }
-        *triangles = whole;
-        Ok(())
-    }
-
-    /// All of the solid's material, by the cells that it was in.
-    fn material(&self, solid: &CutSolid) -> Result<Vec<Piece>> {
-        // Copies of a cell are where it was at rest.
-        let key = |nodes: [u32; 4]| nodes.map(|node| solid.rest(node).to_array().map(f32::to_bits));
-        let mut homes: HashMap<_, u32> = HashMap::new();
-        homes.try_reserve(self.cells.len())?;
-        for (home, &nodes) in (0..).zip(&self.cells) {
-            homes.entry(key(nodes)).or_insert(home);
-        }
-        let mut material = memory::reserved(solid.tetrahedra().len())?;
-        for tetrahedron in solid.tetrahedra() {
-            let nodes = solid.cells()[tetrahedron.cell as usize].nodes;
-            if let Some(&home) = homes.get(&key(nodes)) {
-                let corners = tetrahedron.corners.map(|vertex| solid.rest_place(vertex));
-                material.push(Piece {
-                    home,
-                    nodes,
-                    solid: Solid::of(corners),
-                });
+    /// For vertices bound to these of the material's cells; `None`: it has none.
+    pub fn new(material: &CutMaterial, homes: Vec<u32>, triangles: &[[u32; 3]]) -> Result<Option<Box<Self>>> {
+        let triangles = memory::copied(triangles)?;
+        Ok(match material {
+            CutMaterial::Springs(_) => None,
+            CutMaterial::Surface(surface) => {
+                let cells = surface.cells().iter().map(|cell| cell.nodes);
+                let homes = Homes::new(cells, |node| surface.rest(node), homes, triangles)?;
+                Some(Box::new(Self::Surface(homes)))
             }
+            CutMaterial::Solid(solid) => {
+                let cells = solid.cells().iter().map(|cell| cell.nodes);
+                let homes = Homes::new(cells, |node| solid.rest(node), homes, triangles)?;
+                Some(Box::new(Self::Solid(homes)))
+            }
+        })
+    }
+
+    /// Binds each vertex to the copy of its cell that has the material where it is, and keeps the triangles whose corners hang together; whether
+    /// the binding is one to such cells. Nothing is changed where it is not, or memory is short.
+    pub fn follow(&self, material: &CutMaterial, binding: &mut Binding, triangles: &mut Vec<[u32; 3]>) -> Result<bool> {
+        match (self, material, binding) {
+            (Self::Surface(homes), CutMaterial::Surface(surface), Binding::Triangles(bound)) => {
+                let pieces = pieces_of_surface(surface, homes)?;
+                let weights = |vertex: usize| {
+                    let [b, c] = bound[vertex].weights.map(f64::from);
+                    [1.0 - b - c, b, c]
+                };
+                let rest = |node| surface.rest(node);
+                let nodes = homes.choose(&pieces, rest, |vertex| bound[vertex].nodes, weights)?;
+                *triangles = homes.whole(&nodes)?;
+                for (vertex, nodes) in bound.iter_mut().zip(nodes) {
+                    vertex.nodes = nodes;
+                }
+            }
+            (Self::Solid(homes), CutMaterial::Solid(solid), Binding::Tetrahedra(bound)) => {
+                let pieces = pieces_of_solid(solid, homes)?;
+                let weights = |vertex: usize| {
+                    let [b, c, d] = bound[vertex].weights.map(f64::from);
+                    [1.0 - b - c - d, b, c, d]
+                };
+                let rest = |node| solid.rest(node);
+                let nodes = homes.choose(&pieces, rest, |vertex| bound[vertex].nodes, weights)?;
+                *triangles = homes.whole(&nodes)?;
+                for (vertex, nodes) in bound.iter_mut().zip(nodes) {
+                    vertex.nodes = nodes;
+                }
+            }
+            _ => return Ok(false),
         }
-        material.sort_by_key(|piece| piece.home);
-        Ok(material)
-    }
-
-    fn rest_place(&self, solid: &CutSolid, vertex: &InTetrahedron, home: u32) -> DVec3 {
-        let [a, b, c, d] = self.cells[home as usize].map(|node| solid.rest(node).as_dvec3());
-        let [to_b, to_c, to_d] = vertex.weights.map(f64::from);
-        a + (b - a) * to_b + (c - a) * to_c + (d - a) * to_d
-    }
-
-    /// Whether two vertices still have in common what their cells had: copies on different sides of a cut have less.
-    fn hang_together(&self, [u, v]: [usize; 2], nodes: &[[u32; 4]]) -> bool {
-        let common = |a: [u32; 4], b: [u32; 4]| a.iter().filter(|node| b.contains(node)).count();
-        let [first, last] = [u, v].map(|vertex| self.cells[self.homes[vertex] as usize]);
-        common(nodes[u], nodes[v]) >= common(first, last)
+        Ok(true)
     }
 }
 
-/// A tetrahedron of the material at rest.
-struct Piece {
-    /// The cell that it was in as the body was made.
+impl<const N: usize> Homes<N> {
+    fn new(
+        cells: impl ExactSizeIterator<Item = [u32; N]>,
+        rest: impl Fn(u32) -> Vec3,
+        mut homes: Vec<u32>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self> {
+        let mut all: Vec<[u32; N]> = memory::reserved(cells.len())?;
+        all.extend(cells);
+        let mut roots = HashMap::new();
+        roots.try_reserve(all.len())?;
+        for node in all.iter_mut().flatten() {
+            *node = *roots.entry(key([*node], &rest)).or_insert(*node);
+        }
+        let firsts = firsts(&all, &rest)?;
+        for home in &mut homes {
+            *home = firsts[&key(all[*home as usize], &rest)];
+        }
+        Ok(Self {
+            cells: all,
+            of_vertices: homes,
+            triangles,
+        })
+    }
+
+    /// The nodes of the cell that each vertex goes with from now on, by those of now and the weights that it has of them.
+    fn choose(
+        &self,
+        pieces: &[Piece<N>],
+        rest: impl Fn(u32) -> Vec3,
+        now: impl Fn(usize) -> [u32; N],
+        weights: impl Fn(usize) -> [f64; N],
+    ) -> Result<Vec<[u32; N]>>
+    where
+        Piece<N>: Fit,
+    {
+        let mut chosen = memory::reserved(self.of_vertices.len())?;
+        for (vertex, &home) in self.of_vertices.iter().enumerate() {
+            let first = pieces.partition_point(|piece| piece.home < home);
+            let of_home = pieces[first..].iter().take_while(|piece| piece.home == home);
+            let mut cells = of_home.clone().map(|piece| piece.nodes);
+            // All of its material was taken away: it stays with what it was bound to.
+            let some = cells.next().unwrap_or(now(vertex));
+            if cells.all(|nodes| nodes == some) {
+                chosen.push(some);
+                continue;
+            }
+            let corners = self.cells[home as usize].map(|node| rest(node).as_dvec3());
+            let weights = weights(vertex);
+            let place = (0..N).map(|corner| corners[corner] * weights[corner]).sum();
+            let fits = |a: &&Piece<N>, b: &&Piece<N>| {
+                let (a, b) = (a.fit(place), b.fit(place));
+                a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+            };
+            chosen.push(of_home.min_by(fits).map_or(some, |piece| piece.nodes));
+        }
+        Ok(chosen)
+    }
+
+    /// The triangles whose corners hang together where their vertices go with cells of these nodes.
+    fn whole(&self, nodes: &[[u32; N]]) -> Result<Vec<[u32; 3]>> {
+        // Two vertices still have in common what their cells had: copies on different sides of a cut have less.
+        let common = |a: [u32; N], b: [u32; N]| a.iter().filter(|node| b.contains(node)).count();
+        let hang = |u: u32, v: u32| {
+            let [u, v] = [u, v].map(|vertex| vertex as usize);
+            let [first, last] = [u, v].map(|vertex| self.cells[self.of_vertices[vertex] as usize]);
+            common(nodes[u], nodes[v]) >= common(first, last)
+        };
+        let mut whole = memory::reserved(self.triangles.len())?;
+        let hangs = |&&[a, b, c]: &&[u32; 3]| hang(a, b) && hang(b, c) && hang(c, a);
+        whole.extend(self.triangles.iter().filter(hangs));
+        Ok(whole)
+    }
+}
+
+/// A part of the material at rest: a tetrahedron of it, or a triangle.
+struct Piece<const N: usize> {
+    /// The first of the cells that lay where its own does.
     home: u32,
-    /// Those of the cell that it is in now.
-    nodes: [u32; 4],
-    solid: Solid,
+    /// Those of its cell.
+    nodes: [u32; N],
+    corners: [DVec3; N],
+}
+
+/// How badly a place lies in a piece: the square of its distance, m², then what is less the deeper it is.
+trait Fit {
+    fn fit(&self, place: DVec3) -> (f64, f64);
+}
+
+impl Fit for Piece<3> {
+    fn fit(&self, place: DVec3) -> (f64, f64) {
+        let (weights, _) = nearest_on_triangle(place, self.corners);
+        let nearest = weighted(self.corners, weights);
+        // On a side that two have in common either will do.
+        (place.distance_squared(nearest), 0.0)
+    }
+}
+
+impl Fit for Piece<4> {
+    fn fit(&self, place: DVec3) -> (f64, f64) {
+        let solid = Solid::of(self.corners);
+        // Outside of the body all depths are below 0, and may be the same on both sides.
+        let depth = solid.depth(place);
+        let distance = if depth < 0.0 {
+            solid.distance_squared(place)
+        } else {
+            0.0
+        };
+        (distance, -depth)
+    }
+}
+
+/// Where the nodes of a cell are at rest: the same for copies of it.
+fn key<const N: usize>(nodes: [u32; N], rest: impl Fn(u32) -> Vec3) -> [[u32; 3]; N] {
+    nodes.map(|node| rest(node).to_array().map(f32::to_bits))
+}
+
+/// The first cell in each place.
+fn firsts<const N: usize>(cells: &[[u32; N]], rest: impl Fn(u32) -> Vec3) -> Result<HashMap<[[u32; 3]; N], u32>> {
+    let mut firsts = HashMap::new();
+    firsts.try_reserve(cells.len())?;
+    for (number, &nodes) in (0..).zip(cells) {
+        firsts.entry(key(nodes, &rest)).or_insert(number);
+    }
+    Ok(firsts)
+}
+
+/// All of a surface's material, by the cells that it was in.
+fn pieces_of_surface(surface: &CutSurface, homes: &Homes<3>) -> Result<Vec<Piece<3>>> {
+    let rest = |node| surface.rest(node);
+    let firsts = firsts(&homes.cells, rest)?;
+    let mut pieces = memory::reserved(surface.triangles().len())?;
+    for triangle in surface.triangles() {
+        let nodes = surface.cells()[triangle.cell as usize].nodes;
+        if let Some(&home) = firsts.get(&key(nodes, rest)) {
+            let corners = triangle.corners.map(|vertex| surface.rest_place(vertex));
+            pieces.push(Piece { home, nodes, corners });
+        }
+    }
+    pieces.sort_by_key(|piece| piece.home);
+    Ok(pieces)
+}
+
+/// The same of a solid's.
+fn pieces_of_solid(solid: &CutSolid, homes: &Homes<4>) -> Result<Vec<Piece<4>>> {
+    let rest = |node| solid.rest(node);
+    let firsts = firsts(&homes.cells, rest)?;
+    let mut pieces = memory::reserved(solid.tetrahedra().len())?;
+    for tetrahedron in solid.tetrahedra() {
+        let nodes = solid.cells()[tetrahedron.cell as usize].nodes;
+        if let Some(&home) = firsts.get(&key(nodes, rest)) {
+            let corners = tetrahedron.corners.map(|vertex| solid.rest_place(vertex));
+            pieces.push(Piece { home, nodes, corners });
+        }
+    }
+    pieces.sort_by_key(|piece| piece.home);
+    Ok(pieces)
 }

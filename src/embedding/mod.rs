@@ -7,6 +7,7 @@ mod read;
 use glam::Vec3;
 
 use crate::body::{Body, BodyDefinition, Values};
+use crate::cutting::CutMaterial;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::Mesh;
@@ -22,16 +23,17 @@ pub struct EmbeddingDefinition<'a> {
     pub vertices: &'a [Vec3],
     /// Three vertices each, outward by the right-hand rule: what normals come from. Empty: there are none.
     pub triangles: &'a [[u32; 3]],
-    /// The tetrahedra of the body, as it was created with: each vertex goes with the one that it is in, or nearest to. Empty: each goes with the
-    /// nearest triangle that is drawn of the body, and keeps its distance from that.
+    /// The tetrahedra of the body, as it was created with: each vertex goes with the one that it is in, or nearest to. Where the body has been cut or
+    /// torn, those that it has now are taken instead. Empty: each goes with the nearest triangle that is drawn of the body, and keeps its
+    /// distance from that.
     pub tetrahedra: &'a [[u32; 4]],
 }
 
 /// A fine surface bound to a coarse body, and where its vertices are. It belongs to the caller; the body knows nothing of it and pays nothing.
 ///
 /// In a tetrahedron a vertex keeps its barycentric weights, so that an affine motion of the body is one of the surface; over a triangle it keeps
-/// its place in it and its distance along the normal. It follows cuts and tears of tetrahedra: each vertex goes on with its own side, and triangles
-/// that would reach across are left out.
+/// its place in it and its distance along the normal. It follows cuts and tears: each vertex goes on with its own side, and triangles that would reach
+/// across are left out.
 #[derive(Debug)]
 pub struct Embedding {
     body: BodyId,
@@ -51,18 +53,25 @@ pub struct Embedding {
 }
 
 impl Embedding {
-    /// Of a body with its nodes at `positions`, of which these triangles are drawn.
-    fn new(definition: &EmbeddingDefinition, positions: &[Vec3], drawn: &[[u32; 3]]) -> Result<(Self, Vec<u32>)> {
+    /// Of a body with its nodes at `positions`, of which these triangles are drawn; with the cells of its material that vertices go with. The material
+    /// is asked for where it is that of a surface, or has been cut.
+    fn new(
+        definition: &EmbeddingDefinition,
+        positions: &[Vec3],
+        drawn: &[[u32; 3]],
+        material: Option<&CutMaterial>,
+    ) -> Result<(Self, Vec<u32>)> {
         let EmbeddingDefinition {
             vertices,
             triangles,
             tetrahedra,
         } = *definition;
         check(definition, positions.len())?;
-        let (binding, homes) = if tetrahedra.is_empty() {
-            (Binding::to_triangles(vertices, positions, drawn)?, Vec::new())
-        } else {
-            Binding::to_tetrahedra(vertices, positions, tetrahedra)?
+        let (binding, homes) = match (tetrahedra, material) {
+            ([], Some(CutMaterial::Surface(surface))) => Binding::to_surface(vertices, positions, surface)?,
+            ([], _) => (Binding::to_triangles(vertices, positions, drawn)?, Vec::new()),
+            (_, Some(CutMaterial::Solid(solid))) => Binding::to_solid(vertices, positions, solid)?,
+            _ => Binding::to_tetrahedra(vertices, positions, tetrahedra)?,
         };
         let mut embedding = Self {
             body: BodyId::default(),
@@ -84,10 +93,11 @@ impl Embedding {
     fn join(&mut self, id: BodyId, body: &Body, definition: &EmbeddingDefinition, homes: Vec<u32>) -> Result<()> {
         self.body = id;
         self.topology = body.topology_version();
-        if let Some(solid) = body.solid()
+        if let Some(material) = body.material()
             && !homes.is_empty()
+            && is_made_of(material, definition.tetrahedra, self.topology > 0)
         {
-            self.follower = Follower::new(solid, definition.tetrahedra, homes, definition.triangles)?;
+            self.follower = Follower::new(material, homes, definition.triangles)?;
         }
         Ok(())
     }
@@ -100,21 +110,24 @@ impl Embedding {
     /// Puts the vertices where the body is now. Nothing is allocated, but when the body has been cut or torn since: then the vertices are bound anew.
     ///
     /// # Errors
-    /// [`Error::StaleId`]: the body is gone. [`Error::Unsupported`]: it has been cut or torn since, and the vertices are bound to its triangles, or not
-    /// to all of the tetrahedra of which it was made. [`Error::OutOfMemory`]. The vertices stay where they were.
+    /// [`Error::StaleId`]: the body is gone. [`Error::Unsupported`]: it has been cut or torn since, and the vertices are bound to the triangles of a body of
+    /// tetrahedra, or not to all of the tetrahedra of which it was made. [`Error::OutOfMemory`]. The vertices stay where they were.
     pub fn update(&mut self, world: &World) -> Result<()> {
         let body = world.body(self.body)?;
         if body.topology_version() != self.topology {
-            let (Binding::Tetrahedra(bound), Some(follower), Some(solid)) =
-                (&mut self.binding, &self.follower, body.solid())
-            else {
+            let is_followed = match (&self.follower, body.material()) {
+                (Some(follower), Some(material)) => {
+                    follower.follow(material, &mut self.binding, &mut self.triangles)?
+                }
+                _ => false,
+            };
+            if !is_followed {
                 return Err(Error::Unsupported(format!(
                     "the body has been cut or torn since the embedding was made (its topology has version {}): that is followed by vertices bound to \
-                     all of its tetrahedra alone",
+                     all of its tetrahedra, or to a body of triangles",
                     body.topology_version()
                 )));
-            };
-            follower.follow(solid, bound, &mut self.triangles)?;
+            }
             self.topology = body.topology_version();
             self.node_count = body.node_count();
         }
@@ -164,16 +177,13 @@ impl World {
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: there are no vertices; one is not finite or further than 1e9 m from the origin; an index is
-    /// that of no vertex or node; no tetrahedron has a volume; there are none, and nothing is drawn of the body. [`Error::Unsupported`]: the body has been
-    /// cut or torn, and tetrahedra are given. [`Error::OutOfMemory`].
+    /// that of no vertex or node; no tetrahedron has a volume; there are none, and nothing is drawn of the body. [`Error::OutOfMemory`].
     pub fn create_embedding(&self, body: BodyId, definition: &EmbeddingDefinition) -> Result<Embedding> {
         let host = self.body(body)?;
-        if host.topology_version() > 0 && !definition.tetrahedra.is_empty() {
-            return Err(Error::Unsupported(
-                "tetrahedra are given, and the body has been cut or torn: they are others now".into(),
-            ));
-        }
-        let (mut embedding, homes) = Embedding::new(definition, host.positions(), host.surface())?;
+        // A solid that was not cut is what the caller says it is.
+        let is_asked = |material: &&CutMaterial| material.surface().is_some() || host.topology_version() > 0;
+        let material = host.material().filter(is_asked);
+        let (mut embedding, homes) = Embedding::new(definition, host.positions(), host.surface(), material)?;
         embedding.join(body, host, definition, homes)?;
         Ok(embedding)
     }
@@ -202,7 +212,7 @@ impl World {
             triangles: &drawn.triangles,
             tetrahedra: &mesh.tetrahedra,
         };
-        let (mut embedding, homes) = Embedding::new(&surface, &mesh.positions, &[])?;
+        let (mut embedding, homes) = Embedding::new(&surface, &mesh.positions, &[], None)?;
         let body = self.create_body(&BodyDefinition {
             positions: &mesh.positions,
             triangles: &[],
@@ -217,6 +227,18 @@ impl World {
             return Err(error);
         }
         Ok((body, embedding))
+    }
+}
+
+/// Whether vertices bound to these tetrahedra, where there are some, are bound to cells of the material: once it was changed, its own were taken.
+fn is_made_of(material: &CutMaterial, tetrahedra: &[[u32; 4]], was_changed: bool) -> bool {
+    match material {
+        CutMaterial::Springs(_) => false,
+        CutMaterial::Surface(_) => tetrahedra.is_empty(),
+        CutMaterial::Solid(solid) => {
+            let cells = solid.cells().iter().map(|cell| cell.nodes);
+            was_changed || cells.eq(tetrahedra.iter().copied())
+        }
     }
 }
 

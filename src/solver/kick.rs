@@ -38,6 +38,9 @@ impl Kick<'_> {
             None => self.fall / self.duration,
             Some(_) => self.gravity,
         };
+        if gravity == Vec3::ZERO {
+            return;
+        }
         let first = heavier.partition_point(|sliver| (sliver.node as usize) < nodes.start);
         for sliver in &heavier[first..] {
             let node = sliver.node as usize;

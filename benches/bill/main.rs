@@ -1,12 +1,13 @@
-//! What a body pays for what it asks for, and that it pays nothing for what it does not: one organ as plain springs, the same with every
-//! option given and off, with each option alone, and as finite elements.
+//! The bill: what a body pays for what it asks for, and that it pays nothing for what it does not; what the library and a world cost by themselves.
 //!
-//! `cargo bench --bench material [-- part of a name]` writes `target/report/material.md`: the time of a substep of VERLET by spring, that of a frame of
-//! IMPLICIT, and the memory of the whole body, in one run, in turns, and as ratios to plain springs. Times are the processor's, the least of
-//! all turns. It fails where the body with every option off has other bytes or moves otherwise than the plain one.
+//! `cargo bench --bench bill [-- part of a name]` writes `target/report/bill.md`. One organ as plain springs, the same with every option given and off, with
+//! each feature alone, and as finite elements: the time of a substep of VERLET by spring, that of a frame of IMPLICIT, the memory of the whole
+//! body and the time to make it, in one run, in turns, and as ratios to plain springs. Times are the processor's, the least of all turns. It fails
+//! where the body with every option off has other bytes or moves otherwise than the plain one.
 #![allow(clippy::print_stderr)]
 
-#[path = "storage/clock.rs"]
+mod alone;
+#[path = "../storage/clock.rs"]
 #[allow(dead_code)] // the storage bench uses the rest
 mod clock;
 
@@ -19,7 +20,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
 use sinew::{
-    BodyDefinition, BodyId, Material, Model, Solver, SpringLaw, Values, Viscosity, World, WorldDefinition, Yielding,
+    BodyContact, BodyDefinition, BodyId, BodyReader, Embedding, EmbeddingDefinition, Material, Model, Sleep, Solver,
+    SpringLaw, Tearing, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 const SUBSTEPS: u32 = 16;
@@ -32,6 +34,13 @@ const FRAME: f32 = 1.0 / 60.0;
 
 /// How often each body has its turn.
 const TURNS: usize = 25;
+
+/// How often each body is made.
+const MAKES: usize = 3;
+
+/// What goes with a body rather than in it.
+const READER: &str = "read on another thread";
+const DRAWN: &str = "drawn: its surface, bound, with normals";
 
 /// The system's allocator, counting what is held.
 struct Held;
@@ -84,14 +93,26 @@ struct Contender<'a> {
     name: &'a str,
     world: World,
     body: BodyId,
-    /// Of the body and what its world holds for it.
+    /// What goes with the body, and is read in each turn.
+    beside: Beside,
+    /// Of the body, what its world holds for it and what goes with it.
     bytes: usize,
+    /// What it took to make the body, s.
+    made: f64,
     /// The least of all turns, s.
     least: f64,
 }
 
+/// What reads a body, and is not a part of it.
+enum Beside {
+    Nothing,
+    Reader(BodyReader),
+    /// A surface with its normals.
+    Drawn(Box<Embedding>),
+}
+
 impl<'a> Contender<'a> {
-    fn new(name: &'a str, definition: &BodyDefinition, solver: Solver) -> Self {
+    fn new(name: &'a str, definition: &BodyDefinition, solver: Solver, drawn: &EmbeddingDefinition) -> Self {
         let mut world = World::new(WorldDefinition {
             substeps: if solver == Solver::Verlet { SUBSTEPS } else { 0 },
             gravity: Vec3::ZERO,
@@ -99,9 +120,25 @@ impl<'a> Contender<'a> {
         })
         .expect("a world");
         let before = HELD.load(Ordering::Relaxed);
-        let body = world
-            .create_body(&BodyDefinition { solver, ..*definition })
-            .expect("a body");
+        let mut made = f64::INFINITY;
+        let mut body = BodyId::default();
+        for time in 0..MAKES {
+            made = made.min(
+                clock::time(|| {
+                    let definition = BodyDefinition { solver, ..*definition };
+                    body = world.create_body(&definition).expect("a body");
+                })
+                .processor,
+            );
+            if time + 1 < MAKES {
+                world.destroy_body(body).expect("the body");
+            }
+        }
+        let beside = match name {
+            READER => Beside::Reader(world.create_reader(body).expect("a reader")),
+            DRAWN => Beside::Drawn(Box::new(world.create_embedding(body, drawn).expect("an embedding"))),
+            _ => Beside::Nothing,
+        };
         let bytes = HELD.load(Ordering::Relaxed) - before;
         // Every node trembles a little, so that something is worked out.
         let trembling =
@@ -114,7 +151,9 @@ impl<'a> Contender<'a> {
             .expect("velocities");
         Self {
             name,
+            beside,
             bytes,
+            made,
             world,
             body,
             least: f64::INFINITY,
@@ -125,6 +164,16 @@ impl<'a> Contender<'a> {
     fn turn(&mut self, dt: f32) {
         let elapsed = clock::time(|| {
             self.world.step(dt).expect("a step");
+            match &mut self.beside {
+                Beside::Nothing => (),
+                Beside::Reader(reader) => {
+                    std::hint::black_box(reader.read());
+                }
+                Beside::Drawn(drawn) => {
+                    drawn.update(&self.world).expect("an update");
+                    std::hint::black_box(drawn.normals());
+                }
+            }
         });
         self.least = self.least.min(elapsed.processor);
     }
@@ -272,6 +321,65 @@ fn main() -> ExitCode {
             },
         ),
         (
+            "asleep where it rests, and awake",
+            BodyDefinition {
+                // The smallest speed above 0: it never rests.
+                sleep: Sleep {
+                    speed: f32::MIN_POSITIVE,
+                    time: 0.5,
+                },
+                ..springs
+            },
+        ),
+        (
+            "mass added where it limits the substep",
+            BodyDefinition {
+                mass_scaling: 1e-2,
+                ..springs
+            },
+        ),
+        (
+            "may be cut",
+            BodyDefinition {
+                spare_nodes: 1000,
+                ..springs
+            },
+        ),
+        (
+            "may tear",
+            BodyDefinition {
+                spare_nodes: 1000,
+                tearing: Tearing {
+                    strain: 0.5,
+                    most_per_step: 4,
+                    ..Tearing::default()
+                },
+                ..springs
+            },
+        ),
+        (
+            "meets other bodies",
+            BodyDefinition {
+                contact: BodyContact {
+                    with_bodies: true,
+                    ..BodyContact::default()
+                },
+                ..springs
+            },
+        ),
+        (
+            "meets itself",
+            BodyDefinition {
+                contact: BodyContact {
+                    with_itself: true,
+                    ..BodyContact::default()
+                },
+                ..springs
+            },
+        ),
+        (READER, springs),
+        (DRAWN, springs),
+        (
             "springs from E",
             BodyDefinition {
                 material: Some(tissue(Model::Springs, 0.0)),
@@ -314,7 +422,13 @@ fn main() -> ExitCode {
     ];
     let is_asked =
         |place: usize, name: &str| place < 2 || asked.as_ref().is_none_or(|asked| name.contains(asked.as_str()));
-    let mut report = String::from("# What materials and terms cost\n\n");
+    let mut report = String::from("# The bill\n\n");
+    report.push_str(&alone::report(|| HELD.load(Ordering::Relaxed)));
+    let drawn = EmbeddingDefinition {
+        vertices: &mesh.positions,
+        triangles: &surface,
+        tetrahedra: &mesh.tetrahedra,
+    };
     let mut is_free = true;
     for (solver, dt, unit) in [
         (
@@ -329,7 +443,7 @@ fn main() -> ExitCode {
             .enumerate()
             .filter(|(place, (name, _))| is_asked(*place, name));
         let mut contenders: Vec<Contender> = contenders
-            .map(|(_, (name, definition))| Contender::new(name, definition, solver))
+            .map(|(_, (name, definition))| Contender::new(name, definition, solver, &drawn))
             .collect();
         let spring_count = {
             let plain = &contenders[0];
@@ -353,7 +467,7 @@ fn main() -> ExitCode {
         }
         let _ = writeln!(
             report,
-            "| | {unit} | of plain springs | bytes a node | of plain springs |\n|---|---|---|---|---|"
+            "| | {unit} | of plain springs | bytes a node | of plain springs | made, us a node |\n|---|---|---|---|---|---|"
         );
         let scale = match solver {
             Solver::Verlet => 1e9 / (spring_count as f64 * f64::from(SUBSTEPS)),
@@ -363,12 +477,13 @@ fn main() -> ExitCode {
         for contender in &contenders {
             let _ = writeln!(
                 report,
-                "| {} | {:.3} | {:.2} | {:.0} | {:.2} |",
+                "| {} | {:.3} | {:.2} | {:.0} | {:.2} | {:.2} |",
                 contender.name,
                 contender.least * scale,
                 contender.least / least,
                 contender.bytes as f64 / node_count as f64,
                 contender.bytes as f64 / bytes as f64,
+                1e6 * contender.made / node_count as f64,
             );
         }
         report.push('\n');
@@ -384,7 +499,7 @@ fn main() -> ExitCode {
     }
     eprintln!("{report}");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("report");
-    let path = folder.join("material.md");
+    let path = folder.join("bill.md");
     if let Err(error) = std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&path, report)) {
         eprintln!("{}: {error}", path.display());
         return ExitCode::FAILURE;

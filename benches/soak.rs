@@ -1,0 +1,300 @@
+//! A million frames: bodies and tools that come and go, are pushed, held, cut and torn, for as long as a day of play.
+//!
+//! `cargo bench --bench soak` (some minutes; `-- 50000`: so many frames) fails where anything that can be read is not finite, a step fails that should not, or
+//! the memory of a world that was emptied grows from one tenth to another. `-- --planted` keeps a body of each tenth, and must fail.
+#![allow(clippy::print_stderr)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::Vec3;
+use sinew::cutting::Sweep;
+use sinew::mesh::Mesh;
+use sinew::{
+    BodyContact, BodyDefinition, BodyId, Pose, Shape, Sleep, Solver, Storage, Tearing, ToolDefinition, ToolId, Values,
+    World, WorldDefinition,
+};
+
+const FRAMES: u32 = 1_000_000;
+
+const TENTHS: u32 = 10;
+
+/// How many bodies there are at once, and tools.
+const BODIES: usize = 4;
+const TOOLS: usize = 3;
+
+/// The system's allocator, counting what is held.
+struct Held;
+
+static HELD: AtomicUsize = AtomicUsize::new(0);
+
+#[global_allocator]
+static ALLOCATOR: Held = Held;
+
+// SAFETY: every call goes to the system's allocator unchanged.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Held {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        HELD.fetch_add(layout.size(), Ordering::Relaxed);
+        // SAFETY: the same contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the same contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// Marsaglia's xorshift, 2003.
+struct Dice(u64);
+
+impl Dice {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 >> 11
+    }
+
+    /// Below a number.
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() % count as u64) as usize
+    }
+
+    /// Between -1 and 1.
+    fn number(&mut self) -> f32 {
+        self.next() as f32 / (1_u64 << 52) as f32 - 1.0
+    }
+
+    fn vector(&mut self, most: f32) -> Vec3 {
+        most * Vec3::new(self.number(), self.number(), self.number())
+    }
+}
+
+/// What happened, to be told.
+#[derive(Debug, Default)]
+struct Counts {
+    bodies: u32,
+    cuts: u32,
+    refused: u32,
+    attachments: u32,
+    restored: u32,
+    unstable: u32,
+}
+
+struct Play {
+    world: World,
+    bodies: Vec<BodyId>,
+    tools: Vec<ToolId>,
+    dice: Dice,
+    counts: Counts,
+}
+
+impl Play {
+    fn new() -> Self {
+        let definition = WorldDefinition {
+            max_substeps: 400,
+            ..WorldDefinition::default()
+        };
+        Self {
+            world: World::new(definition).expect("a world"),
+            bodies: Vec::new(),
+            tools: Vec::new(),
+            dice: Dice(88_172_645_463_325_252),
+            counts: Counts::default(),
+        }
+    }
+
+    fn create_body(&mut self) {
+        let dice = &mut self.dice;
+        let is_solid = dice.below(3) == 0;
+        let spare_nodes = [0, 150][dice.below(2)];
+        let tearing = if spare_nodes > 0 {
+            Tearing {
+                strain: 1.5,
+                most_per_step: 2,
+                ..Tearing::default()
+            }
+        } else {
+            Tearing::default()
+        };
+        let mesh = if is_solid {
+            Mesh::block([0.06; 3], [2, 1, 2])
+        } else {
+            Mesh::cloth([0.1; 2], [2 + dice.below(4) as u32, 4])
+        };
+        let mut mesh = mesh.expect("a mesh");
+        let shift = dice.vector(0.1);
+        mesh.positions.iter_mut().for_each(|place| *place += shift);
+        let created = self.world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            tetrahedra: &mesh.tetrahedra,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(30.0),
+            node_dampings: Values::Uniform(2e-3),
+            solver: [Solver::Verlet, Solver::Verlet, Solver::Implicit][dice.below(3)],
+            storage: [Storage::Packed, Storage::FastLink][dice.below(2)],
+            spare_nodes,
+            tearing,
+            sleep: Sleep {
+                speed: [0.0, 0.005][dice.below(2)],
+                time: 0.1,
+            },
+            contact: BodyContact {
+                with_bodies: dice.below(2) == 0,
+                ..BodyContact::default()
+            },
+            ..BodyDefinition::default()
+        });
+        let id = created.expect("a body");
+        for _ in 0..2 {
+            let node = self.dice.below(mesh.positions.len()) as u32;
+            self.world.body_mut(id).and_then(|body| body.pin(node)).expect("a pin");
+        }
+        self.bodies.push(id);
+        self.counts.bodies += 1;
+    }
+
+    fn create_tool(&mut self) {
+        let dice = &mut self.dice;
+        let radius = 0.01 + 0.02 * dice.number().abs();
+        let shape = match dice.below(2) {
+            0 => Shape::Sphere { radius },
+            _ => Shape::Capsule {
+                half_length: 0.03,
+                radius,
+            },
+        };
+        let tool = ToolDefinition {
+            pose: Pose {
+                position: dice.vector(0.3),
+                ..Pose::IDENTITY
+            },
+            friction: 0.3,
+            ..ToolDefinition::new(shape)
+        };
+        self.tools.push(self.world.create_tool(&tool).expect("a tool"));
+    }
+
+    /// What somebody does before a frame.
+    fn act(&mut self) {
+        while self.bodies.len() < BODIES {
+            self.create_body();
+        }
+        while self.tools.len() < TOOLS {
+            self.create_tool();
+        }
+        match self.dice.below(100) {
+            0 if self.bodies.len() == BODIES => {
+                let gone = self.bodies.swap_remove(self.dice.below(BODIES));
+                self.world.destroy_body(gone).expect("a body");
+            }
+            1 if self.tools.len() == TOOLS => {
+                let gone = self.tools.swap_remove(self.dice.below(TOOLS));
+                self.world.destroy_tool(gone).expect("a tool");
+            }
+            2..=4 => {
+                let body = self.bodies[self.dice.below(self.bodies.len())];
+                let (place, along, down) = (self.dice.vector(0.1), self.dice.vector(0.1), self.dice.vector(0.15));
+                let sweep = Sweep {
+                    start: [place - along, place + along],
+                    end: [place - along + down, place + along + down],
+                };
+                match self.world.cut(body, &sweep) {
+                    Ok(_) => self.counts.cuts += 1,
+                    Err(_) => self.counts.refused += 1,
+                }
+            }
+            5 => {
+                let body = self.bodies[self.dice.below(self.bodies.len())];
+                let tool = self.tools[self.dice.below(self.tools.len())];
+                let held = self.world.attach_node(body, self.dice.below(6) as u32, tool, 0.5);
+                self.counts.attachments += u32::from(held.is_ok());
+            }
+            6..=20 => {
+                let body = self.bodies[self.dice.below(self.bodies.len())];
+                let force = self.dice.vector(0.2);
+                let node = self.dice.below(6) as u32;
+                if self
+                    .world
+                    .body_mut(body)
+                    .and_then(|body| body.apply_force(node, force))
+                    .is_err()
+                {
+                    self.counts.refused += 1;
+                }
+            }
+            _ => (),
+        }
+        for &tool in &self.tools {
+            let pose = self.world.pose(tool).expect("a pose");
+            let to = (pose.position + self.dice.vector(0.004)).clamp(Vec3::splat(-0.2), Vec3::splat(0.2));
+            self.world.set_pose(tool, to, None).expect("a pose");
+        }
+    }
+
+    /// A frame; whether all that can be read is finite.
+    fn frame(&mut self) -> bool {
+        self.act();
+        match self.world.step(1.0 / 60.0) {
+            Ok(report) => self.counts.restored += report.bodies_restored,
+            // Too many substeps: a world that says so is as it was.
+            Err(_) => self.counts.unstable += 1,
+        }
+        let bodies = self.bodies.iter().map(|&id| self.world.body(id).expect("a body"));
+        let tools = self.tools.iter().map(|&id| self.world.wrench(id).expect("a tool"));
+        { bodies }.all(|body| body.positions().iter().all(|place| place.is_finite())) && { tools }
+            .all(|(force, torque)| force.is_finite() && torque.is_finite())
+    }
+
+    fn empty(&mut self) {
+        for body in self.bodies.drain(..) {
+            self.world.destroy_body(body).expect("a body");
+        }
+        for tool in self.tools.drain(..) {
+            self.world.destroy_tool(tool).expect("a tool");
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let is_planted = std::env::args().any(|argument| argument == "--planted");
+    let asked = std::env::args().find_map(|argument| argument.parse().ok());
+    let frames: u32 = asked.unwrap_or(FRAMES);
+    let mut play = Play::new();
+    let mut held = Vec::new();
+    for tenth in 0..TENTHS {
+        for frame in 0..frames / TENTHS {
+            if !play.frame() {
+                eprintln!("frame {} of tenth {tenth}: what is not finite", frame);
+                return ExitCode::FAILURE;
+            }
+            if frame % 500 == 0 && std::io::stderr().is_terminal() {
+                eprint!("\r{} of {frames} frames", tenth * (frames / TENTHS) + frame);
+                let _ = std::io::stderr().flush();
+            }
+        }
+        if is_planted {
+            play.bodies.pop();
+        }
+        play.empty();
+        held.push(HELD.load(Ordering::Relaxed));
+    }
+    // What a world keeps room for it has asked for within the first tenths.
+    let (early, late) = held.split_at(TENTHS as usize / 2);
+    let [early, late] = [early, late].map(|held| held.iter().max().copied().unwrap_or(0));
+    eprintln!(
+        "\r{frames} frames: {:?}; bytes held by an empty world after each tenth: {held:?}",
+        play.counts
+    );
+    if late > early {
+        eprintln!("memory grows: {early} bytes, then {late}");
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}

@@ -1,0 +1,525 @@
+// sinew for C++17: what sinew.h has, with owners that end what they own, values returned, and errors thrown. Nothing is allocated here.
+//
+// - Owners (world, mesh, reader, haptic, detector, embedding) are moved, not copied. Moved from, they are empty: every call on them fails.
+// - body, tool, blade and attachment are ids with the world they belong to: copied freely, ended by their world or by destroy(). They
+//   must not be used after the world's end. After their own they are refused, as in C.
+// - Threads, units, and how long views live: as sinew.h says. A function that is const here may be called by any number of threads.
+// - Errors: sinew::error. Programs without exceptions define SINEW_ON_ERROR(status, message), before they include this, as
+//   something that does not return. Where a status is an answer like any other, call the C function with get() or with world() and id.
+#ifndef SINEW_HPP
+#define SINEW_HPP
+
+#include "sinew.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <iterator>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
+namespace sinew {
+
+using vec3 = std::array<float, 3>;
+using quat = std::array<float, 4>; // x y z w
+constexpr float no_limit = std::numeric_limits<float>::infinity();
+
+// Why a call was refused, in the library's words, kept within.
+class error : public std::exception {
+public:
+  error(sinew_status status, const char *message) noexcept : status_(status) {
+    std::size_t length = 0;
+    for (; message[length] && length + 1 < sizeof message_; length++) message_[length] = message[length];
+    message_[length] = 0;
+  }
+  const char *what() const noexcept override { return message_; }
+  sinew_status status() const noexcept { return status_; }
+
+private:
+  sinew_status status_;
+  char message_[512];
+};
+
+[[noreturn]] inline void fail(sinew_status status, const char *message) {
+#ifdef SINEW_ON_ERROR
+  SINEW_ON_ERROR(status, message);
+#else
+  throw error(status, message);
+#endif
+}
+
+inline void check(sinew_status status) {
+  if (status == SINEW_STATUS_OK) return;
+  char message[512] = "";
+  sinew_last_error(message, sizeof message);
+  fail(status, message);
+}
+
+inline void expect(bool fits, const char *otherwise) {
+  if (!fits) fail(SINEW_STATUS_INVALID_ARGUMENT, otherwise);
+}
+
+// A pointer and a count; from arrays and from whatever has data() and size().
+template <class T> class span {
+public:
+  constexpr span() = default;
+  constexpr span(T *data, std::size_t size) : data_(data), size_(size) {}
+  template <class Items, class = std::enable_if_t<std::is_convertible_v<decltype(std::data(std::declval<Items &>())), T *>>>
+  constexpr span(Items &&items) : data_(std::data(items)), size_(std::size(items)) {}
+  constexpr T *data() const { return data_; }
+  constexpr std::size_t size() const { return size_; }
+  constexpr T *begin() const { return data_; }
+  constexpr T *end() const { return data_ + size_; }
+  constexpr T &operator[](std::size_t i) const { return data_[i]; }
+
+private:
+  T *data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+// Vectors as the library lends them, whatever their stride.
+template <class View> struct vectors : View {
+  std::size_t size() const { return this->count; }
+  auto operator[](std::size_t i) const {
+    return reinterpret_cast<decltype(View::data)>(reinterpret_cast<const char *>(this->data) + i * this->stride);
+  }
+};
+using vec3_view = vectors<sinew_vec3_view>;
+using dvec3_view = vectors<sinew_dvec3_view>;
+
+// A definition with its defaults, to be changed and given to what it defines.
+template <class Def, sinew_status (*Init)(Def *, std::size_t)> struct definition : Def {
+  definition() : Def() { check(Init(this, sizeof(Def))); }
+};
+using world_def = definition<sinew_world_def, sinew_world_def_init>;
+using body_def = definition<sinew_body_def, sinew_body_def_init>;
+using rest_state_def = definition<sinew_rest_state_def, sinew_rest_state_def_init>;
+using tool_def = definition<sinew_tool_def, sinew_tool_def_init>;
+using suture_def = definition<sinew_suture_def, sinew_suture_def_init>;
+using blade_def = definition<sinew_blade_def, sinew_blade_def_init>;
+using haptic_def = definition<sinew_haptic_def, sinew_haptic_def_init>;
+using picture_def = definition<sinew_picture_def, sinew_picture_def_init>;
+using detector_def = definition<sinew_detector_def, sinew_detector_def_init>;
+using embedding_def = definition<sinew_embedding_def, sinew_embedding_def_init>;
+
+// What the library fills in, which must know how large it is.
+template <class Report> Report sized() {
+  Report report{};
+  report.struct_size = sizeof report;
+  return report;
+}
+
+template <class Raw, void (*Destroy)(Raw *)> class owner {
+public:
+  owner() = default;
+  explicit owner(Raw *raw) noexcept : raw_(raw) {} // takes it over
+  owner(owner &&other) noexcept : raw_(other.release()) {}
+  owner &operator=(owner &&other) noexcept {
+    if (this != &other) Destroy(std::exchange(raw_, other.release()));
+    return *this;
+  }
+  ~owner() { Destroy(raw_); }
+  Raw *get() const noexcept { return raw_; }
+  Raw *release() noexcept { return std::exchange(raw_, nullptr); } // whoever has it destroys it
+  explicit operator bool() const noexcept { return raw_ != nullptr; }
+
+private:
+  Raw *raw_ = nullptr;
+};
+
+// Something of a world, by its id.
+template <class Id> class part {
+public:
+  part() = default;
+  part(sinew_world *world, Id id) noexcept : id(id), world_(world) {}
+  sinew_world *world() const noexcept { return world_; }
+  Id id{};
+
+private:
+  sinew_world *world_ = nullptr;
+};
+
+struct wrench {
+  vec3 force, torque; // N; N m
+};
+struct pose {
+  vec3 position;
+  quat orientation;
+};
+
+class mesh : public owner<sinew_mesh, sinew_mesh_destroy> {
+public:
+  using owner::owner;
+  static mesh load(const char *path, std::uint32_t format = 0, float scale = 1) {
+    return made([&](auto out) { return sinew_mesh_load(path, format, scale, out); });
+  }
+  static mesh cloth(std::array<float, 2> size, std::array<std::uint32_t, 2> cells) {
+    return made([&](auto out) { return sinew_mesh_create_cloth(size.data(), cells.data(), out); });
+  }
+  static mesh block(vec3 size, std::array<std::uint32_t, 3> cells) {
+    return made([&](auto out) { return sinew_mesh_create_block(size.data(), cells.data(), out); });
+  }
+  static mesh lattice(float edge, std::array<std::uint32_t, 3> cells) {
+    return made([&](auto out) { return sinew_mesh_create_lattice(edge, cells.data(), out); });
+  }
+  static mesh organ(float length, float spacing) {
+    return made([&](auto out) { return sinew_mesh_create_organ(length, spacing, out); });
+  }
+  sinew_mesh_view view() const {
+    auto out = sized<sinew_mesh_view>();
+    return check(sinew_mesh_get_view(get(), &out)), out;
+  }
+
+private:
+  template <class Create> static mesh made(Create create) {
+    sinew_mesh *raw = nullptr;
+    return check(create(&raw)), mesh(raw);
+  }
+};
+
+class attachment : public part<sinew_attachment_id> {
+public:
+  using part::part;
+  void release() const { check(sinew_attachment_release(world(), id)); }
+  vec3 force() const {
+    vec3 out{};
+    return check(sinew_attachment_get_force(world(), id, out.data())), out;
+  }
+  // Of a suture:
+  void set_length(float length) const { check(sinew_suture_set_length(world(), id, length)); }
+  sinew_suture_report suture_report() const {
+    auto out = sized<sinew_suture_report>();
+    return check(sinew_suture_get_report(world(), id, &out)), out;
+  }
+};
+
+class tool : public part<sinew_tool_id> {
+public:
+  using part::part;
+  void destroy() const { check(sinew_tool_destroy(world(), id)); }
+  void set_position(vec3 position) const { check(sinew_tool_set_pose(world(), id, position.data(), nullptr)); }
+  void set_pose(vec3 position, quat orientation) const {
+    check(sinew_tool_set_pose(world(), id, position.data(), orientation.data()));
+  }
+  void set_friction(float friction) const { check(sinew_tool_set_friction(world(), id, friction)); }
+  void set_force_limit(float limit) const { check(sinew_tool_set_force_limit(world(), id, limit)); }
+  void set_collision(std::uint32_t category, std::uint32_t mask) const {
+    check(sinew_tool_set_collision(world(), id, category, mask));
+  }
+  sinew::pose pose() const {
+    sinew::pose out{};
+    return check(sinew_tool_get_pose(world(), id, out.position.data(), out.orientation.data())), out;
+  }
+  sinew::pose target() const {
+    sinew::pose out{};
+    return check(sinew_tool_get_target(world(), id, out.position.data(), out.orientation.data())), out;
+  }
+  sinew::wrench wrench() const {
+    sinew::wrench out{};
+    return check(sinew_tool_get_wrench(world(), id, out.force.data(), out.torque.data())), out;
+  }
+  std::size_t contacts(span<sinew_contact> into) const { // how many there are
+    std::size_t count = 0;
+    return check(sinew_tool_get_contacts(world(), id, into.data(), into.size(), &count)), count;
+  }
+};
+
+class blade : public part<sinew_blade_id> {
+public:
+  using part::part;
+  void destroy() const { check(sinew_blade_destroy(world(), id)); }
+  void set_pose(vec3 position, quat orientation) const {
+    check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
+  }
+  sinew_blade_report report() const {
+    auto out = sized<sinew_blade_report>();
+    return check(sinew_blade_get_report(world(), id, &out)), out;
+  }
+};
+
+class body : public part<sinew_body_id> {
+public:
+  using part::part;
+  using nodes = span<const std::uint32_t>;
+  using floats = span<const float>;
+  void destroy() const { check(sinew_body_destroy(world(), id)); }
+
+  vec3_view positions() const { return viewed<vec3_view>(sinew_body_get_positions); }
+  vec3_view velocities() const { return viewed<vec3_view>(sinew_body_get_velocities); }
+  span<const std::uint32_t> triangles() const { // 3 for each
+    const auto view = viewed<sinew_triangle_view>(sinew_body_get_triangles);
+    return {view.data, 3 * view.count};
+  }
+  void set_positions(floats positions) const { check(sinew_body_set_positions(world(), id, positions.data(), thirds(positions))); }
+  void set_velocities(floats velocities) const { check(sinew_body_set_velocities(world(), id, velocities.data(), thirds(velocities))); }
+  void apply_force(std::uint32_t node, vec3 force) const { check(sinew_body_apply_force(world(), id, node, force.data())); }
+  void apply_forces(nodes at, floats forces) const {
+    expect(forces.size() == 3 * at.size(), "forces: 3 floats for each node");
+    check(sinew_body_apply_forces(world(), id, at.data(), forces.data(), at.size()));
+  }
+  bool is_closed() const { return viewed<std::uint32_t>(sinew_body_is_closed) != 0; }
+  void set_collision(std::uint32_t category, std::uint32_t mask) const {
+    check(sinew_body_set_collision(world(), id, category, mask));
+  }
+
+  void pin(std::uint32_t node) const { check(sinew_body_pin(world(), id, node)); }
+  void pin_axes(std::uint32_t node, std::uint32_t axes) const { check(sinew_body_pin_axes(world(), id, node, axes)); }
+  void unpin(std::uint32_t node) const { check(sinew_body_unpin(world(), id, node)); }
+  void move_pin(std::uint32_t node, vec3 to) const { check(sinew_body_move_pin(world(), id, node, to.data())); }
+  vec3 pin_force(std::uint32_t node) const {
+    vec3 out{};
+    return check(sinew_body_get_pin_force(world(), id, node, out.data())), out;
+  }
+
+  void add_spring(std::uint32_t a, std::uint32_t b, float stiffness, float rest_length) const {
+    check(sinew_body_add_spring(world(), id, a, b, stiffness, rest_length));
+  }
+  void remove_spring(std::uint32_t a, std::uint32_t b) const { check(sinew_body_remove_spring(world(), id, a, b)); }
+  void scale_region(nodes of, float stiffness_factor, float length_factor) const {
+    check(sinew_body_scale_region(world(), id, of.data(), of.size(), stiffness_factor, length_factor));
+  }
+  void set_pressure(float pressure) const { check(sinew_body_set_pressure(world(), id, pressure)); }
+
+  sinew_cut_report cut(span<const float> start, span<const float> end) const { // the edge, two points each, before and after
+    expect(start.size() == 6 && end.size() == 6, "start, end: the 6 floats of an edge each");
+    auto out = sized<sinew_cut_report>();
+    return check(sinew_body_cut(world(), id, start.data(), end.data(), &out)), out;
+  }
+  sinew_topology_changes changes_since(std::uint64_t version) const {
+    auto out = sized<sinew_topology_changes>();
+    return check(sinew_body_get_topology_changes(world(), id, version, &out)), out;
+  }
+  std::uint32_t pieces(span<std::uint32_t> piece_of_node) const { // how many there are
+    std::uint32_t count = 0;
+    return check(sinew_body_get_pieces(world(), id, piece_of_node.data(), piece_of_node.size(), &count)), count;
+  }
+  float node_mass(std::uint32_t node) const {
+    float out = 0;
+    return check(sinew_body_get_node_mass(world(), id, node, &out)), out;
+  }
+
+  float awake_share() const { return viewed<float>(sinew_body_get_awake_share); }
+  void wake() const { check(sinew_body_wake(world(), id)); }
+  sinew_rest_state_report rest_state(const rest_state_def &def = {}) const {
+    auto out = sized<sinew_rest_state_report>();
+    return check(sinew_body_rest_state(world(), id, &def, &out)), out;
+  }
+  sinew_energy energy() const { return reported<sinew_energy>(sinew_body_get_energy); }
+  sinew_storage_report storage_report() const { return reported<sinew_storage_report>(sinew_body_get_storage_report); }
+  sinew_solver_report solver_report() const { return reported<sinew_solver_report>(sinew_body_get_solver_report); }
+  sinew_enclosed_report enclosed_report() const { return reported<sinew_enclosed_report>(sinew_body_get_enclosed_report); }
+  sinew_tear_report tear_report() const { return reported<sinew_tear_report>(sinew_body_get_tear_report); }
+
+  attachment attach(nodes held, const tool &to, float force_limit = no_limit) const {
+    return attached([&](auto out) {
+      return sinew_body_attach_nodes(world(), id, held.data(), held.size(), to.id, force_limit, out);
+    });
+  }
+  attachment attach(nodes held, const body &other, nodes others, float force_limit = no_limit) const {
+    expect(held.size() == others.size(), "others: as many as there are nodes");
+    return attached([&](auto out) {
+      return sinew_body_attach_nodes_to_nodes(world(), id, held.data(), held.size(), other.id, others.data(), force_limit, out);
+    });
+  }
+  attachment suture(std::uint32_t triangle, vec3 weights, const body &other, std::uint32_t other_triangle, vec3 other_weights,
+                    const suture_def &def = {}) const {
+    return attached([&](auto out) {
+      return sinew_body_suture_points(world(), id, triangle, weights.data(), other.id, other_triangle, other_weights.data(), &def, out);
+    });
+  }
+
+private:
+  std::size_t thirds(floats given) const {
+    expect(given.size() % 3 == 0, "3 floats for each node");
+    return given.size() / 3;
+  }
+  template <class Out, class Get> Out viewed(Get get) const {
+    Out out{};
+    return check(get(world(), id, &out)), out;
+  }
+  template <class Out, class Get> Out reported(Get get) const {
+    auto out = sized<Out>();
+    return check(get(world(), id, &out)), out;
+  }
+  template <class Attach> attachment attached(Attach attach) const {
+    sinew_attachment_id made{};
+    return check(attach(&made)), attachment(world(), made);
+  }
+};
+
+// A body as another thread sees it.
+class reader : public owner<sinew_reader, sinew_reader_destroy> {
+public:
+  reader() = default;
+  explicit reader(const body &of) : owner(made(of)) {}
+  sinew_frame read() {
+    auto out = sized<sinew_frame>();
+    return check(sinew_reader_read(get(), &out)), out;
+  }
+
+private:
+  static sinew_reader *made(const body &of) {
+    sinew_reader *raw = nullptr;
+    return check(sinew_reader_create(of.world(), of.id, &raw)), raw;
+  }
+};
+
+// A fine surface that goes with a coarse body.
+class embedding : public owner<sinew_embedding, sinew_embedding_destroy> {
+public:
+  using owner::owner;
+  embedding(const body &in, const embedding_def &def) : owner(made(in, def)) {}
+  void update(const sinew_world *world) { check(sinew_embedding_update(get(), world)); }
+  void update_from(span<const float> positions) { check(sinew_embedding_update_from(get(), positions.data(), positions.size() / 3)); }
+  vec3_view positions() const { return viewed(sinew_embedding_get_positions); }
+  vec3_view normals() { return viewed(sinew_embedding_get_normals); }
+  span<const std::uint32_t> triangles() const { // 3 for each
+    sinew_triangle_view view{};
+    check(sinew_embedding_get_triangles(get(), &view));
+    return {view.data, 3 * view.count};
+  }
+
+private:
+  template <class Get> vec3_view viewed(Get read) const {
+    vec3_view out{};
+    return check(read(get(), &out)), out;
+  }
+  static sinew_embedding *made(const body &in, const embedding_def &def) {
+    sinew_embedding *raw = nullptr;
+    return check(sinew_embedding_create(in.world(), in.id, &def, &raw)), raw;
+  }
+};
+
+// The device's side of a tool, for the device's thread.
+class haptic : public owner<sinew_haptic, sinew_haptic_destroy> {
+public:
+  haptic() = default;
+  haptic(const tool &led, haptic_def def = {}) : owner(made(led, def)) {}
+  sinew_haptic_result tick(const pose &device, vec3 velocity, vec3 angular_velocity, float dt) {
+    auto out = sized<sinew_haptic_result>();
+    check(sinew_haptic_tick(get(), device.position.data(), device.orientation.data(), velocity.data(), angular_velocity.data(), dt, &out));
+    return out;
+  }
+  std::size_t contacts(span<sinew_haptic_contact> into) const {
+    std::size_t count = 0;
+    return check(sinew_haptic_get_contacts(get(), into.data(), into.size(), &count)), count;
+  }
+
+private:
+  static sinew_haptic *made(const tool &led, haptic_def &def) {
+    sinew_haptic *raw = nullptr;
+    def.tool = led.id;
+    return check(sinew_haptic_create(led.world(), &def, &raw)), raw;
+  }
+};
+
+// What two bodies have in common.
+class detector : public owner<sinew_detector, sinew_detector_destroy> {
+public:
+  detector() = default;
+  detector(const body &first, const body &second, detector_def def = {}) : owner(made(first, second, def)) {}
+  sinew_detector_report find(const sinew_world *world) {
+    auto out = sized<sinew_detector_report>();
+    return check(sinew_detector_find(get(), world, &out)), out;
+  }
+  span<const sinew_point_inside> points(std::uint32_t side) const {
+    return listed<sinew_point_inside>(sinew_detector_get_points, side);
+  }
+  span<const sinew_edge_inside> edges(std::uint32_t side) const {
+    return listed<sinew_edge_inside>(sinew_detector_get_edges, side);
+  }
+  dvec3_view gradient(std::uint32_t side) const {
+    dvec3_view out{};
+    return check(sinew_detector_get_gradient(get(), side, &out)), out;
+  }
+
+private:
+  template <class Item, class Get> span<const Item> listed(Get list, std::uint32_t side) const {
+    const Item *items = nullptr;
+    std::size_t count = 0;
+    return check(list(get(), side, &items, &count)), span<const Item>(items, count);
+  }
+  static sinew_detector *made(const body &first, const body &second, detector_def &def) {
+    sinew_detector *raw = nullptr;
+    def.bodies[0] = first.id, def.bodies[1] = second.id;
+    return check(sinew_detector_create(first.world(), &def, &raw)), raw;
+  }
+};
+
+class world : public owner<sinew_world, sinew_world_destroy> {
+public:
+  explicit world(const world_def &def = {}) : owner(made(def)) {}
+  explicit world(sinew_world *raw) noexcept : owner(raw) {}
+
+  sinew_step_report step(float dt) {
+    auto out = sized<sinew_step_report>();
+    return check(sinew_world_step(get(), dt, &out)), out;
+  }
+  void set_gravity(vec3 gravity) { check(sinew_world_set_gravity(get(), gravity.data())); }
+  std::uint64_t state_hash() const {
+    std::uint64_t out = 0;
+    return check(sinew_world_get_state_hash(get(), &out)), out;
+  }
+
+  body create_body(const body_def &def) {
+    sinew_body_id made{};
+    return check(sinew_body_create(get(), &def, &made)), body(get(), made);
+  }
+  std::pair<body, embedding> create_body_from_surface(const body_def &def, float spacing) {
+    sinew_body_id made{};
+    sinew_embedding *drawn = nullptr;
+    check(sinew_body_create_from_surface(get(), &def, spacing, &made, &drawn));
+    return {body(get(), made), embedding(drawn)};
+  }
+  tool create_tool(const tool_def &def) {
+    sinew_tool_id made{};
+    return check(sinew_tool_create(get(), &def, &made)), tool(get(), made);
+  }
+  blade create_blade(const blade_def &def) {
+    sinew_blade_id made{};
+    return check(sinew_blade_create(get(), &def, &made)), blade(get(), made);
+  }
+
+  sinew::wrench wrench(span<const sinew_tool_id> tools, vec3 about) const {
+    sinew::wrench out{};
+    check(sinew_tools_get_wrench(get(), tools.data(), tools.size(), about.data(), out.force.data(), out.torque.data()));
+    return out;
+  }
+  std::size_t contact_changes(span<sinew_contact_change> into) const {
+    std::size_t count = 0;
+    return check(sinew_world_get_contact_changes(get(), into.data(), into.size(), &count)), count;
+  }
+  std::size_t slipped(span<sinew_attachment_id> into) const {
+    std::size_t count = 0;
+    return check(sinew_world_get_slipped(get(), into.data(), into.size(), &count)), count;
+  }
+  sinew_surface_point cast_ray(vec3 origin, vec3 direction, float max_distance) const { // body.index1 is 0 where nothing is hit
+    auto out = sized<sinew_surface_point>();
+    return check(sinew_world_cast_ray(get(), origin.data(), direction.data(), max_distance, &out)), out;
+  }
+  sinew_surface_point find_nearest(vec3 point, float max_distance) const {
+    auto out = sized<sinew_surface_point>();
+    return check(sinew_world_find_nearest(get(), point.data(), max_distance, &out)), out;
+  }
+  void save_picture(const picture_def &def, const char *path) const { check(sinew_world_save_picture(get(), &def, path)); }
+  void save_picture(const picture_def &def, span<const sinew_body_values> coloured, const char *path) const {
+    check(sinew_world_save_picture_of_values(get(), &def, coloured.data(), coloured.size(), path));
+  }
+
+private:
+  static sinew_world *made(const world_def &def) {
+    sinew_world *raw = nullptr;
+    return check(sinew_world_create(&def, &raw)), raw;
+  }
+};
+
+inline sinew_material_preset material_preset(std::uint32_t preset) {
+  auto out = sized<sinew_material_preset>();
+  return check(sinew_material_get_preset(preset, &out)), out;
+}
+
+} // namespace sinew
+
+#endif

@@ -1,0 +1,147 @@
+// sinew.hpp: what is owned is ended once, in any order; errors carry their status and words; views and spans show what C shows.
+#include <sinew.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+static std::size_t allocations = 0;
+void *operator new(std::size_t size) {
+  allocations++;
+  if (void *memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void *memory) noexcept { std::free(memory); }
+void operator delete(void *memory, std::size_t) noexcept { std::free(memory); }
+
+#define EXPECT(condition) expect_that((condition), #condition, __LINE__)
+static void expect_that(bool holds, const char *what, int line) {
+  if (holds) return;
+  std::printf("line %d: %s\n", line, what);
+  std::exit(1);
+}
+
+template <class Call> static sinew_status refused(Call call, const char *word) {
+  try {
+    call();
+  } catch (const sinew::error &error) {
+    EXPECT(std::strstr(error.what(), word) != nullptr);
+    return error.status();
+  }
+  return SINEW_STATUS_OK;
+}
+
+template <class Owner> constexpr bool moves_only =
+    std::is_nothrow_move_constructible_v<Owner> && !std::is_copy_constructible_v<Owner> && !std::is_copy_assignable_v<Owner>;
+static_assert(moves_only<sinew::world> && moves_only<sinew::mesh> && moves_only<sinew::reader> && moves_only<sinew::haptic> &&
+              moves_only<sinew::detector> && moves_only<sinew::embedding>);
+
+static sinew::body_def solid(const sinew_mesh_view &shape) {
+  sinew::body_def def;
+  def.positions = shape.positions, def.node_count = shape.node_count;
+  def.tetrahedra = shape.tetrahedra, def.tetrahedron_count = shape.tetrahedron_count;
+  def.node_mass = 1e-3f, def.stiffness = 100, def.node_damping = 1e-3f;
+  def.spare_nodes = 200;
+  return def;
+}
+
+static void owners() {
+  const auto mesh = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {3, 3, 3});
+  const auto shape = mesh.view();
+  sinew::world world;
+  const sinew_world *raw = world.get();
+  const auto first = world.create_body(solid(shape)), second = world.create_body(solid(shape));
+
+  sinew::world moved = std::move(world); // what belongs to it still does
+  EXPECT(moved.get() == raw && world.get() == nullptr);
+  EXPECT(refused([&] { world.step(0.01f); }, "world") == SINEW_STATUS_INVALID_ARGUMENT);
+  moved = std::move(*&moved); // of itself
+  EXPECT(moved.get() == raw);
+
+  sinew::tool_def ball;
+  ball.shape = SINEW_SHAPE_SPHERE, ball.radius = 0.01f, ball.position[1] = 0.5f;
+  const auto tool = moved.create_tool(ball);
+  sinew::haptic haptic(tool);
+  sinew::reader reader(first);
+  sinew::detector detector(first, second);
+  sinew::embedding_def fine;
+  fine.vertices = shape.positions, fine.vertex_count = shape.node_count;
+  fine.triangles = shape.surface, fine.triangle_count = shape.surface_triangle_count;
+  sinew::embedding drawn(first, fine);
+
+  first.pin(0);
+  const float before = first.positions()[5][1];
+  const auto report = moved.step(0.01f);
+  EXPECT(report.substeps >= 1);
+  const float fallen = first.positions()[5][1] - before;
+  EXPECT(fallen < 0 && fallen > -1e-3f * 9.81f); // at most g t^2
+  const auto frame = reader.read();
+  EXPECT(frame.step == 1 && frame.positions.data[3 * 5 + 1] == first.positions()[5][1]);
+  drawn.update(moved.get());
+  EXPECT(drawn.positions().size() == shape.node_count && std::fabs(drawn.positions()[5][1] - first.positions()[5][1]) < 1e-6f);
+  EXPECT(drawn.triangles().size() == 3 * shape.surface_triangle_count && first.triangles().size() == drawn.triangles().size());
+  detector.find(moved.get());
+  EXPECT(detector.points(0).size() + detector.edges(0).size() > 0);
+  const auto felt = haptic.tick(tool.pose(), {}, {}, 0.001f);
+  EXPECT(felt.force[0] == 0);
+
+  // Of the fixed corner, springs and weight are held.
+  const auto weight = first.pin_force(0);
+  EXPECT(std::isfinite(weight[1]));
+  first.destroy();
+  EXPECT(refused([&] { first.pin(0); }, "body") == SINEW_STATUS_STALE_ID);
+  moved = sinew::world(); // the old one ends, and with it what is left
+  EXPECT(reader.read().is_over == 1);
+}
+
+static void spans() {
+  sinew::world world;
+  const auto mesh = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {2, 2, 2});
+  const auto body = world.create_body(solid(mesh.view()));
+  const std::vector<std::uint32_t> nodes = {1, 2};
+  const float forces[] = {0, 1, 0, 0, 1, 0};
+  body.apply_forces(nodes, forces);
+  EXPECT(refused([&] { body.apply_forces(nodes, std::array<float, 3>{}); }, "3 floats") == SINEW_STATUS_INVALID_ARGUMENT);
+  EXPECT(refused([&] { body.set_positions(std::array<float, 4>{}); }, "3 floats") == SINEW_STATUS_INVALID_ARGUMENT);
+  EXPECT(refused([&] { body.apply_force(1, {NAN, 0, 0}); }, "force") == SINEW_STATUS_INVALID_ARGUMENT);
+  world.set_gravity({});
+  world.step(0.001f);
+  sinew::vec3 momentum{};
+  const auto velocities = body.velocities();
+  for (std::uint32_t i = 0; i < velocities.size(); i++) momentum[1] += body.node_mass(i) * velocities[i][1];
+  EXPECT(std::fabs(momentum[1] - 2e-3f) < 1e-5f); // 2 N for 1 ms
+  const float start[] = {-1, 0.03f, -1, 1, 0.03f, -1}, end[] = {-1, 0.03f, 1, 1, 0.03f, 1};
+  std::vector<std::uint32_t> pieces(body.positions().size());
+  EXPECT(body.pieces(pieces) == 1);
+  body.cut(start, end);
+  pieces.resize(body.positions().size());
+  EXPECT(body.pieces(pieces) == 2);
+}
+
+static void no_allocation_of_its_own() {
+  sinew::world world;
+  const auto mesh = sinew::mesh::cloth({0.1f, 0.1f}, {4, 4});
+  const auto shape = mesh.view();
+  sinew::body_def def;
+  def.positions = shape.positions, def.node_count = shape.node_count;
+  def.triangles = shape.triangles, def.triangle_count = shape.triangle_count;
+  def.node_mass = 1e-3f, def.stiffness = 10;
+  const auto body = world.create_body(def);
+  sinew::reader reader(body);
+  for (int i = 0; i < 10; i++) world.step(0.01f), reader.read(), body.energy();
+}
+
+int main() {
+  const std::size_t before = allocations;
+  no_allocation_of_its_own();
+  EXPECT(allocations == before);
+  owners();
+  spans();
+  std::puts("ok");
+}
