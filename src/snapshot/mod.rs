@@ -12,13 +12,11 @@
 //! All numbers are little-endian.
 
 mod bytes;
-mod check;
 mod saved;
 
 use xxhash_rust::xxh3::Xxh3Default;
 
 pub(crate) use bytes::{Reader, Writer};
-pub(crate) use check::ensure;
 pub(crate) use saved::{
     Saved, floats_into, least_of_field, saved, saved_enum, shape_of_field, shape_of_name, shape_with,
 };

@@ -61,8 +61,20 @@ pub(crate) const fn least_of_field<T, F: Saved>(_: fn(&T) -> &F) -> usize {
 }
 
 /// Writes and reads a structure field by field: `saved!(Name { all, its, fields })`, what is generic as `saved!([T: Saved] Name<T> { .. })`. One that
-/// is left out does not compile, unless `leaves { field: value }` says what it is after loading.
+/// is left out does not compile, unless `leaves { field: value }` says what it is after loading. `saved!(Name)` is of one without fields.
 macro_rules! saved {
+    ($name:ident) => {
+        impl $crate::snapshot::Saved for $name {
+            const SHAPE: u64 = $crate::snapshot::shape_of_name(stringify!($name));
+            const LEAST: usize = 0;
+
+            fn save(&self, _to: &mut $crate::snapshot::Writer) {}
+
+            fn load(_from: &mut $crate::snapshot::Reader) -> $crate::error::Result<Self> {
+                Ok(Self)
+            }
+        }
+    };
     ([$($generics:tt)*] $name:ty { $($field:tt),* $(,)? } $(leaves { $($left:ident: $value:expr),* $(,)? })?) => {
         impl<$($generics)*> $crate::snapshot::Saved for $name {
             const SHAPE: u64 = {

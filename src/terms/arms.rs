@@ -37,7 +37,7 @@ saved!(Arms {
 
 /// Stresses are pulls over the spring's stiffness, m.
 #[derive(Clone, Copy, Debug)]
-struct Arm {
+pub(super) struct Arm {
     rest_length: f32,
     load: f32,
     stress: f32,

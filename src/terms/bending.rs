@@ -29,11 +29,11 @@ use crate::snapshot::saved;
 #[derive(Debug)]
 pub(super) struct Hinges;
 
-saved!(Hinges {});
+saved!(Hinges);
 
 /// A hinge at rest.
 #[derive(Clone, Copy, Debug)]
-struct Shape {
+pub(super) struct Shape {
     /// Where the feet of the arms lie on the edge, 0: at its first node, 1: at its second.
     feet: [f32; 2],
     /// 1/m

@@ -23,7 +23,7 @@ const UNIT: f32 = 1e-3;
 #[derive(Debug)]
 pub(super) struct Fibres;
 
-saved!(Fibres {});
+saved!(Fibres);
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (directions, stiffnesses) = (definition.fibre_directions, &definition.fibre_stiffnesses);

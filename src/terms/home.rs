@@ -14,10 +14,10 @@ use crate::snapshot::saved;
 #[derive(Debug)]
 pub(super) struct Home;
 
-saved!(Home {});
+saved!(Home);
 
 #[derive(Clone, Copy, Debug)]
-struct Shape {
+pub(super) struct Shape {
     /// In the caller's coordinates, m.
     rest: Vec3,
     /// In the body's.

@@ -28,7 +28,7 @@ saved!(Sets { yield_strain, largest });
 
 /// m
 #[derive(Clone, Copy, Debug)]
-struct Set {
+pub(super) struct Set {
     rest_length: f32,
     /// By how much longer it is at rest.
     longer: f32,

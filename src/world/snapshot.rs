@@ -5,17 +5,15 @@ use crate::body::Body;
 use crate::contact::{Tissue, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::readers::Clock;
 use crate::slots::Slots;
 use crate::snapshot::{
-    Reader, Saved, Writer, at_end, begin, opened, saved, seal, section, shape_of_name, shape_with, write_section,
+    Reader, Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section,
 };
-use crate::springs::{ChosenKernel, Kernel, TILE};
-use crate::threads::{RunTasks, Threads};
+use crate::springs::{Kernel, TILE};
+use crate::threads::RunTasks;
 
-use super::attachments::{Attachment, AttachmentId};
+use super::attachments::Attachment;
 use super::blade::Blade;
-use super::blades::BladeId;
 
 saved!(WorldDefinition { gravity, substeps, max_substeps, tolerance, kernel } leaves { thread_count: 1, tasks: None });
 
@@ -51,10 +49,10 @@ impl World {
     /// # Errors
     /// As [`World::save`].
     pub fn saved_size(&self) -> Result<usize> {
-        if let Some(link) = self.haptics.first() {
+        if let Some(tool) = self.led_by_hand() {
             return Err(Error::Unsupported(format!(
-                "a haptic handle leads {}: its thread cannot be saved, destroy the handle first",
-                link.led()
+                "a haptic handle leads tool {} of generation {}: its thread cannot be saved, destroy the handle first",
+                tool.0.index1, tool.0.generation
             )));
         }
         let mut count = Writer::new(None);
@@ -136,7 +134,10 @@ impl World {
             tasks,
             ..Saved::load(&mut from)?
         };
-        let kernel = Kernel::load(&mut from)?.choose()?;
+        let kernel = match Kernel::load(&mut from)?.choose() {
+            Err(_) if definition.kernel == Kernel::Best => Kernel::Best.choose(),
+            chosen => chosen,
+        }?;
         let mut world = Self::new(WorldDefinition {
             kernel: kernel.kernel(),
             ..definition
