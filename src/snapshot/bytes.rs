@@ -40,11 +40,6 @@ impl<'a> Writer<'a> {
         self.size
     }
 
-    /// What was written from a place on.
-    pub fn since(&self, start: usize) -> Option<&[u8]> {
-        self.to.as_deref()?.get(start..self.size)
-    }
-
     /// Writes over what was put.
     pub fn put_at(&mut self, start: usize, bytes: &[u8]) {
         let place = self

@@ -6,9 +6,7 @@ use crate::contact::{Tissue, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::slots::Slots;
-use crate::snapshot::{
-    Reader, Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section,
-};
+use crate::snapshot::{Reader, Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
 use crate::springs::{Kernel, TILE};
 use crate::threads::RunTasks;
 
