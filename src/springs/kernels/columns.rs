@@ -314,9 +314,45 @@ impl Columns {
     pub fn shrink_nodes(&mut self, end: usize, node_count: usize) {
         self.count = end - self.first;
         self.blocks.truncate(self.count.div_ceil(LANES));
+        let last = self.blocks.last().copied().unwrap_or_default();
+        self.runs.truncate(last.runs as usize);
+        self.own_runs.truncate(last.own_runs as usize);
+        self.near.truncate(last.near as usize);
+        self.near_indices.truncate(last.near as usize);
+        self.far.truncate(last.far as usize);
+        self.far_indices.truncate(last.far as usize);
+        self.own_rest_lengths.truncate(last.own as usize);
+        self.own_stiffnesses.truncate(last.own as usize);
+        self.own_dampings.truncate(last.own as usize);
         self.node_count = self.node_count.min(node_count);
-        self.reads.end = self.reads.end.min(node_count.next_multiple_of(LANES) as isize);
         self.strays.shrink(node_count);
+        if self.reads.end > node_count as isize {
+            self.turn_back();
+        }
+    }
+
+    /// Has lanes without a link lead to nodes that there are.
+    fn turn_back(&mut self) {
+        // A run ends within the margin where one of its lanes has a link.
+        let end = self.node_count.next_multiple_of(LANES) + MARGIN;
+        self.reads.end = self.reads.end.min(end as isize);
+        for run in self.runs.iter_mut().filter(|run| run.lanes == 0) {
+            run.offset = 0;
+        }
+        for run in self.own_runs.iter_mut().filter(|run| run.lanes == 0) {
+            run.offset = 0;
+        }
+        let (first, window, node_count) = (self.first, self.window, self.node_count);
+        for index in self.near_indices.iter_mut().flat_map(|column| &mut column.0) {
+            if window + usize::from(*index) >= node_count {
+                *index = (first - window) as u16;
+            }
+        }
+        for index in self.far_indices.iter_mut().flat_map(|column| &mut column.0) {
+            if *index as usize >= node_count {
+                *index = first as u32;
+            }
+        }
     }
 
     /// The body has so many nodes now.

@@ -16,6 +16,8 @@ mod portable;
 mod prefetch;
 mod quantities;
 mod range;
+#[cfg(test)]
+mod sound;
 mod strays;
 mod tetrahedra;
 

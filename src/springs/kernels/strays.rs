@@ -165,6 +165,29 @@ impl Strays {
         start..start + count
     }
 
+    /// Whether these are strays of `nodes` in a body of `node_count` that lead to nodes that are read.
+    #[cfg(test)]
+    pub(super) fn are_sound(
+        &self,
+        nodes: Range<usize>,
+        node_count: usize,
+        damped: bool,
+        is_read: impl Fn(isize) -> bool,
+    ) -> bool {
+        let count = self.len();
+        self.first == nodes.start
+            && self.node_count <= node_count
+            && self.damped == damped
+            && [self.neighbours.len(), self.stiffnesses.len(), self.rest_lengths.len()] == [count; 3]
+            && self.dampings.len() == if damped { count } else { 0 }
+            && self.places.is_sorted()
+            && self.places.iter().all(|&place| usize::from(place) < nodes.len())
+            && self
+                .neighbours
+                .iter()
+                .all(|&node| (node as usize) < node_count && is_read(node as isize))
+    }
+
     pub(super) fn batch_count(&self) -> usize {
         self.len().div_ceil(LANES)
     }
