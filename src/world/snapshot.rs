@@ -36,7 +36,7 @@ impl World {
     /// [`Error::Unsupported`]: a [`HapticHandle`](crate::HapticHandle) leads a tool, or more room is kept for what may come than bytes can ask for.
     /// [`Error::OutOfMemory`].
     pub fn save(&self) -> Result<Vec<u8>> {
-        let size = self.saved_size()?;
+        let size = self.snapshot_size()?;
         let mut bytes = memory::filled(0, size)?;
         self.save_into(&mut bytes)?;
         Ok(bytes)
@@ -45,8 +45,8 @@ impl World {
     /// How many bytes [`World::save_into`] writes.
     ///
     /// # Errors
-    /// As [`World::save`].
-    pub fn saved_size(&self) -> Result<usize> {
+    /// [`Error::Unsupported`], as [`World::save`].
+    pub fn snapshot_size(&self) -> Result<usize> {
         if let Some(tool) = self.led_by_hand() {
             return Err(Error::Unsupported(format!(
                 "a haptic handle leads tool {} of generation {}: its thread cannot be saved, destroy the handle first",
@@ -64,21 +64,21 @@ impl World {
         Ok(count.size())
     }
 
-    /// The same as [`World::save`] into the first of `bytes`: how many.
+    /// The same as [`World::save`] into `bytes`, which are as many as [`World::snapshot_size`] tells.
     ///
     /// # Errors
-    /// As [`World::save`], and [`Error::InvalidArgument`]: there are too few bytes. Then nothing is written.
-    pub fn save_into(&self, bytes: &mut [u8]) -> Result<usize> {
-        let size = self.saved_size()?;
-        let capacity = bytes.len();
-        let Some(bytes) = bytes.get_mut(..size) else {
+    /// [`Error::Unsupported`], as [`World::save`], and [`Error::InvalidArgument`]: there are more or fewer bytes. Then nothing is written.
+    pub fn save_into(&self, bytes: &mut [u8]) -> Result<()> {
+        let size = self.snapshot_size()?;
+        if bytes.len() != size {
             return Err(Error::invalid(format!(
-                "capacity is {capacity}: the world takes {size} bytes"
+                "size is {}: the world takes {size} bytes",
+                bytes.len()
             )));
-        };
+        }
         self.write(&mut Writer::new(Some(bytes)));
         seal(bytes);
-        Ok(size)
+        Ok(())
     }
 
     fn write(&self, to: &mut Writer) {
@@ -117,11 +117,12 @@ impl World {
 
     /// A world of the bytes that [`World::save`] made, with so many threads, or the caller's job system, as in [`WorldDefinition`].
     ///
-    /// Bytes are not trusted: what was cut short, has changed or never was a world is refused as a whole.
+    /// It goes on to the bit where this processor offers the kernel that the world was stepped with; else [`Kernel::Best`] is the best of
+    /// this one. What was cut short, has changed or never was a world is refused as a whole.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: the bytes are no world, or there are too many threads. [`Error::Unsupported`]: they are of another version of the
-    /// library, or this processor does not offer the kernel that the world was stepped with, or the system not so many threads.
+    /// library, or this processor does not offer the kernel that the world was created with, or the system not so many threads.
     /// [`Error::OutOfMemory`].
     pub fn load(bytes: &[u8], thread_count: u32, tasks: Option<RunTasks>) -> Result<Self> {
         let portable = Kernel::Portable.choose()?;

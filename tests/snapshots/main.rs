@@ -10,13 +10,6 @@ use acts::Caller;
 use sinew::{World, WorldDefinition};
 
 /// Of which a step soon ends.
-fn small() -> WorldDefinition {
-    WorldDefinition {
-        max_substeps: 40,
-        ..WorldDefinition::default()
-    }
-}
-
 fn world(threads: u32) -> World {
     World::new(WorldDefinition {
         thread_count: threads,
