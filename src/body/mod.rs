@@ -29,6 +29,7 @@ mod records;
 mod region;
 mod shown;
 mod sleep;
+mod sound;
 mod state;
 mod stretch;
 mod stroke;
@@ -166,7 +167,7 @@ pub struct Body {
     pub(crate) sleeper: Option<Box<Sleeper>>,
 }
 
-saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None });
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None } where Self::is_sound);
 
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]

@@ -61,6 +61,13 @@ impl NodeOrder {
         Ok(Self { own, caller })
     }
 
+    /// Whether each number of so many nodes has its place.
+    pub fn is_sound(&self, count: usize) -> bool {
+        let is_back = |(place, &number): (usize, &u32)| self.own.get(number as usize) == Some(&(place as u32));
+        self.own.len() == self.caller.len()
+            && (self.is_callers() || self.own.len() == count && self.caller.iter().enumerate().all(is_back))
+    }
+
     /// Makes room for so many nodes in all.
     pub fn reserve(&mut self, node_count: usize) -> Result<()> {
         if self.is_callers() {

@@ -218,6 +218,20 @@ impl Pins {
         Ok(())
     }
 
+    /// Whether they are in order, of nodes of which there are so many, and found by tile.
+    pub fn are_sound(&self, count: usize) -> bool {
+        let is_start = |(tile, &start): (usize, &usize)| {
+            start == self.pins.partition_point(|pin| (pin.node as usize) < tile * TILE)
+        };
+        self.pins.is_sorted_by(|a, b| a.node < b.node)
+            && self
+                .pins
+                .last()
+                .is_none_or(|pin| (pin.node as usize) < count && pin.node as usize / TILE < self.tiles.len())
+            && self.tiles.iter().enumerate().all(is_start)
+            && self.partial_count == self.pins.iter().filter(|pin| pin.is_partial()).count()
+    }
+
     /// Lets go of nodes that are not to stay.
     pub fn retain(&mut self, stays: impl Fn(u32) -> bool) {
         self.pins.retain(|pin| stays(pin.node));

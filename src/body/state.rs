@@ -50,6 +50,18 @@ pub(crate) struct Substep<'a> {
 }
 
 impl State {
+    /// Whether it is that of so many nodes, and finite.
+    pub fn is_sound(&self, count: usize) -> bool {
+        let mut all = self.positions.iter().chain(&self.velocities).chain(&self.forces);
+        self.current < self.positions.len()
+            && self.latest < self.positions.len()
+            && self.settled < self.velocities.len()
+            && all.all(|vectors| vectors.len() == count)
+            && [self.positions(), self.velocities()]
+                .into_iter()
+                .all(|vectors| vectors.iter().all(|vector| vector.is_finite()))
+    }
+
     pub fn new(node_count: usize) -> Result<Self> {
         let zeros = || Vectors::zeros(node_count);
         Ok(Self {

@@ -61,7 +61,8 @@ pub(crate) const fn least_of_field<T, F: Saved>(_: fn(&T) -> &F) -> usize {
 }
 
 /// Writes and reads a structure field by field: `saved!(Name { all, its, fields })`, what is generic as `saved!([T: Saved] Name<T> { .. })`. One that
-/// is left out does not compile, unless `leaves { field: value }` says what it is after loading. `saved!(Name)` is of one without fields.
+/// is left out does not compile, unless `leaves { field: value }` says what it is after loading. With
+/// `where check` what is read must pass a check. `saved!(Name)` is of one without fields.
 macro_rules! saved {
     ($name:ident) => {
         impl $crate::snapshot::Saved for $name {
@@ -75,7 +76,7 @@ macro_rules! saved {
             }
         }
     };
-    ([$($generics:tt)*] $name:ty { $($field:tt),* $(,)? } $(leaves { $($left:ident: $value:expr),* $(,)? })?) => {
+    ([$($generics:tt)*] $name:ty { $($field:tt),* $(,)? } $(leaves { $($left:ident: $value:expr),* $(,)? })? $(where $check:path)?) => {
         impl<$($generics)*> $crate::snapshot::Saved for $name {
             const SHAPE: u64 = {
                 let shape = $crate::snapshot::shape_of_name(stringify!($name));
@@ -94,12 +95,16 @@ macro_rules! saved {
             }
 
             fn load(from: &mut $crate::snapshot::Reader) -> $crate::error::Result<Self> {
-                Ok(Self { $($field: $crate::snapshot::Saved::load(from)?,)* $($($left: $value),*)? })
+                let it = Self { $($field: $crate::snapshot::Saved::load(from)?,)* $($($left: $value),*)? };
+                $(if !$check(&it) {
+                    return Err(from.refusal(concat!("no ", stringify!($name), " is like this")));
+                })?
+                Ok(it)
             }
         }
     };
-    ($name:ty { $($rest:tt)* } $($leaves:tt)*) => {
-        $crate::snapshot::saved!([] $name { $($rest)* } $($leaves)*);
+    ($name:ty { $($rest:tt)* } $($more:tt)*) => {
+        $crate::snapshot::saved!([] $name { $($rest)* } $($more)*);
     };
 }
 

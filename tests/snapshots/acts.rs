@@ -515,7 +515,12 @@ impl Caller {
         for &tool in &self.tools {
             asked(worlds, |world| {
                 let contacts: Vec<_> = world.contacts(tool).expect("a tool").collect();
-                (world.wrench(tool), world.pose(tool), world.tool_target(tool), contacts)
+                format!(
+                    "{:?} {:?} {:?} {contacts:?}",
+                    world.wrench(tool),
+                    world.pose(tool),
+                    world.tool_target(tool)
+                )
             });
         }
         for &blade in &self.blades {
@@ -526,7 +531,7 @@ impl Caller {
         });
         for &held in self.attachments.iter().chain(&self.sutures) {
             asked(worlds, |world| {
-                (world.attachment_force(held), world.suture_report(held))
+                format!("{:?} {:?}", world.attachment_force(held), world.suture_report(held))
             });
         }
     }

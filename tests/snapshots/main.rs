@@ -3,6 +3,7 @@
 
 mod acts;
 mod features;
+mod refused;
 
 use std::collections::BTreeMap;
 

@@ -16,7 +16,6 @@ mod portable;
 mod prefetch;
 mod quantities;
 mod range;
-#[cfg(test)]
 mod sound;
 mod strays;
 mod tetrahedra;

@@ -166,7 +166,6 @@ impl Strays {
     }
 
     /// Whether these are strays of `nodes` in a body of `node_count` that lead to nodes that are read.
-    #[cfg(test)]
     pub(super) fn are_sound(
         &self,
         nodes: Range<usize>,

@@ -68,19 +68,24 @@ pub(crate) struct Groups {
     node_count: usize,
 }
 
-saved!(Groups { groups, node_count });
+saved!(Groups { groups, node_count } where Self::lead_to_nodes);
 
 impl Groups {
     /// # Panics
     /// Where a corner is not below `node_count`.
     pub fn new(groups: Vec<Group>, node_count: usize) -> Self {
-        let corners = groups.iter().flat_map(|group| group.corners.as_flattened());
-        assert!(
-            corners
-                .into_iter()
-                .all(|&corner| usize::from(corner / 2) < node_count && corner % 2 == 0)
-        );
-        Self { groups, node_count }
+        let groups = Self { groups, node_count };
+        assert!(groups.lead_to_nodes());
+        groups
+    }
+
+    fn lead_to_nodes(&self) -> bool {
+        let corners = self.groups.iter().flat_map(|group| group.corners.as_flattened());
+        corners.into_iter().all(|corner| self.is_node(corner))
+    }
+
+    fn is_node(&self, corner: &u16) -> bool {
+        usize::from(corner / 2) < self.node_count && corner % 2 == 0
     }
 
     pub fn as_slice(&self) -> &[Group] {
@@ -125,8 +130,7 @@ impl Groups {
     /// # Panics
     /// Where a corner is not below the number of nodes.
     pub fn put(&mut self, [group, lane]: [usize; 2], corners: [u16; 4], inverse: [f32; 6], volume: f32) {
-        let is_node = |&corner: &u16| usize::from(corner / 2) < self.node_count && corner % 2 == 0;
-        assert!(corners.iter().all(is_node));
+        assert!(corners.iter().all(|corner| self.is_node(corner)));
         let group = &mut self.groups[group];
         for (to, corner) in group.corners.iter_mut().zip(corners) {
             to[lane] = corner;

@@ -97,7 +97,7 @@ saved!(Packed {
     kinds,
     materials,
     tiles
-});
+} where Self::is_sound);
 
 /// What columns of these springs cost, the most of them.
 pub(crate) fn costs(springs: &[Spring], rounding: Rounding) -> Result<Costs> {
@@ -198,6 +198,16 @@ impl Packed {
             of.columns.shrink_nodes(tile_nodes(tile, node_count).end, node_count);
         }
         self.node_count = node_count;
+    }
+
+    /// Whether kernels find all that they read without a check.
+    fn is_sound(&self) -> bool {
+        let mut tiles = self.tiles.iter().enumerate();
+        self.tiles.len() == tile_count(self.node_count)
+            && tiles.all(|(tile, of)| {
+                let nodes = tile_nodes(tile, self.node_count);
+                of.columns.is_sound(nodes, self.node_count, self.materials.len())
+            })
     }
 
     fn has(&self, a: u32, b: u32) -> bool {
