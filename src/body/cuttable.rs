@@ -99,7 +99,7 @@ impl Cuttable {
             nodes.sort_unstable();
             edges.binary_search(&nodes).is_ok()
         };
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             search,
             material,
             density: if size > 0.0 { mass / size } else { 0.0 },
@@ -107,7 +107,7 @@ impl Cuttable {
             stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
             toughness: definition.toughness,
-        })))
+        })?))
     }
 }
 

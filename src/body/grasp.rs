@@ -337,7 +337,7 @@ impl Body {
             grasps: memory::reserved(count)?,
             nodes: memory::reserved(nodes)?,
         };
-        self.grasps = Some(Box::new(grasps));
+        self.grasps = Some(memory::boxed(grasps)?);
         Ok(())
     }
 

@@ -199,7 +199,7 @@ impl Body {
         };
         let of_volume = (definition.volume_stiffness > 0.0).then(|| Law::of_volume(definition.volume_stiffness));
         let elements = match law.or(of_volume) {
-            Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
+            Some(law) => Some(memory::boxed(elements_of(law, definition, &order)?)?),
             None => None,
         };
         if springs.is_empty() {
@@ -320,14 +320,14 @@ impl Body {
         let gathers = body.records.is_some();
         body.implicit = match definition.solver {
             Solver::Verlet => None,
-            Solver::Implicit => Some(Box::new(Implicit::new(
+            Solver::Implicit => Some(memory::boxed(Implicit::new(
                 positions, gathers, order, iterations, accuracy,
-            )?)),
+            )?)?),
             Solver::Newton => {
                 let (springs, elements) = (&*body.springs, body.elements.as_deref());
                 let beside = (body.terms.as_deref(), body.enclosed.as_deref());
                 let implicit = Implicit::exact(positions, springs, elements, beside, [order, iterations], accuracy)?;
-                Some(Box::new(implicit))
+                Some(memory::boxed(implicit)?)
             }
         };
         if let (Some(implicit), Some(elements)) = (&mut body.implicit, &body.elements) {
@@ -339,7 +339,7 @@ impl Body {
         if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && !body.has_more_than_springs() {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
-            body.scaling = scaling.map(Box::new);
+            body.scaling = scaling.map(memory::boxed).transpose()?;
         }
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;

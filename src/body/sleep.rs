@@ -253,7 +253,7 @@ impl Body {
                 step: 0.0,
             };
             self.join_tiles(&mut sleeper)?;
-            self.sleeper = Some(Box::new(sleeper));
+            self.sleeper = Some(memory::boxed(sleeper)?);
         }
         Ok(())
     }

@@ -80,7 +80,7 @@ impl Tears {
             report: TearReport::default(),
         };
         tears.reserve(0)?;
-        Ok(Some(Box::new(tears)))
+        Ok(Some(memory::boxed(tears)?))
     }
 
     /// Whether there are limits for the spring or edge between two nodes.

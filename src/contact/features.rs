@@ -107,7 +107,11 @@ impl Features {
     pub fn reserve(&mut self, changed: usize, added: usize) -> Result<()> {
         let uses = match &mut self.uses {
             Some(uses) => uses,
-            none => none.insert(Box::new(EdgeUses::new(self.node_count, &self.edges, &self.faces)?)),
+            none => none.insert(memory::boxed(EdgeUses::new(
+                self.node_count,
+                &self.edges,
+                &self.faces,
+            )?)?),
         };
         uses.reserve(3 * changed, 3 * (changed + added))?;
         self.edges.try_reserve(3 * (changed + added))?;

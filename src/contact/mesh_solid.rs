@@ -13,6 +13,7 @@ use super::tool::Detection;
 use crate::body::{Bounds, not_negative};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::ClosedSurface;
 use crate::snapshot::{Reader, Saved, Writer, shape_of_name};
 
@@ -119,11 +120,11 @@ impl MeshSolid {
             Detection::Exact => (Found::Exact, ExactSolid::new(&surface)?),
             Detection::ImageSpace => {
                 let image = LayeredImage::new(surface.positions(), surface.triangles(), grain)?;
-                (Found::Image(Box::new(image)), ExactSolid::changing(&surface)?)
+                (Found::Image(memory::boxed(image)?), ExactSolid::changing(&surface)?)
             }
             Detection::DistanceField => {
                 let exact = ExactSolid::new(&surface)?;
-                (Found::Field(Box::new(DistanceField::of(&exact, grain)?)), exact)
+                (Found::Field(memory::boxed(DistanceField::of(&exact, grain)?)?), exact)
             }
         };
         let is_fine = resolution > 0.0 || grain * THINNEST <= sides.min_element();

@@ -85,11 +85,11 @@ impl Elements {
     /// Remembers where tetrahedra are that were given in this order.
     pub fn follow_cells(&mut self, tetrahedra: &[[u32; 4]]) -> Result<()> {
         let places = super::parts::places(tetrahedra)?;
-        self.cells = Some(Box::new(Cells {
+        self.cells = Some(memory::boxed(Cells {
             places,
             used: LATER,
             spare: Vec::new(),
-        }));
+        })?);
         Ok(())
     }
 

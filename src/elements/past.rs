@@ -243,14 +243,14 @@ impl Memory {
                 newest: memory::filled(Stresses::ZERO, count)?,
             });
         }
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             viscosity,
             gain: 0.0,
             bounds: yields.then(|| Bounds::new(law, yielding)),
             parts: of_parts,
             spare: Vec::new(),
             rings: Past::new(if viscosity.is_none() { 0 } else { ring_count })?,
-        })))
+        })?))
     }
 
     /// Makes room for more parts of so many groups.

@@ -130,7 +130,7 @@ impl Enclosed {
         }
         let (surface, cavities) = surface::close(definition, triangles, order)?;
         let triangle_count = surface.triangles.len();
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             stiffness: definition.enclosed_stiffness,
             pressure: definition.pressure,
             vectors: memory::filled(Vec3::ZERO, triangle_count)?,
@@ -143,7 +143,7 @@ impl Enclosed {
             highest: f32::INFINITY,
             settled: f32::INFINITY,
             rates_known: false,
-        })))
+        })?))
     }
 
     /// Room for what pressures change by.

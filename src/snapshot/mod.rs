@@ -104,8 +104,10 @@ pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
 
 /// The content of the section that comes next, which must have this tag, and what is behind it.
 pub(crate) fn section<'a>(bytes: &mut &'a [u8], tag: [u8; 4], kernel: ChosenKernel) -> Result<Reader<'a>> {
-    let name = String::from_utf8_lossy(&tag).into_owned();
-    let refusal = |why: &str| Error::invalid(format!("bytes are no world: section {name} {why}"));
+    let refusal = |why: &str| {
+        let name = String::from_utf8_lossy(&tag);
+        Error::invalid(format!("bytes are no world: section {name} {why}"))
+    };
     let (found, rest) = bytes.split_first_chunk().ok_or_else(|| refusal("is missing"))?;
     if *found != tag {
         return Err(refusal("is missing"));

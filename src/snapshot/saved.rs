@@ -6,6 +6,7 @@ use glam::{BVec3, DMat3, DQuat, DVec3, Quat, Vec3, Vec3A};
 
 use super::bytes::{Reader, Writer};
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// What is written and read bit by bit.
 pub(crate) trait Saved: Sized {
@@ -291,7 +292,7 @@ impl<T: Saved> Saved for Box<T> {
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        Ok(Box::new(T::load(from)?))
+        Ok(memory::boxed(T::load(from)?)?)
     }
 }
 

@@ -27,6 +27,7 @@ pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
 use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
@@ -245,12 +246,12 @@ impl Saved for Box<dyn Springs> {
     fn load(from: &mut Reader) -> Result<Self> {
         let [kind] = from.take_array()?;
         Ok(match kind {
-            Packed::SAVED_AS => Box::new(Packed::load(from)?),
-            Efficient::SAVED_AS => Box::new(Efficient::load(from)?),
-            FastLink::<UndampedLink>::SAVED_AS => Box::new(FastLink::<UndampedLink>::load(from)?),
-            FastLink::<DampedLink>::SAVED_AS => Box::new(FastLink::<DampedLink>::load(from)?),
-            DynamicBulk::<UndampedLink>::SAVED_AS => Box::new(DynamicBulk::<UndampedLink>::load(from)?),
-            DynamicBulk::<DampedLink>::SAVED_AS => Box::new(DynamicBulk::<DampedLink>::load(from)?),
+            Packed::SAVED_AS => memory::boxed(Packed::load(from)?)?,
+            Efficient::SAVED_AS => memory::boxed(Efficient::load(from)?)?,
+            FastLink::<UndampedLink>::SAVED_AS => memory::boxed(FastLink::<UndampedLink>::load(from)?)?,
+            FastLink::<DampedLink>::SAVED_AS => memory::boxed(FastLink::<DampedLink>::load(from)?)?,
+            DynamicBulk::<UndampedLink>::SAVED_AS => memory::boxed(DynamicBulk::<UndampedLink>::load(from)?)?,
+            DynamicBulk::<DampedLink>::SAVED_AS => memory::boxed(DynamicBulk::<DampedLink>::load(from)?)?,
             _ => return Err(from.refusal("no storage of springs")),
         })
     }
@@ -262,14 +263,18 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     let width = definition.springs_per_node as usize;
     let damped = springs.iter().any(|spring| spring.damping != 0.0);
     Ok(match (definition.storage, damped) {
-        (Storage::Packed, _) => Box::new(Packed::new(kernel, node_count, springs, definition.rounding())?),
-        (Storage::Efficient, _) => Box::new(Efficient::new(node_count, springs)?),
-        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(kernel, node_count, springs, width)?),
-        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(kernel, node_count, springs, width)?),
-        (Storage::DynamicBulk, false) => {
-            Box::new(DynamicBulk::<UndampedLink>::new(kernel, node_count, springs, width)?)
+        (Storage::Packed, _) => memory::boxed(Packed::new(kernel, node_count, springs, definition.rounding())?)?,
+        (Storage::Efficient, _) => memory::boxed(Efficient::new(node_count, springs)?)?,
+        (Storage::FastLink, false) => {
+            memory::boxed(FastLink::<UndampedLink>::new(kernel, node_count, springs, width)?)?
         }
-        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?),
+        (Storage::FastLink, true) => memory::boxed(FastLink::<DampedLink>::new(kernel, node_count, springs, width)?)?,
+        (Storage::DynamicBulk, false) => {
+            memory::boxed(DynamicBulk::<UndampedLink>::new(kernel, node_count, springs, width)?)?
+        }
+        (Storage::DynamicBulk, true) => {
+            memory::boxed(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?)?
+        }
     })
 }
 

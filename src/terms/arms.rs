@@ -13,6 +13,7 @@ use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
+use crate::memory;
 use crate::snapshot::saved;
 use crate::terms::SpringLaw;
 
@@ -75,7 +76,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         stiffening,
         course: Course::NOTHING,
     };
-    Ok(Some(Box::new(Stencils::new(law, arms, definition.positions.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(
+        law,
+        arms,
+        definition.positions.len(),
+    )?)?))
 }
 
 /// An arm where it is: the way from its first node to the other, and what is elastic.

@@ -100,7 +100,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
             shape,
         });
     }
-    Ok(Some(Box::new(Stencils::new(Hinges, hinges, rest.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(Hinges, hinges, rest.len())?)?))
 }
 
 /// A side of a triangle.

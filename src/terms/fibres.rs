@@ -74,7 +74,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     if fibres.is_empty() {
         return Ok(None);
     }
-    Ok(Some(Box::new(Stencils::new(Fibres, fibres, rest.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(Fibres, fibres, rest.len())?)?))
 }
 
 /// By how much a fibre is longer than at rest, as a part of its length there.

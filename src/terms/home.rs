@@ -40,7 +40,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
         stiffness: stiffnesses.get(node),
         shape: Shape { rest, local: rest },
     }));
-    Ok(Some(Box::new(Stencils::new(Home, springs, node_count)?)))
+    Ok(Some(memory::boxed(Stencils::new(Home, springs, node_count)?)?))
 }
 
 impl Law<1> for Home {

@@ -10,6 +10,7 @@ use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::snapshot::saved;
 
 /// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.
@@ -46,7 +47,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         strain: f64::from(strain),
         stiffening: f64::from(stiffening),
     };
-    Ok(Some(Box::new(Stencils::new(law, limits, definition.positions.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(
+        law,
+        limits,
+        definition.positions.len(),
+    )?)?))
 }
 
 impl Limit {

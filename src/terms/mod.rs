@@ -163,13 +163,13 @@ impl Saved for Box<dyn Term> {
     fn load(from: &mut Reader) -> Result<Self> {
         let [law] = from.take_array()?;
         Ok(match law {
-            Home::SAVED_AS => Box::new(Stencils::<Home, 1>::load(from)?),
-            Arms::SAVED_AS => Box::new(Stencils::<Arms, 2>::load(from)?),
-            Limit::SAVED_AS => Box::new(Stencils::<Limit, 2>::load(from)?),
-            Sets::SAVED_AS => Box::new(Stencils::<Sets, 2>::load(from)?),
-            Hinges::SAVED_AS => Box::new(Stencils::<Hinges, 4>::load(from)?),
-            Stiffening::SAVED_AS => Box::new(Stencils::<Stiffening, 2>::load(from)?),
-            Fibres::SAVED_AS => Box::new(Stencils::<Fibres, 4>::load(from)?),
+            Home::SAVED_AS => memory::boxed(Stencils::<Home, 1>::load(from)?)?,
+            Arms::SAVED_AS => memory::boxed(Stencils::<Arms, 2>::load(from)?)?,
+            Limit::SAVED_AS => memory::boxed(Stencils::<Limit, 2>::load(from)?)?,
+            Sets::SAVED_AS => memory::boxed(Stencils::<Sets, 2>::load(from)?)?,
+            Hinges::SAVED_AS => memory::boxed(Stencils::<Hinges, 4>::load(from)?)?,
+            Stiffening::SAVED_AS => memory::boxed(Stencils::<Stiffening, 2>::load(from)?)?,
+            Fibres::SAVED_AS => memory::boxed(Stencils::<Fibres, 4>::load(from)?)?,
             _ => return Err(from.refusal("no law of terms")),
         })
     }
@@ -231,7 +231,7 @@ impl Terms {
             return Ok(None);
         }
         let mut nodes = 0..definition.positions.len();
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             viscosity: if definition.viscosity.stiffening().is_some() && !springs.is_empty() {
                 definition.viscosity
             } else {
@@ -246,7 +246,7 @@ impl Terms {
             rates_known: false,
             stiffening: AtomicU32::new(1.0_f32.to_bits()),
             settled: 1.0,
-        })))
+        })?))
     }
 
     /// Adds the forces on the nodes of a tile, N.

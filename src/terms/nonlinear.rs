@@ -11,6 +11,7 @@ use super::stencils::{Law, Stencils, directed, direction, lengthening, of_spring
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::snapshot::{saved, saved_enum};
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
@@ -254,11 +255,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         curve: Curve::new(law),
         stiffest,
     };
-    Ok(Some(Box::new(Stencils::new(
+    Ok(Some(memory::boxed(Stencils::new(
         law,
         stiffening,
         definition.positions.len(),
-    )?)))
+    )?)?))
 }
 
 /// A spring where it is.

@@ -14,6 +14,7 @@ use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::material::{Course, Yielding};
+use crate::memory;
 use crate::snapshot::saved;
 use crate::terms::SpringLaw;
 
@@ -60,7 +61,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         yield_strain: f64::from(strain),
         largest: f64::from(largest),
     };
-    Ok(Some(Box::new(Stencils::new(law, sets, definition.positions.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(
+        law,
+        sets,
+        definition.positions.len(),
+    )?)?))
 }
 
 /// What a spring does at a length.

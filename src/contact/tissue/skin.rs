@@ -133,7 +133,7 @@ impl Skin {
             }
         }
         let changing = if body.can_be_cut() {
-            Some(Box::new(Changing::new(body, &nodes, &edges, &triangles)?))
+            Some(memory::boxed(Changing::new(body, &nodes, &edges, &triangles)?)?)
         } else {
             None
         };
