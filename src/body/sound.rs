@@ -12,6 +12,7 @@ impl Body {
         (1..=u32::MAX as usize / 2).contains(&count)
             && self.inverse_masses.len() == count
             && self.springs.node_count() == count
+            && (0..count).all(|node| self.springs_lead_to(node, count))
             && self.order.is_sound(count)
             && self.state.is_sound(count)
             && self.pins.are_sound(count)
@@ -30,5 +31,12 @@ impl Body {
                 .chain(&self.inverse_masses)
                 .all(|&mass| (0.0..f32::INFINITY).contains(&mass))
             && self.origin.is_finite()
+    }
+
+    fn springs_lead_to(&self, node: usize, count: usize) -> bool {
+        let mut all = true;
+        self.springs
+            .visit(node, &mut |link| all &= (link.neighbour as usize) < count);
+        all
     }
 }

@@ -292,7 +292,7 @@ impl<T: Saved> Saved for Box<T> {
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
-        Ok(memory::boxed(T::load(from)?)?)
+        memory::boxed(T::load(from)?)
     }
 }
 

@@ -151,8 +151,7 @@ impl Saved for Box<dyn Term> {
         let shape = shape_with(shape, Stencils::<Sets, 2>::SHAPE);
         let shape = shape_with(shape, Stencils::<Hinges, 4>::SHAPE);
         let shape = shape_with(shape, Stencils::<Stiffening, 2>::SHAPE);
-        let shape = shape_with(shape, Stencils::<Fibres, 4>::SHAPE);
-        shape
+        shape_with(shape, Stencils::<Fibres, 4>::SHAPE)
     };
     const LEAST: usize = 1;
 

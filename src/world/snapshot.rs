@@ -6,7 +6,7 @@ use crate::contact::{Tissue, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::slots::Slots;
-use crate::snapshot::{Reader, Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
+use crate::snapshot::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
 use crate::springs::{Kernel, TILE};
 use crate::threads::RunTasks;
 
@@ -147,18 +147,21 @@ impl World {
         world.holds_made = Saved::load(&mut from)?;
         world.clock = Saved::load(&mut from)?;
         at_end(&from)?;
-        let mut read = |tag: [u8; 4], read: &mut dyn FnMut(&mut Reader) -> Result<()>| {
-            let mut from = section(&mut bytes, tag, kernel)?;
-            read(&mut from)?;
-            at_end(&from)
-        };
-        read(*b"BODY", &mut |from| Ok(world.bodies = Slots::load("body", from)?))?;
-        read(*b"TOOL", &mut |from| Ok(world.tools = Slots::load("tool", from)?))?;
-        read(*b"ATTA", &mut |from| {
-            Ok(world.attachments = Slots::load("attachment", from)?)
-        })?;
-        read(*b"BLAD", &mut |from| Ok(world.blades = Slots::load("blade", from)?))?;
-        read(*b"TISS", &mut |from| Ok(world.tissue = Saved::load(from)?))?;
+        let mut from = section(&mut bytes, *b"BODY", kernel)?;
+        world.bodies = Slots::load("body", &mut from)?;
+        at_end(&from)?;
+        let mut from = section(&mut bytes, *b"TOOL", kernel)?;
+        world.tools = Slots::load("tool", &mut from)?;
+        at_end(&from)?;
+        let mut from = section(&mut bytes, *b"ATTA", kernel)?;
+        world.attachments = Slots::load("attachment", &mut from)?;
+        at_end(&from)?;
+        let mut from = section(&mut bytes, *b"BLAD", kernel)?;
+        world.blades = Slots::load("blade", &mut from)?;
+        at_end(&from)?;
+        let mut from = section(&mut bytes, *b"TISS", kernel)?;
+        world.tissue = Saved::load(&mut from)?;
+        at_end(&from)?;
         if !bytes.is_empty() {
             return Err(Error::invalid(
                 "bytes are no world: something is behind its last section",

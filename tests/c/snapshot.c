@@ -83,6 +83,24 @@ static void compare(const sinew_world *a, const sinew_world *b)
         CHECK(memcmp(node_of(views[0], node), node_of(views[1], node), 3 * sizeof(float)) == 0);
 }
 
+static sinew_world *undo(sinew_world *world, const unsigned char *bytes, size_t size)
+{
+    sinew_world *before = NULL;
+    MUST(sinew_world_load_snapshot(bytes, size, 1, NULL, NULL, &before)); /* one thread, no job system */
+    sinew_world_destroy(world);
+    return before;
+}
+
+static unsigned char *save(const sinew_world *world, size_t *size)
+{
+    unsigned char *bytes;
+    MUST(sinew_world_get_snapshot_size(world, size));
+    bytes = (unsigned char *)malloc(*size);
+    if (bytes != NULL)
+        MUST(sinew_world_save_snapshot(world, bytes, *size));
+    return bytes;
+}
+
 int main(void)
 {
     sinew_world *world = a_scene(), *twin = NULL, *untouched = NULL;
@@ -91,10 +109,8 @@ int main(void)
     int number;
     for (number = 0; number < STEPS; number++) {
         if (number == SAVED) {
-            MUST(sinew_world_get_snapshot_size(world, &size));
-            bytes = (unsigned char *)malloc(size);
+            bytes = save(world, &size);
             CHECK(bytes != NULL);
-            MUST(sinew_world_save_snapshot(world, bytes, size));
             MUST(sinew_world_load_snapshot(bytes, size, 2, NULL, NULL, &twin));
             compare(world, twin);
         }
@@ -127,6 +143,12 @@ int main(void)
         bytes[at] ^= 16;
     }
     CHECK(untouched == NULL);
+
+    /* What has happened since has not. */
+    world = undo(world, bytes, size);
+    for (number = SAVED; number < STEPS; number++)
+        step(world, number);
+    compare(world, twin);
     free(bytes);
     free(again);
     sinew_world_destroy(twin);

@@ -214,7 +214,6 @@ impl Caller {
             viscosity: Viscosity {
                 retardation_time: sometimes(random, 0.01),
                 relaxation_time: sometimes(random, 0.1),
-                ..Viscosity::default()
             },
             yielding: Yielding {
                 strain: sometimes(random, 0.1),

@@ -85,7 +85,7 @@ impl Groups {
     }
 
     fn is_node(&self, corner: &u16) -> bool {
-        usize::from(corner / 2) < self.node_count && corner % 2 == 0
+        usize::from(corner / 2) < self.node_count && corner.is_multiple_of(2)
     }
 
     pub fn as_slice(&self) -> &[Group] {
