@@ -3843,6 +3843,55 @@ sinew_status sinew_body_create_from_surface(struct sinew_world *world,
                                             struct sinew_body_id *out_body,
                                             struct sinew_embedding **out_embedding);
 
+/**
+ * How many bytes sinew_world_save_snapshot writes of the world as it is now.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a haptic handle leads a tool; or more room is kept for what may come
+ * than bytes can ask for).
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `out` is NULL or writable.
+ */
+sinew_status sinew_world_get_snapshot_size(const struct sinew_world *world,
+                                           size_t *out);
+
+/**
+ * Writes the world as bytes, of which sinew_world_load_snapshot makes one that goes on just as this one does, to the bit: with bodies as
+ * they were cut and torn, contacts, what is held and sewn, blades in mid stroke, forces applied for the next step, and ids, which name the
+ * same things there. `size` is what sinew_world_get_snapshot_size tells. The bytes are the same for any number of threads.
+ *
+ * What is not of the world is not in them: threads, readers, detectors and embeddings, which are made again. They are for this version of
+ * the library alone. A checksum tells whether they are as they were written, not who wrote them.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also another size), SINEW_STATUS_UNSUPPORTED as above.
+ *
+ * # Safety
+ * `world` is NULL or a world nobody changes; `bytes` is NULL or as long as stated.
+ */
+sinew_status sinew_world_save_snapshot(const struct sinew_world *world,
+                                       uint8_t *bytes,
+                                       size_t size);
+
+/**
+ * Creates a world of the bytes that sinew_world_save_snapshot wrote, which the caller destroys with sinew_world_destroy. `thread_count`,
+ * `run_tasks`, nullable, and `tasks_context` are as in sinew_world_def.
+ *
+ * It goes on to the bit where the processor offers the kernel that the world was stepped with; else SINEW_KERNEL_BEST is the best of this
+ * one. What was cut short, has changed or never was a world is refused as a whole.
+ *
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (bytes of another version of the library; a thread could not be started,
+ * or the processor does not offer the kernel that the world was created with), SINEW_STATUS_OUT_OF_MEMORY.
+ *
+ * # Safety
+ * `bytes` is NULL or as long as stated; `run_tasks` is NULL or keeps its word, as long as the world lives; `out` is NULL or writable.
+ */
+sinew_status sinew_world_load_snapshot(const uint8_t *bytes,
+                                       size_t size,
+                                       uint32_t thread_count,
+                                       sinew_run_tasks run_tasks,
+                                       void *tasks_context,
+                                       struct sinew_world **out);
+
 #ifdef __cplusplus
 }  // extern "C"
 #endif  // __cplusplus

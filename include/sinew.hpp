@@ -462,6 +462,18 @@ public:
     std::uint64_t out = 0;
     return check(sinew_world_get_state_hash(get(), &out)), out;
   }
+  std::size_t snapshot_size() const {
+    std::size_t out = 0;
+    return check(sinew_world_get_snapshot_size(get(), &out)), out;
+  }
+  // Into as many bytes as snapshot_size.
+  void save_snapshot(span<std::uint8_t> bytes) const { check(sinew_world_save_snapshot(get(), bytes.data(), bytes.size())); }
+  // Bodies and tools of it: sinew::body(world.get(), id).
+  static world load_snapshot(span<const std::uint8_t> bytes, std::uint32_t thread_count = 1, sinew_run_tasks run = nullptr,
+                             void *context = nullptr) {
+    sinew_world *raw = nullptr;
+    return check(sinew_world_load_snapshot(bytes.data(), bytes.size(), thread_count, run, context, &raw)), world(raw);
+  }
 
   body create_body(const body_def &def) {
     sinew_body_id made{};

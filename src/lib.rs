@@ -23,6 +23,7 @@ pub mod raster;
 mod readers;
 mod signs;
 mod slots;
+mod snapshot;
 mod solver;
 mod springs;
 pub mod strain;

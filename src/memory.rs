@@ -48,6 +48,16 @@ pub(crate) fn sort_once<T: Ord>(values: &mut Vec<T>) {
     values.dedup();
 }
 
+/// A value in a place of its own.
+#[allow(unsafe_code)]
+pub(crate) fn boxed<T>(value: T) -> Result<Box<T>> {
+    let mut one = reserved(1)?;
+    one.push(value);
+    let first = Box::into_raw(one.into_boxed_slice()).cast::<T>();
+    // SAFETY: a slice of one lies in memory as what is in it, and nobody else has it.
+    Ok(unsafe { Box::from_raw(first) })
+}
+
 /// Appends `value`, growing the vector fallibly.
 pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     values.try_reserve(1)?;

@@ -7,6 +7,7 @@ use glam::Vec3;
 use crate::error::{Error, Result};
 use crate::handover::pool::{Reader, Writer};
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{TILE, tile_count, tile_nodes};
 use crate::threads::{Team, Tiles};
 
@@ -73,6 +74,8 @@ pub(crate) struct Clock {
     pub step: u64,
     pub time: f64,
 }
+
+saved!(Clock { step, time });
 
 impl Clock {
     pub fn tick(&mut self, dt: f32) {

@@ -1,6 +1,7 @@
 //! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
 
 use crate::error::{Error, Result};
+use crate::snapshot::{Reader, Saved, Writer, saved};
 
 /// Things in places that are used again.
 #[derive(Debug)]
@@ -21,6 +22,40 @@ pub(crate) struct Slot<T> {
     content: Option<T>,
 }
 
+saved!([T: Saved] Slot<T> { generation, content });
+
+impl<T: Saved> Slots<T> {
+    /// Writes all places.
+    pub fn save(&self, to: &mut Writer) {
+        let Self {
+            slots,
+            first_free: _,
+            count: _,
+            noun: _,
+        } = self;
+        slots.save(to);
+    }
+
+    /// Reads all places.
+    pub fn load(noun: &'static str, from: &mut Reader) -> Result<Self> {
+        let slots: Vec<Slot<T>> = Saved::load(from)?;
+        if slots.len() >= u32::MAX as usize || slots.iter().any(|slot| slot.generation == 0) {
+            return Err(from.refusal("a place that nothing ever had"));
+        }
+        Ok(Self {
+            first_free: slots.iter().position(is_usable).unwrap_or(slots.len()),
+            count: slots.iter().filter(|slot| slot.content.is_some()).count(),
+            slots,
+            noun,
+        })
+    }
+}
+
+/// Whether something can be put here.
+fn is_usable<T>(slot: &Slot<T>) -> bool {
+    slot.content.is_none() && slot.generation < u32::MAX
+}
+
 impl<T> Slot<T> {
     /// What lives here.
     pub fn content_mut(&mut self) -> Option<&mut T> {
@@ -34,6 +69,8 @@ pub(crate) struct SlotId {
     pub index1: u32,
     pub generation: u32,
 }
+
+saved!(SlotId { index1, generation });
 
 impl SlotId {
     /// The place, counted from 0, of what is known to live.
@@ -63,8 +100,7 @@ impl<T> Slots<T> {
     }
 
     pub fn insert(&mut self, content: T) -> Result<SlotId> {
-        let usable = |slot: &Slot<T>| slot.content.is_none() && slot.generation < u32::MAX;
-        let index = match self.slots[self.first_free..].iter().position(usable) {
+        let index = match self.slots[self.first_free..].iter().position(is_usable) {
             Some(beyond) => self.first_free + beyond,
             None => {
                 self.slots.try_reserve(1)?;

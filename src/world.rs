@@ -9,6 +9,7 @@ mod holds;
 mod push;
 mod readers;
 mod resistance;
+mod snapshot;
 mod step;
 mod sutures;
 mod tear;
@@ -22,6 +23,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::readers::Clock;
 use crate::slots::{SlotId, Slots};
+use crate::snapshot::saved;
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
 use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{RunTasks, Threads};
@@ -73,9 +75,13 @@ impl Default for WorldDefinition {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BodyId(pub(crate) SlotId);
 
+saved!(BodyId { 0 });
+
 /// A tool of a world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ToolId(pub(crate) SlotId);
+
+saved!(ToolId { 0 });
 
 /// Bodies and tools that are stepped together.
 #[derive(Debug)]

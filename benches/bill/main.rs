@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench bill [-- part of a name]` writes `target/report/bill.md`. One organ as plain springs, the same with every option given and off, with
 //! each feature alone, and as finite elements: the time of a substep of VERLET by spring, that of a frame of IMPLICIT, the memory of the whole
-//! body and the time to make it, in one run, in turns, and as ratios to plain springs. Times are the processor's, the least of all turns. It fails
+//! body, the time to make it, and snapshots of it, in one run, in turns, and as ratios to plain springs. Times are the processor's, the least of all turns. It fails
 //! where the body with every option off has other bytes or moves otherwise than the plain one.
 #![allow(clippy::print_stderr)]
 
@@ -99,6 +99,10 @@ struct Contender<'a> {
     bytes: usize,
     /// What it took to make the body, s.
     made: f64,
+    /// Bytes of a snapshot of its world, and what it took to save and to load it, s.
+    snapshot: usize,
+    saved: f64,
+    loaded: f64,
     /// The least of all turns, s.
     least: f64,
 }
@@ -149,11 +153,21 @@ impl<'a> Contender<'a> {
             .expect("the body")
             .set_velocities(&velocities)
             .expect("velocities");
+        let mut snapshot = Vec::new();
+        let [mut saved, mut loaded] = [f64::INFINITY; 2];
+        for _ in 0..MAKES {
+            saved = saved.min(clock::time(|| snapshot = world.save().expect("a snapshot")).processor);
+            let load = || drop(std::hint::black_box(World::load(&snapshot, 1, None).expect("a world")));
+            loaded = loaded.min(clock::time(load).processor);
+        }
         Self {
             name,
             beside,
             bytes,
             made,
+            snapshot: snapshot.len(),
+            saved,
+            loaded,
             world,
             body,
             least: f64::INFINITY,
@@ -467,7 +481,7 @@ fn main() -> ExitCode {
         }
         let _ = writeln!(
             report,
-            "| | {unit} | of plain springs | bytes a node | of plain springs | made, us a node |\n|---|---|---|---|---|---|"
+            "| | {unit} | of plain springs | bytes a node | of plain springs | made, us a node | snapshot, bytes a node | saved, us a node | loaded, us a node |\n|---|---|---|---|---|---|---|---|---|"
         );
         let scale = match solver {
             Solver::Verlet => 1e9 / (spring_count as f64 * f64::from(SUBSTEPS)),
@@ -477,13 +491,16 @@ fn main() -> ExitCode {
         for contender in &contenders {
             let _ = writeln!(
                 report,
-                "| {} | {:.3} | {:.2} | {:.0} | {:.2} | {:.2} |",
+                "| {} | {:.3} | {:.2} | {:.0} | {:.2} | {:.2} | {:.0} | {:.3} | {:.3} |",
                 contender.name,
                 contender.least * scale,
                 contender.least / least,
                 contender.bytes as f64 / node_count as f64,
                 contender.bytes as f64 / bytes as f64,
                 1e6 * contender.made / node_count as f64,
+                contender.snapshot as f64 / node_count as f64,
+                1e6 * contender.saved / node_count as f64,
+                1e6 * contender.loaded / node_count as f64,
             );
         }
         report.push('\n');

@@ -7,6 +7,7 @@ use crate::cutting::Changes;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Change, Link, Rewiring};
 
 /// No spring.
@@ -22,6 +23,13 @@ struct Limits {
     withheld: Option<(u32, Withheld)>,
 }
 
+saved!(Limits {
+    strain,
+    force,
+    next,
+    withheld
+});
+
 /// Springs with limits, in the body's own numbers.
 #[derive(Debug)]
 pub(super) struct Bearing {
@@ -31,6 +39,8 @@ pub(super) struct Bearing {
     /// Of each node the first spring that it is the lower one of.
     first: Vec<u32>,
 }
+
+saved!(Bearing { springs, limits, first });
 
 impl Bearing {
     /// All springs with the same limits, strain and force; with room for so many nodes.

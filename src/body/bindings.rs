@@ -6,6 +6,7 @@ use super::vectors::Vectors;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// A point that is bound to nodes, which are not bound themselves. It has a number among the body's nodes, without mass or springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,8 @@ pub(crate) struct Bound {
     /// At least 0, 1 in sum.
     pub weights: [f32; 4],
 }
+
+saved!(Bound { node, nodes, weights });
 
 impl Bound {
     /// A node that is bound to none: to itself.
@@ -54,6 +57,8 @@ pub(crate) struct Bindings {
     /// A bit for each of the body's numbers up to the last that nobody draws or touches.
     hidden: Vec<u64>,
 }
+
+saved!(Bindings { points, places, hidden });
 
 /// The nodes that a number stands for, with their weights: itself where it is not bound, as where nothing is.
 #[inline]

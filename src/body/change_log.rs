@@ -2,6 +2,7 @@
 
 use crate::cutting::Changes;
 use crate::error::{Error, Result};
+use crate::snapshot::saved;
 
 /// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
 #[repr(C)]
@@ -16,6 +17,8 @@ pub struct NewNodeSource {
     pub weights: [f32; 3],
 }
 
+saved!(NewNodeSource { node, sources, weights });
+
 /// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +28,8 @@ pub struct NewRimEdge {
     /// The triangle of the surface that it is a side of.
     pub triangle: u32,
 }
+
+saved!(NewRimEdge { nodes, triangle });
 
 /// What has come, changed or gone since a version.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +55,13 @@ struct Lengths {
     rim: usize,
 }
 
+saved!(Lengths {
+    nodes,
+    triangles,
+    removed_springs,
+    rim
+});
+
 /// All that has changed since the body was made.
 #[derive(Debug, Default)]
 pub(super) struct ChangeLog {
@@ -60,6 +72,14 @@ pub(super) struct ChangeLog {
     /// For each version but the first.
     versions: Vec<Lengths>,
 }
+
+saved!(ChangeLog {
+    nodes,
+    triangles,
+    removed_springs,
+    rim,
+    versions
+});
 
 impl ChangeLog {
     pub fn version(&self) -> u64 {

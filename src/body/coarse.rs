@@ -2,6 +2,7 @@
 
 use super::vectors::Vectors;
 use crate::error::Result;
+use crate::snapshot::saved;
 
 /// Positions within and at the end of a coarser step, and velocities at its end; kept only in worlds with a tolerance.
 ///
@@ -14,6 +15,13 @@ pub(crate) struct CoarseStep {
     /// The longest way between a node's last two places within the step, m.
     middle_difference: f32,
 }
+
+saved!(CoarseStep {
+    middle,
+    positions,
+    velocities,
+    middle_difference
+});
 
 impl CoarseStep {
     pub fn new(node_count: usize) -> Result<Self> {

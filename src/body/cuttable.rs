@@ -6,6 +6,7 @@ use super::{Body, BodyDefinition, Bounds, NodeOrder, Spring};
 use crate::cutting::{CutMaterial, CutSolid, CutSurface, Sweep};
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{TILE, tile_count};
 
 use super::change_log::ChangeLog;
@@ -26,6 +27,16 @@ pub(super) struct Cuttable {
     /// What it takes to cut it, J/m, of solids J/m².
     pub toughness: f32,
 }
+
+saved!(Cuttable {
+    material,
+    search,
+    log,
+    stroke,
+    density,
+    springs_are_edges,
+    toughness
+});
 
 impl Cuttable {
     /// With springs and the triangles that are drawn in the caller's numbers; `None`: the body is not to be cut.
@@ -88,7 +99,7 @@ impl Cuttable {
             nodes.sort_unstable();
             edges.binary_search(&nodes).is_ok()
         };
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             search,
             material,
             density: if size > 0.0 { mass / size } else { 0.0 },
@@ -96,7 +107,7 @@ impl Cuttable {
             stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
             toughness: definition.toughness,
-        })))
+        })?))
     }
 }
 
@@ -156,6 +167,12 @@ pub(super) struct Search {
     first_count: u32,
 }
 
+saved!(Search {
+    home_of_cell,
+    homes,
+    first_count
+});
+
 /// The items that are listed at one tile.
 #[derive(Clone, Debug, Default)]
 struct Home {
@@ -165,6 +182,8 @@ struct Home {
     /// Their corners that came later, in the caller's numbers.
     later: Vec<u32>,
 }
+
+saved!(Home { items, tiles, later });
 
 /// The tile at which what lies between these is listed.
 fn home_of<const CORNERS: usize>(corners: [u32; CORNERS], order: &NodeOrder) -> u32 {

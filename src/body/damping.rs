@@ -6,6 +6,7 @@
 use super::Sleeper;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::solver::{MassScaling, Sliver};
 use crate::springs::TILE;
 
@@ -21,6 +22,13 @@ pub(crate) struct NodeDamping {
     /// The substep that the factors are for, s.
     substep: f32,
 }
+
+saved!(NodeDamping {
+    rates,
+    loss,
+    gain,
+    substep
+});
 
 impl NodeDamping {
     pub fn new(rates: Vec<f32>) -> Result<Self> {

@@ -14,6 +14,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::slots::SlotId;
+use crate::snapshot::saved;
 use crate::solver::close;
 
 /// A part of a body that a tool holds: a node, or the corners of a triangle about a point on it.
@@ -31,6 +32,15 @@ pub(crate) struct Grasp {
     /// What the tool did to the tissue, mean over the last step, N.
     pub force: Vec3,
 }
+
+saved!(Grasp {
+    id,
+    tool,
+    nodes,
+    weights,
+    limit,
+    force
+});
 
 /// So many nodes a grasp holds at most: the corners of a triangle are bound to nodes of one cell.
 const MOST: usize = 4;
@@ -52,6 +62,17 @@ pub(crate) struct HeldNode {
     gain: Vec3,
     course: Course,
 }
+
+saved!(HeldNode {
+    node,
+    tool,
+    parts,
+    offset,
+    force,
+    torque,
+    gain,
+    course
+});
 
 /// Weights are added up in so many parts of 1.
 const PARTS: f64 = (1_u64 << 40) as f64;
@@ -84,6 +105,16 @@ struct Course {
     torque_sum: DVec3,
 }
 
+saved!(Course {
+    offset,
+    gap,
+    velocity,
+    gain,
+    pin_sum,
+    force_sum,
+    torque_sum
+});
+
 /// What a substep made of forces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lapse {
@@ -106,6 +137,8 @@ pub(crate) struct Grasps {
     /// In their order.
     nodes: Vec<HeldNode>,
 }
+
+saved!(Grasps { grasps, nodes });
 
 impl Grip {
     /// A node by itself.
@@ -304,7 +337,7 @@ impl Body {
             grasps: memory::reserved(count)?,
             nodes: memory::reserved(nodes)?,
         };
-        self.grasps = Some(Box::new(grasps));
+        self.grasps = Some(memory::boxed(grasps)?);
         Ok(())
     }
 

@@ -29,6 +29,7 @@ mod records;
 mod region;
 mod shown;
 mod sleep;
+mod sound;
 mod state;
 mod stretch;
 mod stroke;
@@ -73,6 +74,7 @@ use crate::error::{Error, Result};
 use crate::material::Made;
 use crate::memory;
 use crate::readers::Shown;
+use crate::snapshot::saved;
 use crate::solver::{
     Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close,
     write_records,
@@ -165,6 +167,8 @@ pub struct Body {
     pub(crate) sleeper: Option<Box<Sleeper>>,
 }
 
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None } where Self::is_sound);
+
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Needs {
@@ -195,7 +199,7 @@ impl Body {
         };
         let of_volume = (definition.volume_stiffness > 0.0).then(|| Law::of_volume(definition.volume_stiffness));
         let elements = match law.or(of_volume) {
-            Some(law) => Some(Box::new(elements_of(law, definition, &order)?)),
+            Some(law) => Some(memory::boxed(elements_of(law, definition, &order)?)?),
             None => None,
         };
         if springs.is_empty() {
@@ -316,14 +320,14 @@ impl Body {
         let gathers = body.records.is_some();
         body.implicit = match definition.solver {
             Solver::Verlet => None,
-            Solver::Implicit => Some(Box::new(Implicit::new(
+            Solver::Implicit => Some(memory::boxed(Implicit::new(
                 positions, gathers, order, iterations, accuracy,
-            )?)),
+            )?)?),
             Solver::Newton => {
                 let (springs, elements) = (&*body.springs, body.elements.as_deref());
                 let beside = (body.terms.as_deref(), body.enclosed.as_deref());
                 let implicit = Implicit::exact(positions, springs, elements, beside, [order, iterations], accuracy)?;
-                Some(Box::new(implicit))
+                Some(memory::boxed(implicit)?)
             }
         };
         if let (Some(implicit), Some(elements)) = (&mut body.implicit, &body.elements) {
@@ -335,7 +339,7 @@ impl Body {
         if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && !body.has_more_than_springs() {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
-            body.scaling = scaling.map(Box::new);
+            body.scaling = scaling.map(memory::boxed).transpose()?;
         }
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::definition::Spring;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Rounding, costs};
 
 /// Where each node is kept, for bodies that do not keep them in the caller's order.
@@ -19,6 +20,8 @@ pub(crate) struct NodeOrder {
     /// The reverse.
     caller: Vec<u32>,
 }
+
+saved!(NodeOrder { own, caller });
 
 impl NodeOrder {
     /// The order that suits these springs best.
@@ -56,6 +59,13 @@ impl NodeOrder {
             own[number as usize] = place;
         }
         Ok(Self { own, caller })
+    }
+
+    /// Whether each number of so many nodes has its place.
+    pub fn is_sound(&self, count: usize) -> bool {
+        let is_back = |(place, &number): (usize, &u32)| self.own.get(number as usize) == Some(&(place as u32));
+        self.own.len() == self.caller.len()
+            && (self.is_callers() || self.own.len() == count && self.caller.iter().enumerate().all(is_back))
     }
 
     /// Makes room for so many nodes in all.

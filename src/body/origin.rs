@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::snapshot::saved;
 use crate::springs::Range;
 
 /// The smallest grid on which an origin is chosen, in metres; a body of one node has no extent of its own.
@@ -13,6 +14,8 @@ pub(crate) struct Bounds {
     pub min: Vec3,
     pub max: Vec3,
 }
+
+saved!(Bounds { min, max });
 
 impl Bounds {
     pub const EMPTY: Self = Self {

@@ -5,6 +5,7 @@ use glam::{BVec3, DVec3, Vec3};
 use super::vectors::Vectors;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::TILE;
 use crate::threads::Ragged;
 
@@ -29,6 +30,18 @@ pub(crate) struct Pin {
     /// The axes along which it is held, at least one; along the others it moves as free nodes do.
     pub axes: BVec3,
 }
+
+saved!(Pin {
+    node,
+    target,
+    force,
+    closing_share,
+    goal,
+    travel,
+    force_sum,
+    solved,
+    axes
+});
 
 impl Pin {
     fn new(node: u32, axes: BVec3) -> Self {
@@ -95,6 +108,12 @@ pub(crate) struct Pins {
     /// How many are held along some axes alone.
     partial_count: usize,
 }
+
+saved!(Pins {
+    pins,
+    tiles,
+    partial_count
+});
 
 impl Pins {
     pub fn iter(&self) -> std::slice::Iter<'_, Pin> {
@@ -197,6 +216,20 @@ impl Pins {
         self.tiles.resize(tiles, 0);
         self.find_tiles();
         Ok(())
+    }
+
+    /// Whether they are in order, of nodes of which there are so many, and found by tile.
+    pub fn are_sound(&self, count: usize) -> bool {
+        let is_start = |(tile, &start): (usize, &usize)| {
+            start == self.pins.partition_point(|pin| (pin.node as usize) < tile * TILE)
+        };
+        self.pins.is_sorted_by(|a, b| a.node < b.node)
+            && self
+                .pins
+                .last()
+                .is_none_or(|pin| (pin.node as usize) < count && pin.node as usize / TILE < self.tiles.len())
+            && self.tiles.iter().enumerate().all(is_start)
+            && self.partial_count == self.pins.iter().filter(|pin| pin.is_partial()).count()
     }
 
     /// Lets go of nodes that are not to stay.

@@ -9,6 +9,7 @@ use super::origin::Bounds;
 use super::{Bindings, Body};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{Reader, Saved, Writer};
 use crate::solver::show_closed;
 use crate::springs::{Loops, TILE, prefetch, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
@@ -23,6 +24,33 @@ pub(super) struct Published {
     velocities: OnceLock<Vec<Vec3>>,
     /// Where velocities are written next, while there are none. Locked by who asks for them alone.
     blank: Mutex<Vec<Vec3>>,
+}
+
+/// Positions: velocities are written again when they are asked for.
+impl Saved for Published {
+    const SHAPE: u64 = Vec::<Vec3>::SHAPE;
+    const LEAST: usize = Vec::<Vec3>::LEAST;
+
+    fn save(&self, to: &mut Writer) {
+        let Self {
+            positions,
+            velocities: _,
+            blank: _,
+        } = self;
+        to.needs(positions.capacity() * size_of::<Vec3>());
+        positions.save(to);
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let positions: Vec<Vec3> = Saved::load(from)?;
+        let mut blank = from.reserved(positions.capacity())?;
+        blank.resize(positions.len(), Vec3::ZERO);
+        Ok(Self {
+            positions,
+            velocities: OnceLock::new(),
+            blank: Mutex::new(blank),
+        })
+    }
 }
 
 impl Published {

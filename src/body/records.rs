@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Loops, TILE};
 use crate::threads::Tiles;
 
@@ -10,9 +11,13 @@ use crate::threads::Tiles;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Record(pub [f32; 4]);
 
+saved!(Record { 0 });
+
 /// One record per node.
 #[derive(Debug)]
 pub(crate) struct Records(Vec<Record>);
+
+saved!(Records { 0 });
 
 impl Records {
     /// `count` of them, all zero.

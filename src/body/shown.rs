@@ -2,6 +2,7 @@
 
 use super::Body;
 use crate::error::Result;
+use crate::memory;
 use crate::readers::{BodyReader, Clock, Shown, View};
 use crate::threads::Team;
 
@@ -10,7 +11,7 @@ impl Body {
         let room = self.node_room.max(self.node_count());
         let mut shown = match self.shown.take() {
             Some(shown) => shown,
-            None => Box::new(Shown::new(room, &self.surface)?),
+            None => memory::boxed(Shown::new(room, &self.surface)?)?,
         };
         shown.clock = clock;
         let reader = shown.create_reader(room, self.view());

@@ -12,6 +12,7 @@ use crate::contact::ToolPath;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Motion, TILE, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -23,6 +24,8 @@ pub struct Sleep {
     /// For how long it has to be at rest, s, above 0: some times what the tissue takes to settle.
     pub time: f32,
 }
+
+saved!(Sleep { speed, time });
 
 impl Default for Sleep {
     /// Never; after half a second.
@@ -66,6 +69,12 @@ struct Tile {
     pull: f32,
 }
 
+saved!(Tile {
+    quiet,
+    is_touched,
+    pull
+});
+
 /// What of a body sleeps.
 #[derive(Debug)]
 pub(crate) struct Sleeper {
@@ -85,6 +94,19 @@ pub(crate) struct Sleeper {
     /// The length of the last step that was taken, s: what tools felt in it they feel for as long as the body sleeps.
     step: f32,
 }
+
+saved!(Sleeper {
+    sleep,
+    tiles,
+    asleep,
+    asleep_count,
+    neighbours,
+    starts,
+    in_parts,
+    bounds,
+    margin,
+    step
+});
 
 impl Sleeper {
     #[inline]
@@ -231,7 +253,7 @@ impl Body {
                 step: 0.0,
             };
             self.join_tiles(&mut sleeper)?;
-            self.sleeper = Some(Box::new(sleeper));
+            self.sleeper = Some(memory::boxed(sleeper)?);
         }
         Ok(())
     }

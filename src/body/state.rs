@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::vectors::Vectors;
 use crate::error::Result;
+use crate::snapshot::saved;
 
 /// Positions, velocities and spring forces of all nodes, with room for a step in progress.
 ///
@@ -24,6 +25,15 @@ pub(crate) struct State {
     settled: usize,
 }
 
+saved!(State {
+    positions,
+    velocities,
+    forces,
+    current,
+    latest,
+    settled
+});
+
 /// What a substep reads and writes.
 pub(crate) struct Substep<'a> {
     /// Velocities and spring forces when the step began.
@@ -40,6 +50,18 @@ pub(crate) struct Substep<'a> {
 }
 
 impl State {
+    /// Whether it is that of so many nodes, and finite.
+    pub fn is_sound(&self, count: usize) -> bool {
+        let mut all = self.positions.iter().chain(&self.velocities).chain(&self.forces);
+        self.current < self.positions.len()
+            && self.latest < self.positions.len()
+            && self.settled < self.velocities.len()
+            && all.all(|vectors| vectors.len() == count)
+            && [self.positions(), self.velocities()]
+                .into_iter()
+                .all(|vectors| vectors.iter().all(|vector| vector.is_finite()))
+    }
+
     pub fn new(node_count: usize) -> Result<Self> {
         let zeros = || Vectors::zeros(node_count);
         Ok(Self {

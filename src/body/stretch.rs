@@ -3,6 +3,7 @@
 use super::{Bounds, Vectors};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{ChosenKernel, Loops};
 use crate::threads::{Items, Team};
 
@@ -24,6 +25,8 @@ pub(super) struct Watched {
     pub longest_squared: f32,
 }
 
+saved!(Watched { nodes, longest_squared });
+
 /// What is known of some springs.
 #[derive(Clone, Copy, Debug, Default)]
 struct Chunk {
@@ -31,6 +34,8 @@ struct Chunk {
     slack: f32,
     is_any_too_long: bool,
 }
+
+saved!(Chunk { slack, is_any_too_long });
 
 /// What is known of the lengths of springs.
 #[derive(Debug)]
@@ -45,6 +50,14 @@ pub(super) struct Stretch {
     /// How far nodes have gone since, so many together.
     drifts: Vec<Bounds>,
 }
+
+saved!(Stretch {
+    chunks,
+    measured,
+    is_measured,
+    looked,
+    drifts
+});
 
 impl Stretch {
     /// Of so many nodes, with room for more up to so many in all.

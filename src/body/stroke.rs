@@ -6,6 +6,7 @@ use crate::cutting::{CutEnd, CutMaterial, SolidStroke, Sweep};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Points that reach along less than this part of an edge do not tell how it turns.
 const LITTLE: f32 = 0.02;
@@ -23,6 +24,8 @@ pub(crate) struct Stroke {
     /// What a solid knows of it while another is made in it.
     pub of_solid: SolidStroke,
 }
+
+saved!(Stroke { edge, ends, of_solid });
 
 impl Default for Stroke {
     fn default() -> Self {

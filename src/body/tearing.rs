@@ -4,6 +4,7 @@ use super::BodyDefinition;
 use super::definition::not_negative;
 use crate::error::{Error, Result};
 use crate::material::Model;
+use crate::snapshot::{saved, saved_enum};
 
 /// When a body tears.
 ///
@@ -27,6 +28,13 @@ pub struct Tearing {
     pub smallest_piece: f32,
 }
 
+saved!(Tearing {
+    strain,
+    force,
+    most_per_step,
+    smallest_piece
+});
+
 /// What tore in the last step, and what did not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TearReport {
@@ -43,6 +51,14 @@ pub struct TearReport {
     pub no_room: u32,
 }
 
+saved!(TearReport {
+    tears,
+    pieces_parted,
+    waiting,
+    small_pieces,
+    no_room
+});
+
 /// Why a spring beyond its limits was not torn. It is not tried again before the topology changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Withheld {
@@ -50,6 +66,8 @@ pub(crate) enum Withheld {
     NoRoom,
     NoWay,
 }
+
+saved_enum!(Withheld { 0 => SmallPiece, 1 => NoRoom, 2 => NoWay });
 
 impl Tearing {
     /// Refuses what is out of its range, or not possible for such a body.

@@ -7,6 +7,7 @@ use super::{BodyDefinition, NodeOrder, Spring, Vectors};
 use crate::cutting::Changes;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Change, ChosenKernel, Link, Rewiring};
 use crate::threads::Team;
 
@@ -18,6 +19,8 @@ struct Beyond {
     callers: [u32; 2],
     nodes: [u32; 2],
 }
+
+saved!(Beyond { load, callers, nodes });
 
 /// The springs of a body that tears, and those beyond their limits after the last step.
 #[derive(Debug)]
@@ -35,6 +38,17 @@ pub(crate) struct Tears {
     torn: Vec<u32>,
     pub(super) report: TearReport,
 }
+
+saved!(Tears {
+    asked,
+    bearing,
+    stretch,
+    beyond,
+    seen,
+    tried,
+    torn,
+    report
+});
 
 impl Tears {
     /// With springs in the body's own numbers; `None`: the body is not to tear. Of tetrahedra that are elements edges without a spring tear too.
@@ -66,7 +80,7 @@ impl Tears {
             report: TearReport::default(),
         };
         tears.reserve(0)?;
-        Ok(Some(Box::new(tears)))
+        Ok(Some(memory::boxed(tears)?))
     }
 
     /// Whether there are limits for the spring or edge between two nodes.

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::records::{Record, Records};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{Reader, Saved, Writer, floats_into};
 use crate::springs::TILE;
 use crate::threads::{Ragged, Tiles};
 
@@ -58,6 +59,11 @@ impl Floats {
         roomier.values[places].copy_from_slice(&self.values[self.places()]);
         *self = roomier;
         Ok(())
+    }
+
+    /// So many numbers may there be, a multiple of a line's.
+    fn room(&self, skew: usize) -> usize {
+        self.values.len() - LINE * (skew + 1) - 2 * MARGIN
     }
 
     fn places(&self) -> Range<usize> {
@@ -151,6 +157,37 @@ impl<'a> View<'a> {
 #[derive(Debug)]
 pub(crate) struct Vectors {
     axes: [Floats; 3],
+}
+
+/// Where they lie in memory is not kept, but how much room there is.
+impl Saved for Vectors {
+    const SHAPE: u64 = Vec::<Vec3>::SHAPE;
+    const LEAST: usize = 16;
+
+    fn save(&self, to: &mut Writer) {
+        self.len().save(to);
+        let room = self.axes[0].room(SKEWS[0]);
+        room.save(to);
+        to.needs(3 * size_of::<f32>() * room);
+        for axis in &self.axes {
+            f32::save_all(&axis.values[axis.places()], to);
+        }
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let (count, room) = (usize::load(from)?, usize::load(from)?);
+        if room < count || !room.is_multiple_of(LINE) {
+            return Err(from.refusal("vectors have not the room that they take"));
+        }
+        from.will_take(room.checked_mul(3 * size_of::<f32>()))?;
+        let floats = |axis: usize| Floats::with_room(count, room, SKEWS[axis]);
+        let mut axes = [floats(0)?, floats(1)?, floats(2)?];
+        for axis in &mut axes {
+            let places = axis.places();
+            floats_into(&mut axis.values[places], from)?;
+        }
+        Ok(Self { axes })
+    }
 }
 
 impl Vectors {

@@ -249,7 +249,7 @@ impl sinew_detector_def {
             && sides.iter().all(|side| side.was_closed);
         let method = if method == Detection::ImageSpace {
             let surfaces = [&sides[0].surface, &sides[1].surface];
-            Method::ImageSpace(Box::new(ImageSpace::new(&image, &surfaces)?))
+            Method::ImageSpace(crate::memory::boxed(ImageSpace::new(&image, &surfaces)?)?)
         } else {
             let solids = [
                 Self::solid(0, &sides[0], bodies[0])?,
@@ -305,7 +305,7 @@ impl sinew_detector_def {
                  as they move; SINEW_DETECTION_IMAGE_SPACE can"
             )));
         }
-        Ok(Some(Box::new(Exact::changing(&surface)?)))
+        Ok(Some(crate::memory::boxed(Exact::changing(&surface)?)?))
     }
 }
 
@@ -509,7 +509,7 @@ pub unsafe extern "C" fn sinew_detector_create(
         with_world(world, |world| {
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_detector_def::defaults())?;
-            *out = Box::into_raw(Box::new(def.detector(world)?));
+            *out = Box::into_raw(crate::memory::boxed(def.detector(world)?)?);
             Ok(())
         })
     }

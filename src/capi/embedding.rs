@@ -104,7 +104,7 @@ pub unsafe extern "C" fn sinew_embedding_create(
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_embedding_def::defaults())?;
             let embedding = world.create_embedding(body.id(), &def.definition()?)?;
-            *out = Box::into_raw(Box::new(sinew_embedding { embedding }));
+            *out = Box::into_raw(crate::memory::boxed(sinew_embedding { embedding })?);
             Ok(())
         })
     }
@@ -271,7 +271,7 @@ pub unsafe extern "C" fn sinew_body_create_from_surface(
             let (body, embedding) = world.create_body_from_surface(&def.definition()?, spacing)?;
             *out_body = body.into();
             if let Some(out) = out_embedding.as_mut() {
-                *out = Box::into_raw(Box::new(sinew_embedding { embedding }));
+                *out = Box::into_raw(crate::memory::boxed(sinew_embedding { embedding })?);
             }
             Ok(())
         })

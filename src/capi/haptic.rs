@@ -210,7 +210,7 @@ pub unsafe extern "C" fn sinew_haptic_create(
             let def = memory::definition("def", def, sinew_haptic_def::defaults())?;
             let orientation = world.pose(def.tool.id())?.orientation;
             let handle = world.create_haptic(&def.definition())?;
-            *out = Box::into_raw(Box::new(sinew_haptic { handle, orientation }));
+            *out = Box::into_raw(crate::memory::boxed(sinew_haptic { handle, orientation })?);
             Ok(())
         })
     }

@@ -131,11 +131,11 @@ unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Result<Loaded
         let loaded = make()?;
         let surface = loaded.mesh.surface()?;
         let closed = is_closed(&surface)?;
-        *out = Box::into_raw(Box::new(sinew_mesh {
+        *out = Box::into_raw(crate::memory::boxed(sinew_mesh {
             loaded,
             surface,
             closed,
-        }));
+        })?);
         Ok(())
     })
 }

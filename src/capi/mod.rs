@@ -59,3 +59,5 @@ pub mod reader;
 pub mod detector;
 
 pub mod embedding;
+
+pub mod snapshot;

@@ -195,7 +195,7 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
         let def = unsafe { memory::definition("def", def, sinew_world_def::defaults()) }?;
         // SAFETY: the same contract.
         let world = World::new(unsafe { def.definition() }?)?;
-        *out = Box::into_raw(Box::new(sinew_world::new(world)));
+        *out = Box::into_raw(crate::memory::boxed(sinew_world::new(world))?);
         Ok(())
     })
 }

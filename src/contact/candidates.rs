@@ -10,6 +10,7 @@ use super::sweep::Corners;
 use crate::body::{Bindings, Bounds, Vectors};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{saved, saved_enum};
 
 /// A list that is good for so many substeps more is kept.
 const WORTH_KEEPING: f32 = 4.0;
@@ -38,6 +39,18 @@ pub(super) struct Candidates {
     marks: Vec<u32>,
 }
 
+saved!(Candidates {
+    near,
+    zones,
+    slack,
+    reach,
+    whole_slack,
+    firsts,
+    corners,
+    longest,
+    marks
+});
+
 /// A corner of what is near, over a slice.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
@@ -47,6 +60,13 @@ struct Corner {
     start: Vec3,
     step: Vec3,
 }
+
+saved!(Corner {
+    node,
+    sides,
+    start,
+    step
+});
 
 #[derive(Clone, Copy, Debug)]
 enum Zone {
@@ -64,6 +84,8 @@ enum Zone {
     /// About what a moving plane sweeps.
     Between { first: (Vec3, Vec3), last: (Vec3, Vec3) },
 }
+
+saved_enum!(Zone { 0 => Box { slot, bounds }, 1 => Mesh { slot, bounds, standing, allowance }, 2 => Behind { slot, point, normal }, 3 => Between { first, last } });
 
 impl Candidates {
     pub fn new(features: &Features) -> Result<Self> {

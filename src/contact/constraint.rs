@@ -8,6 +8,7 @@ use super::impulses::LEVERAGE;
 use super::press::Press;
 use super::supports::{MOST, Supports};
 use crate::body::{Mobility, Vectors};
+use crate::snapshot::saved;
 
 /// A contact over one slice of a substep.
 ///
@@ -54,6 +55,30 @@ pub(super) struct Constraint {
     /// For a rounded tool: the ends of the segment within it when the contact ends, as far as this feature meets it, and its radius.
     pub rounded: Option<([Vec3; 2], f32)>,
 }
+
+saved!(Constraint {
+    feature,
+    weights,
+    nodes,
+    count,
+    starts,
+    shares,
+    answers,
+    normal,
+    least_speed,
+    surface_velocity,
+    arm,
+    depth,
+    friction,
+    tool,
+    effective_mass,
+    free_mass,
+    give,
+    firmness,
+    impulse,
+    friction_impulse,
+    rounded
+});
 
 impl Constraint {
     /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility;

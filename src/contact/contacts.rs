@@ -21,6 +21,7 @@ use super::sweep::Corners;
 use crate::body::{Bindings, Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
 const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
@@ -43,6 +44,11 @@ pub(crate) struct Load {
     pub impulse: DVec3,
     pub angular_impulse: DVec3,
 }
+
+saved!(Load {
+    impulse,
+    angular_impulse
+});
 
 /// The contacts of one body; kept only in worlds that have tools.
 #[derive(Debug)]
@@ -76,6 +82,25 @@ pub(crate) struct Contacts {
     /// Features that a change of the surface brings.
     pub(super) fresh: Vec<u32>,
 }
+
+saved!(Contacts {
+    thickness,
+    filter,
+    features,
+    candidates,
+    constraints,
+    presses,
+    together,
+    holds,
+    loads,
+    pressed_for,
+    touches,
+    touched,
+    given,
+    committed,
+    held,
+    fresh
+});
 
 /// One substep of a body near tools.
 pub(crate) struct Meeting<'a> {

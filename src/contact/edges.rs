@@ -7,6 +7,7 @@ use super::features::HOLE;
 use crate::error::Result;
 use crate::memory;
 use crate::mesh::TRIANGLE_EDGES;
+use crate::snapshot::{Reader, Saved, Writer, shape_of_name};
 
 /// How many triangles have each edge of a surface.
 #[derive(Debug)]
@@ -22,6 +23,57 @@ pub(super) struct EdgeUses {
 }
 
 const MANY: u8 = u8::MAX;
+
+/// Bytes of an edge that came later and its number.
+const EDGE: usize = 12;
+
+impl Saved for EdgeUses {
+    const SHAPE: u64 = shape_of_name("EdgeUses { starts, counts, added, holes }");
+    const LEAST: usize = 64;
+
+    fn save(&self, to: &mut Writer) {
+        let Self {
+            starts,
+            counts,
+            added,
+            holes,
+        } = self;
+        starts.save(to);
+        counts.save(to);
+        added.len().save(to);
+        added.capacity().save(to);
+        to.needs(added.capacity() * size_of::<([u32; 2], u32)>());
+        if let Some(place) = to.place(added.len() * EDGE) {
+            let (edges, _) = place.as_chunks_mut::<EDGE>();
+            for (edge, (&[low, high], &number)) in edges.iter_mut().zip(added) {
+                for (to, number) in edge.as_chunks_mut().0.iter_mut().zip([low, high, number]) {
+                    *to = number.to_le_bytes();
+                }
+            }
+            // In an order that says nothing of what came when.
+            edges.sort_unstable();
+        }
+        holes.save(to);
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let (starts, counts) = (Saved::load(from)?, Saved::load(from)?);
+        let (count, room) = (usize::load(from)?, usize::load(from)?);
+        from.will_take(room.max(count).checked_mul(size_of::<([u32; 2], u32)>()))?;
+        let mut added = HashMap::default();
+        added.try_reserve(room.max(count))?;
+        for _ in 0..count {
+            let (ends, edge) = Saved::load(from)?;
+            added.insert(ends, edge);
+        }
+        Ok(Self {
+            starts,
+            counts,
+            added,
+            holes: Saved::load(from)?,
+        })
+    }
+}
 
 impl EdgeUses {
     /// Of a surface with these edges, in order, and faces.

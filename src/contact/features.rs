@@ -4,6 +4,7 @@ use super::edges::EdgeUses;
 use crate::error::Result;
 use crate::memory;
 use crate::mesh;
+use crate::snapshot::saved;
 
 /// What a tool can meet. The closest points of a tool and a triangle lie on one of these, so that each touch is found
 /// once, however many triangles share the node or edge.
@@ -17,6 +18,13 @@ pub(super) struct Features {
     uses: Option<Box<EdgeUses>>,
 }
 
+saved!(Features {
+    node_count,
+    edges,
+    faces,
+    uses
+});
+
 /// The corners of an edge that is none.
 pub(super) const HOLE: [u32; 2] = [u32::MAX; 2];
 
@@ -26,6 +34,8 @@ pub(super) struct Feature {
     nodes: [u32; 3],
     count: u8,
 }
+
+saved!(Feature { nodes, count });
 
 impl Feature {
     pub fn nodes(&self) -> &[u32] {
@@ -97,7 +107,11 @@ impl Features {
     pub fn reserve(&mut self, changed: usize, added: usize) -> Result<()> {
         let uses = match &mut self.uses {
             Some(uses) => uses,
-            none => none.insert(Box::new(EdgeUses::new(self.node_count, &self.edges, &self.faces)?)),
+            none => none.insert(memory::boxed(EdgeUses::new(
+                self.node_count,
+                &self.edges,
+                &self.faces,
+            )?)?),
         };
         uses.reserve(3 * changed, 3 * (changed + added))?;
         self.edges.try_reserve(3 * (changed + added))?;

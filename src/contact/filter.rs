@@ -4,6 +4,7 @@ use super::tool::{Detection, check_reach};
 use crate::body::not_negative;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::snapshot::saved;
 
 /// Which tools and bodies meet: two do where each has a category that the other's mask has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,8 @@ pub struct CollisionFilter {
     /// The categories that it meets, a bit for each.
     pub mask: u32,
 }
+
+saved!(CollisionFilter { category, mask });
 
 impl Default for CollisionFilter {
     fn default() -> Self {
@@ -69,6 +72,16 @@ pub struct BodyContact {
     /// Which tools and bodies it meets.
     pub filter: CollisionFilter,
 }
+
+saved!(BodyContact {
+    thickness,
+    friction,
+    with_bodies,
+    with_itself,
+    detection,
+    resolution,
+    filter
+});
 
 impl Default for BodyContact {
     fn default() -> Self {

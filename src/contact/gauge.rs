@@ -4,6 +4,7 @@
 //! from step to step: for a force f on an edge of length l, held by a sphere of radius r, as much as a spring of `f r / l²` that is
 //! always a step late.
 
+use crate::snapshot::{saved, saved_enum};
 use glam::DVec3;
 
 /// The surface of a tool near a feature, at the end of a substep.
@@ -20,6 +21,8 @@ pub(super) enum Gauge {
     },
 }
 
+saved_enum!(Gauge { 0 => Rounded { ends, radius }, 1 => Flat { weights, normal, level } });
+
 /// How a feature meets a tool.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Meets {
@@ -33,6 +36,13 @@ pub(super) struct Meets {
     /// that comes near.
     pub tilts: [[f64; 3]; 3],
 }
+
+saved!(Meets {
+    weights,
+    normal,
+    gap,
+    tilts
+});
 
 impl Gauge {
     /// Of a feature with these corners, 1 to 3.

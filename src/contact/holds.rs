@@ -16,6 +16,7 @@ use super::supports::{MOST, Supports, Ties};
 use crate::body::Bindings;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
+use crate::snapshot::saved;
 
 /// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
 const STIFFER: f32 = 3.0;
@@ -48,6 +49,22 @@ struct Hold {
     pushed: bool,
 }
 
+saved!(Hold {
+    nodes,
+    count,
+    corner_count,
+    ties,
+    free,
+    gauge,
+    least,
+    stiffness,
+    multiplier,
+    kept,
+    holds_on,
+    answer,
+    pushed
+});
+
 /// What a contact does.
 #[derive(Clone, Copy, Debug, Default)]
 struct Answer {
@@ -60,6 +77,13 @@ struct Answer {
     stiffness: [[f64; MOST]; MOST],
 }
 
+saved!(Answer {
+    meets,
+    force,
+    shares,
+    stiffness
+});
+
 /// The part of a node in a hold.
 #[derive(Clone, Copy, Debug)]
 struct Share {
@@ -68,6 +92,8 @@ struct Share {
     /// Which of its nodes it is.
     place: usize,
 }
+
+saved!(Share { node, hold, place });
 
 /// What a contact did at the end of a step: where it is found again the next begins with it.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +104,8 @@ struct Push {
     /// N
     force: f64,
 }
+
+saved!(Push { slot, feature, force });
 
 /// The contacts of a body with all tools in the equation in progress.
 #[derive(Debug, Default)]
@@ -91,6 +119,14 @@ pub(crate) struct Holds {
     last: Vec<Push>,
     settled: Vec<Push>,
 }
+
+saved!(Holds {
+    holds,
+    shares,
+    order,
+    last,
+    settled
+});
 
 impl Holds {
     /// Makes room for so many contacts.

@@ -1,5 +1,7 @@
 //! How far a tool of limited force gets.
 
+use crate::snapshot::saved;
+
 /// How often a step is begun again for a tool that would press too hard, at most.
 pub(crate) const TRIES: u32 = 16;
 
@@ -26,6 +28,13 @@ pub(crate) struct Reach {
     /// A part that it does not get to, and by how much more it would press, N.
     high: Option<(f32, f32)>,
 }
+
+saved!(Reach {
+    part,
+    low,
+    is_known,
+    high
+});
 
 impl Reach {
     /// For a tool that pressed with `force` in the last step and presses with `limit` at most.

@@ -10,10 +10,12 @@ use super::exact::ExactSolid;
 use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::tool::Detection;
-use crate::body::Bounds;
+use crate::body::{Bounds, not_negative};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::ClosedSurface;
+use crate::snapshot::{Reader, Saved, Writer, shape_of_name};
 
 /// What a mesh encloses.
 #[derive(Debug)]
@@ -35,6 +37,49 @@ enum Found {
     Exact,
     Field(Box<DistanceField>),
     Image(Box<LayeredImage>),
+}
+
+/// Its surface and how it is found: what else there is of it is made again.
+impl Saved for Arc<MeshSolid> {
+    const SHAPE: u64 = shape_of_name("MeshSolid { positions, triangles, detection, grain, hash }");
+    const LEAST: usize = 29;
+
+    fn save(&self, to: &mut Writer) {
+        let MeshSolid {
+            surface,
+            found,
+            exact: _,
+            bounds: _,
+            reach: _,
+            hash,
+            grain,
+        } = &**self;
+        let detection = match found {
+            Found::Exact => Detection::Exact,
+            Found::Image(_) => Detection::ImageSpace,
+            Found::Field(_) => Detection::DistanceField,
+        };
+        detection.save(to);
+        grain.save(to);
+        hash.save(to);
+        surface.positions().len().save(to);
+        Vec3::save_all(surface.positions(), to);
+        surface.triangles().len().save(to);
+        <[u32; 3]>::save_all(surface.triangles(), to);
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let detection = Detection::load(from)?;
+        let (grain, hash) = (f32::load(from)?, u64::load(from)?);
+        let positions: Box<[Vec3]> = Saved::load(from)?;
+        let triangles: Box<[[u32; 3]]> = Saved::load(from)?;
+        not_negative("resolution", grain)?;
+        let mut solid = MeshSolid::shared(&positions, &triangles, detection, grain)?;
+        if let Some(solid) = Arc::get_mut(&mut solid) {
+            solid.hash = hash;
+        }
+        Ok(solid)
+    }
 }
 
 /// Where it is not said how fine an image or a field is, the longest extent is this many pixels or cells, and the least so many; a few
@@ -75,11 +120,11 @@ impl MeshSolid {
             Detection::Exact => (Found::Exact, ExactSolid::new(&surface)?),
             Detection::ImageSpace => {
                 let image = LayeredImage::new(surface.positions(), surface.triangles(), grain)?;
-                (Found::Image(Box::new(image)), ExactSolid::changing(&surface)?)
+                (Found::Image(memory::boxed(image)?), ExactSolid::changing(&surface)?)
             }
             Detection::DistanceField => {
                 let exact = ExactSolid::new(&surface)?;
-                (Found::Field(Box::new(DistanceField::of(&exact, grain)?)), exact)
+                (Found::Field(memory::boxed(DistanceField::of(&exact, grain)?)?), exact)
             }
         };
         let is_fine = resolution > 0.0 || grain * THINNEST <= sides.min_element();

@@ -6,6 +6,7 @@ use super::filter::CollisionFilter;
 use super::mesh_solid::MeshSolid;
 use super::tool::{Form, Pose, Tool};
 use crate::body::Bounds;
+use crate::snapshot::saved;
 
 /// The way of a tool over a step: a straight line at constant speed, turning at a constant rate.
 #[derive(Clone, Debug)]
@@ -38,6 +39,8 @@ pub(super) struct Placement {
     pub centre: Vec3,
     pub orientation: Quat,
 }
+
+saved!(Placement { centre, orientation });
 
 impl Placement {
     /// A point in the mesh's own frame.

@@ -10,6 +10,7 @@ use super::supports::MOST;
 use crate::body::Vectors;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// One contact as its impulse is found.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +35,21 @@ pub(super) struct Press {
     pub impulse: f32,
     pub friction_impulse: Vec3A,
 }
+
+saved!(Press {
+    places,
+    shares,
+    answers,
+    normal,
+    surface_velocity,
+    least_speed,
+    friction,
+    effective_mass,
+    free_mass,
+    give,
+    impulse,
+    friction_impulse
+});
 
 impl Press {
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
@@ -79,6 +95,12 @@ pub(super) struct Presses {
     nodes: Vec<u32>,
     velocities: Vec<Vec3A>,
 }
+
+saved!(Presses {
+    presses,
+    nodes,
+    velocities
+});
 
 impl Presses {
     /// Makes room for so many contacts of a body of so many nodes.

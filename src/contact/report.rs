@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::snapshot::saved;
 use crate::world::{BodyId, ToolId};
 
 /// Where a tool pressed a body when the last step ended.
@@ -44,3 +45,11 @@ pub(crate) struct Touch {
     /// On the tool, N.
     pub force: Vec3,
 }
+
+saved!(Touch {
+    slot,
+    nodes,
+    weights,
+    normal,
+    force
+});

@@ -12,6 +12,7 @@ use crate::body::{finite_vector, not_negative};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::mesh::FURTHEST;
+use crate::snapshot::{saved, saved_enum};
 
 /// The shape of a tool, about its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +52,8 @@ pub enum Detection {
     DistanceField,
 }
 
+saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
+
 /// Where a tool is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
@@ -59,6 +62,8 @@ pub struct Pose {
     /// A unit quaternion.
     pub orientation: Quat,
 }
+
+saved!(Pose { position, orientation });
 
 impl Pose {
     /// At the origin, not turned.
@@ -160,6 +165,8 @@ pub(crate) enum Form {
     Mesh(Arc<MeshSolid>),
 }
 
+saved_enum!(Form { 0 => Rounded { radius, half_length }, 1 => HalfSpace, 2 => Mesh(solid) });
+
 /// A tool of a world.
 #[derive(Clone, Debug)]
 pub(crate) struct Tool {
@@ -179,6 +186,19 @@ pub(crate) struct Tool {
     /// Mean torque about its position over the last step, N m.
     pub torque: Vec3,
 }
+
+saved!(Tool {
+    form,
+    friction,
+    force_limit,
+    filter,
+    pose,
+    target,
+    led_to,
+    reach,
+    force,
+    torque
+});
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
 const SLENDEREST: f32 = 1e4;

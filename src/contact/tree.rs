@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3, Vec3A};
 use crate::body::Bounds;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Triangles of a leaf at most.
 const LEAF: usize = 4;
@@ -24,6 +25,12 @@ pub(crate) struct Tree {
     triangles: Vec<Placed>,
 }
 
+saved!(Tree {
+    nodes,
+    order,
+    triangles
+});
+
 /// A triangle where it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed {
@@ -31,6 +38,8 @@ pub(crate) struct Placed {
     /// Of unit length; 0 where it has no area.
     pub normal: Vec3,
 }
+
+saved!(Placed { corners, normal });
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -41,6 +50,8 @@ struct Node {
     /// How many triangles a leaf has; 0 for what is none.
     count: u32,
 }
+
+saved!(Node { min, max, first, count });
 
 impl Tree {
     /// Over `count` triangles, halved at the median along the longest side of their centres' box.

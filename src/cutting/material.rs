@@ -10,6 +10,7 @@ use super::surface::CutSurface;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{saved, saved_enum};
 
 /// The material of a body. It is looked for by *items*: the triangles of a surface, the cells of a solid, springs.
 #[derive(Debug)]
@@ -19,6 +20,8 @@ pub(crate) enum CutMaterial {
     Surface(CutSurface),
     Solid(CutSolid),
 }
+
+saved_enum!(CutMaterial { 0 => Springs(it), 1 => Surface(it), 2 => Solid(it) });
 
 impl CutMaterial {
     /// That of triangles.
@@ -322,3 +325,11 @@ pub(crate) struct CutEnd {
     /// The shortest edge of a cell that it is in, in the rest shape, m.
     pub size: f64,
 }
+
+saved!(CutEnd {
+    vertex,
+    nodes,
+    weights,
+    slack,
+    size
+});

@@ -7,6 +7,7 @@ use super::cut::Sweep;
 use super::surface::{CutSurface, SNAP, SurfaceTriangle};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// A part of a blade's way that lies in one triangle of a surface, or in one tetrahedron of a solid's material.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +28,17 @@ pub(crate) struct Met {
     /// Whether it is of a solid.
     pub is_area: bool,
 }
+
+saved!(Met {
+    item,
+    times,
+    weights,
+    places,
+    amount,
+    profile,
+    size,
+    is_area
+});
 
 impl Met {
     /// How much is cut over the length of that edge, m; of solids over its square, m².

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::tracked::Tracked;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 
 /// No triangle, or no corner.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -27,6 +28,14 @@ pub struct SurfaceCell {
     pub(crate) next: [u32; 3],
 }
 
+saved!(SurfaceCell {
+    nodes,
+    area,
+    snap,
+    first,
+    next
+});
+
 /// A triangle that is drawn and touched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTriangle {
@@ -42,6 +51,14 @@ pub struct SurfaceTriangle {
     pub(crate) next: u32,
 }
 
+saved!(SurfaceTriangle {
+    corners,
+    cell,
+    rim,
+    neighbours,
+    next
+});
+
 /// A corner of what is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceVertex {
@@ -55,6 +72,13 @@ pub struct SurfaceVertex {
     pub(crate) around: u32,
 }
 
+saved!(SurfaceVertex {
+    nodes,
+    weights,
+    point,
+    around
+});
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Node {
     /// Of a point that is bound to others nothing is said here.
@@ -62,6 +86,8 @@ pub(crate) struct Node {
     /// The first of the cells' corners at it.
     pub(crate) first: u32,
 }
+
+saved!(Node { rest, first });
 
 impl Node {
     /// A point that is bound to others.
@@ -79,6 +105,13 @@ pub struct CutSurface {
     pub(crate) triangles: Tracked<SurfaceTriangle>,
     pub(crate) vertices: Tracked<SurfaceVertex>,
 }
+
+saved!(CutSurface {
+    nodes,
+    cells,
+    triangles,
+    vertices
+});
 
 impl CutSurface {
     /// Of the rest positions of its nodes, m, and of cells with three nodes each; what is drawn are the cells, with a vertex for each node.

@@ -4,6 +4,7 @@ use std::ops::Index;
 
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{Saved, saved};
 
 /// Values of which each change is kept, so that all changes since [`Tracked::begin`] can be undone without memory.
 #[derive(Clone, Debug)]
@@ -13,6 +14,8 @@ pub(crate) struct Tracked<T> {
     before: Vec<(u32, T)>,
     count_before: u32,
 }
+
+saved!([T: Saved] Tracked<T> { values, before, count_before });
 
 impl<T: Copy> Tracked<T> {
     pub(crate) fn new(values: Vec<T>) -> Self {

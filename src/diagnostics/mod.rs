@@ -1,5 +1,7 @@
 //! What a world says about itself: energy, memory, a hash of its state.
 
+use crate::snapshot::saved;
+
 mod energy;
 mod hash;
 
@@ -50,6 +52,14 @@ pub struct SolverReport {
     /// explicitly.
     pub converged: bool,
 }
+
+saved!(SolverReport {
+    iterations,
+    error,
+    added_mass,
+    solves,
+    converged
+});
 
 impl SolverReport {
     /// Before anything was solved.

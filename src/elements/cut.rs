@@ -10,6 +10,7 @@ use super::{Deformed, Elements, Load, Rest, Sums};
 use crate::body::Vectors;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::solver::{Masses, Rates};
 use crate::springs::{GROUP, Group, Groups, Springs, TILE, tile_count};
 
@@ -28,6 +29,8 @@ pub(super) struct Place {
     pub lane: u16,
 }
 
+saved!(Place { part, group, lane });
+
 /// What bodies that may be cut know of their tetrahedra.
 #[derive(Debug)]
 pub(super) struct Cells {
@@ -38,6 +41,8 @@ pub(super) struct Cells {
     /// Parts that are to come.
     spare: Vec<Part>,
 }
+
+saved!(Cells { places, used, spare });
 
 /// A piece of a tetrahedron, in the body's own numbers of nodes.
 #[derive(Clone, Copy, Debug)]
@@ -80,11 +85,11 @@ impl Elements {
     /// Remembers where tetrahedra are that were given in this order.
     pub fn follow_cells(&mut self, tetrahedra: &[[u32; 4]]) -> Result<()> {
         let places = super::parts::places(tetrahedra)?;
-        self.cells = Some(Box::new(Cells {
+        self.cells = Some(memory::boxed(Cells {
             places,
             used: LATER,
             spare: Vec::new(),
-        }));
+        })?);
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
 
+use crate::snapshot::saved;
 use glam::{DMat3, DVec3};
 
 /// St Venant and Kirchhoff's law with a signed volume term, Pa: the energy of a tetrahedron is
@@ -18,6 +19,13 @@ pub(crate) struct Law {
     /// pressure of a tetrahedron is the mean of its nodes', Bonet, Burton 1998).
     pub rings: bool,
 }
+
+saved!(Law {
+    lambda,
+    mu,
+    kappa,
+    rings
+});
 
 /// Poisson's ratio from which volume is kept by rings.
 const RINGS_FROM: f32 = 0.4;
@@ -88,6 +96,8 @@ pub(crate) struct Load {
     pub pressure: f64,
 }
 
+saved!(Load { stress, pressure });
+
 impl Load {
     pub const NONE: Self = Self {
         stress: DMat3::ZERO,
@@ -111,6 +121,8 @@ pub(crate) struct Rest {
     /// m³
     pub volume: f64,
 }
+
+saved!(Rest { inverse, volume });
 
 impl Rest {
     /// With these edges from its first corner to the others, m, in any order of hands. One without a volume has an inverse that is not

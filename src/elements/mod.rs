@@ -21,6 +21,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity, Yielding};
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
 use crate::threads::{Items, Ragged, Team};
 pub(crate) use cut::PieceOfElement;
@@ -61,6 +62,25 @@ pub(crate) struct Elements {
     offsets: Offsets,
 }
 
+saved!(Elements {
+    law,
+    count,
+    parts,
+    cells,
+    starts,
+    copies,
+    forces,
+    rings,
+    memory,
+    highest,
+    settled,
+    most_damped,
+    stiffnesses,
+    carried,
+    rates_known,
+    offsets
+});
+
 /// Sums of a kind on all copies of nodes.
 #[derive(Debug)]
 pub(crate) struct Sums {
@@ -72,6 +92,14 @@ pub(crate) struct Sums {
     /// Of no nodes where each tetrahedron keeps its own volume.
     pressures: Pressures,
 }
+
+saved!(Sums {
+    positions,
+    ways,
+    sums,
+    of_parts,
+    pressures
+});
 
 impl Sums {
     fn new(copies: usize, parts: usize, with_ways: bool, ring_count: usize) -> Result<Self> {

@@ -17,6 +17,7 @@ use crate::body::{Record, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::ChosenKernel;
 use crate::threads::Team;
 
@@ -42,6 +43,14 @@ pub(super) struct Offsets {
     /// Whether there are none until a step begins.
     are_released: bool,
 }
+
+saved!(Offsets {
+    of_nodes,
+    nodes,
+    taken,
+    waited,
+    are_released
+});
 
 impl Offsets {
     /// Of each node, m³; nothing where there are none.

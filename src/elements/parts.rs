@@ -7,6 +7,7 @@ use super::law::Rest;
 use crate::body::Record;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{GROUP, Group, Groups, TILE, tile_count};
 
 /// Tetrahedra of a part: so few that its nodes stay in the nearest cache, and their numbers are small.
@@ -21,6 +22,12 @@ pub(super) struct Part {
     /// Whether a cut has added it.
     pub is_later: bool,
 }
+
+saved!(Part {
+    nodes,
+    groups,
+    is_later
+});
 
 /// What is shown the nodes of a tetrahedron, the way it is at rest, and its group and lane.
 pub(super) type See<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
@@ -200,6 +207,8 @@ pub(super) struct Copy {
     pub place: u16,
 }
 
+saved!(Copy { at, place });
+
 /// The copies of the nodes of each tile.
 #[derive(Debug)]
 pub(super) struct Copies {
@@ -208,6 +217,8 @@ pub(super) struct Copies {
     /// Those that came later, by tiles; of no tiles where none did.
     later: Vec<Vec<Copy>>,
 }
+
+saved!(Copies { copies, starts, later });
 
 impl Copies {
     pub fn new(parts: &[Part], node_count: usize) -> Result<Self> {

@@ -13,6 +13,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity, Yielding};
 use crate::memory;
+use crate::snapshot::{Saved, saved};
 use crate::springs::{ChosenKernel, GROUP, Group, Stresses};
 
 #[derive(Debug)]
@@ -28,6 +29,15 @@ pub(super) struct Memory {
     pub rings: Past<f32>,
 }
 
+saved!(Memory {
+    viscosity,
+    gain,
+    bounds,
+    parts,
+    spare,
+    rings
+});
+
 /// What is remembered of the tetrahedra of a part.
 #[derive(Debug)]
 pub(super) struct OfPart {
@@ -36,6 +46,8 @@ pub(super) struct OfPart {
     /// Room for elastic stresses.
     pub newest: Vec<Stresses>,
 }
+
+saved!(OfPart { past, set, newest });
 
 /// Stresses of the step in progress, and of the current state.
 #[derive(Debug)]
@@ -46,6 +58,8 @@ pub(super) struct Past<T> {
     kept_arms: Vec<T>,
     kept_elastic: Vec<T>,
 }
+
+saved!([T: Saved] Past<T> { arms, elastic, loads, kept_arms, kept_elastic });
 
 /// What has the numbers of some tetrahedra, or one.
 pub(super) trait Numbers: Copy {
@@ -229,14 +243,14 @@ impl Memory {
                 newest: memory::filled(Stresses::ZERO, count)?,
             });
         }
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             viscosity,
             gain: 0.0,
             bounds: yields.then(|| Bounds::new(law, yielding)),
             parts: of_parts,
             spare: Vec::new(),
             rings: Past::new(if viscosity.is_none() { 0 } else { ring_count })?,
-        })))
+        })?))
     }
 
     /// Makes room for more parts of so many groups.

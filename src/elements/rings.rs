@@ -4,6 +4,7 @@ use super::parts::{Copies, Part};
 use crate::body::Record;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
 
@@ -12,6 +13,8 @@ use crate::threads::{Items, Team, Tiles};
 pub(super) struct Rings {
     pub volumes: Vec<f32>,
 }
+
+saved!(Rings { volumes });
 
 /// The rings of all tetrahedra.
 pub(super) fn of(parts: &[Part], node_count: usize) -> Result<Rings> {
@@ -32,6 +35,8 @@ pub(super) struct Pressures {
     pub of_nodes: Vec<f32>,
     energies: Vec<f64>,
 }
+
+saved!(Pressures { of_nodes, energies });
 
 impl Pressures {
     pub fn new(node_count: usize) -> Result<Self> {

@@ -10,6 +10,7 @@ use super::law::Law;
 use crate::error::Result;
 use crate::material::Yielding;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{ChosenKernel, GROUP, Loops, Stresses};
 
 /// What is left of stresses in the tetrahedra of a part.
@@ -21,12 +22,16 @@ pub(super) struct Set {
     pub loads: Vec<Stresses>,
 }
 
+saved!(Set { stresses, kept, loads });
+
 /// The lengths of stresses, Pa: that at which they yield, and the longest that may be left.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     yields: f32,
     longest: f32,
 }
+
+saved!(Bounds { yields, longest });
 
 impl Bounds {
     pub fn new(law: Law, yielding: Yielding) -> Self {

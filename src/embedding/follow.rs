@@ -37,12 +37,12 @@ impl Follower {
             CutMaterial::Surface(surface) => {
                 let cells = surface.cells().iter().map(|cell| cell.nodes);
                 let homes = Homes::new(cells, |node| surface.rest(node), homes, triangles)?;
-                Some(Box::new(Self::Surface(homes)))
+                Some(memory::boxed(Self::Surface(homes))?)
             }
             CutMaterial::Solid(solid) => {
                 let cells = solid.cells().iter().map(|cell| cell.nodes);
                 let homes = Homes::new(cells, |node| solid.rest(node), homes, triangles)?;
-                Some(Box::new(Self::Solid(homes)))
+                Some(memory::boxed(Self::Solid(homes))?)
             }
         })
     }

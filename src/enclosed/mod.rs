@@ -15,6 +15,7 @@ use crate::body::{BodyDefinition, NodeOrder, Vectors};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::solver::Rates;
 use crate::springs::TileForces;
 use crate::threads::{Items, Ragged, Team};
@@ -32,6 +33,13 @@ struct Cavity {
     /// Pa, where forces were last worked out.
     pressure: f64,
 }
+
+saved!(Cavity {
+    rest_volume,
+    triangles,
+    is_open,
+    pressure
+});
 
 /// The cavities of a body.
 #[derive(Debug)]
@@ -55,6 +63,21 @@ pub(crate) struct Enclosed {
     rates_known: bool,
 }
 
+saved!(Enclosed {
+    stiffness,
+    pressure,
+    cavities,
+    surface,
+    vectors,
+    sums,
+    factors,
+    weights,
+    of_springs,
+    highest,
+    settled,
+    rates_known
+});
+
 /// What there is to know of the triangles of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
@@ -63,12 +86,16 @@ struct Sums {
     bounds: rates::Bounds,
 }
 
+saved!(Sums { volume, bounds });
+
 /// How pressures change where nodes go some ways.
 #[derive(Debug)]
 pub(crate) struct Changes {
     sums: Vec<f64>,
     factors: Vec<f64>,
 }
+
+saved!(Changes { sums, factors });
 
 /// What the nodes of a tile are given.
 #[derive(Clone, Copy)]
@@ -103,7 +130,7 @@ impl Enclosed {
         }
         let (surface, cavities) = surface::close(definition, triangles, order)?;
         let triangle_count = surface.triangles.len();
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             stiffness: definition.enclosed_stiffness,
             pressure: definition.pressure,
             vectors: memory::filled(Vec3::ZERO, triangle_count)?,
@@ -116,7 +143,7 @@ impl Enclosed {
             highest: f32::INFINITY,
             settled: f32::INFINITY,
             rates_known: false,
-        })))
+        })?))
     }
 
     /// Room for what pressures change by.

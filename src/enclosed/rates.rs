@@ -9,6 +9,7 @@
 use glam::DVec3;
 
 use super::Enclosed;
+use crate::snapshot::saved;
 use crate::solver::{Masses, Rates};
 use crate::springs::Springs;
 
@@ -19,6 +20,8 @@ pub(super) struct Weights {
     of_length: f32,
 }
 
+saved!(Weights { of_square, of_length });
+
 /// What the triangles of a block, or of a cavity, add up to.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bounds {
@@ -27,6 +30,8 @@ pub(super) struct Bounds {
     /// The largest square of `v l / 3 m`.
     of_lengths: f64,
 }
+
+saved!(Bounds { of_squares, of_lengths });
 
 impl Bounds {
     /// Adds a triangle with this vector, and these edges and the one between their ends.

@@ -6,6 +6,7 @@ use super::Cavity;
 use crate::body::{BodyDefinition, NodeOrder};
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{TILE, tile_count};
 
 /// Triangles that are worked on together, at most.
@@ -22,6 +23,8 @@ pub(super) struct Block {
     pub end: usize,
 }
 
+saved!(Block { cavity, start, end });
+
 /// A node of a cavity.
 #[derive(Clone, Copy, Debug)]
 struct Member {
@@ -30,6 +33,8 @@ struct Member {
     /// The end of its triangles; they begin where those of the last end.
     end: u32,
 }
+
+saved!(Member { node, cavity, end });
 
 /// The triangles of all cavities, cavity by cavity, and those about each node.
 #[derive(Debug)]
@@ -47,6 +52,16 @@ pub(super) struct Surface {
     /// Whether any node belongs to two cavities.
     pub nodes_are_shared: bool,
 }
+
+saved!(Surface {
+    triangles,
+    blocks,
+    starts,
+    members,
+    tiles,
+    about,
+    nodes_are_shared
+});
 
 /// Finds the cavities of triangles in the caller's numbers.
 ///

@@ -3,6 +3,7 @@
 
 use crate::body::not_negative;
 use crate::error::{Error, Result};
+use crate::snapshot::saved;
 use crate::solver::Rates;
 
 /// How tissue resists the speed at which it is deformed. With E the stiffness at rest, of a spring or an element, a dashpot of
@@ -22,6 +23,11 @@ pub struct Viscosity {
     pub relaxation_time: f32,
 }
 
+saved!(Viscosity {
+    retardation_time,
+    relaxation_time
+});
+
 /// The range of times, s: shorter than any step, and longer than anybody looks on.
 const SHORTEST: f32 = 1e-9;
 const LONGEST: f32 = 1e6;
@@ -35,6 +41,8 @@ pub(crate) struct Course {
     /// Whether what is deformed beyond its yield strain stays so.
     pub yields: bool,
 }
+
+saved!(Course { decay, gain, yields });
 
 impl Course {
     /// None: arms hold what they held.

@@ -9,6 +9,7 @@ use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
 use crate::contact::{Contacts, ToolPath};
+use crate::snapshot::saved;
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
@@ -47,6 +48,13 @@ pub(crate) struct Carry {
     /// The substep that masses are made for, s; 0: they are as they are, and `stability` is that of the current positions.
     pub masses_for: f32,
 }
+
+saved!(Carry {
+    stability,
+    gravity,
+    closing,
+    masses_for
+});
 
 impl Carry {
     /// The longest stable substep with the masses in use, s, where it is known.

@@ -15,6 +15,7 @@ use crate::elements::Shares;
 use crate::enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
@@ -26,6 +27,8 @@ pub(crate) struct ClosingKick {
     pub substep: f32,
     pub gravity: Vec3,
 }
+
+saved!(ClosingKick { substep, gravity });
 
 impl ClosingKick {
     /// What gravity gives in it, m/s.

@@ -6,6 +6,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::body::Bounds;
+use crate::snapshot::saved;
 
 /// Gravity's kicks over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +16,8 @@ pub(crate) struct GravityKicks {
     /// The box of all velocities after the last kick.
     pub velocities: Bounds,
 }
+
+saved!(GravityKicks { residual, velocities });
 
 impl GravityKicks {
     /// Nothing left over, for nodes with velocities in this box.

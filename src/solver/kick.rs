@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::subnormal::{on_grid, still_or};
 use crate::body::{Bounds, Inertia, InverseMasses, NodeDamping, Vectors};
+use crate::snapshot::saved;
 use crate::springs::{ChosenKernel, Loops, TileForces};
 
 /// One kick of a body.
@@ -200,6 +201,8 @@ pub(crate) struct Survey {
     /// Whether the squares of its velocities, and of its positions where they were looked at, are finite.
     pub finite: bool,
 }
+
+saved!(Survey { velocities, finite });
 
 impl Survey {
     pub const NOTHING: Self = Self {

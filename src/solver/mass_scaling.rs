@@ -8,6 +8,7 @@
 use crate::body::NodeDamping;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::Springs;
 
 /// What is left of the substeps where mass is added, at most: for less the motion is not changed.
@@ -36,6 +37,14 @@ pub(crate) struct Sliver {
     /// By how much it is heavier now, kg.
     pub added: f32,
 }
+
+saved!(Sliver {
+    node,
+    stiffness,
+    damping,
+    rate,
+    added
+});
 
 impl Sliver {
     /// The mass that makes a substep of `step` seconds stable, kg.
@@ -82,6 +91,14 @@ pub(crate) struct MassScaling {
     /// The substep that masses are made for, s; 0: they are as they are.
     step: f32,
 }
+
+saved!(MassScaling {
+    most,
+    uniform_inverse_mass,
+    slivers,
+    complete_to,
+    step
+});
 
 impl MassScaling {
     /// Finds the nodes of a body that are to be made heavier where it takes the longest substeps that `fraction` of its mass

@@ -11,6 +11,7 @@ use glam::Vec3;
 
 use super::watched::{Candidate, Watched};
 use crate::body::Vectors;
+use crate::snapshot::saved;
 use crate::springs::{Springs, separation};
 
 /// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over
@@ -35,6 +36,8 @@ pub(crate) struct Rates {
     /// The highest rate of damping, 1/s.
     pub most_damped: f32,
 }
+
+saved!(Rates { stiffest, most_damped });
 
 impl Rates {
     pub const ZERO: Self = Self {
@@ -104,6 +107,13 @@ pub(crate) struct Stability {
     /// How far neighbours may still move against each other before the estimate is stale, m.
     reach: f32,
 }
+
+saved!(Stability {
+    now,
+    anywhere,
+    found,
+    reach
+});
 
 impl Stability {
     pub const UNKNOWN: Self = Self {

@@ -6,6 +6,7 @@
 use super::stability::{Masses, Rates};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::Springs;
 
 /// One node in so many is watched.
@@ -17,6 +18,8 @@ pub(crate) struct Candidate {
     pub limit: f32,
     pub node: u32,
 }
+
+saved!(Candidate { limit, node });
 
 impl Candidate {
     fn before(&self, other: &Self) -> std::cmp::Ordering {
@@ -34,6 +37,12 @@ pub(crate) struct Watched {
     /// What the limit of any other node is at least, s.
     others: f32,
 }
+
+saved!(Watched {
+    candidates,
+    most,
+    others
+});
 
 impl Watched {
     /// Room for the watched nodes of a body; none are yet.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::{Reader, Saved, Writer};
 
 /// An element on the heap: an array of one, because its memory can be asked for in a way that may be refused.
 type Owned<T> = Box<[Element<T>; 1]>;
@@ -89,6 +90,33 @@ impl<T> Drop for Chain<T> {
         while let Some(mut element) = next {
             next = element[0].next.take();
         }
+    }
+}
+
+/// In their order.
+impl<T: Saved> Saved for Chain<T> {
+    const SHAPE: u64 = T::SHAPE;
+    const LEAST: usize = 8;
+
+    fn save(&self, to: &mut Writer) {
+        self.iter().count().save(to);
+        for value in self.iter() {
+            to.needs(size_of::<Element<T>>());
+            value.save(to);
+        }
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let count = usize::load(from)?;
+        if count > from.left() / T::LEAST {
+            return Err(from.refusal("more is announced than there is"));
+        }
+        from.will_take(count.checked_mul(size_of::<Element<T>>()))?;
+        let mut values = memory::reserved(count)?;
+        T::load_all(count, &mut values, from)?;
+        let mut chain = Self::EMPTY;
+        values.into_iter().rev().try_for_each(|value| chain.push(value))?;
+        Ok(chain)
     }
 }
 

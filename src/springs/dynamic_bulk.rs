@@ -14,6 +14,7 @@ use super::{Change, ChosenKernel, Link, Motion, Springs, TileForces, already_joi
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{Saved, Writer, saved};
 
 /// How many nodes ahead arrays are fetched from memory.
 const AHEAD: usize = 16;
@@ -27,6 +28,8 @@ struct Bulks<L> {
     first: Bulk<L>,
     more: Chain<Bulk<L>>,
 }
+
+saved!([L: Saved] Bulks<L> { first, more });
 
 /// Where a node's next link goes, with memory for it.
 enum Room<L> {
@@ -134,6 +137,8 @@ pub(super) struct DynamicBulk<L> {
     nodes: Vec<Bulks<L>>,
 }
 
+saved!([L: Saved] DynamicBulk<L> { kernel, spring_count, springs_per_node, nodes });
+
 impl<L: KeptLink> DynamicBulk<L> {
     /// Arrays of `springs_per_node` places; 0: chosen from the springs.
     pub fn new(kernel: ChosenKernel, node_count: usize, springs: &[Spring], springs_per_node: usize) -> Result<Self> {
@@ -200,7 +205,17 @@ fn least_memory<L>(node_count: usize, ends: &Ends) -> usize {
     CHOICE.min_by_key(bytes).unwrap_or(*CHOICE.end())
 }
 
+impl<L: KeptLink> DynamicBulk<L> {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 4 + L::DAMPED as u8;
+}
+
 impl<L: KeptLink> Springs for DynamicBulk<L> {
+    fn save(&self, to: &mut Writer) {
+        to.put(&[Self::SAVED_AS]);
+        Saved::save(self, to);
+    }
+
     fn damped(&self) -> bool {
         L::DAMPED
     }

@@ -13,6 +13,7 @@ use super::{Change, Link, Motion, Springs, TileForces, already_joined, not_joine
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{Saved, Writer, saved};
 
 /// How many lists are followed side by side.
 const SIDE_BY_SIDE: usize = 16;
@@ -25,6 +26,12 @@ pub(super) struct Efficient {
     /// The size of an element is a multiple of a pointer's: a link with damping takes no more than one without.
     lists: Vec<Chain<DampedLink>>,
 }
+
+saved!(Efficient {
+    spring_count,
+    damped,
+    lists
+});
 
 impl Efficient {
     pub fn new(node_count: usize, springs: &[Spring]) -> Result<Self> {
@@ -86,7 +93,17 @@ fn fetch(lists: &[Chain<DampedLink>]) {
     }
 }
 
+impl Efficient {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 1;
+}
+
 impl Springs for Efficient {
+    fn save(&self, to: &mut Writer) {
+        to.put(&[Self::SAVED_AS]);
+        Saved::save(self, to);
+    }
+
     fn damped(&self) -> bool {
         self.damped
     }

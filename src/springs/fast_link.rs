@@ -13,6 +13,7 @@ use super::{
 use crate::body::Spring;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::{Saved, Writer, saved};
 
 /// How many nodes ahead rows are fetched from memory.
 const AHEAD: usize = 16;
@@ -26,6 +27,8 @@ pub(super) struct FastLink<L> {
     springs_per_node: usize,
     places: Vec<L>,
 }
+
+saved!([L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places });
 
 impl<L: KeptLink> FastLink<L> {
     /// Rows of `springs_per_node` places; 0: as many as the node with the most springs needs, at least one.
@@ -118,7 +121,17 @@ impl<L: KeptLink> RowStorage for FastLink<L> {
     }
 }
 
+impl<L: KeptLink> FastLink<L> {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 2 + L::DAMPED as u8;
+}
+
 impl<L: KeptLink> Springs for FastLink<L> {
+    fn save(&self, to: &mut Writer) {
+        to.put(&[Self::SAVED_AS]);
+        Saved::save(self, to);
+    }
+
     fn damped(&self) -> bool {
         L::DAMPED
     }

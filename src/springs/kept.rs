@@ -2,12 +2,13 @@
 
 use super::Link;
 use super::kernels::EightLinks;
+use crate::snapshot::{Saved, saved};
 
 /// No node: a body has fewer.
 pub(super) const NOBODY: u32 = u32::MAX;
 
 /// A link as a storage keeps it.
-pub(super) trait KeptLink: Copy + Send + Sync + std::fmt::Debug + 'static {
+pub(super) trait KeptLink: Saved + Copy + Send + Sync + std::fmt::Debug + 'static {
     /// Whether damping is kept.
     const DAMPED: bool;
 
@@ -34,6 +35,8 @@ pub(super) struct DampedLink {
     undamped: UndampedLink,
     damping: f32,
 }
+
+saved!(DampedLink { undamped, damping });
 
 impl KeptLink for UndampedLink {
     const DAMPED: bool = false;

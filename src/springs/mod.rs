@@ -27,6 +27,8 @@ pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
 use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
 use crate::error::{Error, Result};
+use crate::memory;
+use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
 use fast_link::FastLink;
@@ -43,6 +45,13 @@ pub(crate) struct Link {
     /// N s/m
     pub damping: f32,
 }
+
+saved!(Link {
+    neighbour,
+    stiffness,
+    rest_length,
+    damping
+});
 
 impl Link {
     /// One that pulls at nothing, of this rest length.
@@ -213,9 +222,38 @@ pub(crate) trait Springs: Debug + Send + Sync {
     /// Gives springs that there are, each once, other parameters. Changes nothing where it fails.
     fn set(&mut self, changes: &[Change]) -> Result<()>;
 
+    /// Writes which storage it is, and what it keeps.
+    fn save(&self, to: &mut Writer);
+
     /// Changes springs as a cut does. Changes nothing where it fails.
     fn rewire(&mut self, rewiring: &Rewiring) -> Result<()> {
         rewire_by(self, rewiring, Self::add, |springs, [a, b]| springs.remove(a, b))
+    }
+}
+
+impl Saved for Box<dyn Springs> {
+    const SHAPE: u64 = {
+        let shape = shape_with(Packed::SHAPE, Efficient::SHAPE);
+        let shape = shape_with(shape, FastLink::<DampedLink>::SHAPE);
+        shape_with(shape, DynamicBulk::<DampedLink>::SHAPE)
+    };
+    const LEAST: usize = 1;
+
+    fn save(&self, to: &mut Writer) {
+        Springs::save(&**self, to);
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let [kind] = from.take_array()?;
+        Ok(match kind {
+            Packed::SAVED_AS => memory::boxed(Packed::load(from)?)?,
+            Efficient::SAVED_AS => memory::boxed(Efficient::load(from)?)?,
+            FastLink::<UndampedLink>::SAVED_AS => memory::boxed(FastLink::<UndampedLink>::load(from)?)?,
+            FastLink::<DampedLink>::SAVED_AS => memory::boxed(FastLink::<DampedLink>::load(from)?)?,
+            DynamicBulk::<UndampedLink>::SAVED_AS => memory::boxed(DynamicBulk::<UndampedLink>::load(from)?)?,
+            DynamicBulk::<DampedLink>::SAVED_AS => memory::boxed(DynamicBulk::<DampedLink>::load(from)?)?,
+            _ => return Err(from.refusal("no storage of springs")),
+        })
     }
 }
 
@@ -225,14 +263,18 @@ pub(crate) fn store(kernel: ChosenKernel, definition: &BodyDefinition, springs: 
     let width = definition.springs_per_node as usize;
     let damped = springs.iter().any(|spring| spring.damping != 0.0);
     Ok(match (definition.storage, damped) {
-        (Storage::Packed, _) => Box::new(Packed::new(kernel, node_count, springs, definition.rounding())?),
-        (Storage::Efficient, _) => Box::new(Efficient::new(node_count, springs)?),
-        (Storage::FastLink, false) => Box::new(FastLink::<UndampedLink>::new(kernel, node_count, springs, width)?),
-        (Storage::FastLink, true) => Box::new(FastLink::<DampedLink>::new(kernel, node_count, springs, width)?),
-        (Storage::DynamicBulk, false) => {
-            Box::new(DynamicBulk::<UndampedLink>::new(kernel, node_count, springs, width)?)
+        (Storage::Packed, _) => memory::boxed(Packed::new(kernel, node_count, springs, definition.rounding())?)?,
+        (Storage::Efficient, _) => memory::boxed(Efficient::new(node_count, springs)?)?,
+        (Storage::FastLink, false) => {
+            memory::boxed(FastLink::<UndampedLink>::new(kernel, node_count, springs, width)?)?
         }
-        (Storage::DynamicBulk, true) => Box::new(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?),
+        (Storage::FastLink, true) => memory::boxed(FastLink::<DampedLink>::new(kernel, node_count, springs, width)?)?,
+        (Storage::DynamicBulk, false) => {
+            memory::boxed(DynamicBulk::<UndampedLink>::new(kernel, node_count, springs, width)?)?
+        }
+        (Storage::DynamicBulk, true) => {
+            memory::boxed(DynamicBulk::<DampedLink>::new(kernel, node_count, springs, width)?)?
+        }
     })
 }
 

@@ -13,11 +13,13 @@ use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
+use crate::memory;
+use crate::snapshot::saved;
 use crate::terms::SpringLaw;
 
 /// Beside springs of a law.
 #[derive(Debug)]
-struct Arms {
+pub(super) struct Arms {
     law: SpringLaw,
     curve: Curve,
     viscosity: Viscosity,
@@ -26,9 +28,17 @@ struct Arms {
     course: Course,
 }
 
+saved!(Arms {
+    law,
+    curve,
+    viscosity,
+    stiffening,
+    course
+});
+
 /// Stresses are pulls over the spring's stiffness, m.
 #[derive(Clone, Copy, Debug)]
-struct Arm {
+pub(super) struct Arm {
     rest_length: f32,
     load: f32,
     stress: f32,
@@ -36,6 +46,15 @@ struct Arm {
     kept_stress: f32,
     kept_elastic: f32,
 }
+
+saved!(Arm {
+    rest_length,
+    load,
+    stress,
+    elastic,
+    kept_stress,
+    kept_elastic
+});
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let viscosity = definition.viscosity;
@@ -57,7 +76,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         stiffening,
         course: Course::NOTHING,
     };
-    Ok(Some(Box::new(Stencils::new(law, arms, definition.positions.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(
+        law,
+        arms,
+        definition.positions.len(),
+    )?)?))
 }
 
 /// An arm where it is: the way from its first node to the other, and what is elastic.
@@ -115,6 +138,8 @@ impl Arms {
 }
 
 impl Law<2> for Arms {
+    const SAVED_AS: u8 = 1;
+
     type Shape = Arm;
 
     const IS_OF_SPRINGS: bool = true;

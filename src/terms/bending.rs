@@ -23,14 +23,17 @@ use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::body::{BodyDefinition, NodeOrder, not_negative};
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Hinges: the two nodes of the edge, then those opposite.
 #[derive(Debug)]
-struct Hinges;
+pub(super) struct Hinges;
+
+saved!(Hinges);
 
 /// A hinge at rest.
 #[derive(Clone, Copy, Debug)]
-struct Shape {
+pub(super) struct Shape {
     /// Where the feet of the arms lie on the edge, 0: at its first node, 1: at its second.
     feet: [f32; 2],
     /// 1/m
@@ -40,6 +43,13 @@ struct Shape {
     /// That of half the angle, over the length of the edge, 1/m; 0: flat.
     sine: f32,
 }
+
+saved!(Shape {
+    feet,
+    inverse_heights,
+    cosine,
+    sine
+});
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let rigidity = definition.bending_stiffness;
@@ -90,7 +100,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
             shape,
         });
     }
-    Ok(Some(Box::new(Stencils::new(Hinges, hinges, rest.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(Hinges, hinges, rest.len())?)?))
 }
 
 /// A side of a triangle.
@@ -234,6 +244,8 @@ fn cross(vector: DVec3) -> DMat3 {
 const EDGE: [f64; 4] = [-1.0, 1.0, 0.0, 0.0];
 
 impl Law<4> for Hinges {
+    const SAVED_AS: u8 = 4;
+
     type Shape = Shape;
 
     fn energy(&self, shape: &Shape, places: &[DVec3; 4]) -> f64 {

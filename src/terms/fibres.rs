@@ -14,13 +14,16 @@ use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, check_values, expect_count};
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::snapshot::saved;
 
 /// What the length of a direction may differ from 1 by.
 const UNIT: f32 = 1e-3;
 
 /// Strings of length 1 at rest; shapes are the weights of all corners but the first, 1/m.
 #[derive(Debug)]
-struct Fibres;
+pub(super) struct Fibres;
+
+saved!(Fibres);
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (directions, stiffnesses) = (definition.fibre_directions, &definition.fibre_stiffnesses);
@@ -71,7 +74,7 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
     if fibres.is_empty() {
         return Ok(None);
     }
-    Ok(Some(Box::new(Stencils::new(Fibres, fibres, rest.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(Fibres, fibres, rest.len())?)?))
 }
 
 /// By how much a fibre is longer than at rest, as a part of its length there.
@@ -89,6 +92,8 @@ fn stiffness(fibre: DVec3) -> DMat3 {
 }
 
 impl Law<4> for Fibres {
+    const SAVED_AS: u8 = 6;
+
     type Shape = [f32; 3];
 
     fn energy(&self, weights: &[f32; 3], places: &[DVec3; 4]) -> f64 {

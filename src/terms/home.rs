@@ -8,18 +8,23 @@ use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::body::{BodyDefinition, NodeOrder, check_values};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Springs of no rest length to a point that stays.
 #[derive(Debug)]
-struct Home;
+pub(super) struct Home;
+
+saved!(Home);
 
 #[derive(Clone, Copy, Debug)]
-struct Shape {
+pub(super) struct Shape {
     /// In the caller's coordinates, m.
     rest: Vec3,
     /// In the body's.
     local: Vec3,
 }
+
+saved!(Shape { rest, local });
 
 pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let (stiffnesses, node_count) = (&definition.home_stiffnesses, definition.positions.len());
@@ -35,10 +40,12 @@ pub(super) fn new(definition: &BodyDefinition, order: &NodeOrder) -> Result<Opti
         stiffness: stiffnesses.get(node),
         shape: Shape { rest, local: rest },
     }));
-    Ok(Some(Box::new(Stencils::new(Home, springs, node_count)?)))
+    Ok(Some(memory::boxed(Stencils::new(Home, springs, node_count)?)?))
 }
 
 impl Law<1> for Home {
+    const SAVED_AS: u8 = 0;
+
     type Shape = Shape;
 
     fn energy(&self, shape: &Shape, [place]: &[DVec3; 1]) -> f64 {

@@ -10,14 +10,18 @@ use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
 use crate::error::{Error, Result};
+use crate::memory;
+use crate::snapshot::saved;
 
 /// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.
 #[derive(Debug)]
-struct Limit {
+pub(super) struct Limit {
     strain: f64,
     /// How much stiffer they are beyond it.
     stiffening: f64,
 }
+
+saved!(Limit { strain, stiffening });
 
 /// A spring is never stiffer than this many times.
 const STIFFEST: f32 = 1e6;
@@ -43,7 +47,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         strain: f64::from(strain),
         stiffening: f64::from(stiffening),
     };
-    Ok(Some(Box::new(Stencils::new(law, limits, definition.positions.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(
+        law,
+        limits,
+        definition.positions.len(),
+    )?)?))
 }
 
 impl Limit {
@@ -65,6 +73,8 @@ impl Limit {
 }
 
 impl Law<2> for Limit {
+    const SAVED_AS: u8 = 2;
+
     type Shape = f32;
 
     const IS_OF_SPRINGS: bool = true;

@@ -28,11 +28,20 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::material::{Course, Viscosity};
 use crate::memory;
+use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
 use crate::solver::{Masses, Rates};
 use crate::springs::{Change, ChosenKernel, Springs, TileForces, tile_count};
 use crate::threads::Team;
+use arms::Arms;
+use bending::Hinges;
+use fibres::Fibres;
+use home::Home;
+use limit::Limit;
 pub use nonlinear::SpringLaw;
+use nonlinear::Stiffening;
 pub(crate) use parting::Parting;
+use set::Sets;
+use stencils::{Law, Stencils};
 
 /// How much the force on one node of a term lessens with the place of another, N/m, for its first nodes.
 pub(crate) type Blocks = [[DMat3; 4]; 4];
@@ -52,6 +61,9 @@ enum Moment {
 
 /// The terms of a body that follow one law.
 trait Term: Debug + Send + Sync {
+    /// Writes which law it is, and its terms.
+    fn save(&self, to: &mut Writer);
+
     /// Adds the forces on the nodes of a tile, N: by how much they are stiffer than their rates say, 1: not at all.
     fn add_forces(
         &self,
@@ -130,6 +142,38 @@ trait Term: Debug + Send + Sync {
     fn hash(&self, hasher: &mut StateHasher);
 }
 
+impl Saved for Box<dyn Term> {
+    const SHAPE: u64 = {
+        let shape = 0;
+        let shape = shape_with(shape, Stencils::<Home, 1>::SHAPE);
+        let shape = shape_with(shape, Stencils::<Arms, 2>::SHAPE);
+        let shape = shape_with(shape, Stencils::<Limit, 2>::SHAPE);
+        let shape = shape_with(shape, Stencils::<Sets, 2>::SHAPE);
+        let shape = shape_with(shape, Stencils::<Hinges, 4>::SHAPE);
+        let shape = shape_with(shape, Stencils::<Stiffening, 2>::SHAPE);
+        shape_with(shape, Stencils::<Fibres, 4>::SHAPE)
+    };
+    const LEAST: usize = 1;
+
+    fn save(&self, to: &mut Writer) {
+        Term::save(&**self, to);
+    }
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        let [law] = from.take_array()?;
+        Ok(match law {
+            Home::SAVED_AS => memory::boxed(Stencils::<Home, 1>::load(from)?)?,
+            Arms::SAVED_AS => memory::boxed(Stencils::<Arms, 2>::load(from)?)?,
+            Limit::SAVED_AS => memory::boxed(Stencils::<Limit, 2>::load(from)?)?,
+            Sets::SAVED_AS => memory::boxed(Stencils::<Sets, 2>::load(from)?)?,
+            Hinges::SAVED_AS => memory::boxed(Stencils::<Hinges, 4>::load(from)?)?,
+            Stiffening::SAVED_AS => memory::boxed(Stencils::<Stiffening, 2>::load(from)?)?,
+            Fibres::SAVED_AS => memory::boxed(Stencils::<Fibres, 4>::load(from)?)?,
+            _ => return Err(from.refusal("no law of terms")),
+        })
+    }
+}
+
 /// All terms of a body.
 #[derive(Debug)]
 pub(crate) struct Terms {
@@ -150,6 +194,18 @@ pub(crate) struct Terms {
     /// The same at the current state.
     settled: f32,
 }
+
+saved!(Terms {
+    laws,
+    holds_any,
+    viscosity,
+    kernel,
+    sums,
+    rates,
+    rates_known,
+    stiffening,
+    settled
+});
 
 impl Terms {
     /// Those that a definition asks for; `springs` are its springs. `None`: it asks for none.
@@ -174,7 +230,7 @@ impl Terms {
             return Ok(None);
         }
         let mut nodes = 0..definition.positions.len();
-        Ok(Some(Box::new(Self {
+        Ok(Some(memory::boxed(Self {
             viscosity: if definition.viscosity.stiffening().is_some() && !springs.is_empty() {
                 definition.viscosity
             } else {
@@ -189,7 +245,7 @@ impl Terms {
             rates_known: false,
             stiffening: AtomicU32::new(1.0_f32.to_bits()),
             settled: 1.0,
-        })))
+        })?))
     }
 
     /// Adds the forces on the nodes of a tile, N.

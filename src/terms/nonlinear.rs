@@ -11,6 +11,8 @@ use super::stencils::{Law, Stencils, directed, direction, lengthening, of_spring
 use super::strings::Tension;
 use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::error::{Error, Result};
+use crate::memory;
+use crate::snapshot::{saved, saved_enum};
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
 /// the stiffness they are given. Springs that are added later are linear.
@@ -38,6 +40,8 @@ pub enum SpringLaw {
         limit: f32,
     },
 }
+
+saved_enum!(SpringLaw { 0 => Linear, 1 => Exponential { steepness, limit }, 2 => Cubic { quadratic, cubic, limit } });
 
 /// A million times as stiff.
 const STEEPEST: f32 = 13.8;
@@ -153,6 +157,14 @@ pub(super) struct Curve {
     limit: f32,
 }
 
+saved!(Curve {
+    steepness,
+    inverse_steepness,
+    quadratic,
+    cubic,
+    limit
+});
+
 impl Curve {
     pub fn new(law: SpringLaw) -> Self {
         let linear = Self {
@@ -219,11 +231,13 @@ fn exponential_beyond(number: f32) -> f32 {
 
 /// What springs of a law do beyond what linear ones do; shapes are their rest lengths, m.
 #[derive(Debug)]
-struct Stiffening {
+pub(super) struct Stiffening {
     law: SpringLaw,
     curve: Curve,
     stiffest: f64,
 }
+
+saved!(Stiffening { law, curve, stiffest });
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let law = definition.spring_law;
@@ -241,11 +255,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         curve: Curve::new(law),
         stiffest,
     };
-    Ok(Some(Box::new(Stencils::new(
+    Ok(Some(memory::boxed(Stencils::new(
         law,
         stiffening,
         definition.positions.len(),
-    )?)))
+    )?)?))
 }
 
 /// A spring where it is.
@@ -283,6 +297,8 @@ impl Stiffening {
 }
 
 impl Law<2> for Stiffening {
+    const SAVED_AS: u8 = 5;
+
     type Shape = f32;
 
     const IS_OF_SPRINGS: bool = true;

@@ -14,23 +14,33 @@ use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::material::{Course, Yielding};
+use crate::memory;
+use crate::snapshot::saved;
 use crate::terms::SpringLaw;
 
 /// What springs pull less than before they yielded, over their stiffness.
 #[derive(Debug)]
-struct Sets {
+pub(super) struct Sets {
     yield_strain: f64,
     largest: f64,
 }
 
+saved!(Sets { yield_strain, largest });
+
 /// m
 #[derive(Clone, Copy, Debug)]
-struct Set {
+pub(super) struct Set {
     rest_length: f32,
     /// By how much longer it is at rest.
     longer: f32,
     kept: f32,
 }
+
+saved!(Set {
+    rest_length,
+    longer,
+    kept
+});
 
 pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeOrder) -> Result<Option<Box<dyn Term>>> {
     let Yielding { strain, largest } = definition.yielding;
@@ -51,7 +61,11 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         yield_strain: f64::from(strain),
         largest: f64::from(largest),
     };
-    Ok(Some(Box::new(Stencils::new(law, sets, definition.positions.len())?)))
+    Ok(Some(memory::boxed(Stencils::new(
+        law,
+        sets,
+        definition.positions.len(),
+    )?)?))
 }
 
 /// What a spring does at a length.
@@ -96,6 +110,8 @@ impl Sets {
 }
 
 impl Law<2> for Sets {
+    const SAVED_AS: u8 = 3;
+
     type Shape = Set;
 
     const IS_OF_SPRINGS: bool = true;

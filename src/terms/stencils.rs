@@ -13,14 +13,18 @@ use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
 use crate::material::Course;
 use crate::memory;
+use crate::snapshot::{Saved, Writer, saved};
 use crate::solver::Masses;
 use crate::springs::{Change, ChosenKernel, TILE, TileForces, tile_count};
 use crate::threads::{Ragged, Team};
 
 /// What a term does whose stiffness is 1.
-pub(super) trait Law<const N: usize>: Debug + Send + Sync {
+pub(super) trait Law<const N: usize>: Saved + Debug + Send + Sync + 'static {
+    /// Which law it is, in bytes.
+    const SAVED_AS: u8;
+
     /// What the term of some nodes is at rest.
-    type Shape: Copy + Debug + Send + Sync;
+    type Shape: Saved + Copy + Debug + Send + Sync;
 
     fn energy(&self, shape: &Self::Shape, places: &[DVec3; N]) -> f64;
 
@@ -138,6 +142,8 @@ pub(super) struct Stencil<T, const N: usize> {
     pub shape: T,
 }
 
+saved!([T: Saved, const N: usize] Stencil<T, N> { nodes, stiffness, shape });
+
 /// A term for each spring, with the shape that its rest length leads to; one without a length at rest has no strain, and nothing that goes
 /// by that.
 pub(super) fn of_springs<T>(
@@ -176,6 +182,8 @@ pub(super) struct Stencils<L: Law<N>, const N: usize> {
     changed: Vec<(u32, f32)>,
     added: Vec<Stencil<L::Shape, N>>,
 }
+
+saved!([L: Law<N>, const N: usize] Stencils<L, N> { law, all, starts, visitor_starts, visitors, later, changed, added });
 
 fn tile_of(node: u32) -> usize {
     node as usize / TILE
@@ -345,6 +353,11 @@ impl<T, const N: usize> Stencil<T, N> {
 }
 
 impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
+    fn save(&self, to: &mut Writer) {
+        to.put(&[L::SAVED_AS]);
+        Saved::save(self, to);
+    }
+
     fn add_forces(
         &self,
         kernel: ChosenKernel,

@@ -23,6 +23,7 @@ pub use tasks::RunTasks;
 pub(crate) use team::Team;
 
 use crate::error::{Error, Result};
+use crate::memory;
 use tasks::Tasks;
 use workers::Workers;
 
@@ -63,7 +64,7 @@ impl Threads {
     pub fn of_tasks(run_tasks: RunTasks, count: u32) -> Result<Self> {
         Ok(Self(match resolved(count)? {
             1 => Others::Nobody,
-            count => Others::Tasks(Box::new(Tasks::new(run_tasks, count)?)),
+            count => Others::Tasks(memory::boxed(Tasks::new(run_tasks, count)?)?),
         }))
     }
 

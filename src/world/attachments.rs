@@ -8,11 +8,14 @@ use crate::contact::{Bonds, Bound, Thread};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::slots::SlotId;
+use crate::snapshot::{saved, saved_enum};
 use crate::solver::Outcome;
 
 /// What a tool holds of a body, or a body of another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct AttachmentId(pub(crate) SlotId);
+
+saved!(AttachmentId { 0 });
 
 /// Whose attachment it is.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +24,8 @@ pub(super) struct Attachment {
     holder: Holder,
 }
 
+saved!(Attachment { body, holder });
+
 /// What it is attached to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Holder {
@@ -28,6 +33,8 @@ enum Holder {
     /// This one, or another.
     Body(BodyId),
 }
+
+saved_enum!(Holder { 0 => Tool(it), 1 => Body(it) });
 
 /// A name that is made where it is needed.
 struct Lazy<F>(F);
@@ -63,6 +70,8 @@ pub struct SurfacePoint {
     pub weights: [f32; 3],
 }
 
+saved!(SurfacePoint { triangle, weights });
+
 /// Where a body is attached to a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anchor {
@@ -71,6 +80,8 @@ pub enum Anchor {
     /// A point of the surface.
     Point(SurfacePoint),
 }
+
+saved_enum!(Anchor { 0 => Node(it), 1 => Point(it) });
 
 /// How far the sum of a point's weights may be from 1.
 const SUM_OFF: f32 = 1e-3;

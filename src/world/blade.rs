@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::FURTHEST;
 use crate::slots::SlotId;
+use crate::snapshot::saved;
 
 /// A proxy is held at no more points: a blade through more layers of a body is held at some.
 pub(super) const MOST_HOLDS: usize = 8;
@@ -70,6 +71,16 @@ pub struct BladeReport {
     pub area: f64,
 }
 
+saved!(BladeReport {
+    force,
+    torque,
+    work,
+    length,
+    lag,
+    refused,
+    area
+});
+
 impl BladeReport {
     /// It has made a cut.
     pub(super) fn add(&mut self, cut: &CutReport) {
@@ -95,6 +106,19 @@ pub(super) struct Blade {
     pub knots: Vec<Knot>,
 }
 
+saved!(Blade {
+    edge,
+    stiffness,
+    filter,
+    pose,
+    target,
+    proxies,
+    report,
+    near,
+    met,
+    knots
+});
+
 /// Where a blade stands in a body: the edge that tissue is cut to.
 #[derive(Debug, Default)]
 pub(super) struct Proxy {
@@ -117,6 +141,19 @@ pub(super) struct Proxy {
     pub was_outside: Option<bool>,
 }
 
+saved!(Proxy {
+    body,
+    stroke,
+    last,
+    uncut,
+    behind,
+    holds,
+    size,
+    force,
+    forward,
+    was_outside
+});
+
 /// A thread between tissue and the true edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hold {
@@ -127,6 +164,8 @@ pub(super) struct Hold {
     /// The way of the point of the true edge that is next to it, in the last step or the next.
     pub way: Lead,
 }
+
+saved!(Hold { id, offset, way });
 
 /// A point of the proxy, and the true edge next to it.
 #[derive(Clone, Copy, Debug)]

@@ -120,6 +120,12 @@ impl World {
         Ok(())
     }
 
+    /// A tool that a handle leads, if any is led.
+    pub(super) fn led_by_hand(&self) -> Option<ToolId> {
+        let link = self.haptics.iter().find(|link| !link.poses.is_alone())?;
+        Some(link.tool)
+    }
+
     /// A tool is gone.
     pub(super) fn leave_haptics(&mut self, tool: ToolId) {
         self.haptics.retain(|link| link.tool != tool);

@@ -3,6 +3,7 @@
 use crate::cutting::Met;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// What a cut snaps to within a part of a cell lies open before the proxy is there: a gap no longer than this part of a cell is gone through as
 /// the tissue before it.
@@ -32,6 +33,13 @@ pub(super) struct Knot {
     slope: f64,
     begins: bool,
 }
+
+saved!(Knot {
+    at,
+    change,
+    slope,
+    begins
+});
 
 /// How far the proxy follows the true edge.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,6 +7,7 @@ use crate::body::Body;
 use crate::contact::{TRIES, ToolPath};
 use crate::error::{Error, Result};
 use crate::slots::Slots;
+use crate::snapshot::saved;
 use crate::solver::{Outcome, StepRequest, Together, attempt};
 use crate::threads::{Items, Team};
 
@@ -32,6 +33,14 @@ pub struct StepReport {
     /// apart. Those of another body in one that is closed come out again by themselves.
     pub crossings: u32,
 }
+
+saved!(StepReport {
+    substeps,
+    stable_substep,
+    bodies_restored,
+    error_estimate,
+    crossings
+});
 
 impl World {
     /// Steps everything by `dt` seconds, above 0.

@@ -122,6 +122,14 @@ static void spans() {
   body.cut(start, end);
   pieces.resize(body.positions().size());
   EXPECT(body.pieces(pieces) == 2);
+  std::vector<std::uint8_t> bytes(world.snapshot_size());
+  world.save_snapshot(bytes);
+  auto again = sinew::world::load_snapshot(bytes);
+  world.step(0.001f), again.step(0.001f);
+  EXPECT(world.state_hash() == again.state_hash());
+  EXPECT(sinew::body(again.get(), body.id).positions().size() == body.positions().size());
+  bytes.back() ^= 1;
+  EXPECT(refused([&] { sinew::world::load_snapshot(bytes); }, "checksum") == SINEW_STATUS_INVALID_ARGUMENT);
 }
 
 static void no_allocation_of_its_own() {

@@ -6,6 +6,7 @@ use super::layers::{Crossing, Layers};
 use super::projection::{Frame, LARGEST_IMAGE, Projection};
 use crate::body::Bounds;
 use crate::error::{Error, Result};
+use crate::snapshot::saved;
 
 /// Room for how many times the pixels and the crossings that a surface has when it is made: it may be stretched.
 const STRETCHED: f64 = 1.5;
@@ -27,6 +28,8 @@ pub(in crate::contact) struct Drawn {
     views: [View; 3],
 }
 
+saved!(Drawn { pixel, views });
+
 #[derive(Debug)]
 struct View {
     /// Along which axis it looks.
@@ -37,6 +40,14 @@ struct View {
     /// Nothing where nothing is near.
     projection: Option<Projection>,
 }
+
+saved!(View {
+    axis,
+    frame,
+    pixels,
+    layers,
+    projection
+});
 
 impl Drawn {
     /// Room for a surface like this one, in pixels of `pixel` metres.

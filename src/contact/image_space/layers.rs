@@ -6,6 +6,7 @@ use super::draw::draw_triangles;
 use super::projection::Projection;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Where the ray of a pixel passes a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,6 +16,8 @@ pub(super) struct Crossing {
     /// The triangle, doubled, and 1 where the ray enters.
     code: u32,
 }
+
+saved!(Crossing { depth, code });
 
 impl Crossing {
     fn new(depth: f32, triangle: usize, enters: bool) -> Self {
@@ -41,6 +44,8 @@ pub(super) struct Layers {
     ends: Vec<u32>,
     crossings: Vec<Crossing>,
 }
+
+saved!(Layers { ends, crossings });
 
 impl Layers {
     /// Room for so much.

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::error::{Error, Result};
 use crate::raster::{GUARD, PixelVertex, Window};
+use crate::snapshot::saved;
 
 /// The most pixels of one image.
 pub(super) const LARGEST_IMAGE: u64 = 1 << 24;
@@ -17,6 +18,8 @@ pub(super) struct Frame {
     pub down: DVec3,
     pub forward: DVec3,
 }
+
+saved!(Frame { right, down, forward });
 
 impl Frame {
     /// Along the axes of space.
@@ -61,6 +64,15 @@ pub(super) struct Projection {
     pub width: u32,
     pub height: u32,
 }
+
+saved!(Projection {
+    frame,
+    low,
+    pixel,
+    per_metre,
+    width,
+    height
+});
 
 impl Projection {
     /// An image of what lies between `low` and `high`, in the coordinates of the frame, at least a pixel large.

@@ -9,6 +9,7 @@ use crate::body::{Body, Bound, NewNode, Vectors};
 use crate::contact::SurfaceChange;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// An edge that is none.
 const HOLE: [u32; 2] = [NONE; 2];
@@ -34,6 +35,15 @@ pub(super) struct Changing {
     /// What cuts have bared of solids.
     pub wound: Option<Wound>,
 }
+
+saved!(Changing {
+    movers,
+    roles,
+    sides,
+    triangles,
+    first_later,
+    wound
+});
 
 /// A body's surface as it is to be, and what moves it.
 pub(crate) struct SurfaceToBe<'a> {

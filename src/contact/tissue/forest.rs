@@ -3,6 +3,7 @@
 use crate::body::Bounds;
 use crate::contact::tree::{Placed, Tree};
 use crate::error::Result;
+use crate::snapshot::saved;
 use glam::Vec3;
 
 /// Trees, each over the triangles that follow those of the one before. Of the later ones each has twice as many as the next or more (Bentley,
@@ -13,6 +14,8 @@ pub(super) struct Forest {
     later: Vec<Later>,
 }
 
+saved!(Forest { first, later });
+
 /// A tree of triangles that came later.
 #[derive(Debug)]
 pub(super) struct Later {
@@ -20,6 +23,8 @@ pub(super) struct Later {
     from: usize,
     tree: Tree,
 }
+
+saved!(Later { from, tree });
 
 impl Forest {
     /// Over so many triangles.

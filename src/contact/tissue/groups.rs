@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// The groups of the bodies of a world.
 #[derive(Debug, Default)]
@@ -9,6 +10,8 @@ pub(super) struct Groups {
     /// By a body's place in the world, one of the places of those that it goes with; `None`: it goes by itself.
     of: Vec<Option<usize>>,
 }
+
+saved!(Groups { of });
 
 impl Groups {
     /// Makes room for the body at this place.

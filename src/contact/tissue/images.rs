@@ -7,6 +7,7 @@ use crate::body::Bounds;
 use crate::contact::image_space::Drawn;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// A longer part of an edge, in pixels, is looked along piece by piece.
 const PIECE: f32 = 8.0;
@@ -20,6 +21,8 @@ pub(super) struct Images {
     /// Metres.
     pixel: f32,
 }
+
+saved!(Images { drawn, edges, pixel });
 
 impl Images {
     /// Room for those of a surface.

@@ -6,6 +6,7 @@ use super::skin::Skin;
 use crate::body::Body;
 use crate::contact::impulses::LEVERAGE;
 use crate::contact::supports::MOST;
+use crate::snapshot::saved;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,8 @@ pub(super) struct Side {
     pub nodes: [u32; 3],
     pub weights: [f32; 3],
 }
+
+saved!(Side { body, nodes, weights });
 
 /// A contact over one step: the first side stays clear of the second.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +41,19 @@ pub(super) struct Link {
     impulse: f32,
     friction_impulse: Vec3,
 }
+
+saved!(Link {
+    sides,
+    normal,
+    least_speed,
+    depth,
+    friction,
+    movers,
+    answers,
+    mass,
+    impulse,
+    friction_impulse
+});
 
 impl Side {
     /// Whose it is, whatever point of it.

@@ -30,6 +30,7 @@ use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
 use crate::error::Result;
 use crate::memory;
 use crate::slots::Slots;
+use crate::snapshot::saved;
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
@@ -80,6 +81,14 @@ pub(crate) struct Tissue {
     /// What is attached.
     pub bonds: Bonds,
 }
+
+saved!(Tissue {
+    groups,
+    skins,
+    links,
+    known,
+    bonds
+});
 
 impl Tissue {
     /// Makes room for a body at this place in the world, which meets tissue.

@@ -13,6 +13,7 @@ use crate::contact::tool::Detection;
 use crate::error::Result;
 use crate::memory;
 use crate::mesh;
+use crate::snapshot::saved;
 
 /// Where the nodes of a body may go in a step, and the tree of its triangles as the step begins.
 #[derive(Debug)]
@@ -56,6 +57,31 @@ pub(crate) struct Skin {
     /// What it takes to change, where its body may be cut.
     pub(super) changing: Option<Box<Changing>>,
 }
+
+saved!(Skin {
+    nodes,
+    edges,
+    triangles,
+    owned,
+    forest,
+    room,
+    is_closed,
+    pierces,
+    origin,
+    starts,
+    velocities,
+    drift,
+    spread,
+    given,
+    short,
+    firsts,
+    travel,
+    meets_bodies,
+    asks_for_images,
+    resolution,
+    images,
+    changing
+});
 
 /// Features that were no further apart at first than this part of the least thickness were one, and are parted.
 pub(super) const PARTED: f32 = 0.1;
@@ -107,7 +133,7 @@ impl Skin {
             }
         }
         let changing = if body.can_be_cut() {
-            Some(Box::new(Changing::new(body, &nodes, &edges, &triangles)?))
+            Some(memory::boxed(Changing::new(body, &nodes, &edges, &triangles)?)?)
         } else {
             None
         };

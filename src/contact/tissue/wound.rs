@@ -13,6 +13,7 @@ use crate::body::{Body, Bounds, Vectors};
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// Edges meet that both look across the gap by this much at least, as the cosine of an angle.
 const SQUARELY: f32 = 0.5;
@@ -41,6 +42,14 @@ pub(super) struct Wound {
     /// Which way is out at each, the sum of its bared triangles.
     normals: Vectors,
 }
+
+saved!(Wound {
+    faces,
+    is_bared,
+    nodes,
+    is_corner,
+    normals
+});
 
 impl Wound {
     /// None yet, of a body with so many triangles.

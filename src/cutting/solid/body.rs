@@ -6,6 +6,7 @@ use super::sever::{Mark, Stroke};
 use crate::cutting::tracked::Tracked;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{saved, saved_enum};
 
 /// No tetrahedron, no triangle, or no corner.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -31,6 +32,14 @@ pub struct SolidCell {
     pub(crate) next: [u32; 4],
 }
 
+saved!(SolidCell {
+    nodes,
+    volume,
+    snap,
+    first,
+    next
+});
+
 /// Whether a face of the material with a tetrahedron across was cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Face {
@@ -41,6 +50,8 @@ pub(crate) enum Face {
     /// It is being opened.
     Opening,
 }
+
+saved_enum!(Face { 0 => Whole, 1 => Severed, 2 => Opening });
 
 /// A tetrahedron of the material.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +74,17 @@ pub struct Tetrahedron {
     pub(crate) next: u32,
 }
 
+saved!(Tetrahedron {
+    corners,
+    cell,
+    volume,
+    neighbours,
+    faces,
+    drawn,
+    turned,
+    next
+});
+
 /// A triangle that is drawn and touched: a face of the material with nothing across.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidTriangle {
@@ -75,6 +97,13 @@ pub struct SolidTriangle {
     /// The tetrahedron of which it is a face.
     pub(crate) tetrahedron: u32,
 }
+
+saved!(SolidTriangle {
+    corners,
+    cell,
+    is_inner,
+    tetrahedron
+});
 
 /// A corner of the material. Those that triangles have are drawn; others lie inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +121,15 @@ pub struct SolidVertex {
     pub(crate) other_mark: Mark,
 }
 
+saved!(SolidVertex {
+    nodes,
+    weights,
+    point,
+    around,
+    mark,
+    other_mark
+});
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Node {
     /// Of a point that is bound to others nothing is said here.
@@ -99,6 +137,8 @@ pub(crate) struct Node {
     /// The first of the cells' corners at it.
     pub(crate) first: u32,
 }
+
+saved!(Node { rest, first });
 
 impl Node {
     /// A point that is bound to others.
@@ -122,6 +162,17 @@ pub struct CutSolid {
     /// Both before the last cut.
     pub(crate) before: (u32, Stroke),
 }
+
+saved!(CutSolid {
+    nodes,
+    cells,
+    tetrahedra,
+    triangles,
+    vertices,
+    strokes,
+    stroke,
+    before
+});
 
 impl CutSolid {
     /// Reserves room for so many more nodes, and for as much of all else as cuts that make them need in general, so that cuts do not have to

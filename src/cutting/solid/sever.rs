@@ -8,6 +8,7 @@ use crate::cutting::cut::Sweep;
 use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{saved, saved_enum};
 
 /// Steps of the blade that go on from each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +22,13 @@ pub(crate) struct Stroke {
     /// Whether it has turned to the side that counts as above, where it turned last.
     turns_up: bool,
 }
+
+saved!(Stroke {
+    number,
+    end,
+    normal,
+    turns_up
+});
 
 impl Stroke {
     /// Before the first.
@@ -87,6 +95,8 @@ pub(crate) struct Plane {
     pub(crate) offset: f64,
 }
 
+saved!(Plane { normal, offset });
+
 impl Plane {
     pub(crate) const NONE: Self = Self {
         normal: DVec3::ZERO,
@@ -111,6 +121,8 @@ pub(crate) enum Side {
     Below,
 }
 
+saved_enum!(Side { 0 => On, 1 => OnBend, 2 => Above, 3 => Below });
+
 /// What the last stroke that came near a vertex has found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mark {
@@ -120,6 +132,8 @@ pub(crate) struct Mark {
     /// The blade's plane; of a vertex on the blade.
     plane: Plane,
 }
+
+saved!(Mark { stroke, side, plane });
 
 impl Mark {
     pub(crate) const NONE: Self = Self {

@@ -10,6 +10,7 @@ use crate::elements::Elements;
 use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
 use crate::terms::Terms;
 use crate::threads::{Team, Tiles};
@@ -26,6 +27,8 @@ pub(super) struct Noise {
     pub square: f64,
 }
 
+saved!(Noise { error, square });
+
 /// What of the stiffness of rings stands on the diagonal, as a part of what it were if each tetrahedron kept its volume: about a node in
 /// the middle of even ones, of which some twenty have it in common.
 const PART_OF_RINGS: f32 = 0.05;
@@ -38,6 +41,8 @@ pub(super) struct Blocks {
     /// The inverses along each entry; 0 for what is pinned.
     inverse: [Vec<f32>; 6],
 }
+
+saved!(Blocks { stiffness, inverse });
 
 impl Blocks {
     pub fn new(node_count: usize) -> Result<Self> {

@@ -13,6 +13,7 @@ use crate::elements::Elements;
 use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::solver::held::without_held;
 use crate::springs::{ChosenKernel, Loops, Springs, TILE, Tangent};
 use crate::terms::Terms;
@@ -50,6 +51,18 @@ pub(super) struct Coarse {
     motions: Vec<f32>,
     sums: Vec<f64>,
 }
+
+saved!(Coarse {
+    clusters,
+    count,
+    places,
+    free,
+    stiffness,
+    inverse,
+    loads,
+    motions,
+    sums
+});
 
 impl Coarse {
     /// Clusters of nodes at these positions.

@@ -7,6 +7,7 @@ use crate::body::{Body, Pins, Vectors};
 use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
+use crate::snapshot::saved;
 use crate::solver::write_records;
 use crate::springs::{ChosenKernel, Loops, Motion, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
@@ -28,6 +29,8 @@ pub(super) struct Total {
     /// What rounding is a part of: the same, with that work added, J.
     pub size: f64,
 }
+
+saved!(Total { energy, size });
 
 /// The energy before a step.
 #[derive(Clone, Copy, Debug)]

@@ -9,6 +9,8 @@
 //! coefficients give a better one, by Gauss-Radau quadrature with a node at t (Meurant, Tichy 2013): its factor takes the place
 //! of 1/t, and comes down as soon as the stiff part has been dealt with.
 
+use crate::snapshot::saved;
+
 /// How many iterations are kept; of longer solutions the bound is that of the first so many, and too high.
 const KEPT: usize = 1024;
 
@@ -26,6 +28,13 @@ pub(super) struct Spectrum {
     steps: Vec<[f64; 2]>,
     smallest: f64,
 }
+
+saved!(Spectrum {
+    diagonal,
+    beside,
+    steps,
+    smallest
+});
 
 impl Spectrum {
     /// With room for all it takes.

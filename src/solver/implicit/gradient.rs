@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::Implicit;
 use super::coarse::Coarse;
 use crate::body::{Body, Pins, Records, Vectors, WriteRecords};
+use crate::snapshot::saved;
 use crate::springs::{Course, Loops, Tangent, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
 
@@ -17,6 +18,8 @@ pub(super) struct Partial {
     pub first: f64,
     pub second: f64,
 }
+
+saved!(Partial { first, second });
 
 /// When the gradient may stop.
 #[derive(Clone, Copy, Debug)]

@@ -29,6 +29,7 @@ use crate::elements::{Elements, Sums};
 use crate::enclosed::{self, Enclosed};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::solver::newton::Newton;
 use crate::springs::{Springs, tile_count};
 use crate::terms::Terms;
@@ -58,6 +59,15 @@ pub(crate) struct History {
     /// What was lost not long ago, and may come back: the energy of a step's formula is not quite this one.
     pub credit: f64,
 }
+
+saved!(History {
+    ways,
+    gains,
+    remainders,
+    step,
+    energy,
+    credit
+});
 
 /// How a substep ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +104,12 @@ struct Experience {
     /// Whether it has become so much worse that it is to be made again.
     worn: bool,
 }
+
+saved!(Experience {
+    smallest,
+    fresh_products,
+    worn
+});
 
 /// What a body that is moved implicitly has beside its state.
 #[derive(Debug)]
@@ -163,6 +179,46 @@ pub(crate) struct Implicit {
     report: SolverReport,
     pub told: SolverReport,
 }
+
+saved!(Implicit {
+    order,
+    budget,
+    left,
+    accuracy,
+    histories,
+    is_deflected,
+    settled,
+    taken,
+    is_attached,
+    latest,
+    pushes,
+    means,
+    corrections,
+    residuals,
+    searches,
+    search_records,
+    changes,
+    pressure_changes,
+    products,
+    preconditioned,
+    inertia,
+    all_inertia,
+    noise,
+    prepared,
+    blocks,
+    coarse,
+    stiffened,
+    loads,
+    partials,
+    spectrum,
+    stale,
+    was_stale,
+    memory,
+    kept,
+    newton,
+    report,
+    told
+});
 
 impl Experience {
     const NONE: Self = Self {

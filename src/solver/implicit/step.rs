@@ -7,6 +7,7 @@ use super::loops::{Add, Finish, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Lapse, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
+use crate::snapshot::saved;
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
@@ -28,6 +29,8 @@ pub(super) struct Formula {
     /// c: what part of the last way and of the last gain goes on.
     carried: f64,
 }
+
+saved!(Formula { time, carried });
 
 impl Formula {
     pub(super) fn new(order: u32, step: f64, last_step: f64) -> Self {

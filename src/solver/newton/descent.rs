@@ -12,6 +12,7 @@ use crate::elements::Elements;
 use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::Springs;
 use crate::terms::Terms;
 
@@ -39,6 +40,15 @@ pub(super) struct Descent {
     matrix: Matrix,
     factor: Matrix,
 }
+
+saved!(Descent {
+    network,
+    equation,
+    residuals,
+    gradient,
+    matrix,
+    factor
+});
 
 /// When a descent is done.
 #[derive(Clone, Copy, Debug)]

@@ -13,6 +13,7 @@ use crate::elements::Deformed;
 use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::solver::held::without_held;
 use crate::springs::Link;
 use crate::terms::Blocks;
@@ -43,6 +44,20 @@ pub(super) struct Equation {
     /// There too, of each tetrahedron: how its volume grows with the place of each corner, m².
     areas: Vec<[DVec3; 4]>,
 }
+
+saved!(Equation {
+    anchors,
+    ways,
+    inertia,
+    loads,
+    masses,
+    drifts,
+    holds,
+    pins,
+    rate,
+    pressures,
+    areas
+});
 
 /// What of the stiffness of rings stands in the factor, as a part of what it were if each tetrahedron kept its volume.
 const PART_OF_RINGS: f32 = 0.05;

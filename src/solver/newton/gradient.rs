@@ -8,6 +8,7 @@ use super::matrix::Matrix;
 use super::network::Network;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// So many iterations in a row must change little before the solution counts as found.
 const WINDOW: usize = 10;
@@ -29,6 +30,15 @@ pub(super) struct Gradient {
     /// Of rings.
     pressure_changes: Vec<f64>,
 }
+
+saved!(Gradient {
+    corrections,
+    searches,
+    residuals,
+    preconditioned,
+    products,
+    pressure_changes
+});
 
 /// How the iterations ended.
 #[derive(Clone, Copy, Debug)]

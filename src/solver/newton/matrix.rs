@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 use super::network::Network;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 
 /// The blocks on the diagonal, and those below it.
 #[derive(Debug)]
@@ -12,6 +13,8 @@ pub(super) struct Matrix {
     pub diagonal: Vec<DMat3>,
     pub beside: Vec<DMat3>,
 }
+
+saved!(Matrix { diagonal, beside });
 
 impl Matrix {
     pub fn new(node_count: usize, spring_count: usize) -> Result<Self> {

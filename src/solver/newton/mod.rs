@@ -26,6 +26,7 @@ use crate::elements::Elements;
 use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::Springs;
 use crate::terms::Terms;
 use descent::Descent;
@@ -40,6 +41,12 @@ pub(crate) struct Newton {
     /// For the energy of elements.
     growths: Vec<f64>,
 }
+
+saved!(Newton {
+    descent,
+    remainders,
+    growths
+});
 
 impl Newton {
     /// For a body as it is.

@@ -6,6 +6,7 @@ use crate::elements::{Elements, Law, Load, Rest};
 use crate::enclosed::Enclosed;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Link, Springs};
 use crate::terms::Terms;
 
@@ -33,6 +34,21 @@ pub(super) struct Network {
     ring_members: Vec<u32>,
 }
 
+saved!(Network {
+    starts,
+    links,
+    tetrahedra,
+    loads,
+    terms,
+    enclosed,
+    edges,
+    law,
+    volumes,
+    ring_loads,
+    ring_starts,
+    ring_members
+});
+
 /// A tetrahedron, and where its pairs of corners are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tetrahedron {
@@ -41,6 +57,8 @@ pub(super) struct Tetrahedron {
     /// Of the pairs of [`PAIRS`].
     pub places: [usize; 6],
 }
+
+saved!(Tetrahedron { corners, rest, places });
 
 /// A tetrahedron with the law and the load of the equation.
 #[derive(Clone, Copy)]

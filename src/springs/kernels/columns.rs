@@ -12,6 +12,7 @@ use super::strays::Strays;
 use crate::body::MARGIN;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::{Link, TILE};
 
 /// Lanes of a column.
@@ -37,6 +38,12 @@ pub(crate) struct Material {
     pub damping: f32,
 }
 
+saved!(Material {
+    stiffness,
+    rest_length,
+    damping
+});
+
 impl Material {
     /// Half the force with which a spring would be pressed to length 0, N.
     #[inline(always)]
@@ -49,6 +56,8 @@ impl Material {
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line(pub [f32; LANES]);
+
+saved!(Line { 0 });
 
 impl Line {
     pub const ZERO: Self = Self([0.0; LANES]);
@@ -96,12 +105,22 @@ pub(super) struct Run {
     pub half_tension: f32,
 }
 
+saved!(Run {
+    offset,
+    lanes,
+    material,
+    stiffness,
+    half_tension
+});
+
 /// A column of neighbours that lie side by side, of springs that bring their own parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnRun {
     pub offset: i32,
     pub lanes: u16,
 }
+
+saved!(OwnRun { offset, lanes });
 
 /// What there is to know of a gather beside its neighbours.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +129,8 @@ pub(super) struct Gather {
     /// Its place in the table of materials; [`OWN`].
     material: u16,
 }
+
+saved!(Gather { lanes, material });
 
 impl Gather {
     /// Its place in the table of materials, where its springs share their parameters.
@@ -129,15 +150,27 @@ pub(super) struct Ends {
     pub own: u32,
 }
 
+saved!(Ends {
+    runs,
+    own_runs,
+    near,
+    far,
+    own
+});
+
 /// Small indices of a column.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NearIndices(pub [u16; LANES]);
 
+saved!(NearIndices { 0 });
+
 /// Indices of a column.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FarIndices(pub [u32; LANES]);
+
+saved!(FarIndices { 0 });
 
 /// The links of the nodes of one tile.
 #[derive(Debug)]
@@ -169,6 +202,27 @@ pub(crate) struct Columns {
     pub(super) damped: bool,
     pub(super) strays: Strays,
 }
+
+saved!(Columns {
+    first,
+    count,
+    node_count,
+    reads,
+    window,
+    blocks,
+    runs,
+    own_runs,
+    near,
+    near_indices,
+    far,
+    far_indices,
+    own_rest_lengths,
+    own_stiffnesses,
+    own_stiffness,
+    own_dampings,
+    damped,
+    strays
+});
 
 /// A link's place.
 #[derive(Clone, Copy)]
@@ -260,9 +314,45 @@ impl Columns {
     pub fn shrink_nodes(&mut self, end: usize, node_count: usize) {
         self.count = end - self.first;
         self.blocks.truncate(self.count.div_ceil(LANES));
+        let last = self.blocks.last().copied().unwrap_or_default();
+        self.runs.truncate(last.runs as usize);
+        self.own_runs.truncate(last.own_runs as usize);
+        self.near.truncate(last.near as usize);
+        self.near_indices.truncate(last.near as usize);
+        self.far.truncate(last.far as usize);
+        self.far_indices.truncate(last.far as usize);
+        self.own_rest_lengths.truncate(last.own as usize);
+        self.own_stiffnesses.truncate(last.own as usize);
+        self.own_dampings.truncate(last.own as usize);
         self.node_count = self.node_count.min(node_count);
-        self.reads.end = self.reads.end.min(node_count.next_multiple_of(LANES) as isize);
         self.strays.shrink(node_count);
+        if self.reads.end > node_count as isize {
+            self.turn_back();
+        }
+    }
+
+    /// Has lanes without a link lead to nodes that there are.
+    fn turn_back(&mut self) {
+        // A run ends within the margin where one of its lanes has a link.
+        let end = self.node_count.next_multiple_of(LANES) + MARGIN;
+        self.reads.end = self.reads.end.min(end as isize);
+        for run in self.runs.iter_mut().filter(|run| run.lanes == 0) {
+            run.offset = 0;
+        }
+        for run in self.own_runs.iter_mut().filter(|run| run.lanes == 0) {
+            run.offset = 0;
+        }
+        let (first, window, node_count) = (self.first, self.window, self.node_count);
+        for index in self.near_indices.iter_mut().flat_map(|column| &mut column.0) {
+            if window + usize::from(*index) >= node_count {
+                *index = (first - window) as u16;
+            }
+        }
+        for index in self.far_indices.iter_mut().flat_map(|column| &mut column.0) {
+            if *index as usize >= node_count {
+                *index = first as u32;
+            }
+        }
     }
 
     /// The body has so many nodes now.

@@ -16,6 +16,7 @@ mod portable;
 mod prefetch;
 mod quantities;
 mod range;
+mod sound;
 mod strays;
 mod tetrahedra;
 
@@ -28,6 +29,7 @@ use range::Ranges;
 pub(crate) use tetrahedra::{GROUP, Group, Groups, Stresses};
 
 use crate::error::{Error, Result};
+use crate::snapshot::{Reader, Saved, Writer, saved_enum};
 
 /// The widest instructions that kernels use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +46,8 @@ pub enum Kernel {
     /// The same bits on every processor.
     Portable,
 }
+
+saved_enum!(Kernel { 0 => Best, 1 => Avx512, 2 => Avx2, 3 => Neon, 4 => Portable });
 
 impl Kernel {
     /// The kernel to be used on this processor.
@@ -92,6 +96,24 @@ impl Kernel {
 /// A kernel whose instructions the processor has: [`Kernel::choose`] alone makes one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ChosenKernel(Kernel);
+
+/// A world says once which it is.
+impl Saved for ChosenKernel {
+    const SHAPE: u64 = 0;
+    const LEAST: usize = 0;
+
+    fn save(&self, _to: &mut Writer) {}
+
+    fn load(from: &mut Reader) -> Result<Self> {
+        Ok(from.kernel)
+    }
+}
+
+impl ChosenKernel {
+    pub(crate) fn kernel(self) -> Kernel {
+        self.0
+    }
+}
 
 /// Plain loops that the compiler turns into the instructions of a kernel.
 pub(crate) trait Loops {

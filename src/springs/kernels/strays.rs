@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::columns::{LANES, Line};
 use crate::error::Result;
+use crate::snapshot::saved;
 use crate::springs::Link;
 
 /// Links beside the columns of a tile.
@@ -21,6 +22,17 @@ pub(crate) struct Strays {
     rest_lengths: Vec<f32>,
     dampings: Vec<f32>,
 }
+
+saved!(Strays {
+    first,
+    node_count,
+    damped,
+    places,
+    neighbours,
+    stiffnesses,
+    rest_lengths,
+    dampings
+});
 
 /// Sixteen strays, or fewer at the end, as the kernel takes them.
 pub(super) struct Batch {
@@ -151,6 +163,28 @@ impl Strays {
         let start = self.places.partition_point(|&other| usize::from(other) < place);
         let count = self.places[start..].partition_point(|&other| usize::from(other) == place);
         start..start + count
+    }
+
+    /// Whether these are strays of `nodes` in a body of `node_count` that lead to nodes that are read.
+    pub(super) fn are_sound(
+        &self,
+        nodes: Range<usize>,
+        node_count: usize,
+        damped: bool,
+        is_read: impl Fn(isize) -> bool,
+    ) -> bool {
+        let count = self.len();
+        self.first == nodes.start
+            && self.node_count <= node_count
+            && self.damped == damped
+            && [self.neighbours.len(), self.stiffnesses.len(), self.rest_lengths.len()] == [count; 3]
+            && self.dampings.len() == if damped { count } else { 0 }
+            && self.places.is_sorted()
+            && self.places.iter().all(|&place| usize::from(place) < nodes.len())
+            && self
+                .neighbours
+                .iter()
+                .all(|&node| (node as usize) < node_count && is_read(node as isize))
     }
 
     pub(super) fn batch_count(&self) -> usize {

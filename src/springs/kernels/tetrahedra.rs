@@ -15,6 +15,7 @@ use super::lanes::Lanes;
 use super::{ChosenKernel, WithLanes};
 use crate::body::Record;
 use crate::elements::Law;
+use crate::snapshot::saved;
 
 /// Tetrahedra side by side.
 pub(crate) const GROUP: usize = 16;
@@ -33,6 +34,13 @@ pub(crate) struct Group {
     pub rates: [f32; GROUP],
 }
 
+saved!(Group {
+    corners,
+    inverse,
+    volumes,
+    rates
+});
+
 impl Group {
     pub const EMPTY: Self = Self {
         corners: [[0; GROUP]; 4],
@@ -47,6 +55,8 @@ impl Group {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stresses(pub [[f32; GROUP]; 7]);
 
+saved!(Stresses { 0 });
+
 impl Stresses {
     pub const ZERO: Self = Self([[0.0; GROUP]; 7]);
 }
@@ -58,17 +68,24 @@ pub(crate) struct Groups {
     node_count: usize,
 }
 
+saved!(Groups { groups, node_count } where Self::lead_to_nodes);
+
 impl Groups {
     /// # Panics
     /// Where a corner is not below `node_count`.
     pub fn new(groups: Vec<Group>, node_count: usize) -> Self {
-        let corners = groups.iter().flat_map(|group| group.corners.as_flattened());
-        assert!(
-            corners
-                .into_iter()
-                .all(|&corner| usize::from(corner / 2) < node_count && corner % 2 == 0)
-        );
-        Self { groups, node_count }
+        let groups = Self { groups, node_count };
+        assert!(groups.lead_to_nodes());
+        groups
+    }
+
+    fn lead_to_nodes(&self) -> bool {
+        let corners = self.groups.iter().flat_map(|group| group.corners.as_flattened());
+        corners.into_iter().all(|corner| self.is_node(corner))
+    }
+
+    fn is_node(&self, corner: &u16) -> bool {
+        usize::from(corner / 2) < self.node_count && corner.is_multiple_of(2)
     }
 
     pub fn as_slice(&self) -> &[Group] {
@@ -113,8 +130,7 @@ impl Groups {
     /// # Panics
     /// Where a corner is not below the number of nodes.
     pub fn put(&mut self, [group, lane]: [usize; 2], corners: [u16; 4], inverse: [f32; 6], volume: f32) {
-        let is_node = |&corner: &u16| usize::from(corner / 2) < self.node_count && corner % 2 == 0;
-        assert!(corners.iter().all(is_node));
+        assert!(corners.iter().all(|corner| self.is_node(corner)));
         let group = &mut self.groups[group];
         for (to, corner) in group.corners.iter_mut().zip(corners) {
             to[lane] = corner;

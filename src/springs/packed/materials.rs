@@ -3,6 +3,7 @@
 use crate::body::Spring;
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::saved;
 use crate::springs::kernels::Material;
 
 /// How many springs are looked at to find the kinds.
@@ -40,11 +41,19 @@ struct Kind {
     longest: f32,
 }
 
+saved!(Kind {
+    material,
+    shortest,
+    longest
+});
+
 /// The kinds of spring in a body.
 #[derive(Debug, Default)]
 pub(super) struct Kinds {
     kinds: Vec<Kind>,
 }
+
+saved!(Kinds { kinds });
 
 impl Kinds {
     /// The kinds that are common among `springs`.

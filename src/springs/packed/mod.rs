@@ -28,6 +28,7 @@ use super::{
 use crate::body::{Spring, View};
 use crate::error::Result;
 use crate::memory;
+use crate::snapshot::{Saved, Writer, saved};
 
 /// How many links may be added to a tile before it is packed again.
 const ADDED: usize = 256;
@@ -42,6 +43,13 @@ struct Tile {
     strays: usize,
     removed: usize,
 }
+
+saved!(Tile {
+    columns,
+    links,
+    strays,
+    removed
+});
 
 impl Tile {
     fn new(columns: Columns, links: usize) -> Self {
@@ -80,6 +88,16 @@ pub(crate) struct Packed {
     materials: Vec<Material>,
     tiles: Vec<Tile>,
 }
+
+saved!(Packed {
+    kernel,
+    node_count,
+    spring_count,
+    damped,
+    kinds,
+    materials,
+    tiles
+} where Self::is_sound);
 
 /// What columns of these springs cost, the most of them.
 pub(crate) fn costs(springs: &[Spring], rounding: Rounding) -> Result<Costs> {
@@ -182,6 +200,16 @@ impl Packed {
         self.node_count = node_count;
     }
 
+    /// Whether kernels find all that they read without a check.
+    fn is_sound(&self) -> bool {
+        let mut tiles = self.tiles.iter().enumerate();
+        self.tiles.len() == tile_count(self.node_count)
+            && tiles.all(|(tile, of)| {
+                let nodes = tile_nodes(tile, self.node_count);
+                of.columns.is_sound(nodes, self.node_count, self.materials.len())
+            })
+    }
+
     fn has(&self, a: u32, b: u32) -> bool {
         let mut found = false;
         self.visit(a as usize, &mut |link| found |= link.neighbour == b);
@@ -219,7 +247,17 @@ impl Packed {
     }
 }
 
+impl Packed {
+    /// Which storage it is, in bytes.
+    pub const SAVED_AS: u8 = 0;
+}
+
 impl Springs for Packed {
+    fn save(&self, to: &mut Writer) {
+        to.put(&[Self::SAVED_AS]);
+        Saved::save(self, to);
+    }
+
     fn damped(&self) -> bool {
         self.damped
     }

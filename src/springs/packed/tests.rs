@@ -350,6 +350,7 @@ fn any_change_of_springs_is_kept() {
             pairs.remove(&[a, b]);
         }
         assert_eq!(packed.spring_count(), pairs.len());
+        assert!(packed.is_sound());
         assert_eq!(links(&packed, count), pairs);
         let expected = reference(&pairs, &positions, None);
         for (found, (expected, size)) in forces(&packed, &positions, None).iter().zip(expected) {
@@ -467,6 +468,7 @@ fn nodes_that_come_later_have_their_springs() {
                     }
                 }
                 packed.rewire(&rewiring).expect("memory");
+                assert!(packed.is_sound(), "{name}");
                 assert_eq!(links(&packed, count + MORE), pairs, "{name}");
                 let positions = vectors(count + MORE, &mut random);
                 let velocities = packed.damped().then(|| vectors(count + MORE, &mut random));
@@ -483,6 +485,7 @@ fn nodes_that_come_later_have_their_springs() {
                 rewiring.removed = std::mem::take(&mut rewiring.added);
                 packed.rewire(&rewiring).expect("memory");
                 packed.resize(count).expect("memory");
+                assert!(packed.is_sound(), "{name}, as it was");
                 pairs.retain(|nodes, _| nodes.iter().all(|&node| (node as usize) < count));
                 assert_eq!(links(&packed, count), pairs, "{name}");
                 let positions = vectors(count, &mut random);

@@ -21,6 +21,7 @@ use crate::diagnostics::StateHasher;
 use crate::error::Result;
 use crate::memory;
 use crate::slots::{SlotId, Slots};
+use crate::snapshot::saved;
 use crate::solver::Outcome;
 use crate::world::Anchor;
 
@@ -46,6 +47,8 @@ pub(crate) struct Bound {
     pub nodes: [(u32, f32); OF_POINT],
 }
 
+saved!(Bound { body, anchor, nodes });
+
 impl Bound {
     /// The sum of the parts of its nodes: 1, but for rounding; 0 of what is no point of tissue.
     fn weight(&self) -> f64 {
@@ -64,6 +67,13 @@ pub(crate) struct Corner {
     /// Which of the ends it is; the bonds see to that.
     pub end: usize,
 }
+
+saved!(Corner {
+    body,
+    node,
+    weight,
+    end
+});
 
 /// Two points that are kept together.
 #[derive(Clone, Copy, Debug)]
@@ -100,6 +110,25 @@ struct Bond {
     is_implicit: bool,
 }
 
+saved!(Bond {
+    id,
+    points,
+    corners,
+    thread,
+    limit,
+    foreseen,
+    mean,
+    is_in_turn,
+    load,
+    impulse,
+    sum,
+    masses,
+    gap,
+    miss,
+    acts,
+    is_implicit
+});
+
 /// A node at which bonds are.
 #[derive(Clone, Copy, Debug)]
 struct End {
@@ -123,6 +152,21 @@ struct End {
     is_pending: bool,
 }
 
+saved!(End {
+    body,
+    node,
+    is_used,
+    is_on_skin,
+    is_in_turn,
+    velocity,
+    answer,
+    given,
+    place,
+    shift,
+    pending,
+    is_pending
+});
+
 /// All bonds of a world.
 #[derive(Debug, Default)]
 pub(crate) struct Bonds {
@@ -133,6 +177,12 @@ pub(crate) struct Bonds {
     /// Whether the first substep is to come, which VERLET begins with half a kick.
     is_opening: bool,
 }
+
+saved!(Bonds {
+    bonds,
+    ends,
+    is_opening
+});
 
 impl Bond {
     fn used(&self) -> impl Iterator<Item = Corner> + use<> {

@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use super::super::Moment;
 use super::CLOSING_SPEED;
+use crate::snapshot::saved;
 
 /// Points that move against each other by no more than this part of their distance in a substep keep to their line.
 const RESOLVED: f64 = 0.5;
@@ -47,12 +48,33 @@ pub(crate) struct Thread {
     answer: DVec3,
 }
 
+saved!(Thread {
+    length,
+    target,
+    compliance,
+    most,
+    lead,
+    pace,
+    current,
+    reach,
+    led,
+    speed,
+    apart,
+    line,
+    drift,
+    duration,
+    give,
+    answer
+});
+
 /// A place that goes straight and evenly from one to another over the next step, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lead {
     pub from: DVec3,
     pub to: DVec3,
 }
+
+saved!(Lead { from, to });
 
 impl Lead {
     /// The same way beside it.

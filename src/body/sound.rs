@@ -1,0 +1,42 @@
+//! Whether a body that was read from bytes hangs together.
+
+use super::Body;
+use crate::springs::tile_count;
+
+impl Body {
+    /// Whether what it has of each node and tile is there for all of them, and what leads to nodes leads to some; all is finite.
+    pub(super) fn is_sound(&self) -> bool {
+        let count = self.masses.len();
+        let tiles = tile_count(count);
+        let of_nodes = [&self.predicted_velocities, &self.applied];
+        (1..=u32::MAX as usize / 2).contains(&count)
+            && self.inverse_masses.len() == count
+            && self.springs.node_count() == count
+            && (0..count).all(|node| self.springs_lead_to(node, count))
+            && self.order.is_sound(count)
+            && self.state.is_sound(count)
+            && self.pins.are_sound(count)
+            && self.published.positions().len() == count
+            && self.surveys.len() == tiles
+            && self.boxes.len() == tiles
+            && of_nodes.into_iter().flatten().all(|vectors| vectors.len() == count)
+            && self
+                .records
+                .as_ref()
+                .is_none_or(|records| records.as_slice().len() == count)
+            && self.surface.iter().flatten().all(|&node| (node as usize) < count)
+            && self
+                .masses
+                .iter()
+                .chain(&self.inverse_masses)
+                .all(|&mass| (0.0..f32::INFINITY).contains(&mass))
+            && self.origin.is_finite()
+    }
+
+    fn springs_lead_to(&self, node: usize, count: usize) -> bool {
+        let mut all = true;
+        self.springs
+            .visit(node, &mut |link| all &= (link.neighbour as usize) < count);
+        all
+    }
+}

@@ -1,0 +1,129 @@
+//! Bytes that are no world, and worlds that cannot be bytes.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use sinew::{Error, HapticDefinition, Shape, ToolDefinition, World};
+use xxhash_rust::xxh3::Xxh3Default;
+
+use super::acts::{Caller, Random};
+use super::world;
+
+/// Where the header keeps the version, the size and the checksum, and where it ends.
+const VERSION: usize = 8;
+const CHECKSUM: usize = 28;
+const HEADER: usize = 36;
+
+/// A world with something of everything, as bytes.
+fn bytes(seed: u64) -> Vec<u8> {
+    let mut caller = Caller::new(seed);
+    let mut worlds = [world(1)];
+    for _ in 0..8 {
+        for _ in 0..4 {
+            caller.act(&mut worlds);
+        }
+        caller.step(&mut worlds);
+    }
+    worlds[0].save().expect("bytes")
+}
+
+fn load(bytes: &[u8]) -> Result<World, Error> {
+    World::load(bytes, 1, None)
+}
+
+/// As somebody would who wants them to be believed.
+fn seal(bytes: &mut [u8]) {
+    let mut hasher = Xxh3Default::new();
+    hasher.update(&bytes[..CHECKSUM]);
+    hasher.update(&bytes[HEADER..]);
+    bytes[CHECKSUM..HEADER].copy_from_slice(&hasher.digest().to_le_bytes());
+}
+
+#[test]
+fn bytes_that_were_cut_short_or_changed_are_refused() {
+    let bytes = bytes(3);
+    assert!(load(&bytes).is_ok());
+    for size in (0..bytes.len()).filter(|size| *size < 300 || size.is_multiple_of(997)) {
+        let refused = load(&bytes[..size]).expect_err("cut short");
+        assert!(matches!(refused, Error::InvalidArgument(_)), "{size}: {refused}");
+    }
+    let longer = [&bytes[..], &[0]].concat();
+    assert!(matches!(load(&longer), Err(Error::InvalidArgument(_))));
+    let mut changed = bytes.clone();
+    for at in (0..bytes.len()).filter(|at| *at < 300 || at.is_multiple_of(997)) {
+        for bit in [0, 3, 7] {
+            changed[at] ^= 1 << bit;
+            assert!(load(&changed).is_err(), "bit {bit} of byte {at}");
+            changed[at] ^= 1 << bit;
+        }
+    }
+    assert!(changed == bytes && load(&changed).is_ok());
+}
+
+#[test]
+fn bytes_of_something_else_are_refused_by_what_they_are() {
+    let said = |bytes: &[u8]| load(bytes).expect_err("no world").to_string();
+    assert!(said(b"").contains("header"));
+    assert!(said(b"solid organ\n").contains("begin with something else"));
+    assert!(said(&[0x89, b'P', b'N', b'G', 13, 10, 26, 10]).contains("begin with something else"));
+    let whole = bytes(3);
+    assert!(said(&whole[..whole.len() - 1]).contains("saved as"));
+    let mut changed = whole.clone();
+    changed[whole.len() / 2] ^= 1;
+    assert!(said(&changed).contains("checksum"));
+    let mut of_later = whole.clone();
+    of_later[VERSION] += 1;
+    seal(&mut of_later);
+    assert!(matches!(load(&of_later), Err(Error::Unsupported(_))));
+    // Of a version whose fields are others.
+    let mut of_others = whole;
+    of_others[VERSION + 4] ^= 1;
+    seal(&mut of_others);
+    assert!(matches!(load(&of_others), Err(Error::Unsupported(_))));
+}
+
+/// Nothing worse than that a step panics comes of bytes that somebody made up, and bytes that were written as they are go back as they are.
+#[test]
+fn bytes_with_a_checksum_of_their_own_are_looked_at_again() {
+    let whole = bytes(5);
+    let mut random = Random(1);
+    let mut refused = 0;
+    for _ in 0..400 {
+        let mut forged = whole.clone();
+        for _ in 0..1 + random.below(3) {
+            let at = HEADER + random.below(forged.len() - HEADER);
+            forged[at] = random.below(256) as u8;
+        }
+        seal(&mut forged);
+        let loaded = catch_unwind(|| load(&forged)).expect("bytes are loaded or refused");
+        match loaded {
+            Ok(mut world) => {
+                let _ = catch_unwind(AssertUnwindSafe(|| world.step(1e-3)));
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(refused > 20, "{refused}");
+}
+
+#[test]
+fn what_cannot_be_bytes_says_so() {
+    let mut world = world(1);
+    let size = world.snapshot_size().expect("a size");
+    for wrong in [0, size - 1, size + 1] {
+        let mut place = vec![7; wrong];
+        let refused = world.save_into(&mut place).expect_err("another size");
+        assert!(refused.to_string().contains(&format!("size is {wrong}")), "{refused}");
+        assert!(place.iter().all(|&byte| byte == 7));
+    }
+    let tool = world
+        .create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.01 }))
+        .expect("a tool");
+    let handle = world.create_haptic(&HapticDefinition::new(tool)).expect("a handle");
+    let refused = world.save().expect_err("a thread leads the tool");
+    assert!(
+        matches!(&refused, Error::Unsupported(why) if why.contains("haptic")),
+        "{refused}"
+    );
+    drop(handle);
+    assert!(world.save().is_ok());
+}
