@@ -21,6 +21,9 @@ FILL = sed -e 's|@VERSION@|$(FULL_VERSION)|g' -e 's|@ABI@|$(VERSION)|g' -e 's|@D
   -e 's|@INCLUDE@|$(INCLUDE_FROM_LIB)|g' -e 's|@NATIVE@|$(NATIVE)|g' -e 's|@SHARED@|$(FULL_NAME)|g' -e 's|@SONAME@|$(SONAME)|g'
 
 install: library
+ifneq ($(EXE),)
+	$(error on Windows take sinew.dll, libsinew.dll.a and include/ from where they are: there is no package for it)
+endif
 ifneq ($(filter-out $(PREFIX)/%,$(LIBDIR) $(INCLUDEDIR)),)
 	$(error LIBDIR and INCLUDEDIR must lie within PREFIX: the package finds its parts from one another)
 endif

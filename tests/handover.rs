@@ -138,6 +138,7 @@ fn a_triple_buffer_hands_over_whole_values_in_order_and_the_last() {
 }
 
 #[test]
+#[cfg_attr(windows, ignore = "SKIPPED: what panics on loom's threads ends the process there")]
 fn a_triple_buffer_needs_its_ordering() {
     assert!(is_found(|| triple_buffer_test!(release_alone)));
     assert!(is_found(|| triple_buffer_test!(acquire_alone)));
@@ -154,6 +155,7 @@ fn a_pool_serves_two_readers() {
 }
 
 #[test]
+#[cfg_attr(windows, ignore = "SKIPPED: what panics on loom's threads ends the process there")]
 fn a_pool_needs_each_of_its_orderings() {
     assert!(is_found(|| pool_test!(announced_too_early, 3, 1, 4, 3)), "announce");
     assert!(is_found(|| pool_test!(heard_too_late, 3, 1, 4, 3)), "listen");

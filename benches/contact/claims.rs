@@ -1,4 +1,4 @@
-//! What the README says of contact, held against what was measured.
+//! What FIGURES.md says of contact, held against what was measured.
 
 use crate::report::{Report, Table};
 
@@ -19,7 +19,7 @@ impl Claims {
     }
 
     pub fn write(&self, report: &mut Report) {
-        report.write("\n## What the README says\n");
+        report.write("\n## What FIGURES.md says\n");
         let mut table = Table::new(&["claim", "measured", ""]);
         for (what, measured, holds) in &self.rows {
             let verdict = if *holds { "holds" } else { "**FAILS**" };

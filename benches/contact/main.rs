@@ -2,7 +2,7 @@
 //! triangles, and what tissue on a tool pays for it.
 //!
 //! `cargo bench --bench contact [-- --quick] [--only pairs|tools|cloth]` writes `target/report/contact.md` and plots beside it. It fails where
-//! what the README says of errors no longer holds.
+//! what FIGURES.md says of errors no longer holds.
 #![allow(clippy::print_stderr)]
 
 mod claims;

@@ -1,4 +1,4 @@
-//! One table over all scenes: what each way to simulate needs for an error. It stands in the README.
+//! One table over all scenes: what each way to simulate needs for an error. It stands in FIGURES.md.
 
 use crate::motion::Sweep;
 use crate::reference::Reference;
