@@ -190,7 +190,7 @@ impl World {
             Ok(()) => Ok(ids),
             Err(error) => {
                 for AttachmentId(id) in ids {
-                    self.attachments.remove(id)?;
+                    self.attachments.take_back(id)?;
                 }
                 Err(error)
             }
@@ -204,7 +204,7 @@ impl World {
                 Ok(id) => ids.push(AttachmentId(id)),
                 Err(error) => {
                     for AttachmentId(id) in ids {
-                        self.attachments.remove(*id)?;
+                        self.attachments.take_back(*id)?;
                     }
                     return Err(error);
                 }
@@ -273,7 +273,7 @@ impl World {
         for place in places {
             make_walks(&mut self.walks, place)?;
         }
-        self.tissue.get_or_insert_default().reserve_bonds(places, pairs.len())?;
+        memory::get_or_box(&mut self.tissue)?.reserve_bonds(places, pairs.len())?;
         for id in bodies {
             self.bodies.get_mut(id.0)?.reserve_bonds()?;
         }
