@@ -104,7 +104,7 @@ fn a_world_is_loaded_whole_or_not_at_all() {
 fn what_there_is_no_memory_for_changes_nothing() {
     let mut failed = 0;
     let mut done = std::collections::BTreeMap::<&str, usize>::new();
-    for seed in 10..16 {
+    for seed in 10..18 {
         let mut caller = Caller::new(seed);
         caller.scarce = Some(|requests| LEFT.set(requests));
         let mut worlds = [World::new(WorldDefinition {

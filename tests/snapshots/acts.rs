@@ -333,8 +333,9 @@ impl Caller {
     fn make_tool(&mut self, worlds: &mut [World]) {
         let random = &mut self.random;
         let mesh = Mesh::block([0.02, 0.05, 0.02], [1, 2, 1]).expect("a mesh");
-        // What meshes share comes from the standard library's `Arc`, which has no way to fail.
-        let shape = match random.below(if self.scarce.is_some() { 3 } else { 4 }) {
+        // What tools share of meshes comes from the standard library's `Arc`, which has no way to fail.
+        let is_scarce = self.scarce.is_some();
+        let shape = match random.below(if is_scarce { 3 } else { 4 }) {
             0 => Shape::Sphere { radius: 0.015 },
             1 => Shape::Capsule {
                 radius: 0.01,
@@ -350,7 +351,7 @@ impl Caller {
         let definition = ToolDefinition {
             detection: match random.below(3) {
                 0 if is_mesh => Detection::DistanceField,
-                1 => Detection::ImageSpace,
+                1 if !is_scarce => Detection::ImageSpace,
                 _ => Detection::Exact,
             },
             resolution: 2e-3,
