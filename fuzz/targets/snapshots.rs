@@ -93,7 +93,10 @@ fn world(kind: usize) -> Vec<u8> {
             end: edge(at + 0.006),
         };
         world.cut(body, &sweep).expect("a cut");
-        world.body_mut(body).and_then(|body| body.apply_force(2, 1e-3 * Vec3::X)).expect("a force");
+        world
+            .body_mut(body)
+            .and_then(|body| body.apply_force(2, 1e-3 * Vec3::X))
+            .expect("a force");
         world.step(1e-3).expect("a step");
     }
     world.save().expect("bytes")
@@ -111,7 +114,9 @@ fuzz_target!(|input: &[u8]| {
         bytes = worlds[usize::from(kind) % worlds.len()].clone();
         let (edits, _) = edits.as_chunks::<4>();
         for &[low, high, what, value] in edits {
-            let at = HEADER + (usize::from(u16::from_le_bytes([low, high])) + (usize::from(what) >> 4 << 16)) % (bytes.len() - HEADER);
+            let at = HEADER
+                + (usize::from(u16::from_le_bytes([low, high])) + (usize::from(what) >> 4 << 16))
+                    % (bytes.len() - HEADER);
             match what & 3 {
                 0 => bytes[at] = value,
                 1 => bytes[at] ^= 1 << (value % 8),
@@ -134,10 +139,10 @@ fuzz_target!(|input: &[u8]| {
         std::process::abort();
     };
     if let Ok(mut world) = loaded {
-        let _ = catch_unwind(AssertUnwindSafe(|| {
-            let _ = world.step(1e-3);
-            let _ = world.save();
-        }));
+        // That takes longer than all the rest: one in four.
+        if kind < 64 {
+            let _ = catch_unwind(AssertUnwindSafe(|| world.step(1e-3)));
+        }
         if cfg!(planted) && edits.len() == 13 {
             eprintln!("the planted fault");
             std::process::abort();
