@@ -1,7 +1,7 @@
 //! A million frames: bodies and tools that come and go, are pushed, held, cut and torn, for as long as a day of play.
 //!
 //! `cargo bench --bench soak` (some minutes; `-- 50000`: so many frames) fails where anything that can be read is not finite, a step fails that should not, or
-//! the memory of a world that was emptied grows from one tenth to another. `-- --planted` keeps a body of each tenth, and must fail.
+//! the memory of a world that was emptied is larger in the second half than in the first by more than a hundredth. `-- --planted` keeps a body of each tenth, and must fail.
 #![allow(clippy::print_stderr)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -266,6 +266,7 @@ fn main() -> ExitCode {
     let is_planted = std::env::args().any(|argument| argument == "--planted");
     let asked = std::env::args().find_map(|argument| argument.parse().ok());
     let frames: u32 = asked.unwrap_or(FRAMES);
+    let before = HELD.load(Ordering::Relaxed);
     let mut play = Play::new();
     let mut held = Vec::new();
     for tenth in 0..TENTHS {
@@ -283,16 +284,16 @@ fn main() -> ExitCode {
             play.bodies.pop();
         }
         play.empty();
-        held.push(HELD.load(Ordering::Relaxed));
+        held.push(HELD.load(Ordering::Relaxed) - before);
     }
-    // What a world keeps room for it has asked for within the first tenths.
+    // What a world keeps room for grows by steps to the most that was ever asked for at once, which takes longer and longer to be more.
     let (early, late) = held.split_at(TENTHS as usize / 2);
     let [early, late] = [early, late].map(|held| held.iter().max().copied().unwrap_or(0));
     eprintln!(
         "\r{frames} frames: {:?}; bytes held by an empty world after each tenth: {held:?}",
         play.counts
     );
-    if late > early {
+    if late > early + early / 100 {
         eprintln!("memory grows: {early} bytes, then {late}");
         return ExitCode::FAILURE;
     }

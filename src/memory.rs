@@ -58,6 +58,15 @@ pub(crate) fn boxed<T>(value: T) -> Result<Box<T>> {
     Ok(unsafe { Box::from_raw(first) })
 }
 
+/// What is there, or made in a place of its own.
+pub(crate) fn get_or_box<T: Default>(place: &mut Option<Box<T>>) -> Result<&mut T> {
+    let there = match place.take() {
+        Some(there) => there,
+        None => boxed(T::default())?,
+    };
+    Ok(place.insert(there))
+}
+
 /// Appends `value`, growing the vector fallibly.
 pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
     values.try_reserve(1)?;

@@ -130,6 +130,19 @@ impl<T> Slots<T> {
         Ok(content)
     }
 
+    /// Takes back what was inserted, where nobody has seen its id: it is given again.
+    pub fn take_back(&mut self, id: SlotId) -> Result<T> {
+        let content = self.remove(id)?;
+        let index = id.index();
+        self.slots[index].generation -= 1;
+        // A place that nothing ever had is none.
+        while self.slots.last().is_some_and(|slot| slot.generation == 0) {
+            self.slots.pop();
+        }
+        self.first_free = self.first_free.min(self.slots.len());
+        Ok(content)
+    }
+
     pub fn get(&self, id: SlotId) -> Result<&T> {
         let index = self.index(id)?;
         self.slots[index].content.as_ref().ok_or_else(|| stale(self.noun, id))

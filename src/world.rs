@@ -21,6 +21,7 @@ use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Skin, Tissue
 use crate::cutting::Sweep;
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::readers::Clock;
 use crate::slots::{SlotId, Slots};
 use crate::snapshot::saved;
@@ -180,7 +181,7 @@ impl World {
             Ok(()) => Ok(BodyId(id)),
             Err(error) => {
                 self.leave_blades(BodyId(id));
-                self.bodies.remove(id)?;
+                self.bodies.take_back(id)?;
                 Err(error)
             }
         }
@@ -194,7 +195,7 @@ impl World {
             return Ok(());
         }
         make_walks(&mut self.walks, place)?;
-        self.tissue.get_or_insert_default().join(place, body)
+        memory::get_or_box(&mut self.tissue)?.join(place, body)
     }
 
     /// Removes a body, and with it what is attached of it.

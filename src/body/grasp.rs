@@ -8,7 +8,7 @@ use std::fmt::Display;
 
 use glam::{DVec3, Vec3};
 
-use super::{Body, Pin, Vectors};
+use super::{Body, Pin, Pins, Vectors};
 use crate::contact::{Frame, ToolPath};
 use crate::diagnostics::StateHasher;
 use crate::error::{Error, Result};
@@ -341,6 +341,11 @@ impl Body {
         Ok(())
     }
 
+    /// Keeps nothing for grasps where there are none.
+    pub(crate) fn drop_room_for_grasps(&mut self) {
+        self.grasps.take_if(|grasps| grasps.grasps.is_empty());
+    }
+
     /// Has the tool in this place hold these, for which there is room and whose nodes can be held, under these names.
     pub(crate) fn grasp(
         &mut self,
@@ -373,13 +378,12 @@ impl Body {
         let mut held = memory::reserved(nodes.len())?;
         let mut untouched = memory::reserved(nodes.len())?;
         untouched.extend(nodes.iter().map(|&node| (node, tool)));
+        let pins = Pins::of(&nodes)?;
+        // From here on nothing fails.
         close(self);
         // Damping is to be that of masses as they are.
         self.scale_masses(0.0);
-        if let Err(error) = self.pins.hold_all(&nodes) {
-            self.forget_held();
-            return Err(error);
-        }
+        self.pins.hold_all(&pins);
         for &node in &nodes {
             let gain = self.implicit.as_ref().map(|implicit| implicit.gain_of(node as usize));
             held.push(HeldNode {
@@ -458,9 +462,7 @@ impl Body {
                 }
             }
         }
-        if grasps.grasps.is_empty() {
-            self.grasps = None;
-        }
+        self.drop_room_for_grasps();
         self.forget_held();
     }
 

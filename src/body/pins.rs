@@ -203,19 +203,22 @@ impl Pins {
         Ok(self.tiles.try_reserve(tiles.saturating_sub(self.tiles.len()))?)
     }
 
-    /// Holds these nodes, which are in order and not held yet, along all axes; there is room for them.
-    pub fn hold_all(&mut self, nodes: &[u32]) -> Result<()> {
-        let Some(last) = nodes.last() else {
-            return Ok(());
+    /// Pins of these nodes, for all axes, to be [held](Self::hold_all).
+    pub fn of(nodes: &[u32]) -> Result<Vec<Pin>> {
+        let mut pins = memory::reserved(nodes.len())?;
+        pins.extend(nodes.iter().map(|&node| Pin::new(node, BVec3::TRUE)));
+        Ok(pins)
+    }
+
+    /// Holds nodes by these pins, which are in order; none of them is held yet, and there is room.
+    pub fn hold_all(&mut self, more: &[Pin]) {
+        let Some(last) = more.last() else {
+            return;
         };
-        let mut more = memory::reserved(nodes.len())?;
-        more.extend(nodes.iter().map(|&node| Pin::new(node, BVec3::TRUE)));
-        let tiles = (*last as usize / TILE + 1).max(self.tiles.len());
-        self.tiles.try_reserve(tiles - self.tiles.len())?;
-        memory::merge(&mut self.pins, &more, |pin| pin.node);
+        let tiles = (last.node as usize / TILE + 1).max(self.tiles.len());
+        memory::merge(&mut self.pins, more, |pin| pin.node);
         self.tiles.resize(tiles, 0);
         self.find_tiles();
-        Ok(())
     }
 
     /// Whether they are in order, of nodes of which there are so many, and found by tile.

@@ -72,13 +72,13 @@ pub(super) fn close(
     triangles: &[[u32; 3]],
     order: &NodeOrder,
 ) -> Result<(Surface, Vec<Cavity>)> {
-    let asked = asked(definition);
+    let (name, value) = asked(definition);
     if triangles.is_empty() {
         return Err(Error::invalid(format!(
-            "{asked}, and the body has no surface: no triangles, tetrahedra or cells"
+            "{name} is {value} Pa, and the body has no surface: no triangles, tetrahedra or cells"
         )));
     }
-    let walls = walls(&asked, triangles)?;
+    let walls = walls((name, value), triangles)?;
     let rest = definition.rest_positions.unwrap_or(definition.positions);
     let mut order_of_walls: Vec<u32> = memory::reserved(triangles.len())?;
     order_of_walls.extend(0..triangles.len() as u32);
@@ -107,7 +107,7 @@ pub(super) fn close(
         let (volume, area) = volume_of(wall);
         if !(volume.abs() > FLAT * area.powf(1.5)) {
             return Err(Error::invalid(format!(
-                "{asked}, and the closed surface of node {} encloses {volume:e} m³ at rest: it is flat",
+                "{name} is {value} Pa, and the closed surface of node {} encloses {volume:e} m³ at rest: it is flat",
                 triangles[wall[0] as usize][0]
             )));
         }
@@ -156,17 +156,17 @@ pub(super) fn close(
 }
 
 /// What a definition asks for, to begin a message with.
-fn asked(definition: &BodyDefinition) -> String {
+fn asked(definition: &BodyDefinition) -> (&'static str, f32) {
     if definition.enclosed_stiffness > 0.0 {
-        format!("enclosed_stiffness is {} Pa", definition.enclosed_stiffness)
+        ("enclosed_stiffness", definition.enclosed_stiffness)
     } else {
-        format!("pressure is {} Pa", definition.pressure)
+        ("pressure", definition.pressure)
     }
 }
 
 /// For each triangle the lowest of those that it hangs together with by edges. Each edge must have as many triangles on one side as on the
 /// other.
-fn walls(asked: &str, triangles: &[[u32; 3]]) -> Result<Vec<u32>> {
+fn walls((name, value): (&str, f32), triangles: &[[u32; 3]]) -> Result<Vec<u32>> {
     // Each edge by its lower node, with the triangles that go up along it, and those that go down.
     let mut edges: Vec<([u32; 2], bool, u32)> = memory::reserved(3 * triangles.len())?;
     for (index, &[a, b, c]) in (0..).zip(triangles) {
@@ -180,7 +180,7 @@ fn walls(asked: &str, triangles: &[[u32; 3]]) -> Result<Vec<u32>> {
         if 2 * ups != same.len() {
             let [a, b] = same[0].0;
             return Err(Error::invalid(format!(
-                "{asked}, and the surface is not closed: {ups} of its triangles go from node {a} to node {b}, {} go back",
+                "{name} is {value} Pa, and the surface is not closed: {ups} of its triangles go from node {a} to node {b}, {} go back",
                 same.len() - ups
             )));
         }

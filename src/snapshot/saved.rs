@@ -355,7 +355,7 @@ impl Saved for String {
 
     fn load(from: &mut Reader) -> Result<Self> {
         let count = usize::load(from)?;
-        let bytes = from.take(count)?.to_vec();
+        let bytes = memory::copied(from.take(count)?)?;
         Self::from_utf8(bytes).map_err(|_| from.refusal("a text is none"))
     }
 }

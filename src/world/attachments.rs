@@ -182,19 +182,23 @@ impl World {
         if grips.len() == 0 {
             return Ok(ids);
         }
-        held.reserve_grasps(grips.len())?;
         let holder = Holder::Tool(tool);
-        self.name(Attachment { body, holder }, grips.len(), &mut ids)?;
-        let held = self.bodies.get_mut(body.0)?;
-        match held.grasp(tool.0.index(), ids.iter().map(|id| id.0).zip(grips), force_limit) {
-            Ok(()) => Ok(ids),
-            Err(error) => {
-                for AttachmentId(id) in ids {
-                    self.attachments.remove(id)?;
-                }
-                Err(error)
+        let count = grips.len();
+        let answer = held
+            .reserve_grasps(count)
+            .and_then(|()| self.name(Attachment { body, holder }, count, &mut ids))
+            .and_then(|()| {
+                let named = ids.iter().map(|id| id.0).zip(grips);
+                self.bodies.get_mut(body.0)?.grasp(tool.0.index(), named, force_limit)
+            });
+        if let Err(error) = answer {
+            for AttachmentId(id) in ids.into_iter().rev() {
+                self.attachments.take_back(id)?;
             }
+            self.bodies.get_mut(body.0)?.drop_room_for_grasps();
+            return Err(error);
         }
+        Ok(ids)
     }
 
     /// Makes names for so many attachments, for which `ids` has room.
@@ -203,8 +207,8 @@ impl World {
             match self.attachments.insert(attachment) {
                 Ok(id) => ids.push(AttachmentId(id)),
                 Err(error) => {
-                    for AttachmentId(id) in ids {
-                        self.attachments.remove(*id)?;
+                    for AttachmentId(id) in ids.drain(..).rev() {
+                        self.attachments.take_back(id)?;
                     }
                     return Err(error);
                 }
@@ -273,7 +277,7 @@ impl World {
         for place in places {
             make_walks(&mut self.walks, place)?;
         }
-        self.tissue.get_or_insert_default().reserve_bonds(places, pairs.len())?;
+        memory::get_or_box(&mut self.tissue)?.reserve_bonds(places, pairs.len())?;
         for id in bodies {
             self.bodies.get_mut(id.0)?.reserve_bonds()?;
         }

@@ -9,6 +9,7 @@ use crate::body::{Body, HoldAt};
 use crate::contact::{Lead, Thread};
 use crate::cutting::Met;
 use crate::error::Result;
+use crate::memory;
 
 /// Where a proxy is to be held: a point of the tissue, and that of the proxy next to it.
 pub(super) type Held = (HoldAt, DVec3);
@@ -23,7 +24,7 @@ impl World {
         };
         body.reserve_bonds()?;
         make_walks(&mut self.walks, place)?;
-        let tissue = self.tissue.get_or_insert_default();
+        let tissue = memory::get_or_box(&mut self.tissue)?;
         tissue.bonds.reserve_rebinding(place)?;
         tissue.reserve_bonds([place; 2], count)
     }

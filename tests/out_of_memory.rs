@@ -1,4 +1,4 @@
-//! A world is saved and loaded whole or not at all, however little memory there is. Alone in its program.
+//! Whatever is asked of a world is done or not, and nothing is lost, however little memory there is. Alone in its program.
 #![allow(unsafe_code)]
 #![allow(clippy::expect_used)]
 
@@ -33,6 +33,20 @@ unsafe impl GlobalAlloc for Scarce {
         unsafe { System.alloc(layout) }
     }
 
+    /// What shrinks stays where it is, as with any allocator.
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let left = LEFT.get();
+        if size > layout.size() {
+            LEFT.set(left.map(|left| left.saturating_sub(1)));
+            if left == Some(0) {
+                return std::ptr::null_mut();
+            }
+        }
+        HELD.set(HELD.get() + size as isize - layout.size() as isize);
+        // SAFETY: the same contract.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         HELD.set(HELD.get() - layout.size() as isize);
         // SAFETY: the same contract.
@@ -52,7 +66,7 @@ fn with<T>(requests: usize, act: impl FnOnce() -> T) -> T {
 }
 
 #[test]
-fn without_memory_nothing_is_lost() {
+fn a_world_is_loaded_whole_or_not_at_all() {
     let mut failed = 0;
     for seed in [1, 4, 9] {
         let mut caller = Caller::new(seed);
@@ -84,4 +98,42 @@ fn without_memory_nothing_is_lost() {
         assert!(loaded.save().expect("bytes") == bytes);
     }
     assert!(failed > 100, "{failed} requests failed");
+}
+
+#[test]
+fn what_there_is_no_memory_for_changes_nothing() {
+    let mut failed = 0;
+    let mut done = std::collections::BTreeMap::<&str, usize>::new();
+    for seed in 10..18 {
+        let mut caller = Caller::new(seed);
+        caller.scarce = Some(|requests| LEFT.set(requests));
+        let mut worlds = [World::new(WorldDefinition {
+            max_substeps: 40,
+            ..WorldDefinition::default()
+        })
+        .expect("a world")];
+        for _ in 0..12 {
+            for _ in 0..3 {
+                caller.act(&mut worlds);
+            }
+            caller.step(&mut worlds);
+        }
+        failed += caller.failed;
+        for (what, count) in caller.done {
+            *done.entry(what).or_default() += count;
+        }
+    }
+    for what in [
+        "a plainer body",
+        "a tool",
+        "a cut",
+        "a blade",
+        "a spring added",
+        "a suture",
+        "an attachment",
+        "springs set",
+    ] {
+        assert!(done.get(what).is_some_and(|&count| count > 0), "{what}: never");
+    }
+    assert!(failed > 1000, "{failed}");
 }
