@@ -233,7 +233,7 @@ impl ToolPath {
                     .into_iter()
                     .flat_map(|(centre, orientation)| solid.corners().map(|corner| centre + orientation * corner));
                 let half_turn = 0.5 * self.turn.length();
-                let height = solid.reach() * (1.0 - half_turn.min(std::f32::consts::PI).cos());
+                let height = solid.reach() * (1.0 - libm::cosf(half_turn.min(std::f32::consts::PI)));
                 (Bounds::of(corners).extended(height), solid.reach(), solid.thickness())
             }
         };

@@ -21,10 +21,10 @@ pub(super) fn surface(radius: f32, half_length: f32) -> Result<(Vec<Vec3>, Vec<[
     for ring in 0..rings {
         let is_lower = is_long && ring >= RINGS / 2;
         let step = ring + u32::from(!is_lower);
-        let (sine, cosine) = (PI * step as f32 / RINGS as f32).sin_cos();
+        let (sine, cosine) = libm::sincosf(PI * step as f32 / RINGS as f32);
         let shift = if is_lower { -half_length } else { half_length };
         for segment in 0..SEGMENTS {
-            let (x, z) = (TAU * segment as f32 / SEGMENTS as f32).sin_cos();
+            let (x, z) = libm::sincosf(TAU * segment as f32 / SEGMENTS as f32);
             positions.push(radius * Vec3::new(sine * x, cosine, sine * z) + Vec3::Y * shift);
         }
     }

@@ -105,7 +105,7 @@ pub(super) fn close(
     let mut has_inner = false;
     for wall in order_of_walls.chunk_by(same_wall) {
         let (volume, area) = volume_of(wall);
-        if !(volume.abs() > FLAT * area.powf(1.5)) {
+        if !(volume.abs() > FLAT * area * area.sqrt()) {
             return Err(Error::invalid(format!(
                 "{name} is {value} Pa, and the closed surface of node {} encloses {volume:e} m³ at rest: it is flat",
                 triangles[wall[0] as usize][0]

@@ -102,8 +102,8 @@ impl Viscosity {
         let (retardation, relaxation) = (f64::from(self.retardation_time), f64::from(self.relaxation_time));
         let ratio = time / relaxation;
         Course {
-            decay: (-ratio).exp(),
-            gain: retardation / time * -(-ratio).exp_m1(),
+            decay: libm::exp(-ratio),
+            gain: retardation / time * -libm::expm1(-ratio),
             yields: true,
         }
     }

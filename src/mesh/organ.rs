@@ -72,7 +72,7 @@ impl Mesh {
 /// Above 0 inside the body, below outside, 0 on its surface: an ellipsoid with a blunt rim, tapered along x, notched, and
 /// bent over the x-z plane. It reaches from -1 to 1 along x.
 fn inside(p: DVec3) -> f64 {
-    let notch = 0.22 * (-((p.x - 0.35) / 0.18).powi(2)).exp();
+    let notch = 0.22 * libm::exp(-((p.x - 0.35) / 0.18).powi(2));
     let half_height = 0.26 * (1.0 - 0.4 * p.x);
     let half_depth = 0.56 * (1.0 - 0.25 * p.x) * (1.0 - notch);
     let y = p.y + 0.16 * p.x * p.x + 0.2 * p.z * p.z;

@@ -116,7 +116,7 @@ impl Resistance {
                         let behind = slope * drawn;
                         let resisting = |place: f64| {
                             let gone = place - at;
-                            let left = (begun - measured + behind) * (-gone / drawn).exp();
+                            let left = (begun - measured + behind) * libm::exp(-gone / drawn);
                             (measured + slope * gone - behind + left).max(0.0)
                         };
                         let pulling = |place: f64| self.stiffness * (way - place);

@@ -43,12 +43,11 @@ impl Coarse {
         let cells = (triangles * CELLS_PER_TRIANGLE).clamp(*CELLS.start(), *CELLS.end());
         let longest = sides.max_element();
         // A flat solid has as many cells as its largest side takes.
-        let cell = (sides
+        let volume = sides
             .as_dvec3()
             .max(sides.as_dvec3() * 0.0 + f64::from(longest) / 64.0)
-            .element_product()
-            / cells as f64)
-            .cbrt() as f32;
+            .element_product();
+        let cell = libm::cbrt(volume / cells as f64) as f32;
         let low = bounds.min - cell;
         let counts = ((sides / cell).ceil() + 2.0).as_uvec3().max(UVec3::ONE);
         let count = counts.as_u64vec3().element_product() as usize;

@@ -168,7 +168,7 @@ impl Facets {
                 self.edges[triangle.edges[corner] as usize].normal += normal;
                 let [here, next, last] = [0, 1, 2].map(|on| corners[(corner + on) % 3]);
                 let (ahead, back) = (next - here, last - here);
-                let angle = ahead.cross(back).length().atan2(ahead.dot(back));
+                let angle = libm::atan2(ahead.cross(back).length(), ahead.dot(back));
                 self.node_normals[triangle.nodes[corner] as usize] += normal * angle;
             }
         }
