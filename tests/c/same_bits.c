@@ -59,16 +59,16 @@ static sinew_body_id a_curtain(sinew_world *world)
 static void a_block(sinew_world *world)
 {
     static const float size[3] = {0.08f, 0.04f, 0.08f};
-    static const uint32_t cells[3] = {6, 3, 6};
+    static const uint32_t cells[3] = {4, 2, 4};
     sinew_mesh *mesh = NULL;
     sinew_mesh_view shape;
     sinew_body_def def;
     sinew_body_id body = {0, 0};
-    float moved[3 * 7 * 4 * 7];
+    float moved[3 * 5 * 3 * 5];
     uint32_t i;
     MUST(sinew_mesh_create_block(size, cells, &mesh));
     shape = view_of(mesh);
-    CHECK(shape.node_count == 7 * 4 * 7);
+    CHECK(shape.node_count == 5 * 3 * 5);
     for (i = 0; i < 3 * shape.node_count; i++)
         moved[i] = shape.positions[i] + (i % 3 == 0 ? 0.3f : 0);
     def = body_of(shape);
@@ -101,12 +101,12 @@ static uint64_t hash_with(uint32_t threads)
     curtain = a_curtain(world);
     a_block(world);
     tools[0] = ball(world, 0), tools[1] = ball(world, 0.3f);
-    for (frame = 0; frame < 20; frame++) {
-        const float place[2][3] = {{0.001f * frame, 0.03f - 0.003f * frame, 0}, {0.3f, 0.05f - 0.0015f * frame, 0}};
+    for (frame = 0; frame < 10; frame++) {
+        const float place[2][3] = {{0.002f * frame, 0.02f - 0.005f * frame, 0}, {0.3f, 0.045f - 0.002f * frame, 0}};
         for (i = 0; i < 2; i++)
             MUST(sinew_tool_set_pose(world, tools[i], place[i], NULL));
         MUST(sinew_world_step(world, 1.0f / 60, NULL));
-        if (frame == 10) {
+        if (frame == 5) {
             cut.struct_size = sizeof cut;
             MUST(sinew_body_cut(world, curtain, start, end, &cut));
             CHECK(cut.new_nodes > 0);
