@@ -69,7 +69,7 @@ pub enum Solver {
 pub(crate) const SMALLEST_MASS: f32 = 1e-37;
 
 /// The most iterations of a step.
-const MOST_ITERATIONS: u32 = 1_000_000;
+pub(crate) const MOST_ITERATIONS: u32 = 1_000_000;
 
 /// What a body is made of. Plain data, used only during [`World::create_body`](crate::World::create_body).
 #[derive(Clone, Copy, Debug)]

@@ -53,7 +53,8 @@ use cuttable::Cuttable;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub use definition::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use definition::{
-    SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices, not_negative,
+    MOST_ITERATIONS, SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices,
+    not_negative,
 };
 pub(crate) use grasp::{Grasps, Grip, Lapse};
 pub(crate) use grow::NewNode;

@@ -23,7 +23,7 @@ pub(super) use step::{begin_parts, next_part, parts_near, run};
 
 use glam::Vec3;
 
-use crate::body::{Records, Vectors};
+use crate::body::{MOST_ITERATIONS, Records, Vectors};
 use crate::diagnostics::{SolverReport, StateHasher};
 use crate::elements::{Elements, Sums};
 use crate::enclosed::{self, Enclosed};
@@ -218,7 +218,7 @@ saved!(Implicit {
     newton,
     report,
     told
-});
+} where Self::ends);
 
 impl Experience {
     const NONE: Self = Self {
@@ -229,6 +229,11 @@ impl Experience {
 }
 
 impl Implicit {
+    /// Whether a step of it ends as soon as one that a caller may ask for.
+    fn ends(&self) -> bool {
+        self.budget <= MOST_ITERATIONS
+    }
+
     /// For nodes at these positions, whose springs gather them or not; what is 0 is as by default.
     pub fn new(positions: &Vectors, gathers: bool, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
         Self::solving(positions, positions.len(), gathers, order, budget, accuracy)
