@@ -47,7 +47,8 @@ pub struct WorldDefinition {
     /// [`Solver::Newton`](crate::Solver::Newton) near a tool, whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms,
     /// and where a substep of theirs gains energy: then they are cut again, to 4096 in all.
     pub substeps: u32,
-    /// A step that needs more is [`Error::Unstable`]; at least 1. What is cut as above is no such need.
+    /// A step that needs more is [`Error::Unstable`]; at least 1. What is cut as above may be 4096 parts whatever this is, and one that would
+    /// take more of them, 4 s near a tool or 1 s attached to a body, is [`Error::Unstable`] too.
     pub max_substeps: u32,
     /// Metres; 0: off; above 0, with `substeps` 0: a step's own position error stays below it.
     pub tolerance: f32,

@@ -9,7 +9,13 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use acts::Caller;
-use sinew::{Error, World, WorldDefinition};
+use glam::{Vec3, vec3};
+use sinew::cutting::Sweep;
+use sinew::mesh::Mesh;
+use sinew::{
+    BodyContact, BodyDefinition, BodyId, EmbeddingDefinition, Error, Material, Model, Result, Solver, SpringLaw,
+    Storage, Tearing, Values, World, WorldDefinition,
+};
 
 thread_local! {
     /// How many more times this thread is given memory; `None`: as often as it asks.
@@ -63,6 +69,31 @@ fn with<T>(requests: usize, act: impl FnOnce() -> T) -> T {
     let done = act();
     LEFT.set(None);
     done
+}
+
+/// Asks with memory for 0, 1, 2 ... requests until there is enough; nothing that was refused holds any. What came of it, and how often there
+/// was too little, after which `look` looks.
+fn ask<T>(mut act: impl FnMut() -> Result<T>, mut look: impl FnMut()) -> (T, usize) {
+    let mut failed = 0;
+    loop {
+        let before = HELD.get();
+        match with(failed, &mut act) {
+            Ok(done) => return (done, failed),
+            Err(error) => assert!(matches!(error, Error::OutOfMemory), "request {failed}: {error}"),
+        }
+        // What a world keeps room for from now on is no loss: it is asked for once.
+        let kept = HELD.get() - before;
+        assert!(
+            kept == 0 || with(failed, &mut act).is_err() && HELD.get() - before == kept,
+            "{kept} bytes"
+        );
+        look();
+        failed += 1;
+    }
+}
+
+fn plain_world() -> World {
+    World::new(WorldDefinition::default()).expect("a world")
 }
 
 #[test]
@@ -136,4 +167,243 @@ fn what_there_is_no_memory_for_changes_nothing() {
         assert!(done.get(what).is_some_and(|&count| count > 0), "{what}: never");
     }
     assert!(failed > 1000, "{failed}");
+}
+
+#[test]
+fn a_world_is_created_or_not() {
+    use sinew::capi::status::{SINEW_STATUS_OK, SINEW_STATUS_OUT_OF_MEMORY};
+    use sinew::capi::world::{sinew_world_create, sinew_world_destroy};
+    let before = HELD.get();
+    let mut failed = 0;
+    loop {
+        let mut world = std::ptr::null_mut();
+        // SAFETY: no definition stands for the defaults, and there is a place for the world.
+        let status = with(failed, || unsafe {
+            sinew_world_create(std::ptr::null(), &raw mut world)
+        });
+        if status == SINEW_STATUS_OK {
+            // SAFETY: it was made above.
+            unsafe { sinew_world_destroy(world) };
+            break;
+        }
+        assert!(status == SINEW_STATUS_OUT_OF_MEMORY && world.is_null());
+        failed += 1;
+    }
+    assert!(failed > 0, "a world that takes no memory");
+    assert_eq!(HELD.get(), before);
+}
+
+/// What a body of a block may have beside springs.
+const KINDS: [(&str, fn(&mut BodyDefinition)); 5] = [
+    ("springs", |_| ()),
+    ("damped springs that may be cut", |body| {
+        (body.spring_dampings, body.spare_nodes) = (Values::Uniform(1e-2), 60);
+    }),
+    ("elements", |body| {
+        (body.masses, body.stiffnesses) = (Values::Uniform(0.0), Values::Uniform(0.0));
+        body.material = Some(Material {
+            model: Model::Tetrahedra,
+            young_modulus: 3e3,
+            poisson_ratio: 0.45,
+            density: 1000.0,
+            thickness: 0.0,
+        });
+    }),
+    ("terms", |body| {
+        (body.volume_stiffness, body.bending_stiffness) = (1e4, 1e-6);
+        (body.home_stiffnesses, body.enclosed_stiffness) = (Values::Uniform(0.1), 100.0);
+        body.spring_law = SpringLaw::Cubic {
+            quadratic: 0.5,
+            cubic: 1.0,
+            limit: 0.5,
+        };
+    }),
+    ("contact", |body| {
+        body.contact = BodyContact {
+            with_bodies: true,
+            with_itself: true,
+            thickness: 1e-3,
+            ..BodyContact::default()
+        };
+    }),
+];
+
+#[test]
+fn a_body_of_any_kind_is_created_or_not() {
+    let mesh = Mesh::block([0.1; 3], [2, 1, 2]).expect("a block");
+    let mut all = 0;
+    for storage in [
+        Storage::Packed,
+        Storage::Efficient,
+        Storage::FastLink,
+        Storage::DynamicBulk,
+    ] {
+        for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {
+            for (kind, change) in KINDS {
+                let mut definition = BodyDefinition {
+                    positions: &mesh.positions,
+                    triangles: &mesh.triangles,
+                    tetrahedra: &mesh.tetrahedra,
+                    masses: Values::Uniform(1e-3),
+                    stiffnesses: Values::Uniform(20.0),
+                    storage,
+                    springs_per_node: 60,
+                    solver,
+                    ..BodyDefinition::default()
+                };
+                change(&mut definition);
+                // Beside one of its kind, with which it goes on afterwards as in a world that never lacked memory.
+                let [scarce, plenty] = [(); 2].map(|()| {
+                    let mut world = plain_world();
+                    world.create_body(&definition).expect("a body");
+                    world.step(1e-3).expect("a step");
+                    std::cell::RefCell::new(world)
+                });
+                let hash = plenty.borrow().state_hash();
+                let (_, failed) = ask(
+                    || scarce.borrow_mut().create_body(&definition),
+                    || assert_eq!(scarce.borrow().state_hash(), hash, "{storage:?}, {solver:?}, {kind}"),
+                );
+                all += failed;
+                plenty.borrow_mut().create_body(&definition).expect("a body");
+                for world in [&scarce, &plenty] {
+                    world.borrow_mut().step(1e-3).expect("a step");
+                }
+                assert_eq!(scarce.borrow().state_hash(), plenty.borrow().state_hash());
+            }
+        }
+    }
+    assert!(all > 60 * 20, "{all} requests failed");
+}
+
+#[test]
+fn a_surface_is_bound_or_not() {
+    let block = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
+    let sheet = Mesh::cloth([0.1; 2], [4, 4]).expect("a sheet");
+    let fine = Mesh::block([0.09; 3], [4, 4, 4]).expect("a fine block");
+    let blade = Sweep {
+        start: [vec3(0.01, -0.1, -0.1), vec3(0.01, 0.1, -0.1)],
+        end: [vec3(0.01, -0.1, 0.0), vec3(0.01, 0.1, 0.0)],
+    };
+    for (mesh, is_cut) in [(&block, false), (&block, true), (&sheet, false), (&sheet, true)] {
+        let mut world = plain_world();
+        let body = world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            tetrahedra: &mesh.tetrahedra,
+            masses: Values::Uniform(1e-3),
+            stiffnesses: Values::Uniform(20.0),
+            spare_nodes: 300,
+            ..BodyDefinition::default()
+        });
+        let body = body.expect("a body");
+        if is_cut {
+            world.cut(body, &blade).expect("a cut");
+        }
+        let definition = EmbeddingDefinition {
+            vertices: &fine.positions,
+            triangles: &fine.triangles,
+            tetrahedra: &mesh.tetrahedra,
+        };
+        let (mut embedding, bound) = ask(|| world.create_embedding(body, &definition), || ());
+        let mut other = world.create_embedding(body, &definition).expect("an embedding");
+        let back = Sweep {
+            start: blade.end,
+            end: blade.end.map(|place| place + Vec3::Z * 0.1),
+        };
+        world.cut(body, &back).expect("a cut");
+        world.step(1e-3).expect("a step");
+        // It follows the cut, or is where it was until there is memory for that.
+        let ((), followed) = ask(|| embedding.update(&world), || ());
+        other.update(&world).expect("an update");
+        assert_eq!(embedding.positions(), other.positions());
+        assert_eq!(embedding.triangles(), other.triangles());
+        assert!(bound > 3, "{bound} and {followed} requests failed");
+    }
+}
+
+#[test]
+fn tissue_is_made_of_a_surface_or_not() {
+    let surface = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
+    let definition = BodyDefinition {
+        positions: &surface.positions,
+        triangles: &surface.triangles,
+        masses: Values::Uniform(1e-3),
+        stiffnesses: Values::Uniform(20.0),
+        ..BodyDefinition::default()
+    };
+    let mut world = plain_world();
+    let empty = world.state_hash();
+    let mut requests = 0;
+    while let Err(error) = with(requests, || world.create_body_from_surface(&definition, 0.03)) {
+        assert!(matches!(error, Error::OutOfMemory), "request {requests}: {error}");
+        assert_eq!(world.state_hash(), empty, "request {requests}");
+        requests += 1;
+    }
+    assert!(requests > 50, "{requests} requests failed");
+    let mut other = plain_world();
+    { other.create_body_from_surface(&definition, 0.03) }.expect("tissue");
+    assert_eq!(world.state_hash(), other.state_hash());
+}
+
+/// A sheet that is pulled apart, and tears.
+fn pulled() -> (World, BodyId) {
+    let mesh = Mesh::cloth([0.1; 2], [8, 4]).expect("a sheet");
+    let stretched: Vec<Vec3> = mesh
+        .positions
+        .iter()
+        .map(|place| *place * vec3(1.5, 1.0, 1.0))
+        .collect();
+    let mut world = plain_world();
+    let body = world.create_body(&BodyDefinition {
+        positions: &stretched,
+        rest_positions: Some(&mesh.positions),
+        triangles: &mesh.triangles,
+        masses: Values::Uniform(1e-3),
+        stiffnesses: Values::Uniform(20.0),
+        spare_nodes: 200,
+        tearing: Tearing {
+            strain: 0.3,
+            most_per_step: 3,
+            ..Tearing::default()
+        },
+        ..BodyDefinition::default()
+    });
+    (world, body.expect("a sheet"))
+}
+
+#[test]
+fn a_step_without_memory_leaves_tears_for_another_time() {
+    let mass = |world: &World, body| {
+        let body = world.body(body).expect("a sheet");
+        (0..body.node_count() as u32)
+            .map(|node| f64::from(body.node_mass(node).expect("a mass")))
+            .sum::<f64>()
+    };
+    let report = |world: &World, body| world.body(body).expect("a sheet").tear_report();
+    let (mut plenty, body) = pulled();
+    let before = mass(&plenty, body);
+    plenty.step(1e-3).expect("a step");
+    let expected = report(&plenty, body);
+    assert!(expected.tears > 0 && expected.no_room == 0, "{expected:?}");
+    let mut failed = 0;
+    loop {
+        let (mut world, body) = pulled();
+        with(failed, || world.step(1e-3)).expect("a step");
+        let first = report(&world, body);
+        for _ in 0..3 {
+            assert!((mass(&world, body) - before).abs() < 1e-6 * before);
+            world.step(1e-3).expect("a step with memory");
+        }
+        assert!(
+            world.body(body).expect("a sheet").topology_version() > 0,
+            "request {failed}: nothing tore"
+        );
+        if first == expected {
+            break;
+        }
+        assert!(first.no_room > 0, "request {failed}: {first:?}");
+        failed += 1;
+    }
+    assert!(failed > 5, "{failed} requests failed");
 }

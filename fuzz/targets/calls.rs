@@ -30,9 +30,6 @@ struct Model {
     attachments: Vec<AttachmentId>,
 }
 
-/// Most of a step, s.
-const LONG: f32 = 0.05;
-
 /// A number as callers send them: mostly sensible, sometimes none.
 fn number(input: &mut Unstructured) -> Result<f32> {
     const ODD: [f32; 12] = [
@@ -290,8 +287,6 @@ impl Model {
             17 => world.set_gravity(vector(input)?),
             _ => {
                 let dt = amount(input, 0.02)?;
-                // Bodies of IMPLICIT and NEWTON take parts of a millisecond where they touch, however many: no more than some here.
-                let dt = if dt > LONG { LONG } else { dt };
                 world.step(dt).map(|_| ())
             }
         };

@@ -54,8 +54,9 @@ pub struct sinew_world_def {
     /// whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms, and where a substep of theirs gains energy: then
     /// they are cut again, to 4096 in all.
     pub substeps: u32,
-    /// Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, is no
-    /// such need: near a tool a long step of theirs takes as many parts, and as much longer.
+    /// Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, may be 4096
+    /// parts whatever this is; one that would take more of them, 4 s near a tool or 1 s attached to a body, is
+    /// SINEW_STATUS_UNSTABLE too.
     pub max_substeps: u32,
     /// m; 0, the default: off, as it is with fixed substeps; above 0, with substeps 0: a step's own position error stays below it.
     pub tolerance: f32,

@@ -21,6 +21,9 @@ const RESERVE_ANYWHERE: f32 = 0.9;
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 4;
 
+/// Near tools and other tissue a step of IMPLICIT or NEWTON is cut into as many parts as this, whatever is allowed otherwise: 4 s of them.
+const MOST_PARTS: u32 = 1 << 12;
+
 /// A step with more substeps than this looks whether the positions allow longer ones: an estimate takes about as long as
 /// so many.
 const WORTH_ESTIMATING: f32 = 8.0;
@@ -36,6 +39,17 @@ pub(crate) struct StepRequest<'a> {
     /// Metres; 0: off.
     pub tolerance: f32,
     pub tools: &'a [ToolPath],
+}
+
+impl StepRequest<'_> {
+    /// In how many parts a step is taken at most that is cut because something is near: what is longer would take as long as it
+    /// liked.
+    pub fn most_parts(&self) -> u32 {
+        MOST_PARTS.max(match self.substeps {
+            0 => self.max_substeps,
+            fixed => fixed,
+        })
+    }
 }
 
 /// What one step hands to the next beside the state.
@@ -86,6 +100,15 @@ pub(crate) enum Outcome {
     },
 }
 
+impl From<TooLong> for Outcome {
+    fn from(TooLong { stable_substep }: TooLong) -> Self {
+        Outcome::Unstable {
+            stable_substep,
+            error: 0.0,
+        }
+    }
+}
+
 /// Takes a step of `body` without making it current.
 pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
     body.rouse(request.tools);
@@ -99,17 +122,11 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
     if request.substeps > 0 {
         return match verlet::run(body, request, request.substeps, 0, start, 0.0, team) {
             Ok(taken) => finish(body, request.substeps, taken, 0.0),
-            Err(too_long) => Outcome::Unstable {
-                stable_substep: too_long.stable_substep,
-                error: 0.0,
-            },
+            Err(too_long) => too_long.into(),
         };
     }
     match run_stably(body, request, start, beside_springs, team) {
-        Err(too_long) => Outcome::Unstable {
-            stable_substep: too_long.stable_substep,
-            error: 0.0,
-        },
+        Err(too_long) => too_long.into(),
         Ok((substeps, taken)) if request.tolerance == 0.0 => finish(body, substeps, taken, 0.0),
         Ok((substeps, taken)) => run_to_tolerance(body, request, substeps, start, taken.carry, team),
     }
@@ -187,7 +204,10 @@ fn attempt_implicitly(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
         implicit.attempt();
     }
     let asked = request.substeps.max(1);
-    let (substeps, taken) = implicit::run(body, request, asked, middle(asked), start, team);
+    let (substeps, taken) = match implicit::run(body, request, asked, middle(asked), start, team) {
+        Ok(taken) => taken,
+        Err(too_long) => return too_long.into(),
+    };
     if request.tolerance == 0.0 || request.substeps > 0 {
         finish(body, substeps, taken, 0.0)
     } else {
@@ -205,7 +225,7 @@ fn run(
     team: &Team,
 ) -> Result<Taken, TooLong> {
     if body.implicit.is_some() {
-        Ok(implicit::run(body, request, substeps, middle, start, team).1)
+        implicit::run(body, request, substeps, middle, start, team).map(|(_, taken)| taken)
     } else {
         verlet::run(body, request, substeps, middle, start, 0.0, team)
     }

@@ -57,10 +57,15 @@ impl Together<'_> {
         let allowed = if request.substeps > 0 { 0 } else { ATTEMPTS };
         let mut stable_substep = f32::INFINITY;
         let mut is_taken = false;
-        let is_beyond = request.substeps == 0 && needed > request.max_substeps;
-        if is_beyond {
+        let is_beyond = if request.substeps == 0 && needed > request.max_substeps {
             stable_substep = request.dt / needed as f32;
-        }
+            true
+        } else if substeps > request.most_parts() {
+            stable_substep = request.dt / substeps as f32;
+            true
+        } else {
+            false
+        };
         for attempt in (0..=allowed).filter(|_| !is_beyond) {
             match self.go(group, bodies, substeps, attempt == allowed) {
                 Ok(()) => {

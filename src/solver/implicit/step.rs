@@ -11,7 +11,7 @@ use crate::snapshot::saved;
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
-use crate::solver::verlet::{Taken, begin};
+use crate::solver::verlet::{Taken, TooLong, begin};
 use crate::springs::{Tangent, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
@@ -61,7 +61,7 @@ const SHARE: u32 = 32;
 
 /// Takes the step in `substeps` equal parts, each a solved equation. Where one ends with more energy than was put in, it was
 /// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
-/// down. How many parts were taken, and what came of them.
+/// down. How many parts were taken, and what came of them; refused is what is near something and would take more parts than a step may.
 pub(in crate::solver) fn run(
     body: &mut Body,
     request: &StepRequest,
@@ -69,7 +69,7 @@ pub(in crate::solver) fn run(
     middle: u32,
     start: Carry,
     team: &Team,
-) -> (u32, Taken) {
+) -> Result<(u32, Taken), TooLong> {
     let mut end = End::NotFinite;
     let mut parts = 1;
     if let Some(mut implicit) = body.implicit.take() {
@@ -79,18 +79,26 @@ pub(in crate::solver) fn run(
             .ceil()
             .max(1.0);
         let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
-        if contact::is_near(body) {
+        let mut is_near = contact::is_near(body);
+        if is_near {
             parts = short;
         }
         implicit.grant(substeps.saturating_mul(parts));
         let mut cuts = 0;
         loop {
+            if is_near && short > 1 && substeps * short > request.most_parts() {
+                body.implicit = Some(implicit);
+                return Err(TooLong {
+                    stable_substep: contact::LONGEST as f32,
+                });
+            }
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
             let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS;
             end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
             match end {
                 End::Fine => break,
                 End::Near => {
+                    is_near = true;
                     parts = parts.max(short);
                     implicit.grant(substeps.saturating_mul(parts));
                 }
@@ -107,7 +115,7 @@ pub(in crate::solver) fn run(
         carry: start,
         finite: end == End::Fine,
     };
-    (substeps.saturating_mul(parts), taken)
+    Ok((substeps.saturating_mul(parts), taken))
 }
 
 impl Implicit {
