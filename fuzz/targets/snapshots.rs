@@ -25,6 +25,23 @@ const STORAGES: [Storage; 4] = [
     Storage::DynamicBulk,
 ];
 
+/// How many substeps a caller fixed and allowed, which is their business, however many they are: where a snapshot has that.
+fn substeps() -> &'static [usize] {
+    static PLACES: OnceLock<Vec<usize>> = OnceLock::new();
+    PLACES.get_or_init(|| {
+        let saved = |substeps, max_substeps| {
+            let definition = WorldDefinition {
+                substeps,
+                max_substeps,
+                ..WorldDefinition::default()
+            };
+            World::new(definition).and_then(|world| world.save()).expect("bytes")
+        };
+        let (some, others) = (saved(1, 1), saved(!1, !1));
+        (HEADER..some.len()).filter(|&at| some[at] != others[at]).collect()
+    })
+}
+
 /// Small worlds, each with something of its own.
 fn worlds() -> &'static [Vec<u8>] {
     static WORLDS: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
@@ -123,6 +140,10 @@ fuzz_target!(|input: &[u8]| {
                 2 => bytes[at] = bytes[at].wrapping_add(value as i8 as u8),
                 _ => bytes[at..].iter_mut().take(8).for_each(|byte| *byte = value),
             }
+        }
+        let saved = &worlds[usize::from(kind) % worlds.len()];
+        for &at in substeps() {
+            bytes[at] = saved[at];
         }
     }
     // As somebody would who wants them to be believed.

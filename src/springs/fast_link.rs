@@ -28,7 +28,13 @@ pub(super) struct FastLink<L> {
     places: Vec<L>,
 }
 
-saved!([L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places });
+saved!([L: Saved] FastLink<L> { kernel, node_count, spring_count, springs_per_node, places } where Self::has_rows);
+
+impl<L> FastLink<L> {
+    fn has_rows(&self) -> bool {
+        self.springs_per_node > 0 && self.node_count.checked_mul(self.springs_per_node) == Some(self.places.len())
+    }
+}
 
 impl<L: KeptLink> FastLink<L> {
     /// Rows of `springs_per_node` places; 0: as many as the node with the most springs needs, at least one.
