@@ -5,8 +5,8 @@ mod support;
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, BodyId, Material, Pose, Shape, Sleep, Solver, Storage, ToolDefinition, ToolId, Values, World,
-    WorldDefinition,
+    BodyDefinition, BodyId, Error, Material, Pose, Shape, Sleep, Solver, Storage, ToolDefinition, ToolId, Values,
+    World, WorldDefinition,
 };
 
 const SLEEP: Sleep = Sleep { speed: 1e-3, time: 0.1 };
@@ -394,4 +394,40 @@ fn a_thousand_sleeps_lead_nowhere() {
         "{} J, {first} J at first",
         energy(&world)
     );
+}
+
+#[test]
+fn a_refused_step_wakes_nobody() {
+    for damping in [0.0, 1e-3] {
+        let change = |definition: &mut BodyDefinition| {
+            definition.material = None;
+            definition.masses = Values::Uniform(1e-4);
+            definition.stiffnesses = Values::Uniform(50.0);
+            definition.spring_dampings = Values::Uniform(damping);
+        };
+        let [mut asked, mut other] = [(); 2].map(|()| {
+            let mut slab = slab(SLEEP, 1, change);
+            slab.run(1.5);
+            slab
+        });
+        assert_eq!(asked.awake(), 0.0);
+        let to_touch = Vec3::new(0.0, asked.top() + 0.9 * RADIUS, 0.0);
+        for slab in [&mut asked, &mut other] {
+            slab.world.set_pose(slab.ball, to_touch, None).expect("a pose");
+        }
+        let hash = asked.world.state_hash();
+        for _ in 0..2 {
+            let refused = asked.world.step(100.0);
+            assert!(matches!(refused, Err(Error::Unstable { .. })), "{refused:?}");
+            assert_eq!(asked.awake(), 0.0);
+            assert_eq!(asked.world.state_hash(), hash);
+        }
+        for _ in 0..3 {
+            for slab in [&mut asked, &mut other] {
+                slab.world.step(DT).expect("a step");
+                assert!(slab.awake() > 0.0);
+            }
+            assert_eq!(asked.world.state_hash(), other.world.state_hash());
+        }
+    }
 }

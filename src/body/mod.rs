@@ -728,6 +728,7 @@ impl Body {
 
     /// Prepares again what an attempted step that is not committed has changed.
     pub(crate) fn put_back(&mut self) {
+        self.sleep_again();
         if let Some(implicit) = &mut self.implicit {
             implicit.put_back();
         }

@@ -93,6 +93,10 @@ pub(crate) struct Sleeper {
     margin: f32,
     /// The length of the last step that was taken, s: what tools felt in it they feel for as long as the body sleeps.
     step: f32,
+    /// What a step that is tried has woken: for how long each tile had been at rest, and whether it slept; nothing where nothing was.
+    before: Vec<(f32, bool)>,
+    /// Whether the body's forces were known then.
+    knew_forces: bool,
 }
 
 saved!(Sleeper {
@@ -105,7 +109,9 @@ saved!(Sleeper {
     in_parts,
     bounds,
     margin,
-    step
+    step,
+    before,
+    knew_forces
 });
 
 impl Sleeper {
@@ -135,6 +141,7 @@ impl Sleeper {
     /// Makes room for so many tiles.
     pub fn reserve(&mut self, tiles: usize) -> Result<()> {
         memory::reserve(&mut self.tiles, tiles)?;
+        memory::reserve(&mut self.before, tiles)?;
         memory::reserve(&mut self.asleep, tiles)
     }
 
@@ -203,6 +210,48 @@ impl Body {
         }
     }
 
+    /// The same for a step that is tried: where it is not taken, [`Body::sleep_again`] puts back what was.
+    pub(crate) fn wake_to_step(&mut self) {
+        self.note_sleep();
+        self.wake();
+    }
+
+    /// Keeps what sleeps before a step that is tried wakes it.
+    fn note_sleep(&mut self) {
+        if let Some(sleeper) = &mut self.sleeper
+            && sleeper.before.is_empty()
+        {
+            let tiles = sleeper.tiles.iter().zip(&sleeper.asleep);
+            sleeper
+                .before
+                .extend(tiles.map(|(it, &is_asleep)| (it.quiet, is_asleep)));
+            sleeper.knew_forces = self.forces_current;
+        }
+    }
+
+    /// The step that was tried is not taken: what it woke is as it was.
+    pub(super) fn sleep_again(&mut self) {
+        if let Some(sleeper) = &mut self.sleeper
+            && !sleeper.before.is_empty()
+        {
+            let Sleeper {
+                tiles, asleep, before, ..
+            } = &mut **sleeper;
+            for ((it, is_asleep), (quiet, slept)) in tiles.iter_mut().zip(asleep).zip(before.drain(..)) {
+                (it.quiet, *is_asleep) = (quiet, slept);
+            }
+            sleeper.asleep_count = sleeper.asleep.iter().filter(|&&is_asleep| is_asleep).count();
+            self.forces_current = sleeper.knew_forces;
+        }
+    }
+
+    /// The step that was tried is taken.
+    pub(super) fn forget_sleep(&mut self) {
+        if let Some(sleeper) = &mut self.sleeper {
+            sleeper.before.clear();
+        }
+    }
+
     /// What tools hold up is awake as long as anything is: what they feel is worked out anew.
     fn wake_touched(&mut self) {
         if let Some(sleeper) = &mut self.sleeper {
@@ -226,6 +275,7 @@ impl Body {
 
     /// The step is over in which nothing of it changed.
     pub(crate) fn sleep_on(&mut self) {
+        self.forget_sleep();
         if let Some(contacts) = &mut self.contacts {
             contacts.sleep_on();
         }
@@ -251,6 +301,8 @@ impl Body {
                 bounds: Bounds::EMPTY,
                 margin: 0.0,
                 step: 0.0,
+                before: memory::reserved(tiles)?,
+                knew_forces: false,
             };
             self.join_tiles(&mut sleeper)?;
             self.sleeper = Some(memory::boxed(sleeper)?);
@@ -306,7 +358,7 @@ impl Body {
             return;
         }
         if self.is_grasped() {
-            self.wake();
+            self.wake_to_step();
             return;
         }
         let Some((margin, bounds)) = self.sleeper.as_ref().map(|sleeper| (sleeper.margin, sleeper.bounds)) else {
@@ -319,6 +371,7 @@ impl Body {
             if !tool.is_near(&bounds, self.origin, 0.0) {
                 continue;
             }
+            self.note_sleep();
             let Some(sleeper) = &mut self.sleeper else {
                 return;
             };
@@ -337,6 +390,7 @@ impl Body {
 
     /// After a step of `dt` seconds: what has been at rest for long enough falls asleep, and what its neighbours pull at wakes.
     pub(crate) fn doze(&mut self, dt: f32, (tools, gravity): (&[ToolPath], Vec3), team: &Team) {
+        self.forget_sleep();
         let Some(mut sleeper) = self.sleeper.take() else {
             return;
         };

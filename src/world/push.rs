@@ -25,6 +25,9 @@ const SLACK: f64 = 0.2;
 /// A proxy that stands in tissue is followed by cuts of no less than this part of a cell: shorter ones would zigzag from what they snap to.
 const SHORTEST_CUT: f64 = 0.2;
 
+/// The same in solids: the further the cut is behind, the more it lets go at once, and what springs back then is lost.
+const SHORTEST_CUT_IN_SOLIDS: f64 = 0.1;
+
 impl World {
     /// Has the proxy of a blade in a body follow it, and cuts what is between. Where it fails the proxy stays.
     pub(super) fn follow_blade(
@@ -208,11 +211,12 @@ impl World {
         let advance = resistance.advance((&blade.met, reach), way, held, &mut blade.knots)?;
         let at = blade.proxy(id)?;
         let (proxy, report, met) = (&mut blade.proxies[at], &mut blade.report, &blade.met[..]);
+        let is_solid = met.iter().any(|part| part.is_area);
         let mut begins = 0.0;
         if standing.is_none() {
             begins = met.iter().map(|part| part.times[0]).fold(1.0, f64::min);
             self.let_go_of_blade(proxy);
-            if proxy.was_outside == Some(true) && met.iter().any(|part| part.is_area) {
+            if proxy.was_outside == Some(true) && is_solid {
                 // The skin bulges beside where an edge presses it.
                 proxy.behind = lag.normalize_or_zero() * size_of(met);
             }
@@ -222,7 +226,8 @@ impl World {
             mut force,
             cuts,
         } = advance;
-        let is_due = proxy.uncut + way * (part - begins) >= SHORTEST_CUT * size_of(met);
+        let shortest = if is_solid { SHORTEST_CUT_IN_SOLIDS } else { SHORTEST_CUT };
+        let is_due = proxy.uncut + way * (part - begins) >= shortest * size_of(met);
         let is_through = force.is_none() && (cuts || standing.is_some());
         let mut points = NOWHERE;
         let mut result = Ok(());

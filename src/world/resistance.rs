@@ -13,7 +13,7 @@ const BRIDGED: f64 = 0.1;
 const STEEPEST: f64 = 0.1;
 
 /// In solids what holds is drawn after what is measured over this part of a cell.
-const DRAWN: f64 = 0.2;
+const DRAWN: f64 = 0.1;
 
 /// What of a way is less than this part of a cell is rounding.
 const ROUNDING: f64 = 1e-4;

@@ -130,7 +130,7 @@ impl World {
         // What meets other tissue, or is joined to it, does not sleep.
         for (place, body) in bodies.iter_mut() {
             if tissue.group(place).is_some() {
-                body.wake();
+                body.wake_to_step();
             }
         }
         attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);

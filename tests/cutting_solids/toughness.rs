@@ -146,6 +146,8 @@ fn the_work_of_a_stroke_is_toughness_times_area() {
         (Solver::Verlet, true, 60),
         (Solver::Verlet, true, 250),
         (Solver::Verlet, true, 1000),
+        (Solver::Verlet, true, 2000),
+        (Solver::Verlet, true, 4000),
         (Solver::Verlet, false, 250),
         (Solver::Implicit, true, 250),
         (Solver::Implicit, false, 250),
