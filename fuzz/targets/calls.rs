@@ -85,7 +85,7 @@ impl Model {
     fn new(input: &mut Unstructured) -> Result<Self> {
         let definition = WorldDefinition {
             substeps: *input.choose(&[0, 0, 0, 1, 3])?,
-            max_substeps: 200,
+            max_substeps: 32,
             thread_count: *input.choose(&[1, 1, 2])?,
             ..WorldDefinition::default()
         };
