@@ -370,8 +370,9 @@ typedef struct sinew_world_def {
    */
   uint32_t substeps;
   /**
-   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, is no
-   * such need: near a tool a long step of theirs takes as many parts, and as much longer.
+   * Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, may be 4096
+   * parts whatever this is; one that would take more of them, 4 s near a tool or 1 s attached to a body, is
+   * SINEW_STATUS_UNSTABLE too.
    */
   uint32_t max_substeps;
   /**

@@ -222,7 +222,7 @@ fn pieces_of_surface(surface: &CutSurface, homes: &Homes<3>) -> Result<Vec<Piece
             pieces.push(Piece { home, nodes, corners });
         }
     }
-    pieces.sort_by_key(|piece| piece.home);
+    pieces.sort_unstable_by_key(|piece| (piece.home, piece.nodes));
     Ok(pieces)
 }
 
@@ -238,6 +238,6 @@ fn pieces_of_solid(solid: &CutSolid, homes: &Homes<4>) -> Result<Vec<Piece<4>>> 
             pieces.push(Piece { home, nodes, corners });
         }
     }
-    pieces.sort_by_key(|piece| piece.home);
+    pieces.sort_unstable_by_key(|piece| (piece.home, piece.nodes));
     Ok(pieces)
 }

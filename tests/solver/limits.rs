@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
-use sinew::{BodyContact, BodyDefinition, Error, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{
+    Anchor, BodyContact, BodyDefinition, Error, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition,
+};
 
 fn world() -> World {
     World::new(WorldDefinition::default()).expect("a world")
@@ -105,24 +107,23 @@ fn a_step_near_something_takes_no_more_than_so_many_parts() {
             solver,
             ..BodyDefinition::default()
         };
-        let held = |with_bodies| {
-            let mut world = world();
+        let hang = |world: &mut World, with_bodies| {
             let body = world.create_body(&cloth(with_bodies)).expect("a cloth");
             for corner in [0, 2, 6, 8] {
                 world.body_mut(body).expect("a cloth").pin(corner).expect("a pin");
             }
-            (world, body)
+            body
         };
-        let (mut near_tissue, _) = held(true);
-        near_tissue.create_body(&cloth(true)).expect("a second cloth");
-        let (mut near_a_tool, _) = held(false);
+        let [mut near_tissue, mut near_a_tool, mut attached] = [(); 3].map(|()| world());
+        hang(&mut near_tissue, true);
+        hang(&mut near_tissue, true);
+        hang(&mut near_a_tool, false);
         near_a_tool
             .create_tool(&ToolDefinition::new(Shape::Sphere { radius: 0.02 }))
             .expect("a ball");
-        let (mut attached, body) = held(false);
-        let other = attached.create_body(&cloth(false)).expect("a second cloth");
-        let nodes = [1, 3, 4].map(|node| [node, node]);
-        { attached.attach_nodes_to_nodes(body, other, &nodes, f32::INFINITY) }.expect("cloths that are attached");
+        let [body, other] = [(); 2].map(|()| hang(&mut attached, false));
+        let anchors = [1, 3, 4].map(Anchor::Node);
+        { attached.attach_to_body(body, &anchors, other, &anchors, f32::INFINITY) }.expect("cloths that are attached");
         for (mut world, longest) in [(near_tissue, 4.096), (near_a_tool, 4.096), (attached, 1.024)] {
             for _ in 0..2 {
                 world.step(0.01).expect("a short step");
