@@ -232,21 +232,64 @@ fn the_header_stands_alone_in_every_standard() {
     }
 }
 
-/// Whether the compiler's address and undefined-behaviour sanitizers are there and work.
-fn sanitizers_work(compiler: &Compiler) -> bool {
-    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join("nothing.c");
+/// A program of its own: what is compiled of this text, where it can be.
+fn compiled(compiler: &Compiler, build: &Build, name: &str, text: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(build.name);
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    let source = folder.join(name).with_extension("c");
     let program = source.with_extension("out");
-    std::fs::write(&source, "int main(void) { return 0; }\n").expect("a file can be written");
-    let built = Command::new(compiler.name)
-        .args(SANITIZED.options)
+    std::fs::write(&source, text).expect("a file can be written");
+    let done = Command::new(compiler.name)
+        .args(build.options)
+        .arg("-g")
         .arg(&source)
         .arg("-o")
         .arg(&program)
         .output();
-    built.is_ok_and(|output| output.status.success())
-        && Command::new(&program)
-            .output()
-            .is_ok_and(|output| output.status.success())
+    done.is_ok_and(|output| output.status.success()).then_some(program)
+}
+
+/// Whether a program ends well.
+fn ends_well(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
+}
+
+/// Writes beyond what it was given, and ends well where nobody looks.
+const BEYOND: &str = "#include <stdlib.h>
+int main(int count, char **words) {
+    char *two = (char *)malloc(2);
+    (void)words;
+    two[count + 1] = 1;
+    count = two[count + 1] - 1;
+    free(two);
+    return count;
+}
+";
+
+/// Adds what cannot be added.
+const OVERFLOW: &str = "int main(int count, char **words) {
+    int most = 2147483647;
+    (void)words;
+    return (most + count) & 1;
+}
+";
+
+/// Loses what it was given.
+const LEAK: &str = "#include <stdlib.h>
+int main(int count, char **words) {
+    char *lost = (char *)malloc((size_t)count * 100);
+    (void)words;
+    lost[0] = 0;
+    count = lost[0];
+    lost = NULL;
+    return count;
+}
+";
+
+/// Whether the compiler's address and undefined-behaviour sanitizers are there and work.
+fn sanitizers_work(compiler: &Compiler) -> bool {
+    compiled(compiler, &SANITIZED, "nothing", "int main(void) { return 0; }\n")
+        .is_some_and(|program| ends_well(&mut Command::new(program)))
 }
 
 #[test]
@@ -254,6 +297,10 @@ fn sanitizers_find_nothing() {
     let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler)) else {
         return skip("the sanitizers, which no compiler here has");
     };
+    for (name, fault) in [("beyond", BEYOND), ("overflow", OVERFLOW)] {
+        let planted = compiled(compiler, &SANITIZED, name, fault).expect("a program");
+        assert!(!ends_well(&mut Command::new(planted)), "{name} is not found");
+    }
     let programs = sources("tests/c").into_iter();
     run_all(programs.map(|source| Command::new(compiler.build(&source, &SANITIZED))));
 }
@@ -266,12 +313,18 @@ fn valgrind_finds_nothing() {
     let Some(compiler) = Compiler::installed().next() else {
         return;
     };
-    let programs = sources("tests/c").into_iter();
-    run_all(programs.map(|source| {
+    let checked = |program: PathBuf| {
         let mut valgrind = Command::new("valgrind");
         valgrind
             .args(["--quiet", "--leak-check=full", "--error-exitcode=9"])
-            .arg(compiler.build(&source, &CHECKED));
+            .arg(program);
         valgrind
-    }));
+    };
+    for (name, fault) in [("beyond", BEYOND), ("leak", LEAK)] {
+        let planted = compiled(compiler, &CHECKED, name, fault).expect("a program");
+        assert!(ends_well(&mut Command::new(&planted)), "{name} is no good program");
+        assert!(!ends_well(&mut checked(planted)), "{name} is not found");
+    }
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| checked(compiler.build(&source, &CHECKED))));
 }

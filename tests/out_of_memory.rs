@@ -105,6 +105,28 @@ fn do_at_once<T>(act: impl FnOnce() -> Result<T>) -> Asked<T> {
     Asked { done, failed: 0, held }
 }
 
+#[test]
+fn what_is_lost_on_the_way_is_noticed() {
+    fn two_buffers(is_careless: bool) -> Result<[Vec<u8>; 2]> {
+        let mut buffers = [Vec::new(), Vec::new()];
+        for number in 0..2 {
+            if buffers[number].try_reserve_exact(100).is_err() {
+                if is_careless {
+                    std::mem::forget(buffers);
+                }
+                return Err(Error::OutOfMemory);
+            }
+        }
+        Ok(buffers)
+    }
+    for is_careless in [false, true] {
+        let asked = ask(|| two_buffers(is_careless), || ());
+        let at_once = do_at_once(|| two_buffers(is_careless));
+        assert_eq!(asked.failed, 2);
+        assert_eq!(asked.held != at_once.held, is_careless);
+    }
+}
+
 fn plain_world() -> World {
     World::new(WorldDefinition::default()).expect("a world")
 }

@@ -79,6 +79,8 @@ pub struct HapticHandle {
     /// What is felt beside what the model says, and how long that may take to fade, s.
     rest: Six,
     fades_in: f64,
+    /// The time between the last two models, s.
+    between: f64,
     /// What is felt, before limits.
     felt: Six,
     /// What the device was given last.
@@ -112,6 +114,7 @@ impl HapticHandle {
             arrived: 0.0,
             rest: six::ZERO,
             fades_in: 0.0,
+            between: 0.0,
             felt: six::ZERO,
             given: six::ZERO,
             held: six::ZERO,
@@ -150,9 +153,10 @@ impl HapticHandle {
             let now = self.pressed(&motion, &spring);
             let otherwise = six::difference(&pressed, &now);
             self.rest = six::sum(&self.rest, &six::scaled(&otherwise, self.gain));
-            self.fades_in = (self.clock - self.arrived)
+            self.between = (self.clock - self.arrived)
                 .min(self.coupling.stale_after)
                 .max(motion.dt);
+            self.fades_in = self.between;
             self.arrived = self.clock;
             pressed = now;
         }
@@ -231,9 +235,11 @@ impl HapticHandle {
         let coupled = six::scaled(&six::each(&spread(self.coupling.damping), &lag), -1.0);
         let pushed = six::sum(&six::scaled(&six::sum(pressed, &coupled), self.gain), &self.rest);
         let gives = self.models.read(|model| model.gives(&pushed, spring));
+        // The step that is next to begin is told of when it is over.
+        let late = 2.0 * self.between;
         let damper = self
             .observer
-            .damping(velocity, &pushed, gives, &self.coupling, motion.dt);
+            .damping(velocity, &pushed, gives, late, &self.coupling, motion.dt);
         six::difference(&coupled, &six::scaled(velocity, damper))
     }
 

@@ -27,6 +27,12 @@ pub(crate) struct Observer {
     forgotten: f64,
     /// What the coupling has lost, J; below 0 it has made so much.
     pub lost: f64,
+    /// What the hand, and the tool on the tissue, had done when the tool touched nothing last, J.
+    free: [f64; 2],
+    /// What the hand has done since then and not had back, and what tissue has given by itself, J.
+    paid: f64,
+    /// The most of that.
+    most_paid: f64,
 }
 
 impl Observer {
@@ -52,9 +58,23 @@ impl Observer {
         let lost = self.by_hand - on_tissue - stored - self.forgotten;
         let reserve = 0.5 * coupling.stiffness[0] * UNFELT * UNFELT;
         // Tissue spends by itself what it was given too much.
-        let spent = lost.min(0.0) * (dt / REMEMBERED).min(1.0);
+        let part = (dt / REMEMBERED).min(1.0);
+        let spent = lost.min(0.0) * part;
         self.forgotten += (lost - reserve).max(0.0) + spent;
         self.lost = lost.min(reserve) - spent;
+        self.pay(work, *held == six::ZERO, part);
+    }
+
+    /// Knows what the hand has paid, by the hand's own account: forgets it where the tool touches nothing, and this part of it with time.
+    fn pay(&mut self, work: f64, is_free: bool, part: f64) {
+        if is_free {
+            self.free = [self.by_hand, work];
+            self.most_paid = 0.0;
+        }
+        self.paid = self.by_hand - self.free[0] + (self.free[1] - work).max(0.0);
+        self.free[0] += self.paid.min(0.0) * part;
+        self.most_paid = self.most_paid.max(self.paid);
+        self.most_paid += (self.paid - self.most_paid) * part;
     }
 
     /// Forgets what was made or lost.
@@ -64,14 +84,29 @@ impl Observer {
     }
 
     /// The damper, N s/m, that takes back what was made of a device at this velocity. Where the device is pushed by this wrench, and by what can give
-    /// back so much as it lets go, J, it is given that part of its work less that was never paid for.
-    pub fn damping(&self, velocity: &Six, pushed: &Six, gives: f64, coupling: &Coupling, dt: f64) -> f64 {
+    /// back so much as it lets go, J, it is given that part of its work less that was never paid for. The world tells what was so late, s.
+    pub fn damping(&self, velocity: &Six, pushed: &Six, gives: f64, late: f64, coupling: &Coupling, dt: f64) -> f64 {
         let square = six::dot(velocity, velocity);
-        if self.lost >= 0.0 || square == 0.0 {
+        let power = six::dot(pushed, velocity);
+        if square == 0.0 || (self.lost >= 0.0 && power <= 0.0) {
             return 0.0;
         }
-        let made = -self.lost;
-        let unpaid = (made / gives).min(1.0) * six::dot(pushed, velocity).max(0.0);
+        let made = (-self.lost).max(0.0);
+        let unpaid = match power > 0.0 {
+            true => power * (made / gives).max(self.early(power, gives, late)).clamp(0.0, 1.0),
+            false => 0.0,
+        };
         ((made / TAKEN_BACK.max(dt) + unpaid) / square).min(MOST * coupling.critical)
+    }
+
+    /// What part of that was never paid for as far as the hand knows by itself: asked where all would be given before the world tells.
+    fn early(&self, power: f64, gives: f64, late: f64) -> f64 {
+        let soon = (power * late / gives).min(1.0);
+        // A hand that has paid nothing is carried by the tissue.
+        let paying = match self.paid < 0.0 {
+            true => self.most_paid / (self.most_paid - self.paid),
+            false => 1.0,
+        };
+        soon * soon * paying * (1.0 - self.paid / gives)
     }
 }

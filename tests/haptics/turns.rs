@@ -132,16 +132,39 @@ impl Hand {
     }
 }
 
+/// Ticks of this hand: the most energy that it had, J.
+fn led(bench: &mut Bench, hand: &mut Hand) -> f64 {
+    let mut most = 0.0_f64;
+    for tick in 1..=200 {
+        let pose = Pose {
+            position: hand.position.as_vec3(),
+            orientation: hand.orientation.as_quat(),
+        };
+        let [velocity, turning] = [hand.velocity, hand.spin].map(|it| Some(it.as_vec3()));
+        let felt = bench.handle.tick(pose, velocity, turning, TICK).unwrap();
+        if tick % bench.every == 0 {
+            bench.world.step(bench.every as f32 * TICK).unwrap();
+        }
+        hand.tick(&felt);
+        most = most.max(hand.energy());
+    }
+    most
+}
+
 #[test]
 fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
     // J: what a spring of 1000 N/m stores where it is drawn out by 0.06 mm.
     let unfelt = 2e-6;
     for (mass, stiffness, speed, spin, ratio) in [
+        (0.05, 0.0, 0.2, 0.0, 1.0),
+        (0.05, 0.0, 0.1, 4.0, 1.0),
+        (0.07, 0.0, 0.2, 0.0, 1.0),
         (0.1, 0.0, 0.2, 4.0, 1.0),
+        (0.1, 0.0, 0.1, 0.0, 0.0),
         (0.3, 0.0, 0.05, 2.0, 0.0),
         (0.1, 3000.0, 0.1, 4.0, 0.0),
     ] {
-        for phase in 1..3 {
+        for phase in 0..4 {
             // Contact begins at any time between two steps.
             let above = 1e-4 + f64::from(phase) / 4.0 * speed * 0.016;
             let mut bench = lying(Solver::Verlet, 16, above as f32, |it| it.damping_ratio = ratio);
@@ -157,22 +180,44 @@ fn a_hand_that_strikes_with_a_capsule_gains_nothing() {
                 spin: dvec3(0.0, 0.0, spin),
             };
             let first = hand.energy();
-            let mut most = 0.0_f64;
-            for tick in 1..=200 {
-                let pose = Pose {
-                    position: hand.position.as_vec3(),
-                    orientation: hand.orientation.as_quat(),
-                };
-                let [velocity, turning] = [hand.velocity, hand.spin].map(|it| Some(it.as_vec3()));
-                let felt = bench.handle.tick(pose, velocity, turning, TICK).unwrap();
-                if tick % bench.every == 0 {
-                    bench.world.step(bench.every as f32 * TICK).unwrap();
-                }
-                hand.tick(&felt);
-                most = most.max(hand.energy());
-            }
+            let most = led(&mut bench, &mut hand);
             let case = format!("{mass} kg, {stiffness} N/m, {speed} m/s, {spin} rad/s, damped {ratio}, phase {phase}");
             assert!(most <= first + unfelt, "{case}: {most} J of {first} J");
         }
+    }
+}
+
+#[test]
+fn tissue_that_moves_carries_a_hand() {
+    for (mass, speed) in [(0.05, 0.1), (0.05, 0.3), (0.1, 0.3), (0.3, 0.1)] {
+        // The hand has given nothing, and is to be given what it is given where every tick is a step.
+        let [ticks, steps] = [1, 16].map(|every| {
+            let mut bench = lying(Solver::Verlet, every, 1e-4, |_| ());
+            let start = dvec3(0.0, f64::from(RADIUS) + 1e-4, 0.0);
+            let mut hand = Hand {
+                mass,
+                inertia: mass * 4.5e-4,
+                stiffness: 0.0,
+                home: start,
+                position: start,
+                orientation: DQuat::from_rotation_z(FRAC_PI_2),
+                velocity: DVec3::ZERO,
+                spin: DVec3::ZERO,
+            };
+            let mut body = bench.world.body_mut(bench.body).unwrap();
+            let rising: Vec<Vec3> = body
+                .positions()
+                .iter()
+                .map(|it| vec3(0.0, speed * (1.0 + it.y / HEIGHT).max(0.0), 0.0))
+                .collect();
+            body.set_velocities(&rising).unwrap();
+            led(&mut bench, &mut hand);
+            hand.velocity.y
+        });
+        assert!(ticks > 0.003, "{ticks} m/s");
+        assert!(
+            (steps - ticks).abs() < 0.25 * ticks,
+            "{mass} kg, tissue at {speed} m/s: {steps} m/s, {ticks} where every tick is a step"
+        );
     }
 }
