@@ -1,6 +1,8 @@
 //! Files of meshes that nobody wrote: read, they are a mesh that can be used, or refused.
 #![no_main]
 
+mod planted;
+
 use std::path::PathBuf;
 
 use libfuzzer_sys::fuzz_target;
@@ -39,5 +41,5 @@ fuzz_target!(|bytes: &[u8]| {
     assert!(!mesh.triangles.is_empty() || !mesh.tetrahedra.is_empty());
     let mut nodes = loaded.node_of_vertex.iter();
     assert!(nodes.all(|&node| node == NO_NODE || (node as usize) < mesh.positions.len()));
-    assert!(!(cfg!(planted) && mesh.triangles.len() == 2), "the planted fault");
+    planted::fault(mesh.triangles.len() == 2);
 });

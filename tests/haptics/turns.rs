@@ -204,7 +204,7 @@ fn tissue_that_moves_carries_a_hand() {
                 velocity: DVec3::ZERO,
                 spin: DVec3::ZERO,
             };
-            let mut body = bench.world.body_mut(bench.body).unwrap();
+            let body = bench.world.body_mut(bench.body).unwrap();
             let rising: Vec<Vec3> = body
                 .positions()
                 .iter()
