@@ -13,9 +13,9 @@ FULL_NAME := $(subst $(VERSION),$(FULL_VERSION),$(SONAME))
 PKGCONFIG_FILES := sinew.pc sinew-static.pc
 CMAKE_FILES := sinewConfig.cmake sinewConfigVersion.cmake
 
-# From the folder of the .pc files, and of the CMake package, to the headers.
-up = $(shell echo '$(1:$(PREFIX)/%=%)' | sed 's|[^/][^/]*|..|g')
-INCLUDE_FROM_LIB = $(call up,$(LIBDIR))/$(INCLUDEDIR:$(PREFIX)/%=%)
+# From the folder of the libraries to the headers; nothing where one of them is not within PREFIX. By the shell, as folders may have spaces in their names.
+INCLUDE_FROM_LIB = $(shell lib='$(LIBDIR)' include='$(INCLUDEDIR)'; lib=$${lib#'$(PREFIX)'/} include=$${include#'$(PREFIX)'/}; \
+  test "$$lib" = '$(LIBDIR)' || test "$$include" = '$(INCLUDEDIR)' || echo "$$(echo "$$lib" | sed 's|[^/][^/]*|..|g')/$$include")
 
 FILL = sed -e 's|@VERSION@|$(FULL_VERSION)|g' -e 's|@ABI@|$(VERSION)|g' -e 's|@DESCRIPTION@|$(DESCRIPTION)|g' \
   -e 's|@INCLUDE@|$(INCLUDE_FROM_LIB)|g' -e 's|@NATIVE@|$(NATIVE)|g' -e 's|@SHARED@|$(FULL_NAME)|g' -e 's|@SONAME@|$(SONAME)|g'
@@ -24,7 +24,7 @@ install: library
 ifneq ($(EXE),)
 	$(error on Windows take sinew.dll, libsinew.dll.a and include/ from where they are: there is no package for it)
 endif
-ifneq ($(filter-out $(PREFIX)/%,$(LIBDIR) $(INCLUDEDIR)),)
+ifeq ($(INCLUDE_FROM_LIB),)
 	$(error LIBDIR and INCLUDEDIR must lie within PREFIX: the package finds its parts from one another)
 endif
 	$(INSTALL) -d '$(DESTDIR)$(INCLUDEDIR)' '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(LIBDIR)/cmake/sinew'

@@ -195,7 +195,8 @@ fn files(folder: &Path) -> BTreeSet<PathBuf> {
 
 #[test]
 fn uninstall_takes_away_what_install_brought_and_no_more() {
-    let prefix = scratch("uninstall");
+    // A name that shells would take apart.
+    let prefix = scratch("un install");
     let settings = [format!("PREFIX={}", prefix.display())];
     let others = [prefix.join("lib/libother.so"), prefix.join("include/other.h")];
     for other in &others {
