@@ -119,9 +119,10 @@ static void read_forces(const char *path, float *measured) {
   int i;
   if (file == NULL) fail("cannot read", path);
   for (i = 0; i < STEPS; i++) {
-    if (fscanf(file, "%f", measured + i) != 1) fail("fewer forces than steps in", path);
+    if (fscanf(file, "%f", measured + i) != 1 || !isfinite(measured[i])) fail("fewer forces than steps in", path);
   }
   fclose(file);
+  if (!(largest(measured) > 0)) fail("no force presses on the ball in", path);
 }
 
 /* A candidate of a round: a grid about the middle, by factors. */

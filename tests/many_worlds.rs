@@ -6,7 +6,7 @@ use std::process::Command;
 
 use glam::Vec3;
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Shape, Solver, ToolDefinition, ToolId, Values, World, WorldDefinition};
 use support::{Library, installed, root, skip, succeed};
 
 /// So many worlds, as many as can be all different in what follows.
@@ -14,57 +14,70 @@ const WORLDS: u32 = 4000;
 
 const THREADS: u32 = 8;
 
-/// A small cloth with a ball on its way to it, all of it by the world's number; and what comes of it.
-fn run(number: u32) -> u64 {
-    let mesh = Mesh::cloth([0.1, 0.1], [3 + number % 4, 3]).expect("a cloth");
-    let mut world = World::new(WorldDefinition::default()).expect("a world");
-    let body = world
-        .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
-            masses: Values::Uniform(1e-3 + 1e-6 * number as f32),
-            stiffnesses: Values::Uniform(40.0),
-            node_dampings: Values::Uniform(1e-3),
-            solver: [Solver::Verlet, Solver::Implicit][(number % 2) as usize],
-            spare_nodes: 20 * (number % 3 % 2),
-            ..BodyDefinition::default()
-        })
-        .expect("a body");
-    world.body_mut(body).and_then(|body| body.pin(0)).expect("a pin");
-    let pose = Pose {
-        position: Vec3::Y * -0.025,
-        ..Pose::IDENTITY
-    };
-    let ball = ToolDefinition {
-        pose,
-        ..ToolDefinition::new(Shape::Sphere { radius: 0.02 })
-    };
-    let ball = world.create_tool(&ball).expect("a ball");
-    for step in 1..=20 {
-        let place = pose.position + Vec3::Y * (1e-3 * step as f32);
-        world.set_pose(ball, place, None).expect("a pose");
-        world.step(5e-3).expect("a step");
+/// Steps of each.
+const STEPS: u32 = 20;
+
+/// A small cloth with a ball on its way to it, all of it by the world's number.
+struct Small {
+    world: World,
+    ball: ToolId,
+}
+
+impl Small {
+    fn new(number: u32) -> Self {
+        let mesh = Mesh::cloth([0.1, 0.1], [3 + number % 4, 3]).expect("a cloth");
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let body = world
+            .create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                triangles: &mesh.triangles,
+                masses: Values::Uniform(1e-3 + 1e-6 * number as f32),
+                stiffnesses: Values::Uniform(40.0),
+                node_dampings: Values::Uniform(1e-3),
+                solver: [Solver::Verlet, Solver::Implicit][(number % 2) as usize],
+                spare_nodes: 20 * (number % 3 % 2),
+                ..BodyDefinition::default()
+            })
+            .expect("a body");
+        world.body_mut(body).and_then(|body| body.pin(0)).expect("a pin");
+        let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.02 });
+        ball.pose.position = Vec3::Y * -0.025;
+        let ball = world.create_tool(&ball).expect("a ball");
+        Self { world, ball }
     }
-    world.state_hash()
+
+    fn step(&mut self, step: u32) {
+        let place = Vec3::Y * (1e-3 * step as f32 - 0.024);
+        self.world.set_pose(self.ball, place, None).expect("a pose");
+        self.world.step(5e-3).expect("a step");
+    }
+}
+
+/// All at once, each stepped now by this thread and now by another; and what comes of them.
+fn together() -> Vec<u64> {
+    let mut worlds: Vec<Small> = (0..WORLDS).map(Small::new).collect();
+    let share = WORLDS.div_ceil(THREADS) as usize;
+    for step in 0..STEPS {
+        // No thread has the worlds that it had.
+        worlds.rotate_left(share / 2 + 1);
+        std::thread::scope(|scope| {
+            for worlds in worlds.chunks_mut(share) {
+                scope.spawn(move || worlds.iter_mut().for_each(|small| small.step(step)));
+            }
+        });
+    }
+    worlds.rotate_right((share / 2 + 1) * STEPS as usize % WORLDS as usize);
+    worlds.iter().map(|small| small.world.state_hash()).collect()
 }
 
 #[test]
 fn worlds_on_many_threads_are_those_on_one() {
-    // On one thread only some, from the first to the last: each must be what it was among all.
-    let some: Vec<(u32, u64)> = (0..WORLDS).step_by(37).map(|number| (number, run(number))).collect();
-    let mut all = vec![0; WORLDS as usize];
-    let share = WORLDS.div_ceil(THREADS) as usize;
-    std::thread::scope(|scope| {
-        for (thread, hashes) in all.chunks_mut(share).enumerate() {
-            scope.spawn(move || {
-                for (place, hash) in hashes.iter_mut().enumerate() {
-                    *hash = run((thread * share + place) as u32);
-                }
-            });
-        }
-    });
-    for (number, hash) in some {
-        assert_eq!(all[number as usize], hash, "world {number}");
+    let all = together();
+    // Alone only some, from the first to the last: each must be what it was among all.
+    for number in (0..WORLDS).step_by(37) {
+        let mut alone = Small::new(number);
+        (0..STEPS).for_each(|step| alone.step(step));
+        assert_eq!(all[number as usize], alone.world.state_hash(), "world {number}");
     }
     let mut different = all.clone();
     different.sort_unstable();
@@ -148,6 +161,13 @@ fn a_search_over_ranks_finds_what_one_alone_does() {
     let alone = rounds(&succeed(alone.arg("-o").arg(&folder)).stdout);
     // Six rounds, and that what is known was found: the program fails where it was not.
     assert_eq!(alone.len(), 7, "{alone:?}");
+    // What was never pressed has no answer.
+    for (name, force) in [("nothing", "0\n"), ("no_number", "nan\n")] {
+        let file = folder.join(name);
+        std::fs::write(&file, force.repeat(250)).expect("a file can be written");
+        let output = Command::new(folder.join("alone")).arg(&file).output();
+        assert!(!output.expect("fit runs").status.success(), "{name}");
+    }
     if !(installed("mpicc") && installed("mpirun")) {
         skip("a search over MPI's ranks: no mpicc or no mpirun");
         return;
