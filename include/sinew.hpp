@@ -133,7 +133,7 @@ private:
 template <class Id> class part {
 public:
   part() = default;
-  part(sinew_world *world, Id id) noexcept : id(id), world_(world) {}
+  part(sinew_world *world, Id given) noexcept : id(given), world_(world) {}
   sinew_world *world() const noexcept { return world_; }
   Id id{};
 

@@ -60,7 +60,16 @@ fn built(compiler: &str, source: &Path, name: &str, options: &[&str]) -> PathBuf
     let library = Library::get();
     succeed(
         Command::new(compiler)
-            .args(["-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1", "-g"])
+            .args([
+                "-std=c++17",
+                "-Wall",
+                "-Wextra",
+                "-Wpedantic",
+                "-Wshadow",
+                "-Werror",
+                "-O1",
+                "-g",
+            ])
             .args(options)
             .arg("-I")
             .arg(root().join("include"))
