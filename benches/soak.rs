@@ -13,8 +13,8 @@ use glam::Vec3;
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, Pose, Shape, Sleep, Solver, Storage, Tearing, ToolDefinition, ToolId, Values,
-    World, WorldDefinition,
+    BodyContact, BodyDefinition, BodyId, Error, Pose, Shape, Sleep, Solver, Storage, Tearing, ToolDefinition, ToolId,
+    Values, World, WorldDefinition,
 };
 
 const FRAMES: u32 = 1_000_000;
@@ -244,7 +244,8 @@ impl Play {
         match self.world.step(1.0 / 60.0) {
             Ok(report) => self.counts.restored += report.bodies_restored,
             // Too many substeps: a world that says so is as it was.
-            Err(_) => self.counts.unstable += 1,
+            Err(Error::Unstable { .. }) => self.counts.unstable += 1,
+            Err(error) => panic!("a step: {error}"),
         }
         let bodies = self.bodies.iter().map(|&id| self.world.body(id).expect("a body"));
         let tools = self.tools.iter().map(|&id| self.world.wrench(id).expect("a tool"));
@@ -293,6 +294,10 @@ fn main() -> ExitCode {
         "\r{frames} frames: {:?}; bytes held by an empty world after each tenth: {held:?}",
         play.counts
     );
+    if play.counts.unstable > frames / 100 {
+        eprintln!("{} frames were not taken: that is no soak", play.counts.unstable);
+        return ExitCode::FAILURE;
+    }
     if late > early + early / 100 {
         eprintln!("memory grows: {early} bytes, then {late}");
         return ExitCode::FAILURE;
