@@ -786,3 +786,42 @@ fn over_the_triangles_of_a_solid_cuts_are_not_followed_and_that_is_said() {
     assert!(matches!(error, Error::Unsupported(_)), "{error}");
     assert_eq!(embedding.positions(), before);
 }
+
+#[test]
+fn a_world_of_before_a_cut_takes_surfaces_of_then_and_refuses_those_of_later() {
+    let mesh = Mesh::block([0.1; 3], [4; 3]).unwrap();
+    let mut world = world();
+    let body = world.create_body(&BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        masses: Values::Uniform(1e-3),
+        stiffnesses: Values::Uniform(20.0),
+        spare_nodes: 1000,
+        ..BodyDefinition::default()
+    });
+    let body = body.unwrap();
+    let fine = EmbeddingDefinition {
+        vertices: &mesh.positions,
+        triangles: &mesh.triangles,
+        tetrahedra: &mesh.tetrahedra,
+    };
+    let bytes = world.save().unwrap();
+    let mut early = world.create_embedding(body, &fine).unwrap();
+    let at = |y: f32, z: f32| vec3(0.013, y, z);
+    let blade = Sweep {
+        start: [at(-1.0, -0.2), at(1.0, -0.2)],
+        end: [at(-1.0, 0.2), at(1.0, 0.2)],
+    };
+    world.cut(body, &blade).unwrap();
+    early.update(&world).unwrap();
+    let mut late = world.create_embedding(body, &fine).unwrap();
+    let before = World::load(&bytes, 1, None).unwrap();
+    early.update(&before).unwrap();
+    assert_eq!(early.triangles(), fine.triangles);
+    vertices_within(early.positions(), &mesh.positions, 1e-6);
+    let places = late.positions().to_vec();
+    let error = late.update(&before).unwrap_err();
+    assert!(matches!(error, Error::InvalidArgument(_)), "{error}");
+    assert_eq!(late.positions(), places);
+    late.update(&world).unwrap();
+}

@@ -295,13 +295,24 @@ fn a_body_of_any_kind_is_created_or_not() {
                 };
                 change(&mut definition);
                 // Beside one of its kind, with which it goes on afterwards as in a world that never lacked memory.
-                let [scarce, plenty] = [(); 2].map(|()| {
+                let world = || {
                     let mut world = plain_world();
                     world.create_body(&definition).expect("a body");
                     world.step(1e-3).expect("a step");
-                    std::cell::RefCell::new(world)
-                });
+                    world
+                };
+                let [scarce, plenty] = [(); 2].map(|()| std::cell::RefCell::new(world()));
                 let hash = plenty.borrow().state_hash();
+                // One that was asked before has room left of it, and asks for less: so another each time, too.
+                let mut other = world();
+                let mut requests = 0;
+                while let Err(error) = with(requests, || other.create_body(&definition)) {
+                    assert!(matches!(error, Error::OutOfMemory), "request {requests}: {error}");
+                    assert_eq!(other.state_hash(), hash, "{storage:?}, {solver:?}, {kind}");
+                    other = world();
+                    requests += 1;
+                }
+                all += requests;
                 let asked = ask(
                     || scarce.borrow_mut().create_body(&definition),
                     || assert_eq!(scarce.borrow().state_hash(), hash, "{storage:?}, {solver:?}, {kind}"),
@@ -394,6 +405,61 @@ fn tissue_is_made_of_a_surface_or_not() {
     let mut other = plain_world();
     { other.create_body_from_surface(&definition, 0.03) }.expect("tissue");
     assert_eq!(world.state_hash(), other.state_hash());
+}
+
+#[test]
+fn tissue_is_made_by_c_or_not() {
+    use sinew::capi::body::sinew_body_id;
+    use sinew::capi::definition::{sinew_body_def, sinew_body_def_init};
+    use sinew::capi::embedding::{sinew_body_create_from_surface, sinew_embedding_destroy};
+    use sinew::capi::status::{SINEW_STATUS_OK, SINEW_STATUS_OUT_OF_MEMORY};
+    use sinew::capi::world::{
+        sinew_world_create, sinew_world_def, sinew_world_def_init, sinew_world_destroy, sinew_world_get_state_hash,
+    };
+    let surface = Mesh::block([0.1; 3], [2, 2, 2]).expect("a block");
+    let mut requests = 0;
+    // SAFETY: pointers to live variables and lists of the lengths stated, and a world used before its end alone.
+    let mut attempt = || unsafe {
+        let mut world_def = std::mem::zeroed::<sinew_world_def>();
+        let done = sinew_world_def_init(&mut world_def, size_of_val(&world_def));
+        assert_eq!(done, SINEW_STATUS_OK);
+        let mut world = std::ptr::null_mut();
+        assert_eq!(sinew_world_create(&world_def, &mut world), SINEW_STATUS_OK);
+        let hash = || {
+            let mut hash = 0;
+            assert_eq!(sinew_world_get_state_hash(world, &mut hash), SINEW_STATUS_OK);
+            hash
+        };
+        let before = hash();
+        let mut def = std::mem::zeroed::<sinew_body_def>();
+        let done = sinew_body_def_init(&mut def, size_of_val(&def));
+        assert_eq!(done, SINEW_STATUS_OK);
+        (def.positions, def.node_count) = (surface.positions.as_ptr().cast(), surface.positions.len());
+        (def.triangles, def.triangle_count) = (surface.triangles.as_ptr().cast(), surface.triangles.len());
+        (def.node_mass, def.stiffness) = (1e-3, 20.0);
+        let mut body = sinew_body_id {
+            index1: 0,
+            generation: 0,
+        };
+        let mut drawn = std::ptr::null_mut();
+        let status = with(requests, || {
+            sinew_body_create_from_surface(world, &def, 0.03, &mut body, &mut drawn)
+        });
+        let is_made = status == SINEW_STATUS_OK;
+        if !is_made {
+            assert_eq!(status, SINEW_STATUS_OUT_OF_MEMORY, "request {requests}");
+            assert_eq!(hash(), before, "request {requests}");
+        }
+        assert_eq!(body.index1 == 1, is_made, "request {requests}");
+        assert_eq!(!drawn.is_null(), is_made, "request {requests}");
+        sinew_embedding_destroy(drawn);
+        sinew_world_destroy(world);
+        requests += 1;
+        is_made
+    };
+    // In a world of its own each time: what a world keeps room for is not asked for again.
+    while !attempt() {}
+    assert!(requests > 50, "{requests} requests failed");
 }
 
 /// A sheet that is pulled apart, and tears.

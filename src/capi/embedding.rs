@@ -1,5 +1,7 @@
 //! Fine surfaces that go with coarse bodies, and bodies made from surfaces.
 
+use std::mem::MaybeUninit;
+
 use super::body::{sinew_body_id, sinew_vec3_view};
 use super::cut::sinew_triangle_view;
 use super::definition::sinew_body_def;
@@ -129,10 +131,9 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
 /// then each vertex is bound to the copy on its side, and triangles that would reach across are left out of
 /// sinew_embedding_get_triangles.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
-/// cut or torn, and the vertices are bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The
-/// vertices stay where they were
-/// then.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body has not the nodes that the vertices are bound to, as in a world that was saved before it was
+/// cut), SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been cut or torn, and the vertices are
+/// bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The vertices stay where they were then.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
@@ -267,11 +268,17 @@ pub unsafe extern "C" fn sinew_body_create_from_surface(
     unsafe {
         with_world_mut(world, |world| {
             let out_body = memory::output("out_body", out_body)?;
+            let out_embedding = match out_embedding.is_null() {
+                true => None,
+                false => Some(memory::output("out_embedding", out_embedding)?),
+            };
             let def = memory::definition("def", def, sinew_body_def::defaults())?;
+            // Nothing may fail once there is a body.
+            let place = crate::memory::boxed(MaybeUninit::uninit())?;
             let (body, embedding) = world.create_body_from_surface(&def.definition()?, spacing)?;
             *out_body = body.into();
-            if let Some(out) = out_embedding.as_mut() {
-                *out = Box::into_raw(crate::memory::boxed(sinew_embedding { embedding })?);
+            if let Some(out) = out_embedding {
+                *out = Box::into_raw(Box::write(place, sinew_embedding { embedding }));
             }
             Ok(())
         })

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::bind::{Binding, Solid, weighted};
 use crate::contact::nearest::nearest_on_triangle;
 use crate::cutting::{CutMaterial, CutSolid, CutSurface};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memory;
 
 /// What following cuts asks for: kept for bodies that may be cut.
@@ -48,30 +48,35 @@ impl Follower {
     }
 
     /// Binds each vertex to the copy of its cell that has the material where it is, and keeps the triangles whose corners hang together; whether
-    /// the binding is one to such cells. Nothing is changed where it is not, or memory is short.
+    /// the binding is one to such cells. Nothing is changed where it is not, the
+    /// body has fewer nodes than vertices are bound to, or memory is short.
     pub fn follow(&self, material: &CutMaterial, binding: &mut Binding, triangles: &mut Vec<[u32; 3]>) -> Result<bool> {
         match (self, material, binding) {
             (Self::Surface(homes), CutMaterial::Surface(surface), Binding::Triangles(bound)) => {
+                homes.check(surface.node_count())?;
                 let pieces = pieces_of_surface(surface, homes)?;
                 let weights = |vertex: usize| {
                     let [b, c] = bound[vertex].weights.map(f64::from);
                     [1.0 - b - c, b, c]
                 };
                 let rest = |node| surface.rest(node);
-                let nodes = homes.choose(&pieces, rest, |vertex| bound[vertex].nodes, weights)?;
+                let now = |vertex: usize| known(bound[vertex].nodes, surface.node_count());
+                let nodes = homes.choose(&pieces, rest, now, weights)?;
                 *triangles = homes.whole(&nodes)?;
                 for (vertex, nodes) in bound.iter_mut().zip(nodes) {
                     vertex.nodes = nodes;
                 }
             }
             (Self::Solid(homes), CutMaterial::Solid(solid), Binding::Tetrahedra(bound)) => {
+                homes.check(solid.node_count())?;
                 let pieces = pieces_of_solid(solid, homes)?;
                 let weights = |vertex: usize| {
                     let [b, c, d] = bound[vertex].weights.map(f64::from);
                     [1.0 - b - c - d, b, c, d]
                 };
                 let rest = |node| solid.rest(node);
-                let nodes = homes.choose(&pieces, rest, |vertex| bound[vertex].nodes, weights)?;
+                let now = |vertex: usize| known(bound[vertex].nodes, solid.node_count());
+                let nodes = homes.choose(&pieces, rest, now, weights)?;
                 *triangles = homes.whole(&nodes)?;
                 for (vertex, nodes) in bound.iter_mut().zip(nodes) {
                     vertex.nodes = nodes;
@@ -108,12 +113,19 @@ impl<const N: usize> Homes<N> {
         })
     }
 
+    /// Refuses a body that has not all of the cells' nodes.
+    fn check(&self, node_count: u32) -> Result<()> {
+        self.cells
+            .iter()
+            .try_for_each(|&nodes| known(nodes, node_count).map(drop))
+    }
+
     /// The nodes of the cell that each vertex goes with from now on, by those of now and the weights that it has of them.
     fn choose(
         &self,
         pieces: &[Piece<N>],
         rest: impl Fn(u32) -> Vec3,
-        now: impl Fn(usize) -> [u32; N],
+        now: impl Fn(usize) -> Result<[u32; N]>,
         weights: impl Fn(usize) -> [f64; N],
     ) -> Result<Vec<[u32; N]>>
     where
@@ -125,7 +137,7 @@ impl<const N: usize> Homes<N> {
             let of_home = pieces[first..].iter().take_while(|piece| piece.home == home);
             let mut cells = of_home.clone().map(|piece| piece.nodes);
             // All of its material was taken away: it stays with what it was bound to.
-            let some = cells.next().unwrap_or(now(vertex));
+            let some = cells.next().map_or_else(|| now(vertex), Ok)?;
             if cells.all(|nodes| nodes == some) {
                 chosen.push(some);
                 continue;
@@ -155,6 +167,16 @@ impl<const N: usize> Homes<N> {
         let hangs = |&&[a, b, c]: &&[u32; 3]| hang(a, b) && hang(b, c) && hang(c, a);
         whole.extend(self.triangles.iter().filter(hangs));
         Ok(whole)
+    }
+}
+
+/// Nodes that a body of so many has: one of another world may have fewer, or the same before it was cut.
+fn known<const N: usize>(nodes: [u32; N], node_count: u32) -> Result<[u32; N]> {
+    match nodes.iter().find(|&&node| node >= node_count) {
+        None => Ok(nodes),
+        Some(node) => Err(Error::invalid(format!(
+            "the embedding goes with node {node}: the body in this world has {node_count} nodes"
+        ))),
     }
 }
 

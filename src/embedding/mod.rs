@@ -111,7 +111,8 @@ impl Embedding {
     ///
     /// # Errors
     /// [`Error::StaleId`]: the body is gone. [`Error::Unsupported`]: it has been cut or torn since, and the vertices are bound to the triangles of a body of
-    /// tetrahedra, or not to all of the tetrahedra of which it was made. [`Error::OutOfMemory`]. The vertices stay where they were.
+    /// tetrahedra, or not to all of the tetrahedra of which it was made. [`Error::InvalidArgument`]: it has not the nodes that the vertices are bound to, as in a world that was
+    /// saved before it was cut. [`Error::OutOfMemory`]. The vertices stay where they were.
     pub fn update(&mut self, world: &World) -> Result<()> {
         let body = world.body(self.body)?;
         if body.topology_version() != self.topology {
