@@ -13,13 +13,19 @@ const GROWTH: usize = 64;
 pub(crate) struct Writer<'a> {
     to: Option<&'a mut [u8]>,
     size: usize,
-    /// What a reader will reserve.
+    /// What a reader will reserve for the section.
     memory: usize,
+    is_too_large: bool,
 }
 
 impl<'a> Writer<'a> {
     pub fn new(to: Option<&'a mut [u8]>) -> Self {
-        Self { to, size: 0, memory: 0 }
+        Self {
+            to,
+            size: 0,
+            memory: 0,
+            is_too_large: false,
+        }
     }
 
     pub fn put(&mut self, bytes: &[u8]) {
@@ -56,9 +62,14 @@ impl<'a> Writer<'a> {
         self.memory = self.memory.saturating_add(memory);
     }
 
-    /// Whether a reader will.
+    /// A section of so many bytes is written, for which by itself a reader reserves no more than [`most_memory`].
+    pub fn end_section(&mut self, size: usize) {
+        self.is_too_large |= std::mem::take(&mut self.memory) > most_memory(size);
+    }
+
+    /// Whether a reader will refuse to reserve what it takes.
     pub fn is_too_large(&self) -> bool {
-        self.memory > most_memory(self.size)
+        self.is_too_large
     }
 }
 

@@ -49,8 +49,9 @@ pub(crate) fn write_section(to: &mut Writer, tag: [u8; 4], content: impl FnOnce(
     0_u64.save(to);
     let start = to.size();
     content(to);
-    let size = (to.size() - start) as u64;
-    to.put_at(place, &size.to_le_bytes());
+    let size = to.size() - start;
+    to.end_section(size);
+    to.put_at(place, &(size as u64).to_le_bytes());
 }
 
 /// Completes the header.
@@ -125,4 +126,29 @@ pub(crate) fn at_end(from: &Reader) -> Result<()> {
         return Err(from.refusal("something is behind what a section holds"));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::springs::Kernel;
+
+    #[test]
+    fn what_is_saved_can_be_loaded_or_is_refused_by_both() {
+        let room = |beside: usize| {
+            let mut to = Writer::new(None);
+            write_section(&mut to, *b"LONG", |to| {
+                to.place(beside);
+            });
+            write_section(&mut to, *b"ROOM", |to| to.needs(2 << 30));
+            to
+        };
+        // Room is counted by section, whatever is beside it.
+        for beside in [0, 1 << 28] {
+            assert!(room(beside).is_too_large());
+        }
+        let kernel = Kernel::Portable.choose().expect("a kernel for every processor");
+        let mut from = section(&mut &b"ROOM\0\0\0\0\0\0\0\0"[..], *b"ROOM", kernel).expect("a section");
+        assert!(from.will_take(Some(2 << 30)).is_err());
+    }
 }
