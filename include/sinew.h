@@ -3764,10 +3764,9 @@ void sinew_embedding_destroy(struct sinew_embedding *embedding);
  * then each vertex is bound to the copy on its side, and triangles that would reach across are left out of
  * sinew_embedding_get_triangles.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been
- * cut or torn, and the vertices are bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The
- * vertices stay where they were
- * then.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body has not the nodes that the vertices are bound to, as in a world that was saved before it was
+ * cut), SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been cut or torn, and the vertices are
+ * bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The vertices stay where they were then.
  *
  * # Safety
  * `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
