@@ -42,6 +42,15 @@ pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
     Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
 }
 
+/// Gives back the room beyond the values. By a copy: `shrink_to_fit` makes one too of what is aligned by more than memory is anyway, and ends the program
+/// where there is none for it.
+pub(crate) fn shrink<T: Copy>(values: &mut Vec<T>) -> Result<()> {
+    if values.capacity() > values.len() {
+        *values = copied(values)?;
+    }
+    Ok(())
+}
+
 /// Sorts the values and leaves each once.
 pub(crate) fn sort_once<T: Ord>(values: &mut Vec<T>) {
     values.sort_unstable();

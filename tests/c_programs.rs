@@ -203,6 +203,16 @@ fn programs_run_with_the_static_library() {
     every_program_runs(["c", "c++"].into_iter().filter_map(of), &STATIC);
 }
 
+/// It takes the place of glibc's allocator.
+#[test]
+#[cfg(target_env = "gnu")]
+fn a_first_refusal_for_want_of_memory_is_an_answer() {
+    if let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") {
+        let program = compiler.build(&root().join("tests/out_of_memory.c"), &SHARED);
+        run_all([Command::new(program)].into_iter());
+    }
+}
+
 #[test]
 fn the_examples_compile_as_c_and_as_cxx() {
     for compiler in Compiler::installed() {

@@ -39,10 +39,10 @@ unsafe impl GlobalAlloc for Scarce {
         unsafe { System.alloc(layout) }
     }
 
-    /// What shrinks stays where it is, as with any allocator.
+    /// What shrinks stays where it is, as with any allocator; but what is aligned by more than memory is anyway Rust has copied.
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         let left = LEFT.get();
-        if size > layout.size() {
+        if size > layout.size() || layout.align() > 16 {
             LEFT.set(left.map(|left| left.saturating_sub(1)));
             if left == Some(0) {
                 return std::ptr::null_mut();

@@ -1,6 +1,7 @@
 //! Statuses, the version, and the message of the last failure.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::fmt::{self, Write};
 
 use libc::c_char;
 
@@ -39,14 +40,45 @@ pub const SINEW_VERSION: u32 = SINEW_VERSION_MAJOR << 16 | SINEW_VERSION_MINOR <
 
 thread_local! {
     static LAST_ERROR: RefCell<Option<Error>> = const { RefCell::new(None) };
+    /// The last was that memory ran out: kept by itself, as a thread's first use of what has to be dropped at its end takes memory, or ends the program.
+    static OUT_OF_MEMORY: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Keeps `error` as this thread's last failure: its status.
 pub(super) fn fail(error: Error) -> sinew_status {
     let status = status_of(&error);
-    // Nothing where the thread is at its end.
-    let _ = LAST_ERROR.try_with(|last| last.replace(Some(error)));
+    let is_out_of_memory = matches!(error, Error::OutOfMemory);
+    OUT_OF_MEMORY.set(is_out_of_memory);
+    if !is_out_of_memory {
+        // Nothing where the thread is at its end.
+        let _ = LAST_ERROR.try_with(|last| last.replace(Some(error)));
+    }
     status
+}
+
+/// A buffer of the caller's: what is written goes there as far as it fits, and is counted.
+struct Message {
+    to: *mut u8,
+    room: usize,
+    written: usize,
+    needed: usize,
+}
+
+impl Write for Message {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        // Behind what was cut nothing follows.
+        if self.written == self.needed {
+            let mut fits = text.len().min(self.room - self.written);
+            while !text.is_char_boundary(fits) {
+                fits -= 1;
+            }
+            // SAFETY: there is room for what fits behind what is written.
+            unsafe { std::ptr::copy_nonoverlapping(text.as_ptr(), self.to.add(self.written), fits) };
+            self.written += fits;
+        }
+        self.needed += text.len();
+        Ok(())
+    }
 }
 
 pub(super) fn status_of(error: &Error) -> sinew_status {
@@ -95,18 +127,27 @@ pub extern "C" fn sinew_status_name(status: sinew_status) -> *const c_char {
 /// `buffer` must be writable for `capacity` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_last_error(buffer: *mut c_char, capacity: usize) -> usize {
-    let message = LAST_ERROR.try_with(|last| last.borrow().as_ref().map(Error::to_string));
-    let message = message.ok().flatten().unwrap_or_default();
-    if !buffer.is_null() && capacity > 0 {
-        let mut written = message.len().min(capacity - 1);
-        while !message.is_char_boundary(written) {
-            written -= 1;
-        }
-        // SAFETY: the caller vouches for `capacity` bytes, of which at most `capacity - 1` and a NUL are written.
-        unsafe {
-            std::ptr::copy_nonoverlapping(message.as_ptr().cast(), buffer, written);
-            *buffer.add(written) = 0;
-        }
+    let has_room = !buffer.is_null() && capacity > 0;
+    let mut message = Message {
+        to: buffer.cast(),
+        room: if has_room { capacity - 1 } else { 0 },
+        written: 0,
+        needed: 0,
+    };
+    // Without memory: there may be none.
+    let _ = match OUT_OF_MEMORY.get() {
+        true => write!(message, "{}", Error::OutOfMemory),
+        false => LAST_ERROR
+            .try_with(|last| {
+                last.borrow()
+                    .as_ref()
+                    .map_or(Ok(()), |error| write!(message, "{error}"))
+            })
+            .unwrap_or(Ok(())),
+    };
+    if has_room {
+        // SAFETY: the caller vouches for `capacity` bytes, of which less are written.
+        unsafe { *buffer.add(message.written) = 0 };
     }
-    message.len() + 1
+    message.needed + 1
 }

@@ -458,17 +458,17 @@ impl Columns {
     }
 
     /// Gives back what was reserved too much while columns were put in.
-    pub fn shrink(&mut self) {
-        self.blocks.shrink_to_fit();
-        self.runs.shrink_to_fit();
-        self.own_runs.shrink_to_fit();
-        self.near.shrink_to_fit();
-        self.near_indices.shrink_to_fit();
-        self.far.shrink_to_fit();
-        self.far_indices.shrink_to_fit();
-        self.own_rest_lengths.shrink_to_fit();
-        self.own_stiffnesses.shrink_to_fit();
-        self.own_dampings.shrink_to_fit();
+    pub fn shrink(&mut self) -> Result<()> {
+        memory::shrink(&mut self.blocks)?;
+        memory::shrink(&mut self.runs)?;
+        memory::shrink(&mut self.own_runs)?;
+        memory::shrink(&mut self.near)?;
+        memory::shrink(&mut self.near_indices)?;
+        memory::shrink(&mut self.far)?;
+        memory::shrink(&mut self.far_indices)?;
+        memory::shrink(&mut self.own_rest_lengths)?;
+        memory::shrink(&mut self.own_stiffnesses)?;
+        memory::shrink(&mut self.own_dampings)
     }
 
     /// Links beside the columns.

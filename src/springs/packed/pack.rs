@@ -64,7 +64,7 @@ pub(super) fn pack(
         rest = after;
         first += LANES;
     }
-    columns.shrink();
+    columns.shrink()?;
     Ok(columns)
 }
 
