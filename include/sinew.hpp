@@ -312,16 +312,18 @@ public:
   sinew_enclosed_report enclosed_report() const { return reported<sinew_enclosed_report>(sinew_body_get_enclosed_report); }
   sinew_tear_report tear_report() const { return reported<sinew_tear_report>(sinew_body_get_tear_report); }
 
-  attachment attach(nodes held, const tool &to, float force_limit = no_limit) const {
-    return attached([&](auto out) {
-      return sinew_body_attach_nodes(world(), id, held.data(), held.size(), to.id, force_limit, out);
-    });
+  attachment attach(std::uint32_t node, const tool &to, float force_limit = no_limit) const {
+    return attached([&](auto out) { return sinew_body_attach_node(world(), id, node, to.id, force_limit, out); });
   }
-  attachment attach(nodes held, const body &other, nodes others, float force_limit = no_limit) const {
+  // An attachment for each node, whose ids `out` has room for: sinew::attachment(world(), id).
+  void attach(nodes held, const tool &to, span<sinew_attachment_id> out, float force_limit = no_limit) const {
+    expect(out.size() == held.size(), "out: as many as there are nodes");
+    check(sinew_body_attach_nodes(world(), id, held.data(), held.size(), to.id, force_limit, out.data()));
+  }
+  void attach(nodes held, const body &other, nodes others, span<sinew_attachment_id> out, float force_limit = no_limit) const {
     expect(held.size() == others.size(), "others: as many as there are nodes");
-    return attached([&](auto out) {
-      return sinew_body_attach_nodes_to_nodes(world(), id, held.data(), held.size(), other.id, others.data(), force_limit, out);
-    });
+    expect(out.size() == held.size(), "out: as many as there are nodes");
+    check(sinew_body_attach_nodes_to_nodes(world(), id, held.data(), held.size(), other.id, others.data(), force_limit, out.data()));
   }
   attachment suture(std::uint32_t triangle, vec3 weights, const body &other, std::uint32_t other_triangle, vec3 other_weights,
                     const suture_def &def = {}) const {
@@ -372,7 +374,10 @@ public:
   using owner::owner;
   embedding(const body &in, const embedding_def &def) : owner(made(in, def)) {}
   void update(const sinew_world *world) { check(sinew_embedding_update(get(), world)); }
-  void update_from(span<const float> positions) { check(sinew_embedding_update_from(get(), positions.data(), positions.size() / 3)); }
+  void update_from(span<const float> positions) {
+    expect(positions.size() % 3 == 0, "3 floats for each node");
+    check(sinew_embedding_update_from(get(), positions.data(), positions.size() / 3));
+  }
   vec3_view positions() const { return viewed(sinew_embedding_get_positions); }
   vec3_view normals() { return viewed(sinew_embedding_get_normals); }
   span<const std::uint32_t> triangles() const { // 3 for each

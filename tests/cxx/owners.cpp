@@ -132,6 +132,35 @@ static void spans() {
   EXPECT(refused([&] { sinew::world::load_snapshot(bytes); }, "checksum") == SINEW_STATUS_INVALID_ARGUMENT);
 }
 
+// Each node has an attachment of its own, and none is written beyond those.
+static void attachments() {
+  sinew::world world;
+  const auto mesh = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {2, 2, 2});
+  const auto first = world.create_body(solid(mesh.view())), second = world.create_body(solid(mesh.view()));
+  sinew::tool_def ball;
+  ball.shape = SINEW_SHAPE_SPHERE, ball.radius = 0.01f, ball.position[1] = 1;
+  const auto tool = world.create_tool(ball);
+  const std::array<std::uint32_t, 3> nodes = {0, 4, 8}, others = {1, 5, 7};
+  std::array<sinew_attachment_id, 5> ids{};
+  const sinew::span<sinew_attachment_id> out(&ids[1], nodes.size());
+  first.attach(nodes, tool, out);
+  EXPECT(ids[0].index1 == 0 && ids[4].index1 == 0);
+  world.step(0.001f);
+  float weight = 0;
+  for (const auto &id : out) {
+    const sinew::attachment held(world.get(), id);
+    weight += held.force()[1];
+    held.release();
+    EXPECT(refused([&] { held.release(); }, "attachment") == SINEW_STATUS_STALE_ID);
+  }
+  EXPECT(weight > 0.9f * 3 * 1e-3f * 9.81f); // at least that of the three, at first
+  first.attach(nodes, second, others, out);
+  EXPECT(ids[0].index1 == 0 && ids[4].index1 == 0 && ids[1].index1 != 0 && ids[3].index1 != 0);
+  first.attach(2, tool).release();
+  EXPECT(refused([&] { first.attach(nodes, tool, ids); }, "out") == SINEW_STATUS_INVALID_ARGUMENT);
+  EXPECT(refused([&] { first.attach(nodes, second, {}, out); }, "others") == SINEW_STATUS_INVALID_ARGUMENT);
+}
+
 static void no_allocation_of_its_own() {
   sinew::world world;
   const auto mesh = sinew::mesh::cloth({0.1f, 0.1f}, {4, 4});
@@ -151,5 +180,6 @@ int main() {
   EXPECT(allocations == before);
   owners();
   spans();
+  attachments();
   std::puts("ok");
 }
