@@ -5,6 +5,7 @@ mod blade;
 mod block;
 mod hollow;
 mod motion;
+mod organs;
 mod random;
 mod refused;
 mod rings;
