@@ -11,4 +11,5 @@ mod refused;
 mod rings;
 mod shapes;
 mod strokes;
+mod sutures;
 mod toughness;
