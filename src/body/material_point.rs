@@ -5,11 +5,14 @@ use glam::DVec3;
 use super::Body;
 use crate::world::SurfacePoint;
 
-/// A point of the surface, where it is in the rest shape.
+/// A point of the surface, where it is in the rest shape and now.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MaterialPoint {
     triangle: u32,
     rest: DVec3,
+    now: DVec3,
+    /// The way outward in the rest shape.
+    normal: DVec3,
 }
 
 impl Body {
@@ -19,26 +22,49 @@ impl Body {
         let sum: f64 = point.weights.iter().map(|&weight| f64::from(weight)).sum();
         let parts = corners.into_iter().zip(point.weights);
         let rest = parts.map(|(corner, weight)| corner * (f64::from(weight) / sum)).sum();
+        let weights = point.weights.map(|weight| f64::from(weight) / sum);
         Some(MaterialPoint {
             triangle: point.triangle,
             rest,
+            now: self.place_now(point.triangle, weights),
+            normal: normal(corners),
         })
     }
 
+    /// Where a point of the surface is, found from the nodes that move it: what is shown may be older.
+    fn place_now(&self, triangle: u32, weights: [f64; 3]) -> DVec3 {
+        let corners = self.surface[triangle as usize].into_iter().zip(weights);
+        let parts = corners.flat_map(|(corner, weight)| {
+            let parts = self.parts_of(corner);
+            parts.map(move |(node, part)| (node, weight * f64::from(part)))
+        });
+        let positions = self.state.positions();
+        parts
+            .map(|(node, part)| part * positions.get(node as usize).as_dvec3())
+            .sum()
+    }
+
     /// The point of the surface that it is after cuts since a version of the topology.
+    ///
+    /// The two sides of a wound lie in one place of the rest shape: it stays on that which faces as it did, and is where it was, as no cut moves
+    /// anything.
     pub(crate) fn surface_point(&self, point: &MaterialPoint, since: u64) -> Option<SurfacePoint> {
         let cuttable = self.cuttable.as_ref()?;
         let changed = cuttable.log.since(since).ok()?.triangles;
         let mut nearest: Option<(f64, SurfacePoint)> = None;
         for triangle in std::iter::once(point.triangle).chain(changed.iter().copied()) {
             let corners = cuttable.material.corners_at_rest(triangle);
+            if normal(corners).dot(point.normal) < 0.0 {
+                continue;
+            }
             let weights = weights_of_nearest(point.rest, corners);
             let place: DVec3 = corners
                 .iter()
                 .zip(weights)
                 .map(|(&corner, weight)| corner * weight)
                 .sum();
-            let off = place.distance_squared(point.rest);
+            let now = self.place_now(triangle, weights);
+            let off = place.distance_squared(point.rest) + now.distance_squared(point.now);
             if off.is_finite() && nearest.is_none_or(|(least, _)| off < least) {
                 let weights = weights.map(|weight| weight.max(0.0) as f32);
                 nearest = Some((off, SurfacePoint { triangle, weights }));
@@ -46,6 +72,10 @@ impl Body {
         }
         nearest.map(|(_, point)| point)
     }
+}
+
+fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
 }
 
 /// The weights of a triangle's corners in its point next to another (Ericson 2005, section 5.1.5).

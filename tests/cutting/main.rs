@@ -6,6 +6,7 @@ mod sheet;
 mod curved;
 mod enclosed;
 mod motion;
+mod organs;
 mod random;
 mod refused;
 mod shapes;
