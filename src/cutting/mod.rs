@@ -19,6 +19,7 @@ mod crumbs;
 mod cut;
 mod material;
 mod met;
+mod numbers;
 mod open;
 mod parted;
 mod pieces;

@@ -1,27 +1,36 @@
-//! Numbers for what is drawn: a vertex at a node has that of the node, any other one of its own among nodes.
+//! Numbers for what is drawn: of the vertices at a node one has that of the node, any other vertex has one of its own among nodes.
 
 use super::changes::{BoundPoint, Source};
 use super::cut::Cut;
-use super::surface::{NONE, Node};
+use super::numbers::FreeNodes;
+use super::surface::{NONE, Node, SurfaceVertex};
 use crate::error::Result;
 use crate::memory;
 
 impl Cut<'_> {
     /// Numbers what is drawn and new, and lists it.
     pub(crate) fn number_points(&mut self) -> Result<()> {
+        let before = self.surface.vertices.before()?;
+        let has_left = |&(vertex, was): &(u32, SurfaceVertex)| {
+            let is = self.surface.vertices[vertex];
+            (was.point == was.nodes[0] && is.nodes[0] != was.point).then_some(was.point)
+        };
+        let made = self.surface.nodes.count_before()..self.surface.nodes.count();
+        let mut free = FreeNodes::new(before.iter().filter_map(has_left), made)?;
         let touched = self.surface.vertices.touched()?;
         let mut drawn = memory::reserved(touched.len())?;
         for vertex in touched {
             let it = self.surface.vertices[vertex];
             let is_at_node = it.weights[0] == 1.0;
-            let point = if is_at_node {
+            let has_own = it.point != NONE && self.surface.nodes[it.point].is_bound();
+            let point = if has_own || is_at_node && it.point == it.nodes[0] {
+                it.point
+            } else if is_at_node && free.take(it.nodes[0]) {
                 it.nodes[0]
-            } else if it.point == NONE {
+            } else {
                 self.limits
                     .check("nodes", self.surface.nodes.count(), self.limits.nodes)?;
                 self.surface.nodes.push(Node::BOUND)?
-            } else {
-                it.point
             };
             if point != it.point {
                 self.surface.vertices.edit(vertex, |vertex| vertex.point = point)?;
@@ -29,7 +38,7 @@ impl Cut<'_> {
                     memory::push(&mut self.changes.triangles, triangle)?;
                 }
             }
-            if is_at_node {
+            if is_at_node && point == it.nodes[0] {
                 drawn.push(point);
             } else {
                 let ([a, b, c], [u, v, w]) = (it.nodes, it.weights);
@@ -45,15 +54,14 @@ impl Cut<'_> {
         self.changes.bound.sort_unstable_by_key(|bound| bound.point);
         memory::sort_once(&mut drawn);
         self.changes.list_copies(&drawn)?;
-        self.list_sources()
+        self.list_sources(&before)
     }
 
-    fn list_sources(&mut self) -> Result<()> {
-        let before = self.surface.vertices.before()?;
+    fn list_sources(&mut self, before: &[(u32, SurfaceVertex)]) -> Result<()> {
         let first = self.surface.vertices.count_before();
         for (vertex, new) in (first..).zip(&self.changes.vertices) {
             let it = self.surface.vertices[vertex];
-            if it.weights[0] == 1.0 {
+            if it.point == it.nodes[0] {
                 continue;
             }
             // Of a vertex that is at a copy now what it was at has the lower number.

@@ -10,7 +10,9 @@ use sinew::mesh::MeshFormat;
 use super::sheet::{Body, Random, flat, snap};
 
 /// Real surfaces, 10 long about the origin; said aloud where they are missing.
-fn organs() -> Vec<(&'static str, (Vec<Vec3>, Vec<[u32; 3]>))> {
+type Surface = (Vec<Vec3>, Vec<[u32; 3]>);
+
+fn organs() -> Vec<(&'static str, Surface)> {
     let mut all = Vec::new();
     for name in ["liver_collision.stl", "stomach.stl", "tissue_surface.obj"] {
         let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
@@ -103,7 +105,7 @@ fn planes_and_loops_part_surfaces_of_organs() {
             for step in 0..steps {
                 cut(&mut body, edge(step), edge(step + 1));
             }
-            assert!(body.check() >= whole + 1, "{name}, loop {round}");
+            assert!(body.check() > whole, "{name}, loop {round}");
         }
     }
 }

@@ -325,6 +325,7 @@ impl Body {
             }
             _ => None,
         };
+        let mut points = BTreeSet::new();
         for (vertex, about) in at_vertex.iter().enumerate() {
             assert!(!about.is_empty(), "vertex {vertex} is in no triangle");
             let mut seen = BTreeSet::from([about[0]]);
@@ -349,6 +350,7 @@ impl Body {
                 "the triangles about vertex {vertex} are one fan"
             );
             let point = self.surface.vertices()[vertex].point;
+            assert!(points.insert(point), "point {point} is two vertices");
             let carried = self.carried[point as usize].distance(self.surface.rest_place(vertex as u32));
             assert!(
                 carried < 1e-9,

@@ -112,7 +112,7 @@ pub struct SolidVertex {
     pub nodes: [u32; 4],
     /// How much of each, at least 0, 1 in all.
     pub weights: [f64; 4],
-    /// Its number among nodes: that of the node that it is at, or one of its own, which no other node or point has.
+    /// Its number among nodes, which no other vertex has: that of the node that it is at, or one of its own.
     pub point: u32,
     /// One of the tetrahedra about it.
     pub(crate) around: u32,
@@ -146,6 +146,11 @@ impl Node {
         rest: Vec3::ZERO,
         first: NONE,
     };
+
+    /// Whether it is such a point.
+    pub(crate) fn is_bound(&self) -> bool {
+        self.first == NONE
+    }
 }
 
 /// A solid that can be cut.

@@ -1,8 +1,9 @@
-//! Numbers for the material's vertices, drawn or not: a vertex at a node has that of the node, any other one of its own among nodes.
+//! Numbers for the material's vertices, drawn or not: of those at a node one has that of the node, any other has one of its own among nodes.
 
-use super::body::{NONE, Node};
+use super::body::{NONE, Node, SolidVertex};
 use super::cut::Cut;
 use crate::cutting::changes::{BoundPoint, Source};
+use crate::cutting::numbers::FreeNodes;
 use crate::error::Result;
 use crate::memory;
 
@@ -10,20 +11,27 @@ impl Cut<'_> {
     /// Numbers what is new, and lists it.
     pub(crate) fn number_points(&mut self) -> Result<()> {
         let before = self.solid.vertices.before()?;
+        let has_left = |&(vertex, was): &(u32, SolidVertex)| {
+            let is = self.solid.vertices[vertex];
+            (was.point == was.nodes[0] && is.nodes[0] != was.point).then_some(was.point)
+        };
+        let made = self.solid.nodes.count_before()..self.solid.nodes.count();
+        let mut free = FreeNodes::new(before.iter().filter_map(has_left), made)?;
         let touched = self.solid.vertices.touched()?;
         let mut at_nodes = memory::reserved(touched.len())?;
         let mut star = Vec::new();
         for vertex in touched {
             let it = self.solid.vertices[vertex];
             let is_at_node = it.weights[0] == 1.0;
-            let point = if is_at_node {
+            let has_own = it.point != NONE && self.solid.nodes[it.point].is_bound();
+            let point = if has_own || is_at_node && it.point == it.nodes[0] {
+                it.point
+            } else if is_at_node && free.take(it.nodes[0]) {
                 it.nodes[0]
-            } else if it.point == NONE {
+            } else {
                 self.limits
                     .check("nodes", self.solid.nodes.count(), self.limits.nodes)?;
                 self.solid.nodes.push(Node::BOUND)?
-            } else {
-                it.point
             };
             if point != it.point {
                 self.solid.vertices.edit(vertex, |vertex| vertex.point = point)?;
@@ -35,7 +43,7 @@ impl Cut<'_> {
                     }
                 }
             }
-            if is_at_node {
+            if is_at_node && point == it.nodes[0] {
                 at_nodes.push(point);
                 continue;
             }
@@ -53,7 +61,7 @@ impl Cut<'_> {
         let first = self.solid.vertices.count_before();
         for (vertex, new) in (first..).zip(&self.changes.vertices) {
             let it = self.solid.vertices[vertex];
-            if it.weights[0] == 1.0 {
+            if it.point == it.nodes[0] {
                 continue;
             }
             // Of a vertex that is at a copy now what it was at has the lower number.
