@@ -90,10 +90,18 @@ impl Forest {
 
     /// Shows the triangles whose boxes come within `reach` of this one, and some more.
     pub fn near(&self, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
+        self.nearest(bounds, reach, |triangle| {
+            see(triangle);
+            reach
+        });
+    }
+
+    /// The same, where `see` tells after each triangle how far the next ones may be.
+    pub fn nearest(&self, bounds: &Bounds, mut reach: f32, mut see: impl FnMut(usize) -> f32) {
         let later = self.later.iter().map(|later| (later.from, &later.tree));
         for (from, tree) in std::iter::once((0, &self.first)).chain(later) {
             tree.near(bounds, reach * reach, |place| {
-                see(from + tree.triangle(place) as usize);
+                reach = see(from + tree.triangle(place) as usize);
                 reach * reach
             });
         }

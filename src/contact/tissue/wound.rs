@@ -18,7 +18,11 @@ use crate::snapshot::saved;
 /// Edges meet that both look across the gap by this much at least, as the cosine of an angle.
 const SQUARELY: f32 = 0.5;
 
-/// A corner is behind a face where it is no deeper than this part of a short edge.
+/// Then they do not look the same way: the cosine of the angle between where they look is no more than this.
+const ONE_WAY: f32 = 1.0 - 2.0 * SQUARELY * SQUARELY;
+
+/// A corner is behind a face where it is no deeper than this part of a short edge, and no deeper than what is bared is large there: what many
+/// cuts have left in crumbs would else be compared with all others.
 const DEPTH: f32 = 1.0;
 
 /// The border of a wound holds corners that are beside it and behind it by no more than this part of a short edge: at first they lie on it.
@@ -41,6 +45,8 @@ pub(super) struct Wound {
     is_corner: Vec<bool>,
     /// Which way is out at each, the sum of its bared triangles.
     normals: Vectors,
+    /// How long the longest edge of these is, m.
+    longest: Vec<f32>,
 }
 
 saved!(Wound {
@@ -48,7 +54,8 @@ saved!(Wound {
     is_bared,
     nodes,
     is_corner,
-    normals
+    normals,
+    longest
 });
 
 impl Wound {
@@ -65,6 +72,7 @@ impl Wound {
             nodes: memory::reserved(spare)?,
             is_corner,
             normals: body.zeros()?,
+            longest: memory::reserved(body.node_count() + spare)?,
         })
     }
 
@@ -80,6 +88,7 @@ impl Wound {
         self.is_bared.resize(triangles.len(), false);
         self.is_corner.resize(node_count.max(self.is_corner.len()), false);
         self.normals.grow(node_count);
+        self.longest.resize(node_count.max(self.longest.len()), 0.0);
         for &triangle in bared {
             if !std::mem::replace(&mut self.is_bared[triangle as usize], true) {
                 self.faces.push(triangle);
@@ -96,13 +105,17 @@ impl Wound {
     pub fn turn(&mut self, triangles: &[[u32; 3]], starts: &Vectors) {
         for &node in &self.nodes {
             self.normals.set(node as usize, Vec3::ZERO);
+            self.longest[node as usize] = 0.0;
         }
         for &face in &self.faces {
             let corners = triangles[face as usize];
-            let normal = normal(corners.map(|corner| starts.get(corner as usize)));
+            let [a, b, c] = corners.map(|corner| starts.get(corner as usize));
+            let normal = normal([a, b, c]);
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
             for corner in corners {
                 let sum = self.normals.get(corner as usize) + normal;
                 self.normals.set(corner as usize, sum);
+                self.longest[corner as usize] = longest.max(self.longest[corner as usize]);
             }
         }
     }
@@ -126,27 +139,32 @@ impl Search<'_> {
         let Some(wound) = skin.wound().filter(|_| self.is_of_one()) else {
             return;
         };
-        let depth = DEPTH * skin.short;
         for &node in &wound.nodes {
+            let border = BORDER * skin.short;
+            let depth = (DEPTH * skin.short).min(wound.longest[node as usize]).max(border);
             let outward = wound.normals.get(node as usize);
             let (start, step) = self.way(party, node, Vec3::ZERO, skin.drift);
             let end = start + step;
             let around = Bounds::of([start, end].into_iter());
             let mut nearest: Option<((bool, f32), Over, usize, Vec3)> = None;
-            skin.near(&around, depth + skin.spread, |triangle| {
+            // How far a face may be from what it is to have behind it or before it.
+            let mut reach = depth;
+            skin.forest.nearest(&around, depth + skin.spread, |triangle| {
                 let nodes = skin.triangles[triangle];
+                let further = |reach: f32| reach + skin.least_thickness() + skin.spread;
                 if !wound.is_bared(triangle) || nodes.contains(&node) {
-                    return;
+                    return further(reach);
                 }
-                let corners = self.corners(party, &nodes);
-                let places = corners.at(1.0);
-                let normal = normal(places).normalize_or_zero();
-                if !(normal.dot(outward) < 0.0) {
-                    return;
+                let places = self.corners(party, &nodes).at(1.0);
+                let across = normal(places);
+                let height = across.dot(end - places[0]);
+                let is_far = height * height > reach * reach * across.length_squared();
+                if is_far || !(across.dot(outward) < 0.0) {
+                    return further(reach);
                 }
+                let normal = across.normalize_or_zero();
                 let over = Over::new(end, places, normal);
                 let is_beside = over.beside > skin.least_thickness();
-                let border = BORDER * skin.short;
                 let within = if is_beside { border } else { depth };
                 // What lies on a face counts before what is beside one.
                 let key = (is_beside, over.height.abs());
@@ -156,7 +174,11 @@ impl Search<'_> {
                     && !skin.was_behind(node, nodes, BELONGS * depth)
                 {
                     nearest = Some((key, over, triangle, normal));
+                    if !is_beside {
+                        reach = over.height.abs();
+                    }
                 }
+                further(reach)
             });
             if let Some((_, over, triangle, normal)) = nearest
                 && over.height < -NOTHING * skin.least_thickness()
@@ -201,6 +223,8 @@ impl Search<'_> {
                 radius: 0.0,
             };
             let around = Bounds::of(ends.into_iter());
+            let within = around.extended(border);
+            let away = outward(edge);
             let mut deepest: Option<(f32, [u32; 2], Separation, Vec3)> = None;
             skin.near(&around, border + skin.spread, |triangle| {
                 for other in skin.owned(triangle).into_iter().filter(|&other| other != NONE) {
@@ -212,6 +236,14 @@ impl Search<'_> {
                     let mut corners = self.corners(party, &other);
                     corners.points = corners.at(1.0);
                     corners.steps = [Vec3::ZERO; 3];
+                    // Most of what is near a long edge's box is not near the edge: what is easily told is told first.
+                    let out = outward(other);
+                    let along = out.dot(away);
+                    let of_both = out.length_squared() * away.length_squared();
+                    let look_one_way = along > 0.0 && along * along > ONE_WAY * ONE_WAY * of_both;
+                    if look_one_way || !Bounds::of(corners.points[..2].iter().copied()).overlaps(&within) {
+                        continue;
+                    }
                     let found = corners.separation(&segment, 0.0);
                     let is_inside = found.inside && found.along > 0.0 && found.along < 1.0;
                     let depth = found.offset.length();
@@ -221,7 +253,7 @@ impl Search<'_> {
                     // From the first edge to the other is out of the other, where the first is behind it.
                     let normal = found.offset / depth;
                     let looks = |along: Vec3| normal.dot(along.normalize_or_zero());
-                    let is_behind = looks(outward(other)) > SQUARELY && looks(outward(edge)) < -SQUARELY;
+                    let is_behind = looks(out) > SQUARELY && looks(away) < -SQUARELY;
                     if is_behind && deepest.is_none_or(|(most, ..)| depth > most) {
                         deepest = Some((depth, other, found, normal));
                     }
