@@ -96,7 +96,7 @@ pub struct World {
     /// The ways of the tools in the step in progress.
     paths: Vec<ToolPath>,
     /// Contacts of tissue with tissue, where bodies ask for them.
-    tissue: Option<Box<Tissue>>,
+    pub(crate) tissue: Option<Box<Tissue>>,
     /// The bodies that take their substeps together, by their places; none where none can.
     walks: Vec<Option<Walk>>,
     /// How the step in progress ended for each body, at its place.

@@ -15,25 +15,31 @@ pub(super) fn mark(
 ) -> u32 {
     let mut count = 0;
     let shift = shift(first, second);
-    let edges = first.edges.iter().zip(pierces);
-    for (edge, pierces) in edges.filter(|(edge, _)| edge[0] != NONE) {
+    let is_of_one = std::ptr::eq(first, second);
+    let edges = first.edges.iter().zip(pierces).enumerate();
+    for (number, (edge, pierces)) in edges.filter(|(_, (edge, _))| edge[0] != NONE) {
         let ends = edge.map(|node| first.starts.get(node as usize) + shift);
         let mut passes = false;
-        second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {
+        let around = Bounds::of(ends.into_iter());
+        let see = |triangle: usize| {
             let nodes = second.triangles[triangle];
             if passes || are_joined(edge, &nodes) {
                 return;
             }
             let corners = nodes.map(|node| second.starts.get(node as usize));
             // What a cut has parted touches.
-            let is_of_one = std::ptr::eq(first, second);
             let depth = if is_of_one {
                 first.crossing_depth(*edge, &nodes)
             } else {
                 0.0
             };
             passes = crosses(ends[0], ends[1], corners, depth);
-        });
+        };
+        if is_of_one {
+            second.near_edge(number, &around, 0.0, see);
+        } else {
+            second.near(&around, 0.0, see);
+        }
         if passes {
             *pierces = true;
             count += 1;

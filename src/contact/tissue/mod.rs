@@ -12,6 +12,7 @@ mod forest;
 mod groups;
 mod images;
 mod link;
+mod nearby;
 mod search;
 mod skin;
 mod wound;
@@ -43,9 +44,6 @@ const FASTER: f32 = 2.0;
 
 /// How far bodies come against each other in a substep, as a part of the short edges.
 const TRAVEL: f32 = 0.5;
-
-/// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
-const WITH_ITSELF: f32 = 0.5;
 
 /// What moves three corners, each of them bound to four nodes at most.
 const MOST_MOVERS: usize = 12;
@@ -357,7 +355,7 @@ impl Tissue {
                 && self.groups.of(place) == Some(group)
                 && moment.concerns(body)
             {
-                skin.go_on(body);
+                skin.go_on(body, moment.duration);
             }
         }
     }
@@ -455,11 +453,11 @@ fn join_movers(bonds: &Bonds, bodies: &Slots<Body>, places: [usize; 2], corners:
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
 fn radius(first: &Party, second: &Party, bodies: [&Body; 2]) -> Option<f32> {
     let [a, b] = bodies.map(|body| &body.contact);
+    if first.place == second.place {
+        return first.skin.radius_with_itself(a);
+    }
     let shortest = first.skin.short.min(second.skin.short);
     let apart = (a.thickness + b.thickness).max(LEAST_THICKNESS * shortest);
-    if first.place == second.place {
-        return a.with_itself.then_some(apart.min(WITH_ITSELF * shortest));
-    }
     meet_each_other(bodies[0], bodies[1]).then_some(apart)
 }
 

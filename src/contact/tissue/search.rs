@@ -60,17 +60,24 @@ impl Search<'_> {
         self.parties[0].place == self.parties[1].place
     }
 
-    /// Shows the triangles that a box comes within `reach` of, those that are seen there where they are to be found in images.
-    fn near(&self, skin: &Skin, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
+    /// Shows the triangles that a corner, by its place among those of its surface, comes within `reach` of on its way through a box; those that are
+    /// seen there where they are to be found in images.
+    fn near_corner(&self, corner: usize, skin: &Skin, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
         match &skin.images {
+            _ if self.is_of_one() => skin.near_itself(corner, bounds, reach + skin.spread, see),
             Some(images) if self.in_images => images.near(skin, bounds, reach, see),
             _ => skin.near(bounds, reach, see),
         }
     }
 
+    /// Whether parts of one surface begin too far apart to meet in the step.
+    fn is_far(&self, skin: &Skin, distance: f32) -> bool {
+        self.is_of_one() && distance > self.radius + 2.0 * skin.spread
+    }
+
     fn nodes_with_faces(&self, of_nodes: Party, of_faces: Party, see: &mut impl FnMut(Touch)) {
         let shift = shift(of_nodes.skin, of_faces.skin);
-        for &node in &of_nodes.skin.nodes {
+        for (corner, &node) in of_nodes.skin.nodes.iter().enumerate() {
             let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
             let segment = Segment {
                 ends: [place; 2],
@@ -85,7 +92,7 @@ impl Search<'_> {
             let is_solid = of_faces.skin.is_closed && !self.is_of_one();
             let depth = if is_solid { LED_OUT * of_faces.skin.short } else { 0.0 };
             let reach = self.radius.max(depth) + of_faces.skin.spread;
-            self.near(of_faces.skin, &around, reach, |triangle| {
+            self.near_corner(corner, of_faces.skin, &around, reach, |triangle| {
                 let nodes = of_faces.skin.triangles[triangle];
                 if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
                     return;
@@ -93,6 +100,9 @@ impl Search<'_> {
                 let corners = self.corners(of_faces, &nodes);
                 let start = corners.separation(&segment, 0.0);
                 let distance = start.offset.length();
+                if self.is_far(of_faces.skin, distance) {
+                    return;
+                }
                 let height = if is_solid { height(&corners, &start) } else { 0.0 };
                 let is_nearer = distance < nearest.0 * (1.0 - SAME)
                     || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
@@ -100,8 +110,10 @@ impl Search<'_> {
                     nearest = (distance, height.abs());
                     behind = (height < 0.0).then_some((triangle, start));
                 }
+                let is_closer =
+                    |(least, known, _): (f32, usize, _)| distance < least || distance == least && triangle < known;
                 if height >= 0.0
-                    && touched.is_none_or(|(least, ..)| distance < least)
+                    && touched.is_none_or(is_closer)
                     && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners))
                 {
                     touched = Some((distance, triangle, found));
@@ -158,13 +170,18 @@ impl Search<'_> {
                         continue;
                     }
                     let corners = self.corners(second, &other);
+                    let start = corners.separation(&segment, 0.0).offset.length();
+                    if self.is_far(second.skin, start) {
+                        continue;
+                    }
                     let Some((found, radius)) = self.approach(second.skin, (edge, &segment), (&other, &corners)) else {
                         continue;
                     };
                     // At an end of either it is a node that meets.
                     if found.inside && found.along > 0.0 && found.along < 1.0 {
-                        let start = corners.separation(&segment, 0.0).offset.length_squared();
-                        if closest.is_none_or(|(least, ..)| start < least) {
+                        let is_closer =
+                            |(least, known, _): (f32, [u32; 2], _)| start < least || start == least && other < known;
+                        if closest.is_none_or(is_closer) {
                             closest = Some((start, other, (found, radius)));
                         }
                     }
@@ -188,7 +205,12 @@ impl Search<'_> {
                 _ => {
                     let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
                     let skin = second.skin;
-                    skin.near(&around, reach, |triangle| see_edges(skin.owned(triangle)));
+                    let see = |triangle| see_edges(skin.owned(triangle));
+                    if self.is_of_one() {
+                        skin.near_edge(index, &around, reach + skin.spread, see);
+                    } else {
+                        skin.near(&around, reach, see);
+                    }
                 }
             }
             if let Some((_, other, (found, radius))) = closest {

@@ -6,8 +6,10 @@ use super::LEAST_THICKNESS;
 use super::change::Changing;
 use super::forest::Forest;
 use super::images::Images;
+use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::body::{Bindings, Body, Bounds, Vectors};
+use crate::contact::BodyContact;
 use crate::contact::sweep::{Corners, Segment};
 use crate::contact::tool::Detection;
 use crate::error::Result;
@@ -56,6 +58,10 @@ pub(crate) struct Skin {
     pub(super) images: Option<Images>,
     /// What it takes to change, where its body may be cut.
     pub(super) changing: Option<Box<Changing>>,
+    /// What of it is near itself, where it meets itself.
+    pub(super) nearby: Option<Box<Nearby>>,
+    /// Whether the trees are where the triangles are.
+    is_fitted: bool,
 }
 
 saved!(Skin {
@@ -80,7 +86,9 @@ saved!(Skin {
     asks_for_images,
     resolution,
     images,
-    changing
+    changing,
+    nearby,
+    is_fitted
 });
 
 /// Features that were no further apart at first than this part of the least thickness were one, and are parted.
@@ -88,6 +96,9 @@ pub(super) const PARTED: f32 = 0.1;
 
 /// Sides of a cut pass through each other where edges do by more than this part of a short edge.
 const CROSSING: f32 = 0.01;
+
+/// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
+const WITH_ITSELF: f32 = 0.5;
 
 /// No edge.
 pub(super) const NONE: u32 = u32::MAX;
@@ -170,6 +181,8 @@ impl Skin {
             given: Bounds::EMPTY,
             triangles,
             changing,
+            nearby: None,
+            is_fitted: true,
         };
         let spare = body.spare_nodes();
         skin.nodes.try_reserve_exact(spare)?;
@@ -179,7 +192,17 @@ impl Skin {
         skin.edges.try_reserve_exact(3 * spare)?;
         skin.pierces.try_reserve_exact(3 * spare)?;
         skin.room += 6 * spare;
+        if contact.with_itself {
+            let nearby = Nearby::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?;
+            skin.nearby = Some(memory::boxed(nearby)?);
+        }
         Ok(skin)
+    }
+
+    /// How far it keeps from itself, m, if it does.
+    pub fn radius_with_itself(&self, contact: &BodyContact) -> Option<f32> {
+        let apart = (2.0 * contact.thickness).max(self.least_thickness());
+        contact.with_itself.then_some(apart.min(WITH_ITSELF * self.short))
     }
 
     /// Whether it knows of a node: of a corner, or of one that moves some.
@@ -228,6 +251,18 @@ impl Skin {
     pub fn are_of_wound(&self, nodes: [u32; 2], others: &[u32]) -> bool {
         let wound = self.wound();
         wound.is_some_and(|wound| wound.has(nodes.into_iter().chain(others.iter().copied())))
+    }
+
+    /// Whether a corner or an edge and others of the same body were so near at first that they never meet, if they keep apart `radius`, m.
+    pub fn are_neighbours(&self, nodes: [u32; 2], others: &[u32], radius: f32) -> bool {
+        let may_meet = match &self.changing {
+            Some(changing) => {
+                let later = |node: &u32| *node >= changing.first_later;
+                nodes.iter().chain(others).any(later) || self.are_of_wound(nodes, others)
+            }
+            None => false,
+        };
+        !may_meet && self.first_distance(nodes, others).is_some_and(|apart| apart <= radius)
     }
 
     /// What keeps off it where it has no thickness, m.
@@ -289,10 +324,11 @@ impl Skin {
         if let Some(wound) = changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
             wound.turn(triangles, starts);
         }
+        self.know_nearby(&body.contact);
     }
 
-    /// Takes points that are bound to nodes to go as those do by now.
-    pub fn go_on(&mut self, body: &Body) {
+    /// Takes nodes to go as impulses have them go by now, and points that are bound to them with those.
+    pub fn go_on(&mut self, body: &Body, duration: f32) {
         let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
         for bound in bindings
             .into_iter()
@@ -301,6 +337,55 @@ impl Skin {
             let velocity = bound.of(|node| self.velocities.get(node));
             self.velocities.set(bound.node as usize, velocity);
         }
+        if self.nearby.is_some() {
+            let ways = self
+                .nodes
+                .iter()
+                .map(|&node| self.velocities.get(node as usize) - self.drift);
+            let ways = Bounds::of(ways);
+            self.spread = self.spread.max(duration * ways.min.abs().max(ways.max.abs()).length());
+            self.know_nearby(&body.contact);
+        }
+    }
+
+    /// Has what is near itself known, or the trees where it is, so far as it is looked for.
+    fn know_nearby(&mut self, contact: &BodyContact) {
+        let Some(mut nearby) = self.nearby.take() else {
+            return;
+        };
+        let is_open = self.wound().is_some_and(Wound::is_open);
+        let border = if is_open { self.wound_border() } else { 0.0 };
+        let radius = self.radius_with_itself(contact).unwrap_or(0.0);
+        let apart = radius.max(border) + 2.0 * self.spread;
+        if !nearby.holds(self, apart) {
+            self.fit();
+            nearby.find(self, apart, radius);
+        }
+        self.nearby = Some(nearby);
+    }
+
+    /// Takes the trees to where the triangles are.
+    fn fit(&mut self) {
+        if !self.is_fitted {
+            let (triangles, starts) = (&self.triangles, &self.starts);
+            self.forest
+                .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
+            self.is_fitted = true;
+        }
+    }
+
+    /// Shows the triangles that may come within `reach` of a corner of the surface or an edge, by its number after those of corners, which goes through
+    /// this box.
+    pub fn near_itself(&self, number: usize, bounds: &Bounds, reach: f32, mut see: impl FnMut(usize)) {
+        match self.nearby.as_ref().and_then(|nearby| nearby.of(number)) {
+            Some(triangles) => triangles.iter().for_each(|&triangle| see(triangle as usize)),
+            None => self.near(bounds, reach, see),
+        }
+    }
+
+    /// The same of an edge.
+    pub fn near_edge(&self, edge: usize, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
+        self.near_itself(self.nodes.len() + edge, bounds, reach, see);
     }
 
     /// Takes the body as it stands when a step that was tried begins, or as it ends.
@@ -313,6 +398,7 @@ impl Skin {
         self.take(body.origin, body.bindings.as_ref(), 0.0, |node| {
             (positions.get(node), Vec3::ZERO)
         });
+        self.know_nearby(&body.contact);
     }
 
     fn take(
@@ -344,9 +430,11 @@ impl Skin {
         self.drift = 0.5 * (all.min + all.max);
         self.travel = duration * all.min.abs().max(all.max.abs()).length();
         self.spread = 0.5 * duration * (all.max - all.min).length();
-        let (triangles, starts) = (&self.triangles, &self.starts);
-        self.forest
-            .refit(|triangle| triangles[triangle as usize].map(|node| starts.get(node as usize)));
+        self.is_fitted = false;
+        // Where what is near itself is known, nothing else looks for anything by the trees.
+        if self.nearby.is_none() || self.meets_bodies || self.wound().is_some_and(Wound::is_open) {
+            self.fit();
+        }
     }
 
     /// Has images of the surface, if it has none.

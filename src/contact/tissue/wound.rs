@@ -120,6 +120,11 @@ impl Wound {
         }
     }
 
+    /// Whether anything is bared.
+    pub fn is_open(&self) -> bool {
+        !self.faces.is_empty()
+    }
+
     /// Whether a triangle is bared.
     pub fn is_bared(&self, triangle: usize) -> bool {
         self.is_bared[triangle]
@@ -140,7 +145,7 @@ impl Search<'_> {
             return;
         };
         for &node in &wound.nodes {
-            let border = BORDER * skin.short;
+            let border = skin.wound_border();
             let depth = (DEPTH * skin.short).min(wound.longest[node as usize]).max(border);
             let outward = wound.normals.get(node as usize);
             let (start, step) = self.way(party, node, Vec3::ZERO, skin.drift);
@@ -209,9 +214,9 @@ impl Search<'_> {
         let Some(wound) = skin.wound().filter(|wound| !wound.faces.is_empty()) else {
             return;
         };
-        let border = BORDER * skin.short;
+        let border = skin.wound_border();
         let outward = |[a, b]: [u32; 2]| wound.normals.get(a as usize) + wound.normals.get(b as usize);
-        for &edge in &skin.edges {
+        for (number, &edge) in skin.edges.iter().enumerate() {
             if edge[0] == NONE || !wound.has(edge.into_iter()) {
                 continue;
             }
@@ -226,7 +231,7 @@ impl Search<'_> {
             let within = around.extended(border);
             let away = outward(edge);
             let mut deepest: Option<(f32, [u32; 2], Separation, Vec3)> = None;
-            skin.near(&around, border + skin.spread, |triangle| {
+            skin.near_edge(number, &around, border + skin.spread, |triangle| {
                 for other in skin.owned(triangle).into_iter().filter(|&other| other != NONE) {
                     let other = skin.edges[other as usize];
                     let is_other = other > edge && !other.iter().any(|node| edge.contains(node));
@@ -254,7 +259,8 @@ impl Search<'_> {
                     let normal = found.offset / depth;
                     let looks = |along: Vec3| normal.dot(along.normalize_or_zero());
                     let is_behind = looks(out) > SQUARELY && looks(away) < -SQUARELY;
-                    if is_behind && deepest.is_none_or(|(most, ..)| depth > most) {
+                    let is_deeper = |most: f32, known: [u32; 2]| depth > most || depth == most && other < known;
+                    if is_behind && deepest.is_none_or(|(most, known, ..)| is_deeper(most, known)) {
                         deepest = Some((depth, other, found, normal));
                     }
                 }
@@ -279,6 +285,11 @@ impl Search<'_> {
 }
 
 impl Skin {
+    /// How far beside the border of a wound, or behind it, corners and edges are held by it, m.
+    pub fn wound_border(&self) -> f32 {
+        BORDER * self.short
+    }
+
     /// Whether a number was behind a triangle of the same body at first, as near as this, m: the tissue behind it is its own.
     fn was_behind(&self, number: u32, triangle: [u32; 3], near: f32) -> bool {
         self.firsts.as_ref().is_some_and(|firsts| {
