@@ -125,6 +125,7 @@ fn tissue_against_tissue_allocates_nothing() {
                 contact: BodyContact {
                     thickness: 1e-3,
                     with_bodies: true,
+                    with_itself: true,
                     detection,
                     ..BodyContact::NOTHING
                 },
