@@ -40,6 +40,8 @@ pub(super) struct Constraint {
     pub friction: f32,
     /// The tool's place among those near the body.
     pub tool: usize,
+    /// Which end of a capsule a face meets, since it may meet both; 0 of all else.
+    pub tip: u8,
     /// The mass that an impulse at the contact moves, kg; less where its nodes are held along axes near the normal.
     effective_mass: f32,
     /// The least that it moves along any direction.
@@ -71,6 +73,7 @@ saved!(Constraint {
     depth,
     friction,
     tool,
+    tip,
     effective_mass,
     free_mass,
     give,
@@ -127,6 +130,7 @@ impl Constraint {
             depth: 0.0,
             friction: 0.0,
             tool: 0,
+            tip: 0,
             effective_mass: fading / inverse_mass,
             free_mass: 1.0 / leverage.max(free),
             give: 1.0 - rigid / inverse_mass,
@@ -185,6 +189,7 @@ impl Constraint {
             depth: self.depth,
             friction: self.friction,
             tool: self.tool,
+            tip: self.tip,
             rounded: self.rounded,
             ..found.unwrap_or(*self)
         };

@@ -450,15 +450,10 @@ impl Contacts {
                 let Some(feature) = self.features.get(self.candidates.near()[candidate]) else {
                     continue;
                 };
-                let is_known = || !slice.foresees && self.holds.know(place, feature);
-                if room.is_some() {
-                    if let Some(corners) = self.candidates.corners(feature)
-                        && !is_known()
-                    {
-                        self.touch(meeting, slice, (place, &motion), (feature, &corners));
-                    }
-                } else if !is_known() {
+                if room.is_none() {
                     self.touch_plane(meeting, slice, (place, &motion), feature);
+                } else if let Some(corners) = self.candidates.corners(feature) {
+                    self.touch(meeting, slice, (place, &motion), (feature, &corners));
                 }
             }
         }
@@ -513,6 +508,7 @@ impl Contacts {
     ) {
         if let Solid::HalfSpace { point, .. } = motion.from
             && feature.nodes().len() == 1
+            && !self.is_known(slice, (tool, feature, 0))
             && !self.is_held(feature, meeting.tools[tool].slot, meeting.bindings)
         {
             let found = meet_plane(meeting, slice, motion, feature, point);
@@ -533,20 +529,27 @@ impl Contacts {
         }
         let part = (feature, corners);
         if let (Solid::Mesh(from), Solid::Mesh(to)) = (motion.from, motion.to) {
-            let found = meet_mesh(meeting, slice, motion, part, [&from, &to]);
-            self.add(meeting, slice, tool, found);
+            if !self.is_known(slice, (tool, feature, 0)) {
+                let found = meet_mesh(meeting, slice, motion, part, [&from, &to]);
+                self.add(meeting, slice, tool, found);
+            }
             return;
         }
         let segment = motion.segment(meeting.drifts);
-        if corners.count == 3 && !segment.is_point() {
-            for end in 0..2 {
-                let found = meet_rounded(meeting, slice, motion, part, &segment.end(end));
-                self.add(meeting, slice, tool, found);
+        let has_tips = corners.count == 3 && !segment.is_point();
+        for tip in 0..1 + u8::from(has_tips) {
+            if self.is_known(slice, (tool, feature, tip)) {
+                continue;
             }
-        } else {
-            let found = meet_rounded(meeting, slice, motion, part, &segment);
+            let met = if has_tips { segment.end(tip.into()) } else { segment };
+            let found = meet_rounded(meeting, slice, motion, part, (&met, tip));
             self.add(meeting, slice, tool, found);
         }
+    }
+
+    /// Whether the equation that was solved has seen how this tool's tip meets the feature.
+    fn is_known(&self, slice: &Slice, met: (usize, Feature, u8)) -> bool {
+        !slice.foresees && self.holds.know(met)
     }
 
     fn add(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, found: Option<Constraint>) {

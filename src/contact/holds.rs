@@ -101,11 +101,17 @@ struct Push {
     /// The tool's place in the world.
     slot: usize,
     feature: Feature,
+    tip: u8,
     /// N
     force: f64,
 }
 
-saved!(Push { slot, feature, force });
+saved!(Push {
+    slot,
+    feature,
+    tip,
+    force
+});
 
 /// The contacts of a body with all tools in the equation in progress.
 #[derive(Debug, Default)]
@@ -113,9 +119,9 @@ pub(crate) struct Holds {
     holds: Vec<Hold>,
     /// In the order of nodes.
     shares: Vec<Share>,
-    /// The tool and the feature of each, in their order.
-    order: Vec<(usize, Feature)>,
-    /// What contacts did before the equation in progress, and before the step; both in the order of tools and features.
+    /// The tool, the feature and the tip of each, in their order.
+    order: Vec<(usize, Feature, u8)>,
+    /// What contacts did before the equation in progress, and before the step; both in the order of tools, features and tips.
     last: Vec<Push>,
     settled: Vec<Push>,
 }
@@ -152,9 +158,12 @@ impl Holds {
         self.last.clear();
         for (hold, constraint) in self.holds.iter().zip(constraints) {
             if hold.answer.force > 0.0 {
+                let feature = constraint.feature.part(hold.answer.meets.weights);
+                let is_whole = feature.nodes().len() == constraint.feature.nodes().len();
                 self.last.push(Push {
                     slot: slot_of(constraint.tool),
-                    feature: constraint.feature.part(hold.answer.meets.weights),
+                    feature,
+                    tip: if is_whole { constraint.tip } else { 0 },
                     force: hold.answer.force,
                 });
             }
@@ -196,6 +205,7 @@ impl Holds {
                 .nodes()
                 .iter()
                 .for_each(|&node| hasher.write_u64(node.into()));
+            hasher.write_u64(push.tip.into());
             hasher.write_u64(push.force.to_bits());
         }
     }
@@ -260,7 +270,7 @@ impl Holds {
             if stiffness.is_finite() {
                 hold.stiffness = f64::from(stiffness);
             }
-            let key = (slot_of(constraint.tool), constraint.feature);
+            let key = (slot_of(constraint.tool), constraint.feature, constraint.tip);
             if let Ok(place) = self.last.binary_search_by_key(&key, Push::key) {
                 hold.multiplier = hold.kept * self.last[place].force;
                 hold.holds_on = true;
@@ -271,7 +281,7 @@ impl Holds {
         self.order.extend(
             constraints
                 .iter()
-                .map(|constraint| (constraint.tool, constraint.feature)),
+                .map(|constraint| (constraint.tool, constraint.feature, constraint.tip)),
         );
         self.order.sort_unstable();
     }
@@ -476,11 +486,9 @@ impl Holds {
         (hold.least - meets.gap).max(0.0)
     }
 
-    /// Whether a feature is among the contacts with this tool of the step.
-    pub(super) fn know(&self, tool: usize, feature: Feature) -> bool {
-        self.order
-            .binary_search_by_key(&(tool, feature), |&(tool, feature)| (tool, feature))
-            .is_ok()
+    /// Whether a feature is among the contacts with this tool of the step, and this tip of it.
+    pub(super) fn know(&self, met: (usize, Feature, u8)) -> bool {
+        self.order.binary_search(&met).is_ok()
     }
 
     fn shares_of(&self, nodes: &Range<usize>) -> &[Share] {
@@ -490,8 +498,8 @@ impl Holds {
 }
 
 impl Push {
-    fn key(&self) -> (usize, Feature) {
-        (self.slot, self.feature)
+    fn key(&self) -> (usize, Feature, u8) {
+        (self.slot, self.feature, self.tip)
     }
 }
 

@@ -85,13 +85,13 @@ pub(super) fn meet_plane(
     Some(constraint)
 }
 
-/// The contact of a feature with a rounded tool over the slice.
+/// The contact of a feature with a rounded tool, or one tip of it, over the slice.
 pub(super) fn meet_rounded(
     meeting: &Meeting,
     slice: &Slice,
     motion: &Motion,
     (feature, corners): (Feature, &Corners),
-    segment: &Segment,
+    (segment, tip): (&Segment, u8),
 ) -> Option<Constraint> {
     let around = Segment {
         radius: segment.radius + meeting.thickness,
@@ -116,6 +116,7 @@ pub(super) fn meet_rounded(
         .unwrap_or(Vec3::Y);
     let weights = separation.weights;
     let mut constraint = meeting.constraint(slice, feature, weights, normal)?;
+    constraint.tip = tip;
     let points = corners.points.iter().zip(weights);
     let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
     let surface = normal * segment.radius;

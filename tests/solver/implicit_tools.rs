@@ -224,3 +224,65 @@ fn a_plane_that_jerks_away_puts_the_body_back() {
         assert_eq!(body(&press), before, "{solver:?}");
     }
 }
+
+/// A sheet that a capsule stands in lies within both of its ends, one on each side: it is carried, and they do not press it against each
+/// other by more and more.
+#[test]
+fn both_ends_of_a_capsule_in_one_face_do_what_is_needed() {
+    for solver in [Solver::Implicit, Solver::Newton] {
+        let mesh = Mesh::cloth([1.0, 1.0], [1, 1]).expect("a sheet");
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let sheet = world
+            .create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                triangles: &mesh.triangles,
+                masses: Values::Uniform(0.01),
+                stiffnesses: Values::Uniform(100.0),
+                solver,
+                ..BodyDefinition::default()
+            })
+            .expect("a body");
+        let middle: Vec3 = mesh.triangles[0]
+            .iter()
+            .map(|&node| mesh.positions[node as usize] / 3.0)
+            .sum();
+        let tool = world
+            .create_tool(&ToolDefinition {
+                pose: Pose {
+                    position: middle,
+                    ..Pose::IDENTITY
+                },
+                ..ToolDefinition::new(Shape::Capsule {
+                    half_length: 0.02,
+                    radius: 0.05,
+                })
+            })
+            .expect("a tool");
+        let weight = 9.81 * 0.01 * mesh.positions.len() as f32;
+        let dt = 0.01;
+        for step in 0..20 {
+            let report = world.step(dt).expect("a step");
+            assert_eq!(report.bodies_restored, 0, "{solver:?}, step {step}");
+            assert!(report.substeps <= 10, "{solver:?}, step {step}: {report:?}");
+            let forces = world
+                .contacts(tool)
+                .expect("a tool")
+                .map(|contact| contact.force.length());
+            let all: f32 = forces.sum();
+            assert!(
+                all < 10.0 * weight,
+                "{solver:?}, step {step}: {all} N for a weight of {weight} N"
+            );
+            let carried = world.wrench(tool).expect("a tool").0.length();
+            assert!(carried < 2.0 * weight, "{solver:?}, step {step}: {carried} N");
+        }
+        assert!(
+            world
+                .body(sheet)
+                .expect("the sheet")
+                .positions()
+                .iter()
+                .all(|place| place.is_finite())
+        );
+    }
+}
