@@ -264,6 +264,7 @@ impl Body {
         }
         self.forces_current = false;
         self.wake();
+        self.carry.energy.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -305,6 +306,7 @@ impl Body {
             self.forces_current = false;
             self.wake();
             self.forget_rates();
+            self.carry.energy.forget();
             if let Some(implicit) = &mut self.implicit {
                 implicit.forget_matrix();
             }
@@ -333,9 +335,7 @@ impl Body {
         enclosed.set_pressure(pressure);
         self.forces_current = false;
         self.wake();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_energy();
-        }
+        self.forget_energy();
         Ok(())
     }
 
@@ -370,6 +370,7 @@ impl Body {
         self.forces_current = false;
         self.wake();
         self.forget_rates();
+        self.carry.energy.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -417,9 +418,18 @@ impl Body {
         }
     }
 
+    /// What it is made of has another energy where it is.
+    pub(super) fn forget_energy(&mut self) {
+        self.carry.energy.forget();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_energy();
+        }
+    }
+
     /// Other nodes move now.
     pub(super) fn forget_matrix(&mut self) {
         self.carry.stability = Stability::UNKNOWN;
+        self.carry.energy.forget();
         self.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
@@ -469,6 +479,7 @@ impl Body {
         let own = self.order.own(node) as usize;
         self.state.velocities_mut().set(own, velocity);
         self.published.forget_velocities();
+        self.carry.energy.forget();
         if self.springs.damped() {
             self.forces_current = false;
             self.wake();

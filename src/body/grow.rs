@@ -3,7 +3,7 @@
 use super::{Body, Bound, Vectors};
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::solver::Survey;
+use crate::solver::{Sums, Survey};
 use crate::springs::{TILE, tile_count};
 
 use super::origin::Bounds;
@@ -30,6 +30,7 @@ impl Body {
             damping.reserve(count)?;
         }
         memory::reserve(&mut self.surveys, tile_count(count))?;
+        memory::reserve(&mut self.tile_sums, tile_count(count))?;
         memory::reserve(&mut self.boxes, tile_count(count))?;
         if let Some(sleeper) = &mut self.sleeper {
             sleeper.reserve(tile_count(count))?;
@@ -100,6 +101,7 @@ impl Body {
         }
         self.published.grow(count);
         self.surveys.resize(tile_count(count), Survey::NOTHING);
+        self.tile_sums.resize(tile_count(count), Sums::default());
         self.boxes.resize(tile_count(count), Bounds::EMPTY);
         self.wake();
         if let Some(sleeper) = &mut self.sleeper {

@@ -78,6 +78,7 @@ impl Body {
             hasher.write_floats(&closing.gravity.to_array());
         }
         hasher.write_floats(&[self.carry.masses_for]);
+        self.carry.energy.hash(hasher);
         for sliver in self.scaling.iter().flat_map(|scaling| scaling.slivers()) {
             hasher.write_u64(u64::from(sliver.node));
         }

@@ -77,8 +77,8 @@ use crate::memory;
 use crate::readers::Shown;
 use crate::snapshot::saved;
 use crate::solver::{
-    Carry, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Survey, Watched, close,
-    write_records,
+    Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums, Survey,
+    Watched, close, write_records,
 };
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::terms::Terms;
@@ -124,6 +124,8 @@ pub struct Body {
     pub(crate) pins: Pins,
     /// What a substep found in each tile.
     pub(crate) surveys: Vec<Survey>,
+    /// What was added up of each tile when its energy was compared last.
+    pub(crate) tile_sums: Vec<Sums>,
     /// The box about the nodes of each tile when they were last published or put, in its own coordinates.
     boxes: Vec<Bounds>,
     surface: Vec<[u32; 3]>,
@@ -168,7 +170,7 @@ pub struct Body {
     pub(crate) sleeper: Option<Box<Sleeper>>,
 }
 
-saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None } where Self::is_sound);
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None } where Self::is_sound);
 
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]
@@ -279,6 +281,7 @@ impl Body {
             scaling: None,
             pins,
             surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
+            tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
             state: State::new(node_count)?,
@@ -302,6 +305,7 @@ impl Body {
                 }),
                 closing: None,
                 masses_for: 0.0,
+                energy: EnergyAccount::UNKNOWN,
             },
             forces_current: false,
             forces_applied: false,
@@ -656,6 +660,7 @@ impl Body {
         self.wake();
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
+        self.carry.energy.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();
             implicit.forget_matrix();

@@ -41,9 +41,7 @@ impl Body {
             write_records(self.kernel, self.state.positions(), records, team);
             elements.fade(self.kernel, records.as_slice(), team);
             self.forces_current = false;
-            if let Some(implicit) = &mut self.implicit {
-                implicit.forget_energy();
-            }
+            self.forget_energy();
         }
     }
 

@@ -173,6 +173,11 @@ impl Pins {
         self.partial_count > 0
     }
 
+    /// Whether the step in progress leads one elsewhere.
+    pub fn are_led(&self) -> bool {
+        self.pins.iter().any(|pin| pin.travel != Vec3::ZERO)
+    }
+
     /// Those that are held along some axes alone.
     pub fn partial(&self) -> impl Iterator<Item = &Pin> {
         let pins = if self.are_partial() { &*self.pins } else { &[] };

@@ -18,6 +18,7 @@ impl Body {
             && self.pins.are_sound(count)
             && self.published.positions().len() == count
             && self.surveys.len() == tiles
+            && self.tile_sums.len() == tiles
             && self.boxes.len() == tiles
             && of_nodes.into_iter().flatten().all(|vectors| vectors.len() == count)
             && self

@@ -95,6 +95,7 @@ impl Body {
         }
         self.measure_anew();
         self.forces_current = false;
+        self.carry.energy.forget();
         self.wake();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();

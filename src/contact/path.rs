@@ -128,6 +128,12 @@ impl ToolPath {
         self.start != self.end
     }
 
+    /// How far its position moves in the step, m, and how far it turns, as axis times angle, rad.
+    pub fn travel(&self) -> [DVec3; 2] {
+        let way = self.end.position.as_dvec3() - self.start.position.as_dvec3();
+        [way, self.turn.as_dvec3()]
+    }
+
     /// Where the step leaves it.
     pub fn end(&self) -> Pose {
         self.end

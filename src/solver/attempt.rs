@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::closing::ClosingKick;
+use super::energy_monitor::EnergyAccount;
 use super::gravity::GravityKicks;
 use super::implicit;
 use super::stability::Stability;
@@ -61,13 +62,15 @@ pub(crate) struct Carry {
     pub closing: Option<ClosingKick>,
     /// The substep that masses are made for, s; 0: they are as they are, and `stability` is that of the current positions.
     pub masses_for: f32,
+    pub energy: EnergyAccount,
 }
 
 saved!(Carry {
     stability,
     gravity,
     closing,
-    masses_for
+    masses_for,
+    energy
 });
 
 impl Carry {
@@ -255,6 +258,7 @@ fn run_stably(
             if substeps > request.max_substeps {
                 break;
             }
+            let substeps = refined(substeps, &start, request);
             let taken = verlet::run(
                 body,
                 request,
@@ -270,13 +274,20 @@ fn run_stably(
         if needed > f64::from(request.max_substeps) {
             break;
         }
-        let substeps = needed.max(1.0) as u32;
+        let substeps = refined(needed.max(1.0) as u32, &start, request);
         match verlet::run(body, request, substeps, middle(substeps), start, 0.0, team) {
             Ok(taken) => return Ok((substeps, taken)),
             Err(found) => stable_substep = stable_substep.min(found.stable_substep),
         }
     }
     Err(TooLong { stable_substep })
+}
+
+/// As many times more substeps than stability asks for as the energy of the body does, as far as they are allowed.
+fn refined(substeps: u32, start: &Carry, request: &StepRequest) -> u32 {
+    substeps
+        .saturating_mul(start.energy.refinement())
+        .min(request.max_substeps.max(substeps))
 }
 
 /// The longest stable substep as far as is known before the step, s.

@@ -223,13 +223,15 @@ impl Together<'_> {
 impl Walk {
     /// A body's way through a step that is to begin, and how many substeps it wants by itself.
     fn of(body: &mut Body, request: &StepRequest, team: &Team) -> (Self, u32) {
-        let (start, masses_for, substeps) = if body.implicit.is_none() {
+        let (mut start, masses_for, substeps) = if body.implicit.is_none() {
             let need = needed(body, request, team);
             (need.start, need.masses_for, need.substeps)
         } else {
             let parts = parts_near(request.dt).max(request.substeps);
             (body.carry, 0.0, parts)
         };
+        // What others do to it is not taken into account.
+        start.energy.forget();
         let walk = Self {
             start,
             masses_for,

@@ -2,6 +2,7 @@
 
 mod attempt;
 mod closing;
+mod energy_monitor;
 mod gravity;
 mod held;
 mod implicit;
@@ -18,6 +19,7 @@ mod watched;
 
 pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt};
 pub(crate) use closing::{close, close_beside, make_up_for, mean_force, show_closed};
+pub(crate) use energy_monitor::{EnergyAccount, Sums};
 pub(crate) use gravity::GravityKicks;
 pub(crate) use implicit::Implicit;
 pub(crate) use kick::Survey;

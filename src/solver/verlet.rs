@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
+use super::energy_monitor::Account;
 use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
@@ -118,7 +119,8 @@ impl<'a> Step<'a> {
         let mut carry = start;
         let mut finite = true;
         begin(body, request);
-        let may_stay_open = may_stay_open(body);
+        let compares = carry.energy.is_due(substeps);
+        let may_stay_open = may_stay_open(body) && !compares && !body.pins.are_led();
         let mut part = self.opening(body, &mut carry);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);
@@ -186,6 +188,13 @@ impl<'a> Step<'a> {
             finite = pass(body, request, &part, &mut carry, team);
             check_beside_springs(body, substep)?;
         }
+        let account = Account {
+            request,
+            substeps,
+            substep,
+            compares,
+        };
+        account.settle(body, &mut carry.energy, team);
         Ok(Some(Taken { carry, finite }))
     }
 

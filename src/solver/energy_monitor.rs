@@ -1,0 +1,534 @@
+//! Keeps a body that VERLET moves from gaining energy that nobody put in.
+//!
+//! Leapfrog conserves the energy of a linear oscillator at any substep below the limit, but not that of a spring which turns by a
+//! good part of a radian within a substep, as compressed springs do when their ends pass each other. Such a body gains a little
+//! energy each time, and without damping it gains without end. So every [`PERIOD`] substeps the energy is compared with what there
+//! was and what gravity, forces, pins and tools have put in since. What is too much is taken off the velocities, and while much has
+//! to be taken off, substeps are shorter.
+//!
+//! What is compared is `sum m v- . v+ / 2 + V = E - h²/8 sum f²/m`, with the velocities half a substep before and after the
+//! positions: leapfrog conserves it exactly where forces are linear, so that the motion of a body that behaves is not touched
+//! (Hairer, Lubich, Wanner 2006, section IX.4).
+
+use glam::{BVec3, DMat3, DVec3, Vec3};
+
+use super::attempt::StepRequest;
+use crate::body::{Body, Vectors};
+use crate::contact::Contacts;
+use crate::diagnostics::StateHasher;
+use crate::snapshot::saved;
+use crate::solver::write_records;
+use crate::springs::{Loops, tile_count, tile_nodes};
+use crate::threads::{Items, Team};
+
+/// The energy is compared after so many substeps at least: it takes about as long as two of them.
+const PERIOD: u32 = 64;
+
+/// So much more energy than there was is borne, as a part of the most kinetic energy of late.
+const BAND: f64 = 5e-4;
+
+/// The energy is a mean over so many comparisons: where motion is nonlinear it swings to and fro, by a percent where springs are stretched
+/// by a tenth with the longest stable substep. Nothing is taken off before it was compared half as often.
+const SAMPLES: f64 = 8.0;
+
+/// What was lost may come back, as far as it is no more than this part of the kinetic energy.
+const CREDIT: f64 = 0.1;
+
+/// What rounding may add, as a part of the energy, and of the energy of motion that is common to all of a body.
+const ROUNDING: [f64; 2] = [1e-6, 1e-4];
+
+/// The kinetic energy of late is that of about so many seconds.
+const MEMORY: f64 = 5.0;
+
+/// Substeps are halved where more than this part of the kinetic energy had to be taken off in about a second.
+const TOO_MUCH: f64 = 5e-3;
+
+/// They are doubled again where it is less than this.
+const LITTLE: f64 = 1e-3;
+
+/// Substeps are at most so many times shorter than stability asks for.
+const FINEST: u32 = 4;
+
+/// What is known of the energy that a body may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct EnergyAccount {
+    /// What the energy was when it was compared last, its mean of late, and what that may be, J; `None`: not known since something changed it.
+    known: Option<[f64; 3]>,
+    /// What was put in since it was compared, J.
+    work: f64,
+    /// The gravity with which it was compared, m/s².
+    gravity: Vec3,
+    /// Substeps since, and seconds.
+    substeps: u32,
+    time: f64,
+    /// How often it was compared, up to as often as matters.
+    comparisons: f64,
+    /// Half the mean square of its changes, J².
+    variance: f64,
+    /// The most kinetic energy of late, J.
+    kinetic: f64,
+    /// How much was taken off in about the last second, as a part of that.
+    removed: f64,
+    /// How many times shorter substeps are than stability asks for.
+    refinement: u32,
+}
+
+saved!(EnergyAccount {
+    known,
+    work,
+    gravity,
+    substeps,
+    time,
+    comparisons,
+    variance,
+    kinetic,
+    removed,
+    refinement
+});
+
+impl EnergyAccount {
+    pub const UNKNOWN: Self = Self {
+        known: None,
+        work: 0.0,
+        gravity: Vec3::ZERO,
+        substeps: 0,
+        time: 0.0,
+        comparisons: 0.0,
+        variance: 0.0,
+        kinetic: 0.0,
+        removed: 0.0,
+        refinement: 1,
+    };
+
+    /// The energy is not what it was when the last step ended.
+    pub fn forget(&mut self) {
+        self.known = None;
+        self.start_over();
+    }
+
+    /// Nothing was put in yet since now.
+    fn start_over(&mut self) {
+        (self.work, self.substeps, self.time) = (0.0, 0, 0.0);
+    }
+
+    /// Whether a step of so many substeps ends with a comparison.
+    pub fn is_due(&self, substeps: u32) -> bool {
+        self.substeps.saturating_add(substeps) >= PERIOD
+    }
+
+    /// How many times as many substeps are to be taken as stability asks for.
+    pub fn refinement(&self) -> u32 {
+        self.refinement
+    }
+
+    /// Takes in what the energy is, J, of which the motion is that much and may lack `rounding`: by how much it is more than it may be.
+    fn compare(&mut self, energy: f64, kinetic: f64, rounding: f64) -> f64 {
+        self.kinetic = kinetic.max(self.kinetic / (1.0 + self.time / MEMORY));
+        self.removed /= 1.0 + self.time;
+        let Some(known) = self.known else {
+            (self.known, self.comparisons) = (Some([energy; 3]), 1.0);
+            return 0.0;
+        };
+        let [last, mean, least] = known.map(|energy| energy + self.work);
+        self.comparisons = (self.comparisons + 1.0).min(SAMPLES);
+        let is_learning = self.comparisons <= 0.5 * SAMPLES;
+        let mean = mean + (energy - mean) / self.comparisons;
+        let least = if is_learning {
+            mean
+        } else {
+            least.min(mean + CREDIT * self.kinetic)
+        };
+        self.known = Some([energy, mean, least]);
+        self.variance += (0.5 * (energy - last).powi(2) - self.variance) / self.comparisons;
+        let allowed = least + BAND * self.kinetic + rounding;
+        // What the mean does not show yet, and is more than usual.
+        let surge = energy - allowed - 2.0 * self.variance.sqrt();
+        if is_learning {
+            return 0.0;
+        }
+        if surge > 0.0 {
+            self.removed += surge / (SAMPLES * self.kinetic);
+        }
+        (mean - allowed).max(0.0)
+    }
+
+    /// So much kinetic energy was taken off, J.
+    fn remove(&mut self, energy: f64) {
+        if let Some([last, mean, _]) = &mut self.known {
+            *last -= energy;
+            *mean -= energy;
+        }
+        if energy > 0.0 {
+            self.removed += energy / self.kinetic;
+        }
+    }
+
+    /// Decides how short substeps are. What is compared depends on them: it is less by `per_square` times the square of the substep.
+    fn refine(&mut self, substep: f64, per_square: f64) {
+        let refinement = self.refinement;
+        if self.removed > TOO_MUCH && refinement < FINEST {
+            self.refinement *= 2;
+            self.removed = 0.5 * TOO_MUCH;
+        } else if self.removed < LITTLE && refinement > 1 {
+            self.refinement /= 2;
+        }
+        if let Some(known) = &mut self.known {
+            let next = substep * f64::from(refinement) / f64::from(self.refinement);
+            let more = per_square * (substep * substep - next * next);
+            known.iter_mut().for_each(|energy| *energy += more);
+        }
+    }
+
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        let [last, mean, least] = self.known.unwrap_or([f64::NAN; 3]);
+        let numbers = [
+            last,
+            mean,
+            least,
+            self.work,
+            self.time,
+            self.comparisons,
+            self.variance,
+            self.kinetic,
+            self.removed,
+        ];
+        numbers
+            .into_iter()
+            .for_each(|number| hasher.write_u64(number.to_bits()));
+        hasher.write_floats(&self.gravity.to_array());
+        hasher.write_u64(u64::from(self.substeps) << 32 | u64::from(self.refinement));
+    }
+}
+
+/// A step that has just been taken, of so many substeps of `substep` seconds.
+#[derive(Clone, Copy)]
+pub(super) struct Account<'a> {
+    pub request: &'a StepRequest<'a>,
+    pub substeps: u32,
+    pub substep: f32,
+    /// Whether its velocities are at the time of its positions, and its energy is to be compared.
+    pub compares: bool,
+}
+
+impl Account<'_> {
+    /// Takes the step into account.
+    pub fn settle(&self, body: &mut Body, account: &mut EnergyAccount, team: &Team) {
+        // What is held by a tool, or sleeps in part, is not alone.
+        if body.is_grasped() || body.sleeps() {
+            account.forget();
+            return;
+        }
+        if account.gravity != self.request.gravity {
+            account.forget();
+            account.gravity = self.request.gravity;
+        }
+        account.substeps = account.substeps.saturating_add(self.substeps);
+        account.time += f64::from(self.request.dt);
+        account.work += self.work(body);
+        if self.compares {
+            self.compare(body, account, team);
+        }
+    }
+
+    /// What forces, pins that are led and tools that move put in, J.
+    fn work(&self, body: &Body) -> f64 {
+        let mut work = 0.0;
+        let (first, (last, _)) = (body.state.positions(), body.state.newest());
+        if let Some(applied) = body.applied.as_ref().filter(|_| body.forces_applied) {
+            for node in (0..body.node_count()).filter(|&node| body.inverse_masses[node] > 0.0) {
+                let way = last.get(node).as_dvec3() - first.get(node).as_dvec3();
+                work += applied.get(node).as_dvec3().dot(way);
+            }
+        }
+        for pin in body.pins.iter().filter(|pin| pin.travel != Vec3::ZERO) {
+            let force = pin.force_sum / f64::from(self.substeps);
+            work += DVec3::select(pin.axes, force, DVec3::ZERO).dot(pin.travel.as_dvec3());
+        }
+        let loads = body.contacts.iter().flat_map(Contacts::loads);
+        for (tool, load) in self.request.tools.iter().zip(loads).filter(|(tool, _)| tool.moves()) {
+            // Where tissue meets a tool faster than that goes, the rest is lost.
+            let [way, turn] = tool.travel();
+            work -= (load.impulse.dot(way) + load.angular_impulse.dot(turn)) / f64::from(self.request.dt);
+        }
+        work
+    }
+
+    /// Takes off what there is too much of, and decides how short the next substeps are.
+    fn compare(&self, body: &mut Body, account: &mut EnergyAccount, team: &Team) {
+        let substep = f64::from(self.substep);
+        let sums = sums(body, self.request.gravity, team);
+        let held = body.held_axes();
+        let elastic = elastic(body, team);
+        let per_square = 0.125 * sums.agitation;
+        let fall = -sums.moment.dot(self.request.gravity.as_dvec3());
+        let energy = sums.kinetic + elastic + fall - per_square * substep * substep;
+        // What is common to all of a body that nothing holds is not looked at closely.
+        let common = DVec3::select(held, DVec3::ZERO, sums.momentum).length_squared() / (2.0 * sums.free_mass);
+        let own = (sums.kinetic - common).max(0.0);
+        let rounding = ROUNDING[0] * (own + elastic.abs()) + ROUNDING[1] * common;
+        if energy.is_finite() && rounding.is_finite() {
+            let gained = account.compare(energy, own, rounding);
+            let removed = if gained > 0.0 {
+                slow_down(body, held, gained)
+            } else {
+                0.0
+            };
+            account.remove(removed);
+            account.refine(substep, per_square);
+            account.start_over();
+        } else {
+            account.forget();
+        }
+    }
+}
+
+/// What the nodes of a tile, or of a body, add up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sums {
+    /// Of what is free to move, J.
+    kinetic: f64,
+    /// The sum of `f²/m` of what is free to move, N²/kg.
+    agitation: f64,
+    /// Of what is free to move, kg m/s.
+    momentum: DVec3,
+    /// The sum of `m x`, kg m.
+    moment: DVec3,
+    mass: f64,
+    free_mass: f64,
+    elastic: f64,
+}
+
+saved!(Sums {
+    kinetic,
+    agitation,
+    momentum,
+    moment,
+    mass,
+    free_mass,
+    elastic
+});
+
+impl Sums {
+    fn plus(self, other: &Self) -> Self {
+        Self {
+            kinetic: self.kinetic + other.kinetic,
+            agitation: self.agitation + other.agitation,
+            momentum: self.momentum + other.momentum,
+            moment: self.moment + other.moment,
+            mass: self.mass + other.mass,
+            free_mass: self.free_mass + other.free_mass,
+            elastic: self.elastic + other.elastic,
+        }
+    }
+}
+
+/// Adds up the newest positions, velocities and forces of a body; the moment is that about the origin of the world.
+fn sums(body: &mut Body, gravity: Vec3, team: &Team) -> Sums {
+    let kernel = body.kernel;
+    let state = body.state.substep();
+    let (positions, velocities, forces) = (state.positions, &*state.velocities, &*state.forces);
+    let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+    let (masses, inverse_masses, pins) = (&body.masses, &body.inverse_masses, &body.pins);
+    let count = masses.len();
+    team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
+        let nodes = tile_nodes(tile, count);
+        let elastic = sums.elastic;
+        *sums = Sums {
+            elastic,
+            ..Sums::default()
+        };
+        for axis in 0..3 {
+            kernel.run(OfAxis {
+                axis,
+                gravity: gravity[axis],
+                positions: &positions.axes()[axis][nodes.clone()],
+                velocities: &velocities.axes()[axis][nodes.clone()],
+                forces: &forces.axes()[axis][nodes.clone()],
+                applied: applied.map(|applied| &applied.axes()[axis][nodes.clone()]),
+                masses: &masses[nodes.clone()],
+                inverse_masses: &inverse_masses[nodes.clone()],
+                sums,
+            });
+        }
+        for pin in pins.of_tile(tile).iter().filter(|pin| pin.is_partial()) {
+            let node = pin.node as usize;
+            let mut force = forces.get(node) + masses[node] * gravity;
+            if let Some(applied) = applied {
+                force += applied.get(node);
+            }
+            let inverse_mass = f64::from(inverse_masses[node]);
+            if inverse_mass > 0.0 {
+                let velocity = pin.held(velocities.get(node)).as_dvec3();
+                sums.kinetic -= 0.5 * velocity.length_squared() / inverse_mass;
+                sums.agitation -= pin.held(force).as_dvec3().length_squared() * inverse_mass;
+                sums.momentum -= velocity / inverse_mass;
+            }
+        }
+    });
+    let mut sums = body
+        .tile_sums
+        .iter()
+        .fold(Sums::default(), |sums, tile| sums.plus(tile));
+    sums.moment += sums.mass * body.origin;
+    sums
+}
+
+/// What the nodes of a tile add to its sums along one axis.
+struct OfAxis<'a> {
+    axis: usize,
+    gravity: f32,
+    positions: &'a [f32],
+    velocities: &'a [f32],
+    forces: &'a [f32],
+    applied: Option<&'a [f32]>,
+    masses: &'a [f32],
+    inverse_masses: &'a [f32],
+    sums: &'a mut Sums,
+}
+
+/// Sums that are made side by side, so that none waits for itself.
+const LANES: usize = 8;
+
+impl Loops for OfAxis<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // kinetic, agitation, momentum, moment, mass, free mass
+        let mut lanes = [[0.0_f64; LANES]; 6];
+        let count = self.masses.len();
+        for start in (0..count).step_by(LANES) {
+            for lane in 0..LANES.min(count - start) {
+                let node = start + lane;
+                let inverse_mass = self.inverse_masses[node];
+                let mass = self.masses[node];
+                let free_mass = if inverse_mass > 0.0 {
+                    f64::from(1.0 / inverse_mass)
+                } else {
+                    0.0
+                };
+                let velocity = f64::from(self.velocities[node]);
+                let applied = self.applied.map_or(0.0, |applied| applied[node]);
+                let force = f64::from(self.forces[node] + applied + mass * self.gravity);
+                lanes[0][lane] += free_mass * velocity * velocity;
+                lanes[1][lane] += force * force * f64::from(inverse_mass);
+                lanes[2][lane] += free_mass * velocity;
+                lanes[3][lane] += f64::from(mass) * f64::from(self.positions[node]);
+                lanes[4][lane] += f64::from(mass);
+                lanes[5][lane] += free_mass;
+            }
+        }
+        let [kinetic, agitation, momentum, moment, mass, free_mass] = lanes.map(|lanes| lanes.into_iter().sum::<f64>());
+        self.sums.kinetic += 0.5 * kinetic;
+        self.sums.agitation += agitation;
+        self.sums.momentum[self.axis] += momentum;
+        self.sums.moment[self.axis] += moment;
+        if self.axis == 0 {
+            self.sums.mass = mass;
+            self.sums.free_mass = free_mass;
+        }
+    }
+}
+
+/// The energy of all inner forces at the newest positions, less the work of a constant pressure, J.
+fn elastic(body: &mut Body, team: &Team) -> f64 {
+    let (kernel, springs) = (body.kernel, &*body.springs);
+    let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
+    let positions = body.state.substep().positions;
+    if let Some(records) = &mut body.records {
+        write_records(kernel, positions, records, team);
+    }
+    let view = positions.view().with_records(body.records.as_ref());
+    let count = positions.len();
+    team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
+        sums.elastic = springs.half_energy(tile_nodes(tile, count), view);
+        if let Some(terms) = terms {
+            sums.elastic += terms.energy_of_tile(tile, &|node| view.get(node).as_dvec3());
+        }
+    });
+    let of_tiles: f64 = body.tile_sums.iter().map(|sums| sums.elastic).sum();
+    let of_elements = match (&mut body.elements, &body.records) {
+        (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
+        _ => 0.0,
+    };
+    let [of_cavities, work] = enclosed.map_or([0.0; 2], |enclosed| {
+        enclosed.energy(&|node| positions.get(node).as_dvec3())
+    });
+    of_tiles + of_elements + of_cavities - work
+}
+
+/// Takes this much kinetic energy off the newest velocities, J, or all there is that nothing conserves: how much it was. A body that nothing
+/// holds keeps its momentum and its angular momentum: it is its deformation that becomes slower.
+fn slow_down(body: &mut Body, held: BVec3, energy: f64) -> f64 {
+    let rigid = RigidMotion::of(body, held);
+    let state = body.state.substep();
+    let (positions, velocities) = (state.positions, state.velocities);
+    let inverse_masses = &body.inverse_masses;
+    let mut own = 0.0;
+    for node in (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0) {
+        let held = body.pins.partial_axes_of(node as u32);
+        let velocity = velocities.get(node).as_dvec3() - rigid.at(positions.get(node));
+        own += 0.5 * DVec3::select(held, DVec3::ZERO, velocity).length_squared() / f64::from(inverse_masses[node]);
+    }
+    if own <= 0.0 {
+        return 0.0;
+    }
+    let factor = (1.0 - energy / own).max(0.0).sqrt();
+    for node in (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0) {
+        let held = body.pins.partial_axes_of(node as u32);
+        let velocity = velocities.get(node);
+        let common = rigid.at(positions.get(node));
+        let slower = common + (velocity.as_dvec3() - common) * factor;
+        velocities.set(node, Vec3::select(held, velocity, slower.as_vec3()));
+    }
+    energy.min(own)
+}
+
+/// How a body moves as a whole; not at all where something holds it.
+struct RigidMotion {
+    centre: DVec3,
+    velocity: DVec3,
+    spin: DVec3,
+}
+
+impl RigidMotion {
+    fn of(body: &mut Body, held: BVec3) -> Self {
+        let inverse_masses = &body.inverse_masses;
+        let state = body.state.substep();
+        let (positions, velocities): (&Vectors, &Vectors) = (state.positions, state.velocities);
+        let nodes = || (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0);
+        let mass_of = |node: usize| 1.0 / f64::from(inverse_masses[node]);
+        let (mut mass, mut moment, mut momentum) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        for node in nodes() {
+            mass += mass_of(node);
+            moment += mass_of(node) * positions.get(node).as_dvec3();
+            momentum += mass_of(node) * velocities.get(node).as_dvec3();
+        }
+        let centre = moment / mass;
+        let velocity = DVec3::select(held, DVec3::ZERO, momentum / mass);
+        let mut spin = DVec3::ZERO;
+        if held == BVec3::FALSE {
+            let (mut inertia, mut angular) = (DMat3::ZERO, DVec3::ZERO);
+            for node in nodes() {
+                let arm = positions.get(node).as_dvec3() - centre;
+                angular += mass_of(node) * arm.cross(velocities.get(node).as_dvec3());
+                inertia += (DMat3::from_diagonal(DVec3::splat(arm.length_squared()))
+                    - DMat3::from_cols(arm * arm.x, arm * arm.y, arm * arm.z))
+                    * mass_of(node);
+            }
+            // A row of nodes has no inertia about its axis, and does not turn about it.
+            let trace = inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z;
+            spin = (inertia + DMat3::from_diagonal(DVec3::splat(1e-9 * trace))).inverse() * angular;
+        }
+        let or_none = |vector: DVec3| if vector.is_finite() { vector } else { DVec3::ZERO };
+        Self {
+            centre: or_none(centre),
+            velocity: or_none(velocity),
+            spin: or_none(spin),
+        }
+    }
+
+    fn at(&self, position: Vec3) -> DVec3 {
+        self.velocity + self.spin.cross(position.as_dvec3() - self.centre)
+    }
+}
