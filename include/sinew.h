@@ -3554,10 +3554,10 @@ sinew_status sinew_world_save_picture_of_values(const struct sinew_world *world,
 /**
  * Writes the first point that a ray from `origin`, 3 floats, m, along `direction`, 3 floats of any length, meets on the surface of a
  * body within `max_distance`, m, at least 0, at the nodes' current places. `out->struct_size` is set by the caller; where nothing is
- * met out->body is all zero. What lies along a triangle does not meet it. All triangles of the bodies whose box the ray meets are looked
- * at: some 0.3 us each.
+ * met out->body is all zero. What lies along a triangle does not meet it. Of equal distances the first body's lowest triangle is taken.
+ * The first query near a body builds a tree over its surface, and the first after its nodes have moved refits it; others take a few us.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the direction is zero).
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the direction is zero), SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody changes; `origin` and `direction` are NULL or 3 floats; `out` is NULL or writable for
@@ -3571,10 +3571,10 @@ sinew_status sinew_world_cast_ray(const struct sinew_world *world,
 
 /**
  * Writes the point of the bodies' surfaces that is nearest to `point`, 3 floats, m, at the nodes' current places, no further than
- * `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero. All triangles of
- * the bodies whose box is near enough are looked at: some 0.15 us each.
+ * `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero. Of equal
+ * distances the first body's lowest triangle is taken. It uses the same trees as sinew_world_cast_ray.
  *
- * Errors: SINEW_STATUS_INVALID_ARGUMENT.
+ * Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
  *
  * # Safety
  * `world` is NULL or a world nobody changes; `point` is NULL or 3 floats; `out` is NULL or writable for `out->struct_size` bytes.

@@ -32,6 +32,7 @@ impl World {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`]: a number is not finite, the direction is zero, or `max_distance` is negative or not a number.
+    /// [`Error::OutOfMemory`]: there is none for a tree over a body's surface.
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
         finite_vector("origin", origin)?;
         finite_vector("direction", direction)?;
@@ -41,7 +42,7 @@ impl World {
             return Err(Error::invalid("direction is 0: it points nowhere"));
         }
         let start = origin.as_dvec3();
-        let mut found: Option<SurfaceHit> = None;
+        let mut found: Option<(f64, SurfaceHit)> = None;
         for (id, body) in self.bodies_by_id() {
             let bounds = body.published_bounds();
             let furthest = start
@@ -49,30 +50,41 @@ impl World {
                 .max(bounds.min.as_dvec3().abs().max(bounds.max.as_dvec3().abs()));
             // Past all of the body: what is as far as is asked for is met too.
             let length = 4.0 * furthest.length() + 1.0;
-            let limit = f64::from(found.map_or(max_distance, |found| found.distance));
+            let limit = found.map_or(f64::from(max_distance), |(distance, _)| distance);
             if !meets(&bounds, start, way * length.min(limit)) {
                 continue;
             }
-            for (triangle, &nodes) in (0..).zip(body.surface()) {
-                let corners = nodes.map(|node| body.positions()[node as usize].as_dvec3());
-                if let Some((fraction, _)) = pierce(start, start + way * length, corners, nodes) {
-                    let distance = fraction * length;
-                    let is_within = distance as f32 <= max_distance;
-                    if is_within && found.is_none_or(|found| distance < f64::from(found.distance)) {
-                        let (weights, _) = nearest_on_triangle(start + way * distance, corners);
-                        found = Some(SurfaceHit::new(id, triangle, corners, weights, distance));
+            let mut first = None;
+            let nearest = found.map_or(f64::INFINITY, |(distance, _)| distance);
+            body.query_tree()?
+                .along(origin, way.as_vec3(), limit as f32, |triangle| {
+                    let (nodes, corners) = body.surface_triangle(triangle);
+                    if let Some((fraction, _)) = pierce(start, start + way * length, corners, nodes) {
+                        let distance = fraction * length;
+                        if distance as f32 <= max_distance && distance < nearest {
+                            replace_if_first(&mut first, (distance, triangle));
+                        }
                     }
-                }
+                    first.map_or(limit, |(distance, _)| distance) as f32
+                });
+            if let Some((distance, triangle)) = first {
+                let (_, corners) = body.surface_triangle(triangle);
+                let (weights, _) = nearest_on_triangle(start + way * distance, corners);
+                found = Some((
+                    distance,
+                    SurfaceHit::new(id, triangle as u32, corners, weights, distance),
+                ));
             }
         }
-        Ok(found)
+        Ok(found.map(|(_, hit)| hit))
     }
 
     /// The point of the bodies' surfaces that is nearest to `point` (m), at the nodes' current places, no further than `max_distance` (m, may
     /// be infinite); `None` where there is none.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a coordinate is not finite, or `max_distance` is negative or not a number.
+    /// [`Error::InvalidArgument`]: a coordinate is not finite, or `max_distance` is negative or not a number. [`Error::OutOfMemory`]: there is
+    /// none for a tree over a body's surface.
     pub fn nearest_point(&self, point: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
         finite_vector("point", point)?;
         check_distance(max_distance)?;
@@ -85,14 +97,22 @@ impl World {
             if (low - place).max(place - high).max(DVec3::ZERO).length() > limit {
                 continue;
             }
-            for (triangle, nodes) in (0..).zip(body.surface()) {
-                let corners = nodes.map(|node| body.positions()[node as usize].as_dvec3());
+            let mut first = None;
+            let about = Bounds { min: point, max: point };
+            body.query_tree()?.nearest(&about, limit as f32, |triangle| {
+                let (_, corners) = body.surface_triangle(triangle);
                 let (weights, _) = nearest_on_triangle(place, corners);
                 let distance = place.distance(mixed(corners, weights));
                 if distance < limit || distance == limit && found.is_none() {
-                    limit = distance;
-                    found = Some(SurfaceHit::new(id, triangle, corners, weights, distance));
+                    replace_if_first(&mut first, (distance, triangle));
                 }
+                first.map_or(limit, |(distance, _)| distance) as f32
+            });
+            if let Some((distance, triangle)) = first {
+                let (_, corners) = body.surface_triangle(triangle);
+                let (weights, _) = nearest_on_triangle(place, corners);
+                limit = distance;
+                found = Some(SurfaceHit::new(id, triangle as u32, corners, weights, distance));
             }
         }
         Ok(found)
@@ -114,13 +134,25 @@ impl SurfaceHit {
 }
 
 impl Body {
+    /// The nodes of a triangle of its surface, and where they are published.
+    fn surface_triangle(&self, triangle: usize) -> ([u32; 3], [DVec3; 3]) {
+        let nodes = self.surface()[triangle];
+        (nodes, nodes.map(|node| self.positions()[node as usize].as_dvec3()))
+    }
+
     /// The box about its nodes as they are published, and a little more.
     fn published_bounds(&self) -> Bounds {
-        let bounds = self.local_bounds();
-        let [min, max] = [bounds.min, bounds.max].map(|corner| (corner.as_dvec3() + self.origin()).as_vec3());
+        let bounds = self.local_bounds().moved(self.origin());
         // By what rounding takes.
-        let rounding = 1e-6 * min.abs().max(max.abs()).max_element();
-        Bounds { min, max }.extended(rounding)
+        let rounding = 1e-6 * bounds.min.abs().max(bounds.max.abs()).max_element();
+        bounds.extended(rounding)
+    }
+}
+
+/// Takes what is nearer than what was found, and where both are as near the lower number: in whichever order triangles are looked at.
+fn replace_if_first(first: &mut Option<(f64, usize)>, other: (f64, usize)) {
+    if first.is_none_or(|first| other < first) {
+        *first = Some(other);
     }
 }
 

@@ -139,6 +139,7 @@ impl Body {
 
     /// Shows callers the nodes from this one on, which are new.
     pub(super) fn publish_new(&mut self, first: usize) {
+        self.query_tree.outdate();
         for node in first..self.node_count() {
             let local = self.state.positions().get(node);
             self.published.positions_mut()[node] = (local.as_dvec3() + self.origin).as_vec3();

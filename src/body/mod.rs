@@ -25,6 +25,7 @@ mod past;
 mod pieces;
 mod pins;
 mod published;
+mod query_tree;
 mod records;
 mod region;
 mod shown;
@@ -90,6 +91,7 @@ use origin::shift_towards;
 pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
+use query_tree::QueryTree;
 pub use sleep::Sleep;
 pub(crate) use sleep::Sleeper;
 use state::State;
@@ -126,7 +128,7 @@ pub struct Body {
     pub(crate) surveys: Vec<Survey>,
     /// What was added up of each tile when its energy was compared last.
     pub(crate) tile_sums: Vec<Sums>,
-    /// The box about the nodes of each tile when they were last published or put, in its own coordinates.
+    /// The box about the nodes of each tile when they were last published or put, in its own coordinates as they are now.
     boxes: Vec<Bounds>,
     surface: Vec<[u32; 3]>,
     pub(crate) state: State,
@@ -166,11 +168,12 @@ pub struct Body {
     published: Published,
     /// For bodies that have readers.
     shown: Option<Box<Shown>>,
+    query_tree: QueryTree,
     /// For bodies that sleep.
     pub(crate) sleeper: Option<Box<Sleeper>>,
 }
 
-saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None } where Self::is_sound);
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None, query_tree: QueryTree::default() } where Self::is_sound);
 
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]
@@ -311,6 +314,7 @@ impl Body {
             forces_applied: false,
             published: Published::new(node_count)?,
             shown: None,
+            query_tree: QueryTree::default(),
             sleeper: None,
         };
         body.place(definition.positions);
@@ -683,6 +687,7 @@ impl Body {
             local.set(own, (position.as_dvec3() - self.origin).as_vec3());
         }
         self.follow_nodes();
+        self.query_tree.outdate();
         let (kernel, local) = (self.kernel, self.state.positions());
         for (tile, bounds) in self.boxes.iter_mut().enumerate() {
             *bounds = kernel.ranges(local.slices(tile_nodes(tile, local.len()))).into();
@@ -781,6 +786,10 @@ impl Body {
         let positions = self.state.positions_mut();
         for node in 0..positions.len() {
             positions.set(node, (positions.get(node).as_dvec3() - shift).as_vec3());
+        }
+        // Exact, as for the nodes: their sides are coordinates of nodes.
+        for bounds in &mut self.boxes {
+            *bounds = bounds.moved(-shift);
         }
         if let Some(contacts) = &mut self.contacts {
             contacts.forget();

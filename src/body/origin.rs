@@ -50,6 +50,11 @@ impl Bounds {
         }
     }
 
+    pub fn moved(self, by: DVec3) -> Self {
+        let [min, max] = [self.min, self.max].map(|corner| (corner.as_dvec3() + by).as_vec3());
+        Self { min, max }
+    }
+
     pub fn contains(&self, other: &Self) -> bool {
         self.min.cmple(other.min).all() && other.max.cmple(self.max).all()
     }

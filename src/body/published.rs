@@ -153,6 +153,7 @@ impl Body {
 
     /// Writes the positions for callers and shows them to readers, and finds the box of each tile.
     pub(super) fn publish(&mut self, team: &Team) {
+        self.query_tree.outdate();
         let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
         let positions = self.state.positions();
         let count = positions.len();

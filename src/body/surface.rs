@@ -26,6 +26,7 @@ impl Body {
             self.surface[index as usize] = corners;
         }
         self.surface.extend_from_slice(change.added);
+        self.query_tree.outdate();
         if let Some(shown) = &mut self.shown {
             shown.forget_triangles();
         }

@@ -10,6 +10,7 @@ mod edges;
 pub(crate) mod exact;
 mod features;
 mod filter;
+mod forest;
 mod gauge;
 mod holds;
 pub(crate) mod image_space;
@@ -33,6 +34,7 @@ pub(crate) mod tree;
 
 pub(crate) use contacts::{Contacts, Meeting};
 pub use filter::{BodyContact, CollisionFilter};
+pub(crate) use forest::Forest;
 pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
 pub(crate) use path::{Frame, ToolPath};

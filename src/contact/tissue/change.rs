@@ -2,11 +2,11 @@
 
 use glam::Vec3;
 
-use super::forest::Later;
 use super::skin::{NONE, Skin};
 use super::wound::Wound;
 use crate::body::{Body, Bound, NewNode, Vectors};
 use crate::contact::SurfaceChange;
+use crate::contact::forest::Later;
 use crate::error::Result;
 use crate::memory;
 use crate::snapshot::saved;

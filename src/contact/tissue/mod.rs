@@ -8,7 +8,6 @@
 mod bonds;
 mod change;
 mod crossing;
-mod forest;
 mod groups;
 mod images;
 mod link;

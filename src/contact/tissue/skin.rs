@@ -4,12 +4,12 @@ use glam::{DVec3, Vec3};
 
 use super::LEAST_THICKNESS;
 use super::change::Changing;
-use super::forest::Forest;
 use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::body::{Bindings, Body, Bounds, Vectors};
 use crate::contact::BodyContact;
+use crate::contact::forest::Forest;
 use crate::contact::sweep::{Corners, Segment};
 use crate::contact::tool::Detection;
 use crate::error::Result;

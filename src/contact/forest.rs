@@ -9,7 +9,7 @@ use glam::Vec3;
 /// Trees, each over the triangles that follow those of the one before. Of the later ones each has twice as many as the next or more (Bentley,
 /// Saxe 1980): there are few of them, and what a cut costs is a matter of what it adds, but for a factor of the logarithm of what all have added.
 #[derive(Debug)]
-pub(super) struct Forest {
+pub(crate) struct Forest {
     first: Tree,
     later: Vec<Later>,
 }
@@ -18,7 +18,7 @@ saved!(Forest { first, later });
 
 /// A tree of triangles that came later.
 #[derive(Debug)]
-pub(super) struct Later {
+pub(crate) struct Later {
     /// The number of its first triangle.
     from: usize,
     tree: Tree,
@@ -35,7 +35,7 @@ impl Forest {
         })
     }
 
-    fn count(&self) -> usize {
+    pub fn triangle_count(&self) -> usize {
         let last = self.later.last();
         last.map_or(self.first.triangle_count(), |last| {
             last.from + last.tree.triangle_count()
@@ -47,8 +47,8 @@ impl Forest {
         if more == 0 {
             return Ok(None);
         }
-        let end = self.count() + more;
-        let mut from = self.count();
+        let end = self.triangle_count() + more;
+        let mut from = self.triangle_count();
         for later in self.later.iter().rev() {
             if later.tree.triangle_count() >= 2 * (end - from) {
                 break;
@@ -103,6 +103,17 @@ impl Forest {
             tree.near(bounds, reach * reach, |place| {
                 reach = see(from + tree.triangle(place) as usize);
                 reach * reach
+            });
+        }
+    }
+
+    /// Shows the triangles whose boxes the ray may meet before `limit` times its direction; `see` tells the limit after each triangle.
+    pub fn along(&self, origin: Vec3, direction: Vec3, mut limit: f32, mut see: impl FnMut(usize) -> f32) {
+        let later = self.later.iter().map(|later| (later.from, &later.tree));
+        for (from, tree) in std::iter::once((0, &self.first)).chain(later) {
+            tree.along(origin, direction, limit, |place| {
+                limit = see(from + tree.triangle(place) as usize);
+                limit
             });
         }
     }
