@@ -376,7 +376,28 @@ impl World {
         if id.is_err() && self.tool_places() == 0 {
             self.drop_contacts();
         }
-        Ok(ToolId(id?))
+        let id = ToolId(id?);
+        let index = self.tool_index(id)?;
+        for (_, body) in self.bodies.iter_mut() {
+            if let Some(contacts) = &mut body.contacts {
+                contacts.add_tool(index);
+            }
+        }
+        self.wake_near(id)?;
+        Ok(id)
+    }
+
+    /// How many tools come before this one.
+    fn tool_index(&self, tool: ToolId) -> Result<usize> {
+        let slot = self.tools.place(tool.0)?;
+        Ok(self.tools.iter().take_while(|&(place, _)| place < slot).count())
+    }
+
+    /// Wakes what a tool meets and is near to.
+    fn wake_near(&mut self, tool: ToolId) -> Result<()> {
+        let path = ToolPath::new(self.tools.place(tool.0)?, self.tools.get(tool.0)?);
+        self.bodies.iter_mut().for_each(|(_, body)| body.wake_near(&path));
+        Ok(())
     }
 
     /// Removes a tool. What is attached to it is let go.
@@ -384,7 +405,8 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`].
     pub fn destroy_tool(&mut self, tool: ToolId) -> Result<()> {
-        let slot = self.tools.place(tool.0)?;
+        let (slot, index) = (self.tools.place(tool.0)?, self.tool_index(tool)?);
+        self.wake_near(tool)?;
         self.tools.remove(tool.0)?;
         // They share what a mesh takes.
         self.paths.clear();
@@ -394,9 +416,8 @@ impl World {
             self.drop_contacts();
         }
         for (_, body) in self.bodies.iter_mut() {
-            body.wake();
             if let Some(contacts) = &mut body.contacts {
-                contacts.forget_tool(slot);
+                contacts.forget_tool(slot, index);
             }
         }
         Ok(())
@@ -442,8 +463,7 @@ impl World {
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not finite.
     pub fn set_friction(&mut self, tool: ToolId, friction: f32) -> Result<()> {
         self.tools.get_mut(tool.0)?.set_friction(friction)?;
-        self.bodies.iter_mut().for_each(|(_, body)| body.wake());
-        Ok(())
+        self.wake_near(tool)
     }
 
     /// Has this force, N, at least 0 or infinity, be the largest that moves a tool, from the next step on.
@@ -459,9 +479,11 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`].
     pub fn set_collision_filter(&mut self, tool: ToolId, filter: CollisionFilter) -> Result<()> {
+        // What it has met may be let go, and what it has not may be pushed.
+        self.wake_near(tool)?;
         self.tools.get_mut(tool.0)?.filter = filter;
+        self.wake_near(tool)?;
         for (_, body) in self.bodies.iter_mut() {
-            body.wake();
             if let Some(contacts) = &mut body.contacts {
                 contacts.look_again();
             }

@@ -5,8 +5,8 @@ mod support;
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, BodyId, Error, Material, Pose, Shape, Sleep, Solver, Storage, ToolDefinition, ToolId, Values,
-    World, WorldDefinition,
+    BodyDefinition, BodyId, CollisionFilter, Error, Material, Pose, Shape, Sleep, Solver, Storage, ToolDefinition,
+    ToolId, Values, World, WorldDefinition,
 };
 
 const SLEEP: Sleep = Sleep { speed: 1e-3, time: 0.1 };
@@ -97,6 +97,13 @@ impl Slab {
 
     fn positions(&self) -> &[Vec3] {
         self.world.body(self.body).expect("a body").positions()
+    }
+
+    /// Another ball, about a point at this height.
+    fn make_ball(&mut self, height: f32) -> ToolId {
+        let mut ball = ToolDefinition::new(Shape::Sphere { radius: RADIUS });
+        ball.pose = above(height);
+        self.world.create_tool(&ball).expect("a tool")
     }
 
     /// Moves the ball down or up to where its lowest point is at `height`, in so many seconds.
@@ -208,7 +215,7 @@ fn what_reaches_it_wakes_it() {
     let middle = slab.positions().len() as u32 - 1;
     let pin = slab.pins[0];
     type Reach = (&'static str, fn(&mut Slab, u32, u32));
-    let reaches: [Reach; 11] = [
+    let reaches: [Reach; 12] = [
         ("a force", |slab, node, _| {
             let body = slab.world.body_mut(slab.body).expect("a body");
             body.apply_force(node, Vec3::new(0.0, -0.05, 0.0)).expect("a force");
@@ -246,13 +253,18 @@ fn what_reaches_it_wakes_it() {
             let velocities = vec![Vec3::X; body.node_count()];
             body.set_velocities(&velocities).expect("velocities");
         }),
-        ("a tool that is made", |slab, _, _| {
-            let mut other = ToolDefinition::new(Shape::Sphere { radius: RADIUS });
-            other.pose = above(1.0);
-            slab.world.create_tool(&other).expect("a tool");
+        ("a tool that is made beside it", |slab, _, _| {
+            slab.ball = slab.make_ball(slab.top() + RADIUS + 1e-3);
         }),
         ("its friction", |slab, _, _| {
             slab.world.set_friction(slab.ball, 0.5).expect("a tool")
+        }),
+        ("what it meets", |slab, _, _| {
+            let filter = CollisionFilter {
+                category: 3,
+                mask: u32::MAX,
+            };
+            slab.world.set_collision_filter(slab.ball, filter).expect("a tool")
         }),
         ("a tool that is gone", |slab, _, _| {
             slab.world.destroy_tool(slab.ball).expect("a tool")
@@ -269,6 +281,55 @@ fn what_reaches_it_wakes_it() {
         slab.run(2.0 * DT);
         assert!(slab.awake() > 0.0, "after {name} it sleeps at once");
     }
+}
+
+/// Tools far away come and go, and meet this or that, while it sleeps on; what holds it up goes on to feel its weight.
+#[test]
+fn what_is_far_from_a_tool_sleeps_on() {
+    let mut slab = slab_of(20, SLEEP, 1, |_| ());
+    // In this order: two that are far, and one that presses.
+    let first = slab.ball;
+    slab.make_ball(50.0);
+    let pressing = slab.make_ball(slab.top() + RADIUS - 1e-3);
+    slab.run(2.0);
+    let force = slab.world.wrench(pressing).expect("a tool").0;
+    assert!(slab.awake() == 0.0 && force.y > 1e-3, "{force} N");
+    let sleeps_on = |slab: &mut Slab, what: &str| {
+        slab.world.step(DT).expect("a step");
+        assert_eq!(slab.awake(), 0.0, "{what} wakes it");
+        assert_eq!(slab.world.wrench(pressing).expect("a tool").0, force, "after {what}");
+    };
+    slab.world.destroy_tool(first).expect("a tool");
+    sleeps_on(&mut slab, "a tool before others that is gone");
+    let again = slab.make_ball(50.0);
+    sleeps_on(&mut slab, "a tool that is made in its place");
+    let last = slab.make_ball(20.0);
+    sleeps_on(&mut slab, "a tool that is made after others");
+    slab.world.set_friction(again, 0.5).expect("a tool");
+    sleeps_on(&mut slab, "friction far away");
+    let filter = CollisionFilter { category: 0, mask: 0 };
+    slab.world.set_collision_filter(again, filter).expect("a tool");
+    sleeps_on(&mut slab, "what a tool meets far away");
+    slab.world.destroy_tool(last).expect("a tool");
+    sleeps_on(&mut slab, "the last tool that is gone");
+    // What no longer meets it lets go of it, and it rises again.
+    let pressed = slab.top();
+    slab.world.set_collision_filter(pressing, filter).expect("a tool");
+    assert!(slab.awake() > 0.0);
+    slab.run(1.0);
+    let middle = |slab: &Slab| {
+        let above = |place: &&Vec3| place.x.abs() < 1e-3 && place.z.abs() < 1e-3;
+        slab.positions()
+            .iter()
+            .filter(above)
+            .map(|place| place.y)
+            .fold(f32::MIN, f32::max)
+    };
+    assert!(
+        (middle(&slab) - pressed).abs() < 1e-4,
+        "{} of {pressed} m",
+        middle(&slab)
+    );
 }
 
 /// Solvers, storages and threads.

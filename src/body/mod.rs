@@ -541,7 +541,6 @@ impl Body {
     }
 
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {
-        self.wake();
         match &mut self.contacts {
             Some(contacts) => contacts.reserve(tools)?,
             None => {

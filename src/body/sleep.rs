@@ -361,30 +361,38 @@ impl Body {
             self.wake_to_step();
             return;
         }
-        let Some((margin, bounds)) = self.sleeper.as_ref().map(|sleeper| (sleeper.margin, sleeper.bounds)) else {
+        for tool in tools {
+            if tool.moves() && self.may_touch(tool) {
+                self.note_sleep();
+                self.wake_near(tool);
+            }
+        }
+    }
+
+    /// Whether a tool meets it and comes near to what sleeps of it.
+    fn may_touch(&self, tool: &ToolPath) -> bool {
+        let is_near = |sleeper: &Sleeper| tool.is_near(&sleeper.bounds, self.origin, 0.0);
+        tool.filter.meets(self.contact.filter) && self.sleeps() && self.sleeper.as_deref().is_some_and(is_near)
+    }
+
+    /// Wakes what a tool that meets it is near to.
+    pub(crate) fn wake_near(&mut self, tool: &ToolPath) {
+        if !self.may_touch(tool) {
+            return;
+        }
+        let Some(sleeper) = &mut self.sleeper else {
             return;
         };
-        for tool in tools {
-            if !tool.filter.meets(self.contact.filter) || !tool.moves() {
-                continue;
-            }
-            if !tool.is_near(&bounds, self.origin, 0.0) {
-                continue;
-            }
-            self.note_sleep();
-            let Some(sleeper) = &mut self.sleeper else {
-                return;
-            };
-            let mut woken = false;
-            for (tile, bounds) in self.boxes.iter().enumerate() {
-                woken |= sleeper.is_asleep(tile) && tool.is_near(bounds, self.origin, margin) && sleeper.wake(tile);
-            }
-            if woken && sleeper.in_parts {
-                self.forces_current = false;
-                self.wake_touched();
-            } else if woken {
-                self.wake();
-            }
+        let margin = sleeper.margin;
+        let mut woken = false;
+        for (tile, bounds) in self.boxes.iter().enumerate() {
+            woken |= sleeper.is_asleep(tile) && tool.is_near(bounds, self.origin, margin) && sleeper.wake(tile);
+        }
+        if woken && sleeper.in_parts {
+            self.forces_current = false;
+            self.wake_touched();
+        } else if woken {
+            self.wake();
         }
     }
 

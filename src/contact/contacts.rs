@@ -274,8 +274,18 @@ impl Contacts {
         self.candidates.invalidate();
     }
 
-    /// A tool at this place in the world is gone.
-    pub fn forget_tool(&mut self, slot: usize) {
+    /// There is a tool more, this many in order: it has pressed nothing yet. There is [room](Self::reserve) for it.
+    pub fn add_tool(&mut self, index: usize) {
+        if index <= self.loads.len() {
+            self.loads.insert(index, Load::default());
+        }
+    }
+
+    /// A tool at this place in the world is gone, this many in order: what the others pressed counts as long as the body sleeps.
+    pub fn forget_tool(&mut self, slot: usize, index: usize) {
+        if index < self.loads.len() {
+            self.loads.remove(index);
+        }
         // Another may come to its place.
         self.look_again();
         self.holds.forget_tool(slot);
