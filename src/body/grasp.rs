@@ -522,6 +522,7 @@ impl Body {
 
     /// Other nodes are held now.
     fn forget_held(&mut self) {
+        self.wake();
         self.scale_masses(self.carry.masses_for);
         self.forget_matrix();
     }
