@@ -6,7 +6,8 @@
  * Every function that can fail returns a sinew_status, writes its outputs only on SINEW_STATUS_OK
  * and, failed, changes nothing; sinew_last_error says in words what was wrong. What is refused
  * everywhere: NULL where it is not allowed, NaN and infinity, an index out of range, an unknown
- * constant, a negative mass or stiffness, a reserved field that is not zero.
+ * constant, a negative mass or stiffness, a reserved field that is not zero, a struct_size that no
+ * header of this or an earlier version gave the struct.
  *
  * const sinew_world *: any number of threads at once. sinew_world *: one thread, nobody else inside
  * that world. Two worlds share nothing. Handles made for the purpose (a reader) are the exception:

@@ -118,6 +118,48 @@ fn every_function_says_what_it_does_and_how_it_fails() {
     }
 }
 
+/// Those that have a `struct_size`, by a program that tries each with sizes that no header gave them.
+#[test]
+fn every_function_that_takes_a_struct_is_tried_with_a_wrong_struct_size() {
+    let header = committed();
+    let sized: Vec<&str> = header
+        .split("typedef struct ")
+        .filter(|declaration| {
+            declaration
+                .split("} ")
+                .next()
+                .unwrap_or_default()
+                .contains(" struct_size;")
+        })
+        .filter_map(|declaration| declaration.split(" {").next())
+        .collect();
+    assert!(sized.len() > 20, "{sized:?}");
+    let tried = fs::read_to_string(root().join("tests/c/struct_sizes.c")).expect("the program");
+    // Definitions are filled by a macro.
+    let kinds: Vec<String> = sized
+        .iter()
+        .filter_map(|name| name.strip_suffix("_def"))
+        .map(str::to_owned)
+        .collect();
+    let mut count = 0;
+    for declaration in header.split("\nsinew_status ").skip(1) {
+        let declaration = declaration.split(';').next().unwrap_or_default();
+        let name = declaration.split('(').next().unwrap_or_default();
+        if sized
+            .iter()
+            .any(|sized| declaration.contains(&format!("struct {sized} *")))
+        {
+            let fills = kinds.iter().find(|kind| name == format!("{kind}_def_init"));
+            let call = fills.map_or(format!("{name}("), |kind| {
+                format!("DEFINITION({}, ", &kind["sinew_".len()..])
+            });
+            assert!(tried.contains(&call), "{name}");
+            count += 1;
+        }
+    }
+    assert!(count > 35, "{count}");
+}
+
 #[test]
 fn the_documents_list_every_function_beside_its_counterpart_in_rust() {
     let page = fs::read_to_string(root().join("src/capi/functions.md")).expect("src/capi/functions.md");

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::ffi::CStr;
+use std::fmt;
 use std::ops::Range;
 
 use glam::Vec3;
@@ -152,7 +153,7 @@ pub(super) unsafe fn definition<T: Versioned>(name: &str, pointer: *const T, def
     }
     // SAFETY: `struct_size` is the first field of every `Versioned`.
     let size = unsafe { pointer.cast::<usize>().read_unaligned() };
-    known_size::<T>(size)?;
+    known_size::<T>(&format_args!("{name}->struct_size"), size)?;
     let mut definition = defaults;
     // SAFETY: `size` bytes are there, and fit into T: no known size is larger.
     unsafe {
@@ -169,7 +170,7 @@ pub(super) unsafe fn initialise<T: Versioned>(pointer: *mut T, size: usize, mut 
     if pointer.is_null() {
         return Err(null("def"));
     }
-    known_size::<T>(size)?;
+    known_size::<T>(&"struct_size", size)?;
     // SAFETY: `struct_size` is the first field of every `Versioned`.
     unsafe { (&raw mut defaults).cast::<usize>().write(size) };
     // SAFETY: the caller vouches for `size` bytes, and T has as many: no known size is larger.
@@ -193,36 +194,31 @@ pub(super) unsafe fn report<T: Versioned>(name: &str, pointer: *mut T) -> Result
     }
     // SAFETY: `struct_size` is the first field of every `Versioned`.
     let size = unsafe { pointer.cast::<usize>().read_unaligned() };
-    let oldest = T::SIZES[0];
-    if size < oldest {
-        return Err(Error::invalid(format!(
-            "{name}: struct_size is {size}: a {} has at least {oldest} bytes",
-            T::NAME
-        )));
-    }
+    known_size::<T>(&format_args!("{name}->struct_size"), size)?;
     Ok(Report { pointer, size })
 }
 
 impl<T: Versioned> Report<T> {
-    /// Fills what both sides know, and leaves `struct_size` as it is.
+    /// Fills what the caller knows, and leaves `struct_size` as it is.
     ///
     /// # Safety
     /// The struct is still there.
     pub unsafe fn fill(&self, mut value: T) {
         // SAFETY: `struct_size` is the first field of every `Versioned`.
         unsafe { (&raw mut value).cast::<usize>().write(self.size) };
-        let bytes = self.size.min(size_of::<T>());
-        // SAFETY: the caller vouches for `size` bytes, and the value has at least as many as are copied.
-        unsafe { std::ptr::copy_nonoverlapping((&raw const value).cast::<u8>(), self.pointer.cast::<u8>(), bytes) };
+        let from = (&raw const value).cast::<u8>();
+        // SAFETY: the caller vouches for `size` bytes, and the value has as many: no known size is larger.
+        unsafe { std::ptr::copy_nonoverlapping(from, self.pointer.cast::<u8>(), self.size) };
     }
 }
 
-fn known_size<T: Versioned>(size: usize) -> Result<()> {
+/// Refuses a size that no header gave the struct: it was not set, or is a newer header's.
+fn known_size<T: Versioned>(name: &dyn fmt::Display, size: usize) -> Result<()> {
     if T::SIZES.contains(&size) {
         return Ok(());
     }
     Err(Error::invalid(format!(
-        "struct_size is {size}: this library knows a {} of {:?} bytes",
+        "{name} is {size}: this library knows a {} of {:?} bytes",
         T::NAME,
         T::SIZES
     )))
@@ -296,12 +292,12 @@ mod tests {
             report.fill(Grown { old: 5, ..DEFAULTS });
         }
         assert_eq!(place, [16, 5, 99]);
-        let mut newer = [40_usize, 0, 0, 99, 99];
-        // SAFETY: 40 bytes are there.
-        unsafe {
-            let report = report::<Grown>("out", newer.as_mut_ptr().cast()).expect("a newer size");
-            report.fill(DEFAULTS);
+        for unknown in [0, 8, 20, 40] {
+            let mut place = [unknown, 0, 99];
+            // SAFETY: 24 bytes are there, and nothing is written.
+            let refused = unsafe { report::<Grown>("out", place.as_mut_ptr().cast()) }.err();
+            let message = refused.expect("refused").to_string();
+            assert!(message.contains(&format!("out->struct_size is {unknown}")), "{message}");
         }
-        assert_eq!(newer, [40, 1, 2, 99, 99]);
     }
 }

@@ -177,8 +177,7 @@ static const char *const bad_id_names[BAD_IDS] = {
         }                                                                      \
     } while (0)
 
-/* Sizes that no header ever gave the struct; the call may use `size`. A definition is known to the byte, a result struct
- * may be a newer header's, of which the library fills what it knows: so only too small a one is refused. */
+/* Sizes that no header ever gave the struct; the call may use `size`. */
 #define REFUSES_EACH(sizes, count, set, call)                                  \
     do {                                                                       \
         size_t i_;                                                             \
@@ -196,7 +195,7 @@ static const char *const bad_id_names[BAD_IDS] = {
 /* `result` is the output whose struct_size it is. */
 #define REFUSES_RESULT_SIZES(type, oldest, result, call)                       \
     do {                                                                       \
-        const size_t sizes_[] = {0, 1, sizeof(size_t), (oldest) - 4, (oldest) - 1}; \
+        const size_t sizes_[] = {0, 1, sizeof(size_t), (oldest) - 4, (oldest) - 1, sizeof(type) + 1, sizeof(type) + 8, SIZE_MAX}; \
         REFUSES_EACH(sizes_, sizeof sizes_ / sizeof sizes_[0],                 \
                      out.result.struct_size = untouched.result.struct_size = size, call); \
         out.result.struct_size = untouched.result.struct_size = sizeof(type);  \
