@@ -499,11 +499,11 @@ typedef struct sinew_body_def {
    */
   const float *spring_dampings;
   /**
-   * N/m; default 0.
+   * N/m; default 0; must be 0 where the body has no springs.
    */
   float stiffness;
   /**
-   * N s/m; default 0.
+   * N s/m; default 0; must be 0 where the body has no springs.
    */
   float spring_damping;
   /**

@@ -30,6 +30,14 @@ impl Values<'_> {
         }
     }
 
+    /// The value of all, 0 where each has its own.
+    pub(crate) fn uniform(&self) -> f32 {
+        match self {
+            Values::Uniform(value) => *value,
+            Values::Each(_) => 0.0,
+        }
+    }
+
     /// Whether every value is zero.
     pub(crate) fn all_zero(&self) -> bool {
         match self {
@@ -86,11 +94,11 @@ pub struct BodyDefinition<'a> {
     /// The two nodes of each spring, each pair once; `None`: the edges of the triangles, tetrahedra and cells, of
     /// the latter with the diagonals of their faces, each once.
     pub springs: Option<&'a [[u32; 2]]>,
-    /// The stiffness of each spring in N/m, at least 0.
+    /// The stiffness of each spring in N/m, at least 0; [`Values::Uniform`] of 0 where there are no springs.
     pub stiffnesses: Values<'a>,
     /// The rest length of each spring in metres, at least 0; `None`: from the rest positions.
     pub rest_lengths: Option<&'a [f32]>,
-    /// Damping along each spring in N s/m, at least 0.
+    /// Damping along each spring in N s/m, at least 0; [`Values::Uniform`] of 0 where there are no springs.
     pub spring_dampings: Values<'a>,
     /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the boundary of the
     /// tetrahedra, or of the cells.

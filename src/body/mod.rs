@@ -208,24 +208,26 @@ impl Body {
             Some(law) => Some(memory::boxed(elements_of(law, definition, &order)?)?),
             None => None,
         };
+        let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
         if springs.is_empty() {
             // Volume alone is viscous, and does not yield.
-            for (name, value, is_offered) in [
+            for (name, value, is_used) in [
                 (
                     "retardation_time",
                     definition.viscosity.retardation_time,
                     elements.is_some(),
                 ),
                 ("yield_strain", definition.yielding.strain, law.is_some()),
+                ("stiffness", definition.stiffnesses.uniform(), false),
+                ("spring_damping", definition.spring_dampings.uniform(), false),
             ] {
-                if value > 0.0 && !is_offered {
+                if value > 0.0 && !is_used {
                     return Err(Error::invalid(format!(
-                        "{name} is {value}, and the body has neither springs nor elements"
+                        "{name} is {value}, and the body has no springs, nor elements that use it"
                     )));
                 }
             }
         }
-        let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
         let mut surface = match (definition.triangles, definition.tetrahedra) {
             ([], []) => crate::mesh::cell_boundary(definition.cells)?,
             ([], tetrahedra) => crate::mesh::boundary(tetrahedra)?,

@@ -134,7 +134,7 @@ impl Block {
             rest_positions: Some(&rest),
             masses: Values::Uniform(MASS),
             springs: Some(if asked.springs { &self.springs } else { &[] }),
-            stiffnesses: Values::Uniform(STIFFNESS * stiffness),
+            stiffnesses: Values::Uniform(on(asked.springs, STIFFNESS)),
             tetrahedra: &self.mesh.tetrahedra,
             triangles: &self.surface,
             material: asked.elements.map(|poisson_ratio| Material {

@@ -550,3 +550,64 @@ fn what_tetrahedra_cannot_be_is_refused() {
         assert!(error.contains(named), "{named}: {error}");
     }
 }
+
+/// A stiffness that would be nobody's is refused by name, and one of springs that are given beside elements is theirs.
+#[test]
+fn what_only_springs_have_is_theirs_or_refused() {
+    let mesh = Mesh::block([0.04; 3], [2; 3]).expect("a block");
+    let elements = BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(tissue(0.3)),
+        ..BodyDefinition::default()
+    };
+    let nodes = BodyDefinition {
+        tetrahedra: &[],
+        material: None,
+        masses: Values::Uniform(1e-3),
+        springs: Some(&[]),
+        ..elements
+    };
+    let refused = |definition: &BodyDefinition, name: &str| {
+        let mut world = World::new(FREE).expect("a world");
+        let message = world.create_body(definition).expect_err("refused").to_string();
+        assert!(message.starts_with(&format!("{name} is 3")), "{message}");
+    };
+    let nothing: &[[u32; 2]] = &[];
+    for body in [elements, nodes] {
+        for springs in [body.springs, Some(nothing)] {
+            let body = BodyDefinition { springs, ..body };
+            let stiff = BodyDefinition {
+                stiffnesses: Values::Uniform(3.0),
+                ..body
+            };
+            refused(&stiff, "stiffness");
+            let damped = BodyDefinition {
+                spring_dampings: Values::Uniform(3.0),
+                ..body
+            };
+            refused(&damped, "spring_damping");
+            World::new(FREE).expect("a world").create_body(&body).expect("a body");
+        }
+    }
+    // One spring beside the elements, twice as long at rest.
+    let spring = [[0, mesh.positions.len() as u32 - 1]];
+    let length = mesh.positions[0].distance(*mesh.positions.last().expect("a node"));
+    let energy = |definition: &BodyDefinition| {
+        let mut world = World::new(FREE).expect("a world");
+        let body = world.create_body(definition).expect("a body");
+        world.body(body).expect("the body").energy(Vec3::ZERO).elastic
+    };
+    let both = BodyDefinition {
+        springs: Some(&spring),
+        stiffnesses: Values::Uniform(300.0),
+        rest_lengths: Some(&[2.0 * length]),
+        ..elements
+    };
+    let (alone, both) = (energy(&elements), energy(&both));
+    let expected = 0.5 * 300.0 * f64::from(length).powi(2);
+    assert!(
+        (both - alone - expected).abs() < 1e-5 * expected,
+        "{alone} J, {both} J with it"
+    );
+}
