@@ -1,7 +1,7 @@
 //! Threads of our own: they look for work as long as some comes, and sleep between steps that are far apart.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
 use super::board::{Apart, Board, Patience};
@@ -14,6 +14,8 @@ struct Shared {
     board: Board,
     /// For each seat.
     asleep: Vec<Apart<AtomicBool>>,
+    /// How many workers have begun.
+    begun: AtomicUsize,
     state: Apart<State>,
 }
 
@@ -40,6 +42,7 @@ impl Workers {
             shared: Arc::new(Shared {
                 board: Board::new(count)?,
                 asleep,
+                begun: AtomicUsize::new(0),
                 state: Apart::default(),
             }),
             handles: memory::reserved(count - 1)?,
@@ -54,6 +57,10 @@ impl Workers {
                     "thread_count is {count}: only {seat} could be had, the next was not started: {error}"
                 ))
             })?);
+        }
+        // What the system allocates as a thread begins is not to fall into a step.
+        while workers.shared.begun.load(Ordering::Relaxed) < count - 1 {
+            thread::yield_now();
         }
         Ok(workers)
     }
@@ -105,6 +112,7 @@ impl Shared {
     /// What the worker of this seat does in its life.
     fn work(&self, seat: usize) {
         let State { leading, closing } = &self.state.0;
+        self.begun.fetch_add(1, Ordering::Relaxed);
         let mut seen = 0;
         let mut patience = Patience::new();
         while !closing.load(Ordering::Relaxed) {
