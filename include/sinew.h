@@ -584,7 +584,8 @@ typedef struct sinew_body_def {
   /**
    * SINEW_MATERIAL_...; NONE, the default: the four below are 0. Else it fills the tetrahedra or the cells, or where there are
    * none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
-   * triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001.
+   * triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001 and the
+   * rounding of their corners' coordinates.
    */
   uint32_t material;
   /**

@@ -127,7 +127,8 @@ pub struct sinew_body_def {
     pub cell_count: usize,
     /// SINEW_MATERIAL_...; NONE, the default: the four below are 0. Else it fills the tetrahedra or the cells, or where there are
     /// none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
-    /// triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001.
+    /// triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001 and the
+    /// rounding of their corners' coordinates.
     pub material: u32,
     /// Young's modulus at small strains, Pa, above 0. Exact for cells and equilateral triangles; an irregular mesh is some 4 to 8 %
     /// softer, one that is one or two tetrahedra thick far more.

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use crate::body::BodyDefinition;
 use crate::error::{Error, Result};
 use crate::mesh::{CELL_DIAGONALS, CELL_EDGES, cell_volume, tetrahedron_volume};
+use crate::springs::Rounding;
 
 /// An element is flat where its height is no more than this part of its longest edge: what rounding makes of a plane.
 const FLAT: f64 = 1e-7;
@@ -46,7 +47,7 @@ impl<'a> Filled<'a> {
                 check_each("tetrahedra", tetrahedra, rest, &tetrahedron_height)?;
                 Self::Tetrahedra(tetrahedra)
             }
-            (_, [], cells @ [_, ..]) => Self::Cells(cells, common_edge(cells, rest)?),
+            (_, [], cells @ [_, ..]) => Self::Cells(cells, common_edge(cells, rest, definition.rounding())?),
             (triangles, [], []) => {
                 if thickness == 0.0 {
                     return Err(Error::invalid(
@@ -125,8 +126,10 @@ fn check_each<const N: usize>(
     }
 }
 
-/// The edge of cells that are cubes of one size.
-fn common_edge(cells: &[[u32; 8]], rest: &[Vec3]) -> Result<f64> {
+/// The edge of cells that are cubes of one size, but for what rounding made of their corners' coordinates.
+fn common_edge(cells: &[[u32; 8]], rest: &[Vec3], Rounding { reach }: Rounding) -> Result<f64> {
+    // A coordinate may be off by half a last place, an edge by a whole one; a diagonal, and the mean that it is compared with, by 1.42.
+    let rounding = 3.0 * f64::from(f32::EPSILON) * f64::from(reach);
     let length = |corners: &[DVec3; 8], [a, b]: [usize; 2]| corners[a].distance(corners[b]);
     let sum_of = |cell: &[u32; 8]| {
         let corners = corners(cell, rest);
@@ -139,7 +142,7 @@ fn common_edge(cells: &[[u32; 8]], rest: &[Vec3]) -> Result<f64> {
         for (pairs, expected) in [(CELL_EDGES, edge), (CELL_DIAGONALS, diagonal)] {
             for ends in pairs {
                 let found = length(&corners, ends);
-                if !(found > 0.0 && (found - expected).abs() <= SAME_EDGE * expected) {
+                if !(found > 0.0 && (found - expected).abs() <= SAME_EDGE * expected + rounding) {
                     let [a, b] = ends.map(|corner| cell[corner]);
                     return Err(Error::invalid(format!(
                         "cells[{index}] is no cube of the cells' mean edge, {} m: nodes {a} and {b} lie {} m apart, not {} m",

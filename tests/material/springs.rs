@@ -714,3 +714,53 @@ fn presets_have_figures_and_sources() {
         },
     ));
 }
+
+/// Coordinates far from the origin are rounded by up to 0.5 mm at 8 km and from there on.
+#[test]
+fn a_lattice_far_from_the_origin_is_one_of_cubes() {
+    const EDGE: f32 = 0.2;
+    let mesh = Mesh::lattice(EDGE, [5, 3, 4]).expect("a lattice");
+    for far in [0.0, 1000.0, 8000.0, 10_000.0] {
+        for towards in [Vec3::X, Vec3::new(0.6, -0.8, 0.0), Vec3::new(-0.48, 0.64, 0.6)] {
+            let positions: Vec<Vec3> = mesh.positions.iter().map(|place| *place + far * towards).collect();
+            let lattice = BodyDefinition {
+                positions: &positions,
+                node_dampings: Values::Uniform(10.0),
+                ..definition(&mesh, TISSUE)
+            };
+            let (mut world, id) = world_of(&lattice);
+            // What a coordinate may be off by, twice: an edge.
+            let rounding = f32::EPSILON * (far + 1.0);
+            let body = world.body(id).expect("the body");
+            let mass: f64 = (0..body.node_count() as u32)
+                .map(|node| f64::from(body.node_mass(node).expect("a node")))
+                .sum();
+            let expected = f64::from(TISSUE.density) * 60.0 * f64::from(EDGE).powi(3);
+            let off = f64::from(3.0 * rounding / EDGE) + 1e-6;
+            assert!(
+                (mass / expected - 1.0).abs() < off,
+                "{mass} kg of {expected}, {far} m away"
+            );
+            // It is at rest where it was put, to within that rounding.
+            for _ in 0..50 {
+                world.step(0.01).expect("a step");
+            }
+            let now = world.body(id).expect("the body").positions();
+            let moved = now.iter().zip(&positions).map(|(now, then)| now.distance(*then));
+            let moved = moved.fold(0.0, f32::max);
+            assert!(moved <= 8.0 * rounding, "{moved} m in half a second, {far} m away");
+            // What is no cube is refused there too.
+            let mut skew = positions.clone();
+            skew[7] += Vec3::new(0.05 * EDGE, 0.0, 0.0);
+            let skew = BodyDefinition {
+                positions: &skew,
+                ..lattice
+            };
+            let error = World::new(FREE)
+                .expect("a world")
+                .create_body(&skew)
+                .expect_err("refused");
+            assert!(error.to_string().contains("is no cube"), "{error}");
+        }
+    }
+}
