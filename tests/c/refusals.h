@@ -295,6 +295,8 @@ static inline void set_up(void)
     memset(&untouched, 0xA5, sizeof untouched);
     untouched.step.struct_size = sizeof untouched.step;
     untouched.energy.struct_size = sizeof untouched.energy;
+    untouched.rest.struct_size = sizeof untouched.rest;
+    untouched.preset.struct_size = sizeof untouched.preset;
     untouched.suture.struct_size = sizeof untouched.suture;
     untouched.storage.struct_size = sizeof untouched.storage;
     untouched.solver.struct_size = sizeof untouched.solver;
