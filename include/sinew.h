@@ -499,11 +499,11 @@ typedef struct sinew_body_def {
    */
   const float *spring_dampings;
   /**
-   * N/m; default 0; must be 0 where the body has no springs.
+   * N/m; default 0; 0 with SINEW_MATERIAL_TETRAHEDRA where no springs are given.
    */
   float stiffness;
   /**
-   * N s/m; default 0; must be 0 where the body has no springs.
+   * N s/m; default 0; 0 with SINEW_MATERIAL_TETRAHEDRA where no springs are given.
    */
   float spring_damping;
   /**

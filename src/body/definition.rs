@@ -94,11 +94,11 @@ pub struct BodyDefinition<'a> {
     /// The two nodes of each spring, each pair once; `None`: the edges of the triangles, tetrahedra and cells, of
     /// the latter with the diagonals of their faces, each once.
     pub springs: Option<&'a [[u32; 2]]>,
-    /// The stiffness of each spring in N/m, at least 0; [`Values::Uniform`] of 0 where there are no springs.
+    /// The stiffness of each spring in N/m, at least 0; 0 where tetrahedra are elements and no springs are given.
     pub stiffnesses: Values<'a>,
     /// The rest length of each spring in metres, at least 0; `None`: from the rest positions.
     pub rest_lengths: Option<&'a [f32]>,
-    /// Damping along each spring in N s/m, at least 0; [`Values::Uniform`] of 0 where there are no springs.
+    /// Damping along each spring in N s/m, at least 0; 0 where tetrahedra are elements and no springs are given.
     pub spring_dampings: Values<'a>,
     /// The surface that is drawn and touched, outward by the right-hand rule; where it is empty, the boundary of the
     /// tetrahedra, or of the cells.

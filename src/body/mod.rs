@@ -210,7 +210,7 @@ impl Body {
         };
         let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
         if springs.is_empty() {
-            // Volume alone is viscous, and does not yield.
+            // Volume alone is viscous, and does not yield. Edges are springs, but where tetrahedra are elements.
             for (name, value, is_used) in [
                 (
                     "retardation_time",
@@ -218,8 +218,8 @@ impl Body {
                     elements.is_some(),
                 ),
                 ("yield_strain", definition.yielding.strain, law.is_some()),
-                ("stiffness", definition.stiffnesses.uniform(), false),
-                ("spring_damping", definition.spring_dampings.uniform(), false),
+                ("stiffness", definition.stiffnesses.uniform(), law.is_none()),
+                ("spring_damping", definition.spring_dampings.uniform(), law.is_none()),
             ] {
                 if value > 0.0 && !is_used {
                     return Err(Error::invalid(format!(

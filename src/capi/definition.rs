@@ -78,9 +78,9 @@ pub struct sinew_body_def {
     pub rest_lengths: *const f32,
     /// spring_count floats, N s/m along the spring; nullable: spring_damping.
     pub spring_dampings: *const f32,
-    /// N/m; default 0; must be 0 where the body has no springs.
+    /// N/m; default 0; 0 with SINEW_MATERIAL_TETRAHEDRA where no springs are given.
     pub stiffness: f32,
-    /// N s/m; default 0; must be 0 where the body has no springs.
+    /// N s/m; default 0; 0 with SINEW_MATERIAL_TETRAHEDRA where no springs are given.
     pub spring_damping: f32,
     /// 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra or cells is what
     /// is drawn and touched.

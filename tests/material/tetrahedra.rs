@@ -561,34 +561,25 @@ fn what_only_springs_have_is_theirs_or_refused() {
         material: Some(tissue(0.3)),
         ..BodyDefinition::default()
     };
-    let nodes = BodyDefinition {
-        tetrahedra: &[],
-        material: None,
-        masses: Values::Uniform(1e-3),
-        springs: Some(&[]),
-        ..elements
-    };
     let refused = |definition: &BodyDefinition, name: &str| {
         let mut world = World::new(FREE).expect("a world");
         let message = world.create_body(definition).expect_err("refused").to_string();
         assert!(message.starts_with(&format!("{name} is 3")), "{message}");
     };
     let nothing: &[[u32; 2]] = &[];
-    for body in [elements, nodes] {
-        for springs in [body.springs, Some(nothing)] {
-            let body = BodyDefinition { springs, ..body };
-            let stiff = BodyDefinition {
-                stiffnesses: Values::Uniform(3.0),
-                ..body
-            };
-            refused(&stiff, "stiffness");
-            let damped = BodyDefinition {
-                spring_dampings: Values::Uniform(3.0),
-                ..body
-            };
-            refused(&damped, "spring_damping");
-            World::new(FREE).expect("a world").create_body(&body).expect("a body");
-        }
+    for springs in [None, Some(nothing)] {
+        let body = BodyDefinition { springs, ..elements };
+        let stiff = BodyDefinition {
+            stiffnesses: Values::Uniform(3.0),
+            ..body
+        };
+        refused(&stiff, "stiffness");
+        let damped = BodyDefinition {
+            spring_dampings: Values::Uniform(3.0),
+            ..body
+        };
+        refused(&damped, "spring_damping");
+        World::new(FREE).expect("a world").create_body(&body).expect("a body");
     }
     // One spring beside the elements, twice as long at rest.
     let spring = [[0, mesh.positions.len() as u32 - 1]];
