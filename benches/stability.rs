@@ -2,10 +2,14 @@
 //!
 //! `cargo bench --bench stability [-- part of a case's name [solver]]` writes `target/report/stability.md`. What is not as it
 //! should be makes it fail. A name of nothing, `""`, is part of all.
+//!
+//! `cargo bench --bench stability -- long` is the table of long runs; see `stability/long_runs.rs`.
 #![allow(clippy::print_stderr)]
 
 #[path = "../tests/stability/mod.rs"]
 mod cases;
+#[path = "stability/long_runs.rs"]
+mod long_runs;
 #[path = "../tests/support/mod.rs"]
 mod support;
 
@@ -21,6 +25,9 @@ fn main() -> ExitCode {
         .skip(1)
         .filter(|argument| argument != "--bench")
         .collect();
+    if arguments.first().is_some_and(|first| first == "long") {
+        return long_runs::main(&arguments[1..]);
+    }
     let asked = arguments.first().map_or("", String::as_str);
     let solver = arguments.get(1).map(String::as_str);
     let solvers: Vec<Solver> = SOLVERS

@@ -101,3 +101,20 @@ fn what_is_pending_is_told() {
     }
     support::report_pending("Stability", &lines);
 }
+
+mod long_runs {
+    use super::cases::long_runs::quick;
+
+    #[test]
+    fn good_states_stay_good() {
+        let mut wrong = Vec::new();
+        for (row, seconds) in quick() {
+            let outcome = row.run(seconds);
+            println!("{row}: {outcome}");
+            if outcome.has_failed() {
+                wrong.push(format!("{row}: {outcome}"));
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+}

@@ -7,6 +7,7 @@
 mod bad_starts;
 mod frames;
 mod ledger;
+pub mod long_runs;
 mod ratios;
 mod setup;
 mod statics;

@@ -61,7 +61,7 @@ pub fn real(name: &str, scale: f32) -> Option<Mesh> {
         let _ = writeln!(std::io::stderr(), "SKIPPED: ../shared/meshes/{name} is missing");
         return None;
     };
-    Some(sinew::mesh::load(path, MeshFormat::Stl, scale).expect("a mesh").mesh)
+    Some(sinew::mesh::load(path, MeshFormat::Auto, scale).expect("a mesh").mesh)
 }
 
 /// A box between two corners.
