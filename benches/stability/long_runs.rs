@@ -1,70 +1,106 @@
 //! The table of long runs, all of it: hours.
 //!
-//! `cargo bench --bench stability -- long [parts of a row's name] [--seconds S] [--list]` writes `target/report/long_runs.md` as it goes. Only
-//! rows that have all these parts in their names are run, for S simulated seconds, 600 where it is not given. It fails where a row does.
+//! `cargo bench --bench stability -- long [parts of a row's name] [--seconds S] [--minutes M] [--list]` writes
+//! `target/report/long_runs.md` as it goes. Only rows that have all these parts in their names are run, each for S simulated seconds, 600
+//! where it is not given, and no longer than M minutes of processor time, 10. It fails where a row does.
+//!
+//! `--list` shows the rows. `cargo bench --profile dev ...` takes the library as tests do.
 
 use std::fs;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use crate::cases::long_runs::full;
+use crate::cases::long_runs::{Outcome, Row, full};
 use crate::support::report_folder;
 
-/// Simulated, s.
-const SECONDS: f64 = 600.0;
+/// What is asked for.
+struct Asked {
+    parts: Vec<String>,
+    /// Simulated, s.
+    seconds: f64,
+    /// Of processor time at the most.
+    minutes: f64,
+    list: bool,
+}
+
+impl Asked {
+    fn of(arguments: &[String]) -> Result<Self, String> {
+        let mut asked = Self {
+            parts: Vec::new(),
+            seconds: 600.0,
+            minutes: 10.0,
+            list: false,
+        };
+        let mut arguments = arguments.iter();
+        while let Some(argument) = arguments.next() {
+            let mut number = || {
+                let given = arguments.next().and_then(|given| given.parse().ok());
+                given.ok_or_else(|| format!("a number must follow {argument}"))
+            };
+            match argument.as_str() {
+                "--list" => asked.list = true,
+                "--seconds" => asked.seconds = number()?,
+                "--minutes" => asked.minutes = number()?,
+                part => asked.parts.push(part.to_lowercase()),
+            }
+        }
+        Ok(asked)
+    }
+
+    fn rows(&self) -> Vec<Row> {
+        let mut rows = full();
+        rows.retain(|row| {
+            let name = row.to_string().to_lowercase();
+            self.parts.iter().all(|part| name.contains(part))
+        });
+        rows
+    }
+}
 
 pub fn main(arguments: &[String]) -> ExitCode {
-    let mut seconds = SECONDS;
-    let mut parts = Vec::new();
-    let mut list = false;
-    let mut arguments = arguments.iter();
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--list" => list = true,
-            "--seconds" => {
-                let Some(given) = arguments.next().and_then(|given| given.parse().ok()) else {
-                    eprintln!("--seconds: a number must follow");
-                    return ExitCode::FAILURE;
-                };
-                seconds = given;
-            }
-            part => parts.push(part.to_lowercase()),
+    let failed = Asked::of(arguments).and_then(|asked| {
+        let rows = asked.rows();
+        if asked.list {
+            rows.iter().for_each(|row| eprintln!("{row}"));
+            return Ok(0);
+        }
+        run(&asked, &rows)
+    });
+    match failed {
+        Ok(0) => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
+        Err(why) => {
+            eprintln!("{why}");
+            ExitCode::FAILURE
         }
     }
-    let mut rows = full();
-    rows.retain(|row| {
-        let name = row.to_string().to_lowercase();
-        parts.iter().all(|part| name.contains(part))
-    });
-    if list {
-        rows.iter().for_each(|row| eprintln!("{row}"));
-        return ExitCode::SUCCESS;
-    }
+}
+
+/// Runs the rows; how many failed.
+fn run(asked: &Asked, rows: &[Row]) -> Result<usize, String> {
     let path = report_folder().join("long_runs.md");
-    let mut report = format!("# Long runs of {seconds} s\n\n");
+    let mut report = format!("# Long runs of {} s\n\n| row | {}\n", asked.seconds, Outcome::HEADS);
+    report += &format!("|---|{}\n", "---|".repeat(Outcome::HEADS.matches('|').count()));
     let mut failed = 0;
     for (index, row) in rows.iter().enumerate() {
-        let start = Instant::now();
-        let outcome = row.run(seconds);
+        let number = format!("{}/{} {row}", index + 1, rows.len());
+        let (start, mut told) = (Instant::now(), Instant::now());
+        let outcome = row.run(asked.seconds, 60.0 * asked.minutes, &mut |figures| {
+            if told.elapsed().as_secs() >= 10 {
+                told = Instant::now();
+                let rate = figures.time / start.elapsed().as_secs_f64();
+                eprintln!(
+                    "{number}: {:.0} of {} s, {rate:.1} times real time",
+                    figures.time, asked.seconds
+                );
+            }
+        });
         failed += usize::from(outcome.has_failed());
-        let line = format!("{row}: {outcome}");
-        eprintln!(
-            "{}/{} {line} ({:.0} s)",
-            index + 1,
-            rows.len(),
-            start.elapsed().as_secs_f64()
-        );
-        report += &format!("- {line}\n");
+        eprintln!("{number}: {outcome}, took {:.1} s", start.elapsed().as_secs_f64());
+        report += &format!("| {row} | {}\n", outcome.cells());
         let written = fs::create_dir_all(report_folder()).and_then(|()| fs::write(&path, &report));
-        if let Err(error) = written {
-            eprintln!("{}: {error}", path.display());
-            return ExitCode::FAILURE;
-        }
+        written.map_err(|error| format!("{}: {error}", path.display()))?;
     }
     eprintln!("{}: {failed} of {} failed", path.display(), rows.len());
-    if failed == 0 {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    }
+    Ok(failed)
 }

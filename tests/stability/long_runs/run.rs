@@ -1,148 +1,85 @@
-//! A row is run, and watched at the end of its steps.
+//! A row is run, and looked at some sixty times a second.
 
-use std::fmt;
-
-use glam::Vec3;
-use sinew::{Body, BodyId, Solver, World, WorldDefinition};
-
-use super::account::Copy;
+use super::account::Account;
+use super::activity::Activity;
 use super::clock;
+use super::figures::{Figures, Outcome};
+use super::pluck;
+use super::press::Press;
+use super::scene::Scene;
 use super::subject::Subject;
 use super::table::Row;
-use crate::support::bodies::FREE;
 
-/// Of the energy put in, how much more there may be.
-const ENERGY: f64 = 1e-3;
-
-#[derive(Clone, Debug)]
-pub enum Outcome {
-    /// A file is missing.
-    Skipped,
-    Ran(Figures),
+/// How long a row runs.
+pub struct Length {
+    /// Simulated, s.
+    pub simulated: f64,
+    /// Processor time at the most, s.
+    pub processor: f64,
 }
 
-/// What a run showed.
-#[derive(Clone, Debug, Default)]
-pub struct Figures {
-    /// The energy put in, J.
-    put_in: f64,
-    /// The most energy above what was put in, as a part of it, and when, s.
-    excess: f64,
-    at: f64,
-    substeps: u32,
-    /// Processor time of a frame, s.
-    frame: f64,
-    /// How long it ran, s.
-    time: f64,
-    faults: Vec<String>,
-}
+/// Looked at so often, 1/s.
+const LOOKS: f64 = 60.0;
 
-impl Outcome {
-    pub fn has_failed(&self) -> bool {
-        matches!(self, Outcome::Ran(figures) if !figures.faults.is_empty())
-    }
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Outcome::Ran(figures) = self else {
-            return f.write_str("SKIPPED");
-        };
-        let verdict = if self.has_failed() { "FAILED" } else { "ok" };
-        write!(
-            f,
-            "{verdict}: energy {:+.1e} of {:.2e} J at {:.1} s; {} substeps, {:.2} ms a frame, {:.1} s",
-            figures.excess,
-            figures.put_in,
-            figures.at,
-            figures.substeps,
-            1e3 * figures.frame,
-            figures.time
-        )?;
-        figures.faults.iter().try_for_each(|fault| write!(f, "; {fault}"))
-    }
-}
-
-struct Run {
-    world: World,
-    id: BodyId,
-    copy: Copy,
-    gravity: Vec3,
-    first: f64,
-    figures: Figures,
-}
-
-/// Runs a row for so many seconds.
-pub fn run(row: &Row, seconds: f64) -> Outcome {
-    let Some(subject) = Subject::new(row.shape, row.law) else {
+/// Runs a row; `watch` is shown how it goes.
+pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outcome {
+    let Some(subject) = Subject::new(row.matter, row.damping) else {
         return Outcome::Skipped;
     };
-    let gravity = Vec3::new(0.0, -9.81, 0.0);
-    let definition = subject.definition(row.solver, row.damping);
-    let mut world = World::new(WorldDefinition { gravity, ..FREE }).expect("a world");
-    let id = world.create_body(&definition).expect("a body");
-    for &node in &subject.end {
-        world.body_mut(id).expect("the body").pin(node).expect("a pin");
-    }
-    let mut copy = Copy::new(&definition, gravity, &subject.end);
-    let rest = copy.energy_at_rest();
-    let mut run = Run {
-        world,
-        id,
-        copy,
-        gravity,
-        first: 0.0,
-        figures: Figures {
-            excess: f64::NEG_INFINITY,
-            ..Figures::default()
-        },
+    let result = match row.activity {
+        Activity::Plucked => pluck::ring(row, &subject),
+        _ => go_on(row, &subject, length, watch),
     };
-    run.first = run.energy();
-    run.figures.put_in = run.first - rest;
-    let frames = (seconds / f64::from(row.step)).round() as usize;
-    for frame in 1..=frames {
-        let mut outcome = None;
-        let elapsed = clock::time(|| outcome = Some(run.world.step(row.step)));
-        run.figures.frame += elapsed.processor;
-        run.figures.time = frame as f64 * f64::from(row.step);
-        match outcome.expect("a step") {
-            Err(error) => run.figures.faults.push(format!("step {frame}: {error}")),
-            Ok(report) if report.bodies_restored > 0 => run.figures.faults.push(format!("step {frame}: restored")),
-            Ok(report) => run.check(row, report.substeps),
-        }
-        if !run.figures.faults.is_empty() {
-            break;
-        }
-    }
-    let steps = run.figures.time / f64::from(row.step);
-    run.figures.frame /= steps;
-    if run.figures.excess > ENERGY {
-        run.figures.faults.push("energy".into());
-    }
-    Outcome::Ran(run.figures)
+    Outcome::Ran(result.unwrap_or_else(|error| Figures::of_fault(format!("no state of rest: {error}"))))
 }
 
-impl Run {
-    fn body(&self) -> &Body {
-        self.world.body(self.id).expect("the body")
-    }
-
-    fn energy(&self) -> f64 {
-        let energy = self.body().energy(self.gravity);
-        energy.kinetic + energy.elastic + energy.gravitational
-    }
-
-    fn check(&mut self, row: &Row, substeps: u32) {
-        self.figures.substeps = self.figures.substeps.max(substeps);
-        let mut above = self.energy() - self.first;
-        if above > 0.0 && row.solver == Solver::Verlet {
-            let body = self.world.body(self.id).expect("the body");
-            above -= self.copy.oscillation(body, f64::from(row.step) / f64::from(substeps));
+fn go_on(
+    row: &Row,
+    subject: &Subject,
+    length: &Length,
+    watch: &mut dyn FnMut(&Figures),
+) -> Result<Figures, sinew::Error> {
+    let mut scene = row.activity.begin(subject, row.solver)?;
+    let (mut account, mut figures) = Account::new(row.activity, subject, row.solver, &scene)?;
+    let mut press = Press::new(row.activity, subject, &mut scene);
+    let step = f64::from(row.step);
+    let looks = (1.0 / (LOOKS * step)).round().max(1.0) as usize;
+    figures.wanted = length.simulated;
+    let (mut count, mut processor) = (0_usize, 0.0);
+    while figures.time < length.simulated && processor < length.processor && !figures.is_hopeless() {
+        count += 1;
+        figures.time = count as f64 * step;
+        if let Some(press) = &mut press {
+            press.act(&mut scene, figures.time);
         }
-        let excess = above / self.figures.put_in;
-        if !(excess <= self.figures.excess) {
-            self.figures.excess = excess;
-            self.figures.at = self.figures.time;
+        let substeps = take(&mut scene, row.step, count, &mut processor, &mut figures);
+        figures.cost = processor / count as f64;
+        let Some(substeps) = substeps else {
+            break;
+        };
+        if let Some(press) = &press {
+            account.add_work(press.work(&scene), &mut figures);
+        }
+        let is_free = press.as_ref().is_none_or(Press::is_over);
+        if is_free && count.is_multiple_of(looks) {
+            account.check(&scene, &subject.masses, step / f64::from(substeps), &mut figures);
+            watch(&figures);
         }
     }
+    Ok(figures)
+}
+
+/// Takes a step: how many substeps that took, `None` where it went wrong.
+fn take(scene: &mut Scene, step: f32, count: usize, processor: &mut f64, figures: &mut Figures) -> Option<u32> {
+    let mut result = None;
+    *processor += clock::time(|| result = Some(scene.world.step(step))).processor;
+    match result? {
+        Err(error) => figures.faults.push(format!("step {count}: {error}")),
+        Ok(report) if report.bodies_restored > 0 => figures.faults.push(format!("step {count}: restored")),
+        Ok(report) => {
+            figures.substeps = figures.substeps.max(report.substeps);
+            return Some(report.substeps.max(1));
+        }
+    }
+    None
 }

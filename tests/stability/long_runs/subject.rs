@@ -1,22 +1,82 @@
 //! The bodies of the long runs: a shape, and the law that its forces follow.
 
-use glam::Vec3;
-use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Solver, Values};
+use std::fmt;
 
-use crate::support::solid::real;
+use glam::{Vec3, Vec3Swizzles};
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model, Solver, SpringLaw, Values, Viscosity};
+
+use super::scene::Scene;
+use crate::support::solid::{ball, real};
 
 /// Of soft tissue, Pa and kg/m³.
 const YOUNG: f32 = 5400.0;
 const DENSITY: f32 = 1060.0;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Of what has no tetrahedra or cells, m.
+const THICKNESS: f32 = 0.001;
+
+/// Of a body of springs that are given, kg.
+const MASS: f32 = 0.2;
+
+/// The part of its length along which a body is held.
+const HELD: f32 = 0.1;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shape {
     Organ,
+    /// The organ as coarse as it can be.
+    SmallOrgan,
     Stomach,
+    Flap,
+    Liver,
+    Gallbladder,
     Cloth,
+    Lattice,
+    Balloon,
 }
 
+impl Shape {
+    pub fn name(self) -> &'static str {
+        match self {
+            Shape::Organ => "organ",
+            Shape::SmallOrgan => "small organ",
+            Shape::Stomach => "stomach",
+            Shape::Flap => "flap",
+            Shape::Liver => "liver",
+            Shape::Gallbladder => "gallbladder",
+            Shape::Cloth => "cloth",
+            Shape::Lattice => "lattice",
+            Shape::Balloon => "balloon",
+        }
+    }
+
+    /// `None` where its file is missing.
+    fn mesh(self) -> Option<Mesh> {
+        let made = match self {
+            Shape::Organ => Mesh::organ(0.15, 0.012),
+            Shape::SmallOrgan => Mesh::organ(0.15, 0.15 / 8.0),
+            Shape::Stomach => return real("stomach.msh", 1e-3),
+            Shape::Flap => return real("tissue_volume.msh", 1.0),
+            Shape::Liver => return real("liver_volumetric.vtk", 1e-3),
+            Shape::Gallbladder => return real("gallbladder_volumetric.vtk", 1e-3),
+            Shape::Cloth => Mesh::cloth([0.3; 2], [16; 2]),
+            Shape::Lattice => Mesh::lattice(0.02, [8, 3, 3]),
+            Shape::Balloon => Ok(ball(0.05, 2)),
+        };
+        Some(made.expect("a mesh"))
+    }
+
+    /// From its free end to the end by which it is held.
+    fn axis(self) -> Vec3 {
+        match self {
+            Shape::Stomach | Shape::Balloon => Vec3::Y,
+            _ => Vec3::NEG_X,
+        }
+    }
+}
+
+/// What the forces in a body follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// Springs of this stiffness, N/m.
@@ -27,69 +87,149 @@ pub enum Law {
     Elements(f32),
 }
 
-/// A shape at rest.
+/// What a body has beside its law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Extra {
+    #[default]
+    Nothing,
+    /// Tetrahedra keep their volume.
+    Volume,
+    /// The surface resists bending.
+    Bending,
+    /// A spring and a dashpot in series beside what is elastic.
+    Maxwell,
+    /// A dashpot beside what is elastic.
+    Voigt,
+    /// Along the body.
+    Fibres,
+    /// Springs stiffen exponentially.
+    Exponential,
+    /// Springs stiffen with the cube of their strain.
+    Cubic,
+    /// Springs are much stiffer from a strain on.
+    Limited,
+    /// Nodes are drawn back to their rest positions.
+    Home,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Matter {
+    pub shape: Shape,
+    pub law: Law,
+    pub extra: Extra,
+}
+
+impl fmt::Display for Matter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.shape.name())?;
+        match self.law {
+            Law::Springs(stiffness) => write!(f, ", springs of {stiffness} N/m")?,
+            Law::Young => f.write_str(", springs by modulus")?,
+            Law::Elements(ratio) => write!(f, ", elements {ratio:.2}")?,
+        }
+        match self.extra {
+            Extra::Nothing => Ok(()),
+            extra => write!(f, ", {}", format!("{extra:?}").to_lowercase()),
+        }
+    }
+}
+
+/// A body that can be made.
 pub struct Subject {
-    pub mesh: Mesh,
-    /// The nodes at one end.
-    pub end: Vec<u32>,
-    law: Law,
+    pub matter: Matter,
+    mesh: Mesh,
+    /// The masses of the nodes, kg.
+    pub masses: Vec<f32>,
+    /// The nodes by which it is held, and those at the other end.
+    pub ends: [Vec<u32>; 2],
+    /// From its free end to the one by which it is held.
+    pub axis: Vec3,
+    /// Along its axis, m.
+    pub length: f32,
+    fibres: Vec<Vec3>,
+    dampings: Vec<f32>,
 }
 
 impl Subject {
-    /// `None` where the file of the shape is missing.
-    pub fn new(shape: Shape, law: Law) -> Option<Self> {
-        let mesh = match shape {
-            Shape::Organ => Mesh::organ(0.15, 0.012).expect("an organ"),
-            Shape::Stomach => real("stomach.msh", 1e-3)?,
-            Shape::Cloth => Mesh::cloth([0.3; 2], [20; 2]).expect("a cloth"),
+    /// Its nodes damped at `rate`, 1/s. `None` where a file is missing.
+    pub fn new(matter: Matter, rate: f32) -> Option<Self> {
+        let mesh = matter.shape.mesh()?;
+        let axis = matter.shape.axis();
+        let heights: Vec<f32> = mesh.positions.iter().map(|p| p.dot(axis)).collect();
+        let low = heights.iter().copied().fold(f32::INFINITY, f32::min);
+        let high = heights.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let length = high - low;
+        let within = |is_there: &dyn Fn(f32) -> bool| -> Vec<u32> {
+            let nodes = (0..).zip(&heights).filter(|&(_, &height)| is_there(height));
+            nodes.map(|(node, _)| node).collect()
         };
-        // The organ lies along x, and so does a side of the cloth; other organs hang from their tops.
-        let along = match shape {
-            Shape::Organ | Shape::Cloth => -Vec3::X,
-            Shape::Stomach => Vec3::Y,
+        let ends = [
+            within(&|height| height > high - HELD * length),
+            within(&|height| height < low + HELD * length),
+        ];
+        let fibres = match matter.extra {
+            Extra::Fibres => vec![axis; mesh.tetrahedra.len()],
+            _ => Vec::new(),
         };
-        let heights = mesh.positions.iter().map(|p| p.dot(along));
-        let low = heights.clone().fold(f32::INFINITY, f32::min);
-        let high = heights.clone().fold(f32::NEG_INFINITY, f32::max);
-        let edge = high - 0.1 * (high - low);
-        let end = (0..)
-            .zip(heights)
-            .filter(|&(_, height)| height > edge)
-            .map(|(node, _)| node);
-        Some(Self {
-            end: end.collect(),
+        let mut subject = Self {
+            matter,
+            masses: Vec::new(),
+            ends,
+            axis,
+            length,
+            fibres,
+            dampings: vec![0.0; mesh.positions.len()],
             mesh,
-            law,
-        })
+        };
+        let scene = Scene::new(&subject.definition(Solver::Verlet), Vec3::ZERO);
+        let nodes = 0..scene.body().node_count() as u32;
+        subject.masses = nodes
+            .map(|node| scene.body().node_mass(node).expect("a node"))
+            .collect();
+        subject.dampings = subject.masses.iter().map(|mass| rate * mass).collect();
+        Some(subject)
     }
 
-    /// Damped at `rate`, 1/s.
-    pub fn definition(&self, solver: Solver, rate: f32) -> BodyDefinition<'_> {
+    /// At right angles to its axis.
+    pub fn across(&self) -> Vec3 {
+        self.axis.zxy().abs()
+    }
+
+    pub fn definition(&self, solver: Solver) -> BodyDefinition<'_> {
         let mesh = &self.mesh;
-        let material = Material {
-            young_modulus: YOUNG,
-            density: DENSITY,
-            thickness: if mesh.tetrahedra.is_empty() { 0.001 } else { 0.0 },
-            ..Material::default()
-        };
+        let is_surface = mesh.tetrahedra.is_empty() && mesh.cells.is_empty();
         let definition = BodyDefinition {
             positions: &mesh.positions,
-            triangles: if mesh.tetrahedra.is_empty() {
-                &mesh.triangles
-            } else {
-                &[]
-            },
+            triangles: if is_surface { &mesh.triangles } else { &[] },
             tetrahedra: &mesh.tetrahedra,
+            cells: &mesh.cells,
+            node_dampings: Values::Each(&self.dampings),
             solver,
             ..BodyDefinition::default()
         };
-        // A tenth of a kilogram.
-        let node_mass = 0.1 / mesh.positions.len() as f32;
-        let _ = rate;
-        match self.law {
+        let definition = match self.matter.shape {
+            // A tenth longer than at rest.
+            Shape::Balloon => BodyDefinition {
+                pressure: 20.0,
+                enclosed_stiffness: 1e4,
+                ..definition
+            },
+            _ => definition,
+        };
+        self.with_extra(self.with_law(definition, is_surface))
+    }
+
+    fn with_law<'a>(&'a self, definition: BodyDefinition<'a>, is_surface: bool) -> BodyDefinition<'a> {
+        let material = Material {
+            young_modulus: YOUNG,
+            density: DENSITY,
+            thickness: if is_surface { THICKNESS } else { 0.0 },
+            ..Material::default()
+        };
+        match self.matter.law {
             Law::Springs(stiffness) => BodyDefinition {
                 stiffnesses: Values::Uniform(stiffness),
-                masses: Values::Uniform(node_mass),
+                masses: Values::Uniform(MASS / self.mesh.positions.len() as f32),
                 ..definition
             },
             Law::Young => BodyDefinition {
@@ -105,5 +245,45 @@ impl Subject {
                 ..definition
             },
         }
+    }
+
+    fn with_extra<'a>(&'a self, mut definition: BodyDefinition<'a>) -> BodyDefinition<'a> {
+        match self.matter.extra {
+            Extra::Nothing => {}
+            Extra::Volume => definition.volume_stiffness = 0.5 * YOUNG,
+            Extra::Bending => definition.bending_stiffness = YOUNG * THICKNESS.powi(3) / 12.0 * 100.0,
+            Extra::Maxwell => {
+                definition.viscosity = Viscosity {
+                    retardation_time: 0.02,
+                    relaxation_time: 0.02,
+                }
+            }
+            Extra::Voigt => {
+                definition.viscosity = Viscosity {
+                    retardation_time: 0.001,
+                    relaxation_time: 0.0,
+                }
+            }
+            Extra::Fibres => {
+                definition.fibre_directions = &self.fibres;
+                definition.fibre_stiffnesses = Values::Uniform(2.0 * YOUNG);
+            }
+            Extra::Exponential => {
+                definition.spring_law = SpringLaw::Exponential {
+                    steepness: 5.0,
+                    limit: 0.5,
+                }
+            }
+            Extra::Cubic => {
+                definition.spring_law = SpringLaw::Cubic {
+                    quadratic: 1.0,
+                    cubic: 20.0,
+                    limit: 0.5,
+                }
+            }
+            Extra::Limited => definition.strain_limit = 0.1,
+            Extra::Home => definition.home_stiffnesses = Values::Uniform(1.0),
+        }
+        definition
     }
 }

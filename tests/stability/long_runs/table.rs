@@ -4,13 +4,15 @@ use std::fmt;
 
 use sinew::Solver;
 
-use super::run::{Outcome, run};
-use super::subject::{Law, Shape};
+use super::activity::Activity;
+use super::figures::{Figures, Outcome};
+use super::run::{Length, run};
+use super::subject::{Extra, Law, Matter, Shape};
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    pub shape: Shape,
-    pub law: Law,
+    pub matter: Matter,
+    pub activity: Activity,
     pub solver: Solver,
     /// Of nodes, 1/s.
     pub damping: f32,
@@ -19,56 +21,143 @@ pub struct Row {
 }
 
 impl Row {
-    pub fn run(&self, seconds: f64) -> Outcome {
-        run(self, seconds)
+    /// Runs it for so many simulated seconds, and processor time at the most, s; `watch` is shown how it goes.
+    pub fn run(&self, simulated: f64, processor: f64, watch: &mut dyn FnMut(&Figures)) -> Outcome {
+        run(self, &Length { simulated, processor }, watch)
     }
 }
 
 impl fmt::Display for Row {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{:?}, {:?}, {:?}, damping {}/s, 1/{:.0} s",
-            self.shape,
-            self.law,
-            self.solver,
-            self.damping,
-            1.0 / self.step
-        )
+        let activity = format!("{:?}", self.activity).to_lowercase();
+        let solver = format!("{:?}", self.solver).to_uppercase();
+        let damped = if self.damping > 0.0 { "damped" } else { "undamped" };
+        let rate = (1.0 / self.step).round();
+        write!(f, "{}, {activity}, {solver}, {damped}, 1/{rate} s", self.matter)
     }
 }
 
-const BODIES: [(Shape, Law); 5] = [
-    (Shape::Organ, Law::Young),
-    (Shape::Organ, Law::Elements(0.3)),
-    (Shape::Organ, Law::Elements(0.45)),
-    (Shape::Cloth, Law::Springs(20.0)),
-    (Shape::Cloth, Law::Young),
+const fn matter(shape: Shape, law: Law, extra: Extra) -> Matter {
+    Matter { shape, law, extra }
+}
+
+use Extra::{Bending, Cubic, Exponential, Fibres, Home, Limited, Maxwell, Nothing, Voigt, Volume};
+use Law::{Elements, Springs, Young};
+use Shape::{Balloon, Cloth, Flap, Gallbladder, Lattice, Liver, Organ, SmallOrgan, Stomach};
+
+/// Of each shape what it is made of most often: everything is done to it, in steps of all lengths.
+const MAIN: [Matter; 15] = [
+    matter(Organ, Young, Nothing),
+    matter(Organ, Elements(0.3), Nothing),
+    matter(SmallOrgan, Young, Nothing),
+    matter(SmallOrgan, Elements(0.3), Nothing),
+    matter(Stomach, Young, Nothing),
+    matter(Stomach, Elements(0.3), Nothing),
+    matter(Flap, Young, Nothing),
+    matter(Flap, Elements(0.3), Nothing),
+    matter(Liver, Young, Nothing),
+    matter(Liver, Elements(0.3), Nothing),
+    matter(Gallbladder, Young, Nothing),
+    matter(Gallbladder, Elements(0.3), Nothing),
+    matter(Cloth, Young, Bending),
+    matter(Lattice, Young, Nothing),
+    matter(Balloon, Young, Nothing),
 ];
+
+/// Hangs, spins and rings at one step.
+const OTHERS: [Matter; 29] = [
+    matter(Organ, Springs(10.0), Nothing),
+    matter(Organ, Elements(0.45), Nothing),
+    matter(Organ, Young, Volume),
+    matter(Organ, Young, Maxwell),
+    matter(Organ, Young, Voigt),
+    matter(Organ, Elements(0.3), Maxwell),
+    matter(Organ, Elements(0.3), Voigt),
+    matter(Organ, Elements(0.3), Fibres),
+    matter(Organ, Young, Fibres),
+    matter(Organ, Young, Exponential),
+    matter(Organ, Young, Cubic),
+    matter(Organ, Young, Limited),
+    matter(Organ, Young, Home),
+    matter(SmallOrgan, Elements(0.45), Nothing),
+    matter(SmallOrgan, Young, Volume),
+    matter(SmallOrgan, Young, Exponential),
+    matter(Stomach, Elements(0.45), Nothing),
+    matter(Stomach, Young, Volume),
+    matter(Flap, Elements(0.45), Nothing),
+    matter(Liver, Elements(0.45), Nothing),
+    matter(Gallbladder, Elements(0.45), Nothing),
+    matter(Cloth, Springs(20.0), Nothing),
+    matter(Cloth, Young, Nothing),
+    matter(Cloth, Young, Exponential),
+    matter(Cloth, Young, Voigt),
+    matter(Lattice, Springs(20.0), Nothing),
+    matter(Lattice, Young, Cubic),
+    matter(Lattice, Young, Maxwell),
+    matter(Balloon, Young, Bending),
+];
+
+const ACTIVITIES: [Activity; 6] = [
+    Activity::Hanging,
+    Activity::Spinning,
+    Activity::Led,
+    Activity::Pushed,
+    Activity::Poked,
+    Activity::Plucked,
+];
+
+const FRAME: f32 = 1.0 / 60.0;
+const STEPS: [f32; 4] = [FRAME, 1.0 / 30.0, 1.0 / 120.0, 1e-3];
+
+/// Of what is damped, 1/s.
+const DAMPING: f32 = 0.3;
+
+/// NEWTON is slow.
+fn solvers(matter: Matter) -> &'static [Solver] {
+    match matter.shape {
+        SmallOrgan | Liver | Lattice => &[Solver::Verlet, Solver::Implicit, Solver::Newton],
+        _ => &[Solver::Verlet, Solver::Implicit],
+    }
+}
 
 /// Every row.
 pub fn full() -> Vec<Row> {
     let mut rows = Vec::new();
-    for (shape, law) in BODIES {
-        for solver in [Solver::Verlet, Solver::Implicit] {
-            for step in [1.0 / 60.0, 1.0 / 30.0, 1.0 / 120.0, 1e-3] {
-                rows.push(Row {
-                    shape,
-                    law,
-                    solver,
-                    damping: 0.0,
-                    step,
-                });
+    let mut add = |matter: Matter, activity, damping, step| {
+        for &solver in solvers(matter) {
+            rows.push(Row {
+                matter,
+                activity,
+                solver,
+                damping,
+                step,
+            });
+        }
+    };
+    for matter in MAIN {
+        for activity in ACTIVITIES {
+            for step in STEPS {
+                let is_long = matches!(activity, Activity::Hanging | Activity::Spinning | Activity::Plucked);
+                if is_long || step == FRAME {
+                    add(matter, activity, 0.0, step);
+                }
             }
+        }
+        add(matter, Activity::Hanging, DAMPING, FRAME);
+        add(matter, Activity::Led, DAMPING, FRAME);
+    }
+    for matter in OTHERS {
+        for activity in [Activity::Hanging, Activity::Spinning, Activity::Plucked] {
+            add(matter, activity, 0.0, FRAME);
         }
     }
     rows
 }
 
+#[allow(dead_code, reason = "the bench takes all")]
 /// Rows that `cargo test` takes, and for how many seconds.
 pub fn quick() -> Vec<(Row, f64)> {
     let rows = full().into_iter();
-    rows.filter(|row| row.step == 1.0 / 60.0)
-        .map(|row| (row, 5.0))
-        .collect()
+    let is_quick = |row: &Row| row.matter.shape == SmallOrgan && row.step == FRAME;
+    rows.filter(is_quick).map(|row| (row, 5.0)).collect()
 }

@@ -1,0 +1,164 @@
+//! The frequency of a body's first mode.
+//!
+//! A body hangs at rest, is drawn aside by forces in proportion to the masses, a thousandth of its length, and let go of. The shape that
+//! it has then is nearly that of its first mode, so that the sum over its nodes of mass times displacement times this shape is nearly a
+//! pure oscillation; its zeros are counted over some periods.
+//!
+//! The true frequency comes from NEWTON, whose equations are solved in `f64`, in steps so short that its formula's own error is small, and
+//! that error is taken out. For a mode of frequency omega the second backward difference formula has
+//! `(3/2 - i omega h) z² - 2 z + 1/2 = 0`, and turns by `arg z` in a step. So a solver that solves its equations well has the frequency
+//! `arg z / h`; VERLET's, `2/h asin(h omega / 2)`, cannot be told from the true one here.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::sync::Mutex;
+
+use glam::DVec3;
+use sinew::{Error, Solver};
+
+use super::activity::Activity;
+use super::figures::Figures;
+use super::scene::Scene;
+use super::subject::Subject;
+use super::table::Row;
+
+/// Of its length, how far a body is drawn aside.
+const AMPLITUDE: f64 = 1e-3;
+
+/// The periods that are counted.
+const PERIODS: usize = 3;
+
+/// The reference's steps in a period.
+const STEPS: f64 = 100.0;
+
+/// Longer than any body takes, s.
+const LONGEST: f64 = 30.0;
+
+/// A body that has been let go of.
+struct Plucked {
+    scene: Scene,
+    /// Its shape at rest, and mass times how far each node was drawn from it.
+    rest: Vec<DVec3>,
+    shape: Vec<DVec3>,
+}
+
+impl Plucked {
+    fn new(subject: &Subject, solver: Solver) -> Result<Self, Error> {
+        let mut scene = Activity::Plucked.begin(subject, solver)?;
+        let positions =
+            |scene: &Scene| -> Vec<DVec3> { scene.body().positions().iter().map(|p| p.as_dvec3()).collect() };
+        let rest = positions(&scene);
+        // The displacement is in proportion to forces that are small: how much the first, small ones do is looked at first.
+        let mut share = 1e-3;
+        for _ in 0..2 {
+            draw(&mut scene, subject, share)?;
+            let drawn = positions(&scene);
+            let farthest = drawn.iter().zip(&rest).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            share *= AMPLITUDE * f64::from(subject.length) / farthest;
+        }
+        let drawn = positions(&scene);
+        let ways = drawn.iter().zip(&rest).map(|(drawn, rest)| *drawn - *rest);
+        let shape = ways.zip(&subject.masses).map(|(way, &mass)| way * f64::from(mass));
+        Ok(Self {
+            shape: shape.collect(),
+            scene,
+            rest,
+        })
+    }
+
+    fn signal(&self) -> f64 {
+        let positions = self.scene.body().positions().iter();
+        let ways = positions.zip(&self.rest).map(|(p, rest)| p.as_dvec3() - *rest);
+        ways.zip(&self.shape).map(|(way, shape)| way.dot(*shape)).sum()
+    }
+
+    /// Its frequency in steps of this length, 1/s; the figures learn what went wrong.
+    fn frequency(&mut self, step: f32, figures: &mut Figures) -> Option<f64> {
+        let (mut before, mut time) = (self.signal(), 0.0);
+        let mut zeros = Vec::new();
+        while zeros.len() < 2 * PERIODS + 1 && time < LONGEST {
+            match self.scene.world.step(step) {
+                Ok(report) if report.bodies_restored == 0 => figures.substeps = figures.substeps.max(report.substeps),
+                other => {
+                    figures.faults.push(format!("at {time} s: {other:?}"));
+                    return None;
+                }
+            }
+            let now = self.signal();
+            if (now > 0.0) != (before > 0.0) {
+                zeros.push(time + f64::from(step) * before / (before - now));
+            }
+            (before, time) = (now, time + f64::from(step));
+        }
+        figures.time = time;
+        if zeros.len() < 2 * PERIODS + 1 {
+            figures.faults.push(format!("{} zeros in {time:.0} s", zeros.len()));
+            return None;
+        }
+        Some(PERIODS as f64 / (zeros[2 * PERIODS] - zeros[0]))
+    }
+}
+
+/// Puts a body where it rests under so large a part of its weight, sideways.
+fn draw(scene: &mut Scene, subject: &Subject, share: f64) -> Result<(), Error> {
+    let forces = subject
+        .masses
+        .iter()
+        .map(|&mass| 9.81 * mass * share as f32 * subject.across());
+    let nodes = (0..).zip(forces).filter(|(node, _)| !subject.ends[0].contains(node));
+    let (nodes, mut forces): (Vec<u32>, Vec<_>) = nodes.unzip();
+    scene.body_mut().apply_forces(&nodes, &forces).expect("forces");
+    scene.rest()?;
+    // What was applied is pending.
+    forces.iter_mut().for_each(|force| *force = -*force);
+    scene.body_mut().apply_forces(&nodes, &forces).expect("forces");
+    Ok(())
+}
+
+/// The part by which the second backward difference formula is slower in steps of `h omega`.
+fn slowness(h_omega: f64) -> f64 {
+    // z = (2 + sqrt(4 - 2 (3/2 - i h omega))) / (2 (3/2 - i h omega)), the root near 1.
+    let (re, im) = (1.0, 2.0 * h_omega);
+    let size = f64::hypot(re, im);
+    let root = [((size + re) / 2.0).sqrt(), ((size - re) / 2.0).sqrt()];
+    let angle = root[1].atan2(2.0 + root[0]) - (-h_omega).atan2(1.5);
+    angle / h_omega - 1.0
+}
+
+/// The true frequency of a body's first mode, 1/s.
+fn reference(subject: &Subject) -> Result<f64, Error> {
+    static KNOWN: Mutex<Option<HashMap<String, f64>>> = Mutex::new(None);
+    let name = subject.matter.to_string();
+    let known = KNOWN.lock().ok().and_then(|known| known.as_ref()?.get(&name).copied());
+    if let Some(known) = known {
+        return Ok(known);
+    }
+    let find = |solver, step: f64| -> Result<f64, Error> {
+        let mut figures = Figures::default();
+        let found = Plucked::new(subject, solver)?.frequency(step as f32, &mut figures);
+        found.ok_or_else(|| Error::NotConverged(format!("no reference: {}", figures.faults.join("; "))))
+    };
+    let rough = find(Solver::Verlet, 1.0 / 240.0)?;
+    let step = 1.0 / (STEPS * rough);
+    let found = find(Solver::Newton, step)? / (1.0 + slowness(TAU / STEPS));
+    if let Ok(mut known) = KNOWN.lock() {
+        known.get_or_insert_default().insert(name, found);
+    }
+    Ok(found)
+}
+
+pub fn ring(row: &Row, subject: &Subject) -> Result<Figures, Error> {
+    let mut figures = Figures::default();
+    let truth = reference(subject)?;
+    let mut plucked = Plucked::new(subject, row.solver)?;
+    let Some(found) = plucked.frequency(row.step, &mut figures) else {
+        return Ok(figures);
+    };
+    let substep = f64::from(row.step) / f64::from(figures.substeps.max(1));
+    let formula = match row.solver {
+        Solver::Verlet => truth,
+        _ => truth * (1.0 + slowness(TAU * truth * substep)),
+    };
+    figures.frequency = Some([found / formula - 1.0, found / truth - 1.0]);
+    Ok(figures)
+}

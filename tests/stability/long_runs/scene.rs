@@ -1,0 +1,46 @@
+//! A world with one body.
+
+use glam::Vec3;
+use sinew::{Body, BodyDefinition, BodyId, Error, RestStateDefinition, World, WorldDefinition};
+
+use crate::support::bodies::FREE;
+
+pub struct Scene {
+    pub world: World,
+    pub id: BodyId,
+}
+
+impl Scene {
+    pub fn new(definition: &BodyDefinition, gravity: Vec3) -> Self {
+        let mut world = World::new(WorldDefinition { gravity, ..FREE }).expect("a world");
+        let id = world.create_body(definition).expect("a body");
+        Self { world, id }
+    }
+
+    pub fn body(&self) -> &Body {
+        self.world.body(self.id).expect("the body")
+    }
+
+    pub fn body_mut(&mut self) -> &mut Body {
+        self.world.body_mut(self.id).expect("the body")
+    }
+
+    pub fn pin(&mut self, nodes: &[u32]) {
+        for &node in nodes {
+            self.body_mut().pin(node).expect("a node");
+        }
+    }
+
+    /// J
+    pub fn energy(&self) -> f64 {
+        let energy = self.body().energy(self.world.gravity());
+        energy.kinetic + energy.elastic + energy.gravitational
+    }
+
+    /// Goes to its state of rest.
+    pub fn rest(&mut self) -> Result<(), Error> {
+        self.world
+            .rest_state(self.id, &RestStateDefinition::default())
+            .map(|_| ())
+    }
+}
