@@ -1,8 +1,8 @@
 //! The table of long runs, all of it: hours.
 //!
-//! `cargo bench --bench stability -- long [parts of a row's name] [--seconds S] [--minutes M] [--list]` writes
-//! `target/report/long_runs.md` as it goes. Only rows that have all these parts in their names are run, each for S simulated seconds, 600
-//! where it is not given, and no longer than M minutes of processor time, 10. It fails where a row does.
+//! `cargo bench --bench stability -- long [parts of a row's name] [--not PART] [--seconds S] [--minutes M] [--list]` writes
+//! `target/report/long_runs.md` as it goes. Only rows that have all these parts in their names are run, and none of those after `--not`,
+//! each for S simulated seconds, 600 where it is not given, and no longer than M minutes of processor time, 10. It fails where a row does.
 //!
 //! `--list` shows the rows. `cargo bench --profile dev ...` takes the library as tests do.
 
@@ -16,6 +16,7 @@ use crate::support::report_folder;
 /// What is asked for.
 struct Asked {
     parts: Vec<String>,
+    others: Vec<String>,
     /// Simulated, s.
     seconds: f64,
     /// Of processor time at the most.
@@ -27,18 +28,22 @@ impl Asked {
     fn of(arguments: &[String]) -> Result<Self, String> {
         let mut asked = Self {
             parts: Vec::new(),
+            others: Vec::new(),
             seconds: 600.0,
             minutes: 10.0,
             list: false,
         };
         let mut arguments = arguments.iter();
         while let Some(argument) = arguments.next() {
-            let mut number = || {
-                let given = arguments.next().and_then(|given| given.parse().ok());
-                given.ok_or_else(|| format!("a number must follow {argument}"))
+            let mut word = || {
+                arguments
+                    .next()
+                    .ok_or_else(|| format!("something must follow {argument}"))
             };
+            let mut number = || word()?.parse().map_err(|_| format!("a number must follow {argument}"));
             match argument.as_str() {
                 "--list" => asked.list = true,
+                "--not" => asked.others.push(word()?.to_lowercase()),
                 "--seconds" => asked.seconds = number()?,
                 "--minutes" => asked.minutes = number()?,
                 part => asked.parts.push(part.to_lowercase()),
@@ -51,7 +56,7 @@ impl Asked {
         let mut rows = full();
         rows.retain(|row| {
             let name = row.to_string().to_lowercase();
-            self.parts.iter().all(|part| name.contains(part))
+            self.parts.iter().all(|part| name.contains(part)) && !self.others.iter().any(|part| name.contains(part))
         });
         rows
     }

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use sinew::{Error, Solver};
 
+use super::rest::rest_shape;
 use super::scene::Scene;
 use super::subject::Subject;
 
@@ -42,7 +43,8 @@ impl Activity {
             Activity::Spinning => spin(&mut scene, subject),
             _ => {
                 scene.pin(&subject.ends[0]);
-                scene.rest()?;
+                let rest = rest_shape(subject, gravity, false)?;
+                scene.body_mut().set_positions(&rest).expect("positions");
             }
         }
         Ok(scene)

@@ -106,8 +106,7 @@ impl Figures {
 
 impl Outcome {
     /// The heads of the columns of `cells`.
-    pub const HEADS: &str =
-        "verdict | put in, J | energy | momentum | angular momentum | frequency | substeps | ms a step | s |";
+    pub const HEADS: &str = "verdict | put in, J | energy | momentum | angular momentum | frequency | against the true one | substeps | ms a step | s |";
 
     pub fn has_failed(&self) -> bool {
         matches!(self, Outcome::Ran(figures) if !figures.wrong().is_empty())
@@ -116,23 +115,24 @@ impl Outcome {
     /// A row of a table in Markdown.
     pub fn cells(&self) -> String {
         let Outcome::Ran(figures) = self else {
-            return format!("SKIPPED {}", "|".repeat(9));
+            return format!("SKIPPED {}", "|".repeat(10));
         };
         let optional = |figure: Option<f64>| figure.map_or(String::new(), |figure| format!("{figure:+.1e}"));
-        let frequency = figures.frequency.map(|[own, _]| own);
+        let [own, whole] = [0, 1].map(|which| figures.frequency.map(|errors| errors[which]));
         let ran = if figures.time < figures.wanted {
             format!("{:.1} of {:.0}", figures.time, figures.wanted)
         } else {
             format!("{:.0}", figures.time)
         };
         format!(
-            "{} | {:.2e} | {} | {} | {} | {} | {} | {:.3} | {ran} |",
+            "{} | {:.2e} | {} | {} | {} | {} | {} | {} | {:.3} | {ran} |",
             self.verdict(),
             figures.put_in,
             optional(figures.energy),
             optional(figures.momentum),
             optional(figures.angular_momentum),
-            optional(frequency),
+            optional(own),
+            optional(whole),
             figures.substeps,
             1e3 * figures.cost,
         )
@@ -153,7 +153,10 @@ impl fmt::Display for Outcome {
         let Outcome::Ran(figures) = self else {
             return Ok(());
         };
-        write!(f, " ({:.2e} J put in", figures.put_in)?;
+        write!(f, " ({:.1} s", figures.time)?;
+        if figures.put_in > 0.0 {
+            write!(f, ", {:.2e} J put in", figures.put_in)?;
+        }
         let parts = [
             ("energy", figures.energy),
             ("momentum", figures.momentum),
@@ -166,7 +169,11 @@ impl fmt::Display for Outcome {
                 write!(f, ", {name} {figure:+.1e}")?;
             }
         }
-        let [substeps, cost, time] = [f64::from(figures.substeps), 1e3 * figures.cost, figures.time];
-        write!(f, ", {substeps} substeps, {cost:.3} ms a step, {time:.1} s)")
+        write!(
+            f,
+            ", {} substeps, {:.3} ms a step)",
+            figures.substeps,
+            1e3 * figures.cost
+        )
     }
 }

@@ -12,6 +12,7 @@ mod clock;
 mod figures;
 mod pluck;
 mod press;
+mod rest;
 mod run;
 mod scene;
 mod subject;

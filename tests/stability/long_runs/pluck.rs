@@ -9,15 +9,15 @@
 //! `(3/2 - i omega h) z² - 2 z + 1/2 = 0`, and turns by `arg z` in a step. So a solver that solves its equations well has the frequency
 //! `arg z / h`; VERLET's, `2/h asin(h omega / 2)`, cannot be told from the true one here.
 
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Mutex;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use sinew::{Error, Solver};
 
 use super::activity::Activity;
 use super::figures::Figures;
+use super::rest::{Known, once};
 use super::scene::Scene;
 use super::subject::Subject;
 use super::table::Row;
@@ -29,7 +29,7 @@ const AMPLITUDE: f64 = 1e-3;
 const PERIODS: usize = 3;
 
 /// The reference's steps in a period.
-const STEPS: f64 = 100.0;
+const STEPS: f64 = 60.0;
 
 /// Longer than any body takes, s.
 const LONGEST: f64 = 30.0;
@@ -38,26 +38,18 @@ const LONGEST: f64 = 30.0;
 struct Plucked {
     scene: Scene,
     /// Its shape at rest, and mass times how far each node was drawn from it.
-    rest: Vec<DVec3>,
+    rest: Vec<Vec3>,
     shape: Vec<DVec3>,
 }
 
 impl Plucked {
     fn new(subject: &Subject, solver: Solver) -> Result<Self, Error> {
+        static DRAWN: Known<Vec<Vec3>> = Mutex::new(None);
         let mut scene = Activity::Plucked.begin(subject, solver)?;
-        let positions =
-            |scene: &Scene| -> Vec<DVec3> { scene.body().positions().iter().map(|p| p.as_dvec3()).collect() };
-        let rest = positions(&scene);
-        // The displacement is in proportion to forces that are small: how much the first, small ones do is looked at first.
-        let mut share = 1e-3;
-        for _ in 0..2 {
-            draw(&mut scene, subject, share)?;
-            let drawn = positions(&scene);
-            let farthest = drawn.iter().zip(&rest).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-            share *= AMPLITUDE * f64::from(subject.length) / farthest;
-        }
-        let drawn = positions(&scene);
-        let ways = drawn.iter().zip(&rest).map(|(drawn, rest)| *drawn - *rest);
+        let rest = scene.body().positions().to_vec();
+        let drawn = once(&DRAWN, &subject.matter.to_string(), || draw(subject, &rest))?;
+        scene.body_mut().set_positions(&drawn).expect("positions");
+        let ways = drawn.iter().zip(&rest).map(|(&drawn, &rest)| way(drawn, rest));
         let shape = ways.zip(&subject.masses).map(|(way, &mass)| way * f64::from(mass));
         Ok(Self {
             shape: shape.collect(),
@@ -68,7 +60,7 @@ impl Plucked {
 
     fn signal(&self) -> f64 {
         let positions = self.scene.body().positions().iter();
-        let ways = positions.zip(&self.rest).map(|(p, rest)| p.as_dvec3() - *rest);
+        let ways = positions.zip(&self.rest).map(|(&p, &rest)| way(p, rest));
         ways.zip(&self.shape).map(|(way, shape)| way.dot(*shape)).sum()
     }
 
@@ -99,8 +91,30 @@ impl Plucked {
     }
 }
 
-/// Puts a body where it rests under so large a part of its weight, sideways.
-fn draw(scene: &mut Scene, subject: &Subject, share: f64) -> Result<(), Error> {
+fn way(to: Vec3, from: Vec3) -> DVec3 {
+    to.as_dvec3() - from.as_dvec3()
+}
+
+/// Where a body rests that is drawn aside as far as it shall be.
+fn draw(subject: &Subject, rest: &[Vec3]) -> Result<Vec<Vec3>, Error> {
+    let mut scene = Activity::Plucked.begin(subject, Solver::Verlet)?;
+    // The displacement is in proportion to forces that are small: what the first do says how large they should be.
+    let mut share = 1e-3;
+    for _ in 0..2 {
+        rest_under(&mut scene, subject, share)?;
+        let drawn = scene.body().positions();
+        let farthest = drawn
+            .iter()
+            .zip(rest)
+            .map(|(&a, &b)| way(a, b).length())
+            .fold(0.0, f64::max);
+        share *= AMPLITUDE * f64::from(subject.length) / farthest;
+    }
+    Ok(scene.body().positions().to_vec())
+}
+
+/// Puts a body where it rests under such a part of its weight, sideways.
+fn rest_under(scene: &mut Scene, subject: &Subject, share: f64) -> Result<(), Error> {
     let forces = subject
         .masses
         .iter()
@@ -127,24 +141,17 @@ fn slowness(h_omega: f64) -> f64 {
 
 /// The true frequency of a body's first mode, 1/s.
 fn reference(subject: &Subject) -> Result<f64, Error> {
-    static KNOWN: Mutex<Option<HashMap<String, f64>>> = Mutex::new(None);
-    let name = subject.matter.to_string();
-    let known = KNOWN.lock().ok().and_then(|known| known.as_ref()?.get(&name).copied());
-    if let Some(known) = known {
-        return Ok(known);
-    }
+    static KNOWN: Known<f64> = Mutex::new(None);
     let find = |solver, step: f64| -> Result<f64, Error> {
         let mut figures = Figures::default();
         let found = Plucked::new(subject, solver)?.frequency(step as f32, &mut figures);
         found.ok_or_else(|| Error::NotConverged(format!("no reference: {}", figures.faults.join("; "))))
     };
-    let rough = find(Solver::Verlet, 1.0 / 240.0)?;
-    let step = 1.0 / (STEPS * rough);
-    let found = find(Solver::Newton, step)? / (1.0 + slowness(TAU / STEPS));
-    if let Ok(mut known) = KNOWN.lock() {
-        known.get_or_insert_default().insert(name, found);
-    }
-    Ok(found)
+    once(&KNOWN, &subject.matter.to_string(), || {
+        let rough = find(Solver::Verlet, 1.0 / 240.0)?;
+        let step = 1.0 / (STEPS * rough);
+        Ok(find(Solver::Newton, step)? / (1.0 + slowness(TAU / STEPS)))
+    })
 }
 
 pub fn ring(row: &Row, subject: &Subject) -> Result<Figures, Error> {

@@ -1,0 +1,39 @@
+//! Where bodies are at rest, found once for all rows.
+
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+use glam::Vec3;
+use sinew::{Error, Solver};
+
+use super::scene::Scene;
+use super::subject::Subject;
+
+/// What was found, by names.
+pub type Known<T> = Mutex<Option<HashMap<String, T>>>;
+
+/// What `find` finds, or what it found for this name before.
+pub fn once<T: Clone>(known: &Known<T>, name: &str, find: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    let mut known = known.lock().expect("nobody has panicked");
+    let known = known.get_or_insert_default();
+    if let Some(found) = known.get(name) {
+        return Ok(found.clone());
+    }
+    let found = find()?;
+    known.insert(name.into(), found.clone());
+    Ok(found)
+}
+
+/// The positions of a body at rest, held at one end unless it is free.
+pub fn rest_shape(subject: &Subject, gravity: Vec3, is_free: bool) -> Result<Vec<Vec3>, Error> {
+    static SHAPES: Known<Vec<Vec3>> = Mutex::new(None);
+    let name = format!("{} {gravity} {is_free}", subject.matter);
+    once(&SHAPES, &name, || {
+        let mut scene = Scene::new(&subject.definition(Solver::Verlet), gravity);
+        if !is_free {
+            scene.pin(&subject.ends[0]);
+        }
+        scene.rest()?;
+        Ok(scene.body().positions().to_vec())
+    })
+}
