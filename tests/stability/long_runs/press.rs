@@ -6,6 +6,7 @@ use sinew::{Pose, Shape, ToolDefinition, ToolId};
 use super::activity::Activity;
 use super::scene::Scene;
 use super::subject::Subject;
+use crate::support::tissue::penetration;
 
 /// How long it is pressed further and further, and when it is let go of, s.
 const GROWING: f64 = 0.25;
@@ -155,17 +156,22 @@ impl Press {
 
 /// A sphere beside the middle of the body, which it just touches.
 fn create_tool(scene: &mut Scene, across: Vec3, radius: f32) -> ToolId {
-    let positions = scene.body().positions();
-    let middle = positions.iter().sum::<Vec3>() / positions.len() as f32;
-    let below = positions.iter().map(|p| p - middle);
-    let below = below.filter(|p| p.reject_from(across).length() < radius);
-    let height = below.map(|p| p.dot(across)).fold(0.0, f32::max);
+    let body = scene.body();
+    let shape = Shape::Sphere { radius };
+    let middle = body.positions().iter().sum::<Vec3>() / body.node_count() as f32;
+    let heights = body.positions().iter().map(|p| (p - middle).dot(across));
+    let mut pose = Pose {
+        position: middle + (heights.fold(0.0, f32::max) + 2.0 * radius) * across,
+        ..Pose::IDENTITY
+    };
+    // So far it may always go without touching anything.
+    for _ in 0..100 {
+        let room = -penetration(body, shape, pose) as f32;
+        pose.position -= room.max(0.0) * across;
+    }
     let tool = ToolDefinition {
-        pose: Pose {
-            position: middle + (height + radius) * across,
-            ..Pose::IDENTITY
-        },
-        ..ToolDefinition::new(Shape::Sphere { radius })
+        pose,
+        ..ToolDefinition::new(shape)
     };
     scene.world.create_tool(&tool).expect("a tool")
 }
