@@ -1,16 +1,16 @@
 //! The table of long runs, all of it: hours.
 //!
-//! `cargo bench --bench stability -- long [parts of a row's name] [--not PART] [--seconds S] [--minutes M] [--list]` writes
+//! `cargo bench --bench stability -- long [parts of a row's name] [--not PART] [--seconds S] [--minutes M] [--quick] [--list]` writes
 //! `target/report/long_runs.md` as it goes. Only rows that have all these parts in their names are run, and none of those after `--not`,
 //! each for S simulated seconds, 600 where it is not given, and no longer than M minutes of processor time, 10. It fails where a row does.
 //!
-//! `--list` shows the rows. `cargo bench --profile dev ...` takes the library as tests do.
+//! `--quick` takes the rows that `cargo test` takes, for as long as it does. `--list` shows the rows. `cargo bench --profile dev ...` takes the library as tests do.
 
 use std::fs;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use crate::cases::long_runs::{Outcome, Row, full};
+use crate::cases::long_runs::{Outcome, Row, full, quick};
 use crate::support::report_folder;
 
 /// What is asked for.
@@ -21,6 +21,7 @@ struct Asked {
     seconds: f64,
     /// Of processor time at the most.
     minutes: f64,
+    quick: bool,
     list: bool,
 }
 
@@ -31,6 +32,7 @@ impl Asked {
             others: Vec::new(),
             seconds: 600.0,
             minutes: 10.0,
+            quick: false,
             list: false,
         };
         let mut arguments = arguments.iter();
@@ -42,6 +44,7 @@ impl Asked {
             };
             let mut number = || word()?.parse().map_err(|_| format!("a number must follow {argument}"));
             match argument.as_str() {
+                "--quick" => asked.quick = true,
                 "--list" => asked.list = true,
                 "--not" => asked.others.push(word()?.to_lowercase()),
                 "--seconds" => asked.seconds = number()?,
@@ -52,9 +55,13 @@ impl Asked {
         Ok(asked)
     }
 
-    fn rows(&self) -> Vec<Row> {
-        let mut rows = full();
-        rows.retain(|row| {
+    /// The rows, and for how many simulated seconds.
+    fn rows(&self) -> Vec<(Row, f64)> {
+        let mut rows = match self.quick {
+            true => quick(),
+            false => full().into_iter().map(|row| (row, self.seconds)).collect(),
+        };
+        rows.retain(|(row, _)| {
             let name = row.to_string().to_lowercase();
             self.parts.iter().all(|part| name.contains(part)) && !self.others.iter().any(|part| name.contains(part))
         });
@@ -66,7 +73,7 @@ pub fn main(arguments: &[String]) -> ExitCode {
     let failed = Asked::of(arguments).and_then(|asked| {
         let rows = asked.rows();
         if asked.list {
-            rows.iter().for_each(|row| eprintln!("{row}"));
+            rows.iter().for_each(|(row, _)| eprintln!("{row}"));
             return Ok(0);
         }
         run(&asked, &rows)
@@ -82,15 +89,15 @@ pub fn main(arguments: &[String]) -> ExitCode {
 }
 
 /// Runs the rows; how many failed.
-fn run(asked: &Asked, rows: &[Row]) -> Result<usize, String> {
+fn run(asked: &Asked, rows: &[(Row, f64)]) -> Result<usize, String> {
     let path = report_folder().join("long_runs.md");
-    let mut report = format!("# Long runs of {} s\n\n| row | {}\n", asked.seconds, Outcome::HEADS);
+    let mut report = format!("# Long runs\n\n| row | {}\n", Outcome::HEADS);
     report += &format!("|---|{}\n", "---|".repeat(Outcome::HEADS.matches('|').count()));
     let mut failed = 0;
-    for (index, row) in rows.iter().enumerate() {
+    for (index, (row, seconds)) in rows.iter().enumerate() {
         let number = format!("{}/{} {row}", index + 1, rows.len());
         let (start, mut told) = (Instant::now(), Instant::now());
-        let outcome = row.run(asked.seconds, 60.0 * asked.minutes, &mut |figures| {
+        let outcome = row.run(*seconds, 60.0 * asked.minutes, &mut |figures| {
             if told.elapsed().as_secs() >= 10 {
                 told = Instant::now();
                 let rate = figures.time / start.elapsed().as_secs_f64();

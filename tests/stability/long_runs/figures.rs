@@ -104,6 +104,7 @@ impl Figures {
     }
 }
 
+#[allow(dead_code, reason = "the bench writes a table")]
 impl Outcome {
     /// The heads of the columns of `cells`.
     pub const HEADS: &str = "verdict | put in, J | energy | momentum | angular momentum | frequency | against the true one | substeps | ms a step | s |";

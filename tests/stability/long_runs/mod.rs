@@ -10,14 +10,16 @@ mod activity;
 #[allow(dead_code, reason = "the wall's clock is for benches")]
 mod clock;
 mod figures;
+mod full;
 mod pluck;
 mod press;
+mod quick;
 mod rest;
 mod run;
 mod scene;
 mod subject;
 mod table;
 
-pub use figures::Outcome;
-#[allow(unused_imports, reason = "each program takes one of the tables")]
-pub use table::{Row, full, quick};
+pub use quick::quick;
+#[allow(unused_imports, reason = "the bench takes all")]
+pub use {figures::Outcome, full::full, table::Row};

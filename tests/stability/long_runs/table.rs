@@ -1,4 +1,4 @@
-//! The rows of the table.
+//! A row of the table.
 
 use std::fmt;
 
@@ -37,127 +37,21 @@ impl fmt::Display for Row {
     }
 }
 
-const fn matter(shape: Shape, law: Law, extra: Extra) -> Matter {
+/// s
+pub const FRAME: f32 = 1.0 / 60.0;
+
+/// What a body is made of.
+pub const fn matter(shape: Shape, law: Law, extra: Extra) -> Matter {
     Matter { shape, law, extra }
 }
 
-use Extra::{Bending, Cubic, Exponential, Fibres, Home, Limited, Maxwell, Nothing, Voigt, Volume};
-use Law::{Elements, Springs, Young};
-use Shape::{Balloon, Cloth, Flap, Gallbladder, Lattice, Liver, Organ, SmallOrgan, Stomach};
-
-/// Of each shape what it is made of most often: everything is done to it, in steps of all lengths.
-const MAIN: [Matter; 15] = [
-    matter(Organ, Young, Nothing),
-    matter(Organ, Elements(0.3), Nothing),
-    matter(SmallOrgan, Young, Nothing),
-    matter(SmallOrgan, Elements(0.3), Nothing),
-    matter(Stomach, Young, Nothing),
-    matter(Stomach, Elements(0.3), Nothing),
-    matter(Flap, Young, Nothing),
-    matter(Flap, Elements(0.3), Nothing),
-    matter(Liver, Young, Nothing),
-    matter(Liver, Elements(0.3), Nothing),
-    matter(Gallbladder, Young, Nothing),
-    matter(Gallbladder, Elements(0.3), Nothing),
-    matter(Cloth, Young, Bending),
-    matter(Lattice, Young, Nothing),
-    matter(Balloon, Young, Nothing),
-];
-
-/// Hangs, spins and rings at one step.
-const OTHERS: [Matter; 29] = [
-    matter(Organ, Springs(10.0), Nothing),
-    matter(Organ, Elements(0.45), Nothing),
-    matter(Organ, Young, Volume),
-    matter(Organ, Young, Maxwell),
-    matter(Organ, Young, Voigt),
-    matter(Organ, Elements(0.3), Maxwell),
-    matter(Organ, Elements(0.3), Voigt),
-    matter(Organ, Elements(0.3), Fibres),
-    matter(Organ, Young, Fibres),
-    matter(Organ, Young, Exponential),
-    matter(Organ, Young, Cubic),
-    matter(Organ, Young, Limited),
-    matter(Organ, Young, Home),
-    matter(SmallOrgan, Elements(0.45), Nothing),
-    matter(SmallOrgan, Young, Volume),
-    matter(SmallOrgan, Young, Exponential),
-    matter(Stomach, Elements(0.45), Nothing),
-    matter(Stomach, Young, Volume),
-    matter(Flap, Elements(0.45), Nothing),
-    matter(Liver, Elements(0.45), Nothing),
-    matter(Gallbladder, Elements(0.45), Nothing),
-    matter(Cloth, Springs(20.0), Nothing),
-    matter(Cloth, Young, Nothing),
-    matter(Cloth, Young, Exponential),
-    matter(Cloth, Young, Voigt),
-    matter(Lattice, Springs(20.0), Nothing),
-    matter(Lattice, Young, Cubic),
-    matter(Lattice, Young, Maxwell),
-    matter(Balloon, Young, Bending),
-];
-
-const ACTIVITIES: [Activity; 6] = [
-    Activity::Hanging,
-    Activity::Spinning,
-    Activity::Led,
-    Activity::Pushed,
-    Activity::Poked,
-    Activity::Plucked,
-];
-
-const FRAME: f32 = 1.0 / 60.0;
-const STEPS: [f32; 4] = [FRAME, 1.0 / 30.0, 1.0 / 120.0, 1e-3];
-
-/// Of what is damped, 1/s.
-const DAMPING: f32 = 0.3;
-
-/// NEWTON is slow.
-fn solvers(matter: Matter) -> &'static [Solver] {
-    match matter.shape {
-        SmallOrgan | Liver | Lattice => &[Solver::Verlet, Solver::Implicit, Solver::Newton],
-        _ => &[Solver::Verlet, Solver::Implicit],
+/// Undamped.
+pub fn row(matter: Matter, activity: Activity, solver: Solver, step: f32) -> Row {
+    Row {
+        matter,
+        activity,
+        solver,
+        damping: 0.0,
+        step,
     }
-}
-
-/// Every row.
-pub fn full() -> Vec<Row> {
-    let mut rows = Vec::new();
-    let mut add = |matter: Matter, activity, damping, step| {
-        for &solver in solvers(matter) {
-            rows.push(Row {
-                matter,
-                activity,
-                solver,
-                damping,
-                step,
-            });
-        }
-    };
-    for matter in MAIN {
-        for activity in ACTIVITIES {
-            for step in STEPS {
-                let is_long = matches!(activity, Activity::Hanging | Activity::Spinning | Activity::Plucked);
-                if is_long || step == FRAME {
-                    add(matter, activity, 0.0, step);
-                }
-            }
-        }
-        add(matter, Activity::Hanging, DAMPING, FRAME);
-        add(matter, Activity::Led, DAMPING, FRAME);
-    }
-    for matter in OTHERS {
-        for activity in [Activity::Hanging, Activity::Spinning, Activity::Plucked] {
-            add(matter, activity, 0.0, FRAME);
-        }
-    }
-    rows
-}
-
-#[allow(dead_code, reason = "the bench takes all")]
-/// Rows that `cargo test` takes, and for how many seconds.
-pub fn quick() -> Vec<(Row, f64)> {
-    let rows = full().into_iter();
-    let is_quick = |row: &Row| row.matter.shape == SmallOrgan && row.step == FRAME;
-    rows.filter(is_quick).map(|row| (row, 5.0)).collect()
 }

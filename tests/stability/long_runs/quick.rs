@@ -1,0 +1,54 @@
+//! The rows that `cargo test` takes.
+
+use sinew::Solver;
+
+use super::activity::Activity;
+use super::subject::{Extra, Law, Shape};
+use super::table::{FRAME, Row, matter, row};
+use Activity::{Hanging, Led, Plucked, Poked, Pushed, Spinning};
+use Extra::{Bending, Maxwell, Nothing};
+use Law::{Elements, Young};
+use Shape::{Balloon, Cloth, Lattice, Liver, Organ, SmallOrgan};
+
+/// A few seconds of some rows: simulated, s.
+pub fn quick() -> Vec<(Row, f64)> {
+    let verlet = |matter, activity, step, seconds| (row(matter, activity, Solver::Verlet, step), seconds);
+    let implicit = |matter, activity, step, seconds| (row(matter, activity, Solver::Implicit, step), seconds);
+    let newton = |matter, activity, step, seconds| (row(matter, activity, Solver::Newton, step), seconds);
+    let springs = matter(Organ, Young, Nothing);
+    let elements = matter(Organ, Elements(0.3), Nothing);
+    let small = matter(SmallOrgan, Elements(0.3), Nothing);
+    let cloth = matter(Cloth, Young, Nothing);
+    let stiff_cloth = matter(Cloth, Young, Bending);
+    let lattice = matter(Lattice, Young, Nothing);
+    let balloon = matter(Balloon, Young, Nothing);
+    let liver = |law| matter(Liver, law, Nothing);
+    vec![
+        verlet(springs, Hanging, FRAME, 5.0),
+        verlet(springs, Hanging, 1e-3, 3.0),
+        verlet(cloth, Hanging, FRAME, 8.0),
+        verlet(small, Led, 1.0 / 120.0, 10.0),
+        verlet(small, Hanging, 1.0 / 120.0, 20.0),
+        verlet(liver(Young), Hanging, FRAME, 5.0),
+        verlet(liver(Elements(0.3)), Hanging, FRAME, 5.0),
+        verlet(elements, Hanging, FRAME, 3.0),
+        verlet(matter(Organ, Young, Maxwell), Hanging, FRAME, 3.0),
+        verlet(stiff_cloth, Pushed, FRAME, 5.0),
+        verlet(lattice, Poked, FRAME, 5.0),
+        verlet(balloon, Led, FRAME, 5.0),
+        verlet(springs, Spinning, FRAME, 5.0),
+        verlet(elements, Plucked, FRAME, 5.0),
+        implicit(springs, Hanging, FRAME, 3.0),
+        implicit(elements, Hanging, FRAME, 3.0),
+        implicit(stiff_cloth, Hanging, FRAME, 3.0),
+        implicit(lattice, Poked, FRAME, 2.0),
+        implicit(small, Pushed, FRAME, 3.0),
+        implicit(small, Spinning, FRAME, 5.0),
+        implicit(balloon, Spinning, 1.0 / 120.0, 5.0),
+        implicit(liver(Elements(0.3)), Plucked, 1e-3, 0.0),
+        implicit(elements, Plucked, 1e-3, 0.0),
+        implicit(springs, Plucked, FRAME, 0.0),
+        newton(small, Hanging, FRAME, 2.0),
+        newton(small, Spinning, FRAME, 3.0),
+    ]
+}
