@@ -23,7 +23,7 @@ use super::subject::Subject;
 use super::table::Row;
 
 /// Of its length, how far a body is drawn aside.
-const AMPLITUDE: f64 = 1e-3;
+const AMPLITUDE: f64 = 2e-4;
 
 /// The periods that are counted.
 const PERIODS: usize = 3;
