@@ -104,7 +104,8 @@ fn what_is_pending_is_told() {
 
 /// A few seconds of long runs.
 mod long_runs {
-    use super::cases::long_runs::quick;
+    use super::cases::long_runs::{Activity, found, quick};
+    use glam::Vec3;
     use sinew::Solver;
 
     fn check(solver: Solver) {
@@ -131,5 +132,22 @@ mod long_runs {
     #[test]
     fn newton() {
         check(Solver::Newton);
+    }
+
+    #[test]
+    fn what_is_planted_is_found() {
+        let plants: [(Activity, fn(Vec3) -> Vec3, &str); 3] = [
+            (Activity::Hanging, |v| 1.01 * v, "energy"),
+            (Activity::Spinning, |v| v + Vec3::splat(1e-5), "momentum"),
+            (Activity::Spinning, |v| 0.997 * v, "angular momentum"),
+        ];
+        for (activity, change, expected) in plants {
+            let [before, after] = found(activity, change);
+            assert!(before.is_empty(), "{before:?}");
+            assert!(
+                after.iter().any(|what| what.starts_with(expected)),
+                "{expected}: {after:?}"
+            );
+        }
     }
 }

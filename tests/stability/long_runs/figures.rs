@@ -31,8 +31,9 @@ pub struct Figures {
     /// Of the first mode, against that of the solver's formula, and against the true one.
     pub frequency: Option<[f64; 2]>,
     pub substeps: u32,
-    /// Processor time of a step, s.
-    pub cost: f64,
+    /// Processor time of all steps, s.
+    pub processor: f64,
+    pub steps: usize,
     /// How long it ran, and how long it should have, s.
     pub time: f64,
     pub wanted: f64,
@@ -82,6 +83,11 @@ impl Figures {
     /// Whether it need not be looked at any longer.
     pub fn is_hopeless(&self) -> bool {
         !self.faults.is_empty() || self.energy.is_some_and(|energy| !(energy <= 1.0))
+    }
+
+    /// Processor time of a step, ms.
+    fn cost(&self) -> f64 {
+        1e3 * self.processor / self.steps as f64
     }
 
     /// What is not as it should be.
@@ -135,7 +141,7 @@ impl Outcome {
             optional(own),
             optional(whole),
             figures.substeps,
-            1e3 * figures.cost,
+            figures.cost(),
         )
     }
 
@@ -170,11 +176,6 @@ impl fmt::Display for Outcome {
                 write!(f, ", {name} {figure:+.1e}")?;
             }
         }
-        write!(
-            f,
-            ", {} substeps, {:.3} ms a step)",
-            figures.substeps,
-            1e3 * figures.cost
-        )
+        write!(f, ", {} substeps, {:.3} ms a step)", figures.substeps, figures.cost())
     }
 }

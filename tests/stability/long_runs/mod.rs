@@ -11,6 +11,7 @@ mod activity;
 mod clock;
 mod figures;
 mod full;
+mod planted;
 mod pluck;
 mod press;
 mod quick;
@@ -21,5 +22,5 @@ mod subject;
 mod table;
 
 pub use quick::quick;
-#[allow(unused_imports, reason = "the bench takes all")]
-pub use {figures::Outcome, full::full, table::Row};
+#[allow(unused_imports, reason = "the bench takes all rows, the test plants faults")]
+pub use {activity::Activity, figures::Outcome, full::full, planted::found, table::Row};

@@ -64,27 +64,21 @@ impl Plucked {
         ways.zip(&self.shape).map(|(way, shape)| way.dot(*shape)).sum()
     }
 
-    /// Its frequency in steps of this length, 1/s; the figures learn what went wrong.
+    /// Its frequency in steps of this length, 1/s; `None` where something went wrong, which the figures say.
     fn frequency(&mut self, step: f32, figures: &mut Figures) -> Option<f64> {
-        let (mut before, mut time) = (self.signal(), 0.0);
+        let mut before = self.signal();
         let mut zeros = Vec::new();
-        while zeros.len() < 2 * PERIODS + 1 && time < LONGEST {
-            match self.scene.world.step(step) {
-                Ok(report) if report.bodies_restored == 0 => figures.substeps = figures.substeps.max(report.substeps),
-                other => {
-                    figures.faults.push(format!("at {time} s: {other:?}"));
-                    return None;
-                }
-            }
+        while zeros.len() < 2 * PERIODS + 1 && figures.time < LONGEST {
+            let time = figures.time;
+            self.scene.step(step, figures)?;
             let now = self.signal();
             if (now > 0.0) != (before > 0.0) {
                 zeros.push(time + f64::from(step) * before / (before - now));
             }
-            (before, time) = (now, time + f64::from(step));
+            before = now;
         }
-        figures.time = time;
         if zeros.len() < 2 * PERIODS + 1 {
-            figures.faults.push(format!("{} zeros in {time:.0} s", zeros.len()));
+            figures.faults.push(format!("{} zeros in {LONGEST} s", zeros.len()));
             return None;
         }
         Some(PERIODS as f64 / (zeros[2 * PERIODS] - zeros[0]))

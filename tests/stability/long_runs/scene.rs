@@ -3,6 +3,8 @@
 use glam::Vec3;
 use sinew::{Body, BodyDefinition, BodyId, Error, RestStateDefinition, World, WorldDefinition};
 
+use super::clock;
+use super::figures::Figures;
 use crate::support::bodies::FREE;
 
 pub struct Scene {
@@ -29,6 +31,23 @@ impl Scene {
         for &node in nodes {
             self.body_mut().pin(node).expect("a node");
         }
+    }
+
+    /// Takes a step: in how many substeps, `None` where it went wrong, which the figures say.
+    pub fn step(&mut self, step: f32, figures: &mut Figures) -> Option<u32> {
+        let mut result = None;
+        figures.processor += clock::time(|| result = Some(self.world.step(step))).processor;
+        figures.steps += 1;
+        figures.time = figures.steps as f64 * f64::from(step);
+        match result? {
+            Ok(report) if report.bodies_restored == 0 => {
+                figures.substeps = figures.substeps.max(report.substeps);
+                return Some(report.substeps.max(1));
+            }
+            Ok(_) => figures.faults.push(format!("restored in step {}", figures.steps)),
+            Err(error) => figures.faults.push(format!("step {}: {error}", figures.steps)),
+        }
+        None
     }
 
     /// J

@@ -208,7 +208,7 @@ impl Subject {
             ..BodyDefinition::default()
         };
         let definition = match self.matter.shape {
-            // A tenth longer than at rest.
+            // Its filling hardly gives.
             Shape::Balloon => BodyDefinition {
                 pressure: 20.0,
                 enclosed_stiffness: 1e4,
