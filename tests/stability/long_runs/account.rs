@@ -1,27 +1,27 @@
-//! What a body may have: the energy that was put into it, and the momentum it began with.
+//! The balance of energy and momentum of a body.
 //!
-//! **Energy.** A body that begins with the energy `E0` can turn into motion what it has above its state of rest, `E0 - E_rest`, and the work
-//! `W` that is done on it: the sum over steps of the mean force of led pins times their displacement, of applied forces times that of
-//! their nodes, and of the force of a tool times its own. `E0 - E_rest + W` is the energy put in. Nothing but work raises `E`, so that
-//! `E <= E0 + W` whatever dampers take; how far E is above that, over the energy put in, may be a thousandth. IMPLICIT and NEWTON have
-//! positions and velocities of the same time, and their E is compared as it is.
+//! **Energy.** `E` is the kinetic, elastic and gravitational energy of the body together. It begins with `E0`, and its static equilibrium has
+//! `E_rest`. The work `W` is a sum over the steps: the mean force of a moved pin times the pin's displacement, an applied force times the
+//! displacement of its node, and the force of a tool times the tool's displacement. The energy put in is `E0 - E_rest + W`: this much can
+//! become motion. Only work raises `E`, and damping lowers it, so `E <= E0 + W`. The excess `E - E0 - W` may be a thousandth of the energy
+//! put in. IMPLICIT and NEWTON report positions and velocities of the same time, so `E` is compared directly.
 //!
-//! VERLET keeps another energy. A kick of half a substep h, a drift and half a kick again take v to `v' = v + h/2 (a + a')` and x to
-//! `x' = x + h (v + h/2 a)`. So the kinetic energy changes by
+//! VERLET conserves another energy. A substep `h` is half a kick, a drift and half a kick: `v' = v + h/2 (a + a')` and
+//! `x' = x + h (v + h/2 a)`. The kinetic energy of a node then changes by
 //!
 //! `m/2 (v' - v).(v' + v) = (F + F')/2 . (x' - x) + h²/8 (F'² - F²)/m`.
 //!
-//! The first part is the trapezoidal rule for the work of the forces, which is exact where they are linear. So leapfrog keeps
-//! `E - h²/8 Q` of a linear body, Q being the sum of `F²/m` over free nodes: its shadow energy. E itself oscillates above that by as much as
-//! the part `(h omega / 2)²` of the elastic energy, since `F²/m <= omega² 2 U`. This is no fault. No guess of omega is made to allow for
-//! it: Q is measured by a very short step of a copy of the body, and `E - h²/8 Q <= E0 + W` is what is asked for.
+//! The first term is the trapezoidal rule for the work of the forces. It is exact for linear forces, so leapfrog conserves the shadow energy
+//! `E - h²/8 Q` of a linear body exactly, with `Q` the sum of `F²/m` over the free nodes. `Q` is at most `2 omega² U`, with `U` the elastic
+//! energy above equilibrium and `omega` the highest frequency. So `E` itself oscillates by up to `(h omega / 2)² U`, and this is no fault:
+//! it gives the bound `E0 / (1 - (h omega / 2)²)` for `E`. That bound is loose, since most of the energy is in slow modes, and `omega` is not
+//! known exactly. The check therefore measures `Q` by a very short step of a copy of the body, and demands `E - h²/8 Q <= E0 + W`.
 //!
-//! It is asked for from when nothing presses the body any more: the copy has neither the pins nor the forces nor the tool. What was gained
-//! before is there still.
+//! The check begins when the body is released: the copy has no led pins, applied forces or tool. Energy gained before that is still there.
 //!
-//! **Momentum.** Nothing acts on a free body from outside: its momentum stays within 1e-5 of the sum of the nodes' own, and its angular
-//! momentum about the centre of mass within 2e-3. What mass scaling adds is inertia that the masses do not show: where it comes or goes,
-//! their momentum may change by twice that of the mass added, at the speed of the fastest node.
+//! **Momentum.** No external force acts on a free body. Its momentum may change by 1e-5 of the sum of the magnitudes of the nodal momenta, its
+//! angular momentum about the centre of mass by 2e-3. Mass scaling adds inertia that the nodal masses do not contain. Their momentum may
+//! change by twice the momentum that the added mass has at the speed of the fastest node.
 
 use glam::{DVec3, Vec3};
 use sinew::{Body, Error, Solver};
@@ -38,7 +38,7 @@ pub struct Account {
     is_verlet: bool,
     /// E0 + W, J.
     allowed: f64,
-    /// Where nothing acts from outside.
+    /// The initial momenta of a free body.
     momenta: Option<Momenta>,
 }
 
@@ -63,13 +63,13 @@ impl Account {
         Ok((account, figures))
     }
 
-    /// Takes in the work done in a step, J.
+    /// Adds the work of a step, J.
     pub fn add_work(&mut self, work: f64, figures: &mut Figures) {
         self.allowed += work;
         figures.put_in += work;
     }
 
-    /// Looks at the body at the end of a step that was taken in substeps of this length, s.
+    /// Checks the body after a step of substeps of this length, s.
     pub fn check(&mut self, scene: &Scene, masses: &[f32], substep: f64, figures: &mut Figures) {
         let mut excess = scene.energy() - self.allowed;
         if self.is_verlet && excess > 0.0 {
@@ -84,7 +84,7 @@ impl Account {
         }
     }
 
-    /// h²/8 Q, J.
+    /// Measures h²/8 Q, J.
     fn oscillation(&mut self, body: &Body, masses: &[f32], substep: f64) -> f64 {
         let short = (substep / 16.0) as f32;
         let before = body.velocities();
@@ -92,7 +92,7 @@ impl Account {
         copy.set_positions(body.positions()).expect("positions");
         copy.set_velocities(before).expect("velocities");
         if self.copy.world.step(short).is_err() {
-            // What has blown up has no substep that is short enough.
+            // The body has blown up: no substep is short enough.
             return 0.0;
         }
         let after = self.copy.body().velocities();
@@ -103,10 +103,10 @@ impl Account {
     }
 }
 
-/// Of a body about its centre of mass.
+/// Momentum, and angular momentum about the centre of mass.
 struct Momenta {
     sum: DVec3,
-    /// The sum of the sizes of the nodes' momenta.
+    /// The sum of the magnitudes of the nodal momenta.
     size: f64,
     angular: DVec3,
     /// The speed of the fastest node, m/s.

@@ -1,4 +1,4 @@
-//! What a body does in a long run, and how it begins.
+//! The motions of the long runs, and their initial states.
 
 use glam::Vec3;
 use sinew::{Error, Solver};
@@ -10,27 +10,27 @@ use super::subject::Subject;
 /// m/s²
 const GRAVITY: f32 = 9.81;
 
-/// Of the ends of what spins, m/s: soft tissue is some per cent longer then.
+/// The speed of the ends of a spinning body, m/s: soft tissue stretches by a few per cent.
 const SPEED: f32 = 0.5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activity {
-    /// It is let go of in its rest shape, held at one end: it swings down.
+    /// Pinned at one end and released in its rest shape: it swings down.
     Hanging,
-    /// It spins, free and without gravity.
+    /// Free and without gravity, it spins.
     Spinning,
-    /// It hangs straight and still; its free end is led aside by pins, and let go of.
+    /// In equilibrium at first; pins move its free end aside and release it.
     Led,
-    /// The same with forces.
+    /// In equilibrium at first; forces push its free end aside.
     Pushed,
-    /// The same with a sphere that presses it in the middle, and is withdrawn.
+    /// In equilibrium at first; a sphere presses its middle and retreats.
     Poked,
-    /// The same with a displacement so small that it rings in its first mode: its frequency.
+    /// Released near equilibrium, it oscillates in its first mode.
     Plucked,
 }
 
 impl Activity {
-    /// A body where it begins.
+    /// Creates the body in its initial state.
     pub fn begin(self, subject: &Subject, solver: Solver) -> Result<Scene, Error> {
         let gravity = match self {
             Activity::Hanging => GRAVITY * Vec3::NEG_Y,
@@ -51,7 +51,7 @@ impl Activity {
     }
 }
 
-/// About the centre of mass.
+/// Sets velocities of a rotation about the centre of mass.
 fn spin(scene: &mut Scene, subject: &Subject) {
     let positions = scene.body().positions();
     let weighed = positions.iter().zip(&subject.masses);

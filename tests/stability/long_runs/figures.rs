@@ -1,15 +1,17 @@
-//! What a run showed, and whether it may.
+//! The measured figures of a run, and their bounds.
 
 use std::fmt;
 
-/// Of the energy put in, how much more there may be.
+/// Excess energy over the energy put in.
 const ENERGY: f64 = 1e-3;
 
-/// What may be lost of the momentum, as a part of the sum of the nodes' own, and of the angular momentum.
+/// Change of momentum over the sum of the magnitudes of the nodal momenta.
 const MOMENTUM: f64 = 1e-5;
+
+/// Relative change of angular momentum.
 const ANGULAR_MOMENTUM: f64 = 2e-3;
 
-/// How far the frequency of the first mode may be from the one that the solver's formula has.
+/// Relative error of the frequency of the first mode, against the frequency of the formula of the solver.
 const FREQUENCY: f64 = 1e-2;
 
 #[derive(Clone, Debug)]
@@ -23,25 +25,27 @@ pub enum Outcome {
 pub struct Figures {
     /// J
     pub put_in: f64,
-    /// The most energy above what was put in, as a part of it, and when it was too much first, s.
+    /// The largest excess energy over the energy put in.
     energy: Option<f64>,
-    too_much_at: Option<f64>,
+    /// When the excess first passed its bound, s.
+    exceeded_at: Option<f64>,
     momentum: Option<f64>,
     angular_momentum: Option<f64>,
-    /// Of the first mode, against that of the solver's formula, and against the true one.
+    /// Relative error of the frequency of the first mode, against the formula of the solver and against the true frequency.
     pub frequency: Option<[f64; 2]>,
     pub substeps: u32,
     /// Processor time of all steps, s.
     pub processor: f64,
     pub steps: usize,
-    /// How long it ran, and how long it should have, s.
+    /// Simulated, s.
     pub time: f64,
+    /// To be simulated, s.
     pub wanted: f64,
-    /// What else went wrong.
+    /// Refused steps, restored bodies and the like.
     pub faults: Vec<String>,
 }
 
-/// The larger one; what is not a number is larger than all.
+/// Keeps the larger value; NaN is larger than all.
 fn raise(most: &mut Option<f64>, figure: f64) {
     if most.is_none_or(|most| !(figure <= most)) {
         *most = Some(figure);
@@ -49,7 +53,7 @@ fn raise(most: &mut Option<f64>, figure: f64) {
 }
 
 impl Figures {
-    /// Of a body into which so much energy was put, J.
+    /// Before the first step, with the energy put in, J.
     pub fn of(put_in: f64) -> Self {
         Self {
             put_in,
@@ -57,7 +61,7 @@ impl Figures {
         }
     }
 
-    /// Of a run that could not begin.
+    /// The figures of a run that could not start.
     pub fn of_fault(fault: String) -> Self {
         Self {
             faults: vec![fault],
@@ -67,8 +71,8 @@ impl Figures {
 
     pub fn see_energy(&mut self, excess: f64) {
         raise(&mut self.energy, excess);
-        if !(excess <= ENERGY) && self.too_much_at.is_none() {
-            self.too_much_at = Some(self.time);
+        if !(excess <= ENERGY) && self.exceeded_at.is_none() {
+            self.exceeded_at = Some(self.time);
         }
     }
 
@@ -80,7 +84,7 @@ impl Figures {
         raise(&mut self.angular_momentum, lost);
     }
 
-    /// Whether it need not be looked at any longer.
+    /// Whether the run need not continue.
     pub fn is_hopeless(&self) -> bool {
         !self.faults.is_empty() || self.energy.is_some_and(|energy| !(energy <= 1.0))
     }
@@ -90,7 +94,7 @@ impl Figures {
         1e3 * self.processor / self.steps as f64
     }
 
-    /// What is not as it should be.
+    /// The checks that failed.
     pub fn wrong(&self) -> Vec<String> {
         let mut wrong = self.faults.clone();
         let bounds = [
@@ -98,7 +102,7 @@ impl Figures {
             ("angular momentum", self.angular_momentum, ANGULAR_MOMENTUM),
             ("frequency", self.frequency.map(|[own, _]| own.abs()), FREQUENCY),
         ];
-        if let Some(time) = self.too_much_at {
+        if let Some(time) = self.exceeded_at {
             wrong.push(format!("energy from {time:.1} s on"));
         }
         for (name, figure, bound) in bounds {
@@ -112,8 +116,8 @@ impl Figures {
 
 #[allow(dead_code, reason = "the bench writes a table")]
 impl Outcome {
-    /// The heads of the columns of `cells`.
-    pub const HEADS: &str = "verdict | put in, J | energy | momentum | angular momentum | frequency | against the true one | substeps | ms a step | s |";
+    /// The column heads of `cells`.
+    pub const HEADS: &str = "verdict | put in, J | energy | momentum | angular momentum | frequency | against true | substeps | ms a step | s |";
 
     pub fn has_failed(&self) -> bool {
         matches!(self, Outcome::Ran(figures) if !figures.wrong().is_empty())
@@ -169,7 +173,7 @@ impl fmt::Display for Outcome {
             ("momentum", figures.momentum),
             ("angular momentum", figures.angular_momentum),
             ("frequency", figures.frequency.map(|[own, _]| own)),
-            ("against the true one", figures.frequency.map(|[_, whole]| whole)),
+            ("against true", figures.frequency.map(|[_, whole]| whole)),
         ];
         for (name, figure) in parts {
             if let Some(figure) = figure {

@@ -11,7 +11,7 @@ use Extra::{Bending, Cubic, Exponential, Fibres, Home, Limited, Maxwell, Nothing
 use Law::{Elements, Springs, Young};
 use Shape::{Balloon, Cloth, Flap, Gallbladder, Lattice, Liver, Organ, SmallOrgan, Stomach};
 
-/// Of each shape what it is made of most often: everything is done to it, in steps of all lengths.
+/// The most common bodies, for all activities and steps.
 const MAIN: [Matter; 13] = [
     matter(Organ, Young, Nothing),
     matter(Organ, Elements(0.3), Nothing),
@@ -28,7 +28,7 @@ const MAIN: [Matter; 13] = [
     matter(Balloon, Young, Nothing),
 ];
 
-/// Hangs, spins and rings at one step.
+/// Further bodies, for three activities and one step.
 const OTHERS: [Matter; 31] = [
     matter(Organ, Springs(10.0), Nothing),
     matter(Organ, Elements(0.45), Nothing),
@@ -67,10 +67,10 @@ const ACTIVITIES: [Activity; 6] = [Hanging, Spinning, Led, Pushed, Poked, Plucke
 
 const STEPS: [f32; 4] = [FRAME, 1.0 / 30.0, 1.0 / 120.0, 1e-3];
 
-/// Of what is damped, 1/s.
+/// Node damping of damped rows, 1/s.
 const DAMPING: f32 = 0.3;
 
-/// NEWTON is slow.
+/// NEWTON is slow, and takes part with small bodies.
 fn solvers(matter: Matter) -> &'static [Solver] {
     match matter.shape {
         SmallOrgan | Liver | Lattice => &[Solver::Verlet, Solver::Implicit, Solver::Newton],

@@ -1,13 +1,13 @@
-//! Long runs from good states: ten minutes of hanging, spinning and being pressed, in which energy and momentum are kept.
+//! Long runs from good states: bodies hang, spin and are pressed for ten simulated minutes.
 //!
-//! `tests/stability.rs` takes a few seconds of some rows, `benches/stability.rs` all of them. A row is a body (`subject.rs`) and what is
-//! done to it (`activity.rs`, `press.rs`); it is judged by its energy and momentum (`account.rs`), or by the frequency of its first
-//! mode (`pluck.rs`). No step may be refused, and no body restored.
+//! `tests/stability.rs` runs some rows for a few seconds, `benches/stability.rs` runs all of them. A row names a body (`subject.rs`), an
+//! activity (`activity.rs`, `press.rs`), a solver and a step. A row fails if energy grows or momentum is lost (`account.rs`), if the
+//! frequency of the first mode is wrong (`pluck.rs`), if a step is refused, or if a body is restored.
 
 mod account;
 mod activity;
 #[path = "../../../benches/storage/clock.rs"]
-#[allow(dead_code, reason = "the wall's clock is for benches")]
+#[allow(dead_code, reason = "long runs need processor time alone")]
 mod clock;
 mod figures;
 mod full;

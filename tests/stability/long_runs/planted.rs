@@ -1,4 +1,4 @@
-//! Faults that an account has to find.
+//! Planted faults, which the checks must find.
 #![allow(dead_code, reason = "`cargo test` plants them")]
 
 use glam::Vec3;
@@ -9,7 +9,7 @@ use super::activity::Activity;
 use super::subject::{Extra, Law, Shape, Subject};
 use super::table::{FRAME, matter};
 
-/// What is wrong with a body that was left alone for a while, and then with one whose velocities were changed.
+/// The failed checks of an undisturbed body, and those after a change of its velocities.
 pub fn found(activity: Activity, change: fn(Vec3) -> Vec3) -> [Vec<String>; 2] {
     let matter = matter(Shape::SmallOrgan, Law::Young, Extra::Nothing);
     let subject = Subject::new(matter, 0.0).expect("it is made, not read");

@@ -1,4 +1,4 @@
-//! A body is pressed once and let go of, and the work done on it is added up.
+//! Presses a body once, releases it, and measures the work.
 
 use glam::Vec3;
 use sinew::{Pose, Shape, ToolDefinition, ToolId};
@@ -8,23 +8,23 @@ use super::scene::Scene;
 use super::subject::Subject;
 use crate::support::tissue::penetration;
 
-/// How long it is pressed further and further, and when it is let go of, s.
+/// The duration of the loading, and the time of the release, s.
 const GROWING: f64 = 0.25;
 const LET_GO: f64 = 0.5;
 
-/// How far pins and tools go, as a part of the body's length.
+/// The displacement of pins and tools, as a fraction of the length of the body.
 const DEPTH: f32 = 0.1;
 
-/// What pushes it, as a part of its weight.
+/// The total force, as a fraction of the weight of the body.
 const LOAD: f32 = 0.3;
 
-/// The radius of the tool, as a part of the body's length.
+/// The radius of the tool, as a fraction of the length of the body.
 const RADIUS: f32 = 0.15;
 
 #[derive(Clone, Copy)]
 enum By {
     Pins,
-    /// As large at the most, N on each node.
+    /// The final force on each node, N.
     Forces(Vec3),
     Tool(ToolId),
 }
@@ -32,10 +32,11 @@ enum By {
 pub struct Press {
     by: By,
     nodes: Vec<u32>,
-    /// How far pins or the tool are led, m.
+    /// Of pins or the tool, m.
     displacement: Vec3,
-    /// Where what is led was at first, and before the step, m.
+    /// Initial positions of the nodes or the tool, m.
     first: Vec<Vec3>,
+    /// Their positions before the step, m.
     before: Vec<Vec3>,
     /// The force on each node in the step, N.
     force: Vec3,
@@ -43,7 +44,7 @@ pub struct Press {
 }
 
 impl Press {
-    /// `None` where nothing is pressed.
+    /// `None` if the activity does not press.
     pub fn new(activity: Activity, subject: &Subject, scene: &mut Scene) -> Option<Self> {
         let across = subject.across();
         let mut displacement = DEPTH * subject.length * across;
@@ -72,21 +73,21 @@ impl Press {
             force: Vec3::ZERO,
             is_over: false,
         };
-        press.first = press.places(scene);
+        press.first = press.positions(scene);
         Some(press)
     }
 
-    /// Whether nothing acts on the body any more.
+    /// Whether the body has been released.
     pub fn is_over(&self) -> bool {
         self.is_over
     }
 
-    /// Before a step that ends at `time`.
+    /// Prepares a step that ends at `time`.
     pub fn act(&mut self, scene: &mut Scene, time: f64) {
         if self.is_over {
             return;
         }
-        self.before = self.places(scene);
+        self.before = self.positions(scene);
         let share = (time / GROWING).min(1.0) as f32;
         self.is_over = match self.by {
             By::Tool(_) => time > LET_GO + 2.0 * GROWING,
@@ -112,7 +113,7 @@ impl Press {
             }
             By::Tool(tool) if self.is_over => scene.world.destroy_tool(tool).expect("the tool"),
             By::Tool(tool) => {
-                // Back as it came, and further.
+                // It retreats beyond its initial position.
                 let back = ((time - LET_GO) / GROWING).max(0.0) as f32;
                 let to = self.first[0] + (share - back) * self.displacement;
                 scene.world.set_pose(tool, to, None).expect("the tool");
@@ -125,27 +126,31 @@ impl Press {
         if self.is_over {
             return 0.0;
         }
-        let ways = self.places(scene).into_iter().zip(&self.before);
-        let ways = ways.map(|(now, before)| now.as_dvec3() - before.as_dvec3());
+        let displacements = self.positions(scene).into_iter().zip(&self.before);
+        let displacements = displacements.map(|(now, before)| now.as_dvec3() - before.as_dvec3());
         match self.by {
             By::Pins => {
                 let force = |node: u32| scene.body().pin_force(node).expect("a pin").as_dvec3();
                 self.nodes
                     .iter()
-                    .zip(ways)
-                    .map(|(&node, way)| force(node).dot(way))
+                    .zip(displacements)
+                    .map(|(&node, displacement)| force(node).dot(displacement))
                     .sum()
             }
-            By::Forces(_) => ways.map(|way| self.force.as_dvec3().dot(way)).sum(),
+            By::Forces(_) => displacements
+                .map(|displacement| self.force.as_dvec3().dot(displacement))
+                .sum(),
             By::Tool(tool) => {
                 let (force, _) = scene.world.wrench(tool).expect("the tool");
-                ways.map(|way| -force.as_dvec3().dot(way)).sum()
+                displacements
+                    .map(|displacement| -force.as_dvec3().dot(displacement))
+                    .sum()
             }
         }
     }
 
-    /// Where the nodes, or the tool, are now, m.
-    fn places(&self, scene: &Scene) -> Vec<Vec3> {
+    /// The positions of the nodes or the tool, m.
+    fn positions(&self, scene: &Scene) -> Vec<Vec3> {
         if let By::Tool(tool) = self.by {
             return vec![scene.world.pose(tool).expect("the tool").position];
         }
@@ -154,7 +159,7 @@ impl Press {
     }
 }
 
-/// A sphere beside the middle of the body, which it just touches.
+/// Creates a sphere that touches the body near its middle.
 fn create_tool(scene: &mut Scene, across: Vec3, radius: f32) -> ToolId {
     let body = scene.body();
     let shape = Shape::Sphere { radius };
@@ -164,7 +169,7 @@ fn create_tool(scene: &mut Scene, across: Vec3, radius: f32) -> ToolId {
         position: middle + (heights.fold(0.0, f32::max) + 2.0 * radius) * across,
         ..Pose::IDENTITY
     };
-    // So far it may always go without touching anything.
+    // Conservative advancement: a step as long as the distance touches nothing.
     for _ in 0..100 {
         let room = -penetration(body, shape, pose) as f32;
         pose.position -= room.max(0.0) * across;

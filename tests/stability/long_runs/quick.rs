@@ -1,4 +1,4 @@
-//! The rows that `cargo test` takes.
+//! The rows of `cargo test`.
 
 use sinew::Solver;
 
@@ -10,7 +10,7 @@ use Extra::{Bending, Maxwell, Nothing};
 use Law::{Elements, Young};
 use Shape::{Balloon, Cloth, Gallbladder, Lattice, Liver, Organ, SmallOrgan};
 
-/// With how many seconds they are simulated for; what is plucked takes as long as it takes.
+/// Rows with their simulated time, s; a plucked body takes a fixed number of periods.
 pub fn quick() -> Vec<(Row, f64)> {
     let verlet = |matter, activity, step, seconds| (row(matter, activity, Solver::Verlet, step), seconds);
     let implicit = |matter, activity, step, seconds| (row(matter, activity, Solver::Implicit, step), seconds);

@@ -1,4 +1,4 @@
-//! Where bodies are at rest, found once for all rows.
+//! Static equilibria, each computed once for all rows.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -9,10 +9,10 @@ use sinew::{Error, Solver};
 use super::scene::Scene;
 use super::subject::Subject;
 
-/// What was found, by names.
+/// Results by name.
 pub type Known<T> = Mutex<Option<HashMap<String, T>>>;
 
-/// What `find` finds, or what it found for this name before.
+/// The result of `find`, computed once for each name.
 pub fn once<T: Clone>(known: &Known<T>, name: &str, find: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     let mut known = known.lock().expect("nobody has panicked");
     let known = known.get_or_insert_default();
@@ -24,7 +24,7 @@ pub fn once<T: Clone>(known: &Known<T>, name: &str, find: impl FnOnce() -> Resul
     Ok(found)
 }
 
-/// The positions of a body at rest, held at one end unless it is free.
+/// The positions in static equilibrium, pinned at one end unless the body is free.
 pub fn rest_shape(subject: &Subject, gravity: Vec3, is_free: bool) -> Result<Vec<Vec3>, Error> {
     static SHAPES: Known<Vec<Vec3>> = Mutex::new(None);
     let name = format!("{} {gravity} {is_free}", subject.matter);

@@ -1,4 +1,4 @@
-//! A row is run, and looked at some sixty times a second.
+//! Runs a row, and checks it about sixty times a simulated second.
 
 use super::account::Account;
 use super::activity::Activity;
@@ -8,30 +8,30 @@ use super::press::Press;
 use super::subject::Subject;
 use super::table::Row;
 
-/// How long a row runs.
+/// The duration of a run.
 pub struct Length {
     /// Simulated, s.
     pub simulated: f64,
-    /// Processor time at the most, s.
+    /// Maximum processor time, s.
     pub processor: f64,
 }
 
-/// Looked at so often, 1/s.
-const LOOKS: f64 = 60.0;
+/// Checks in a simulated second.
+const CHECKS: f64 = 60.0;
 
-/// Runs a row; `watch` is shown how it goes.
+/// Runs a row; `watch` sees the figures after each check.
 pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outcome {
     let Some(subject) = Subject::new(row.matter, row.damping) else {
         return Outcome::Skipped;
     };
     let result = match row.activity {
         Activity::Plucked => pluck::ring(row, &subject),
-        _ => go_on(row, &subject, length, watch),
+        _ => simulate(row, &subject, length, watch),
     };
     Outcome::Ran(result.unwrap_or_else(|error| Figures::of_fault(format!("no state of rest: {error}"))))
 }
 
-fn go_on(
+fn simulate(
     row: &Row,
     subject: &Subject,
     length: &Length,
@@ -41,7 +41,7 @@ fn go_on(
     let (mut account, mut figures) = Account::new(row.activity, subject, row.solver, &scene)?;
     let mut press = Press::new(row.activity, subject, &mut scene);
     let step = f64::from(row.step);
-    let looks = (1.0 / (LOOKS * step)).round().max(1.0) as usize;
+    let interval = (1.0 / (CHECKS * step)).round().max(1.0) as usize;
     figures.wanted = length.simulated;
     while figures.time < length.simulated && figures.processor < length.processor && !figures.is_hopeless() {
         if let Some(press) = &mut press {
@@ -54,7 +54,7 @@ fn go_on(
             account.add_work(press.work(&scene), &mut figures);
         }
         let is_free = press.as_ref().is_none_or(Press::is_over);
-        if is_free && figures.steps.is_multiple_of(looks) {
+        if is_free && figures.steps.is_multiple_of(interval) {
             account.check(&scene, &subject.masses, step / f64::from(substeps), &mut figures);
             watch(&figures);
         }

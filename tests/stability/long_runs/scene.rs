@@ -33,7 +33,7 @@ impl Scene {
         }
     }
 
-    /// Takes a step: in how many substeps, `None` where it went wrong, which the figures say.
+    /// Takes a step and returns its substeps. `None` after a fault, which the figures report.
     pub fn step(&mut self, step: f32, figures: &mut Figures) -> Option<u32> {
         let mut result = None;
         figures.processor += clock::time(|| result = Some(self.world.step(step))).processor;
@@ -50,13 +50,13 @@ impl Scene {
         None
     }
 
-    /// J
+    /// Total energy, J.
     pub fn energy(&self) -> f64 {
         let energy = self.body().energy(self.world.gravity());
         energy.kinetic + energy.elastic + energy.gravitational
     }
 
-    /// Goes to its state of rest.
+    /// Moves the body to static equilibrium.
     pub fn rest(&mut self) -> Result<(), Error> {
         self.world
             .rest_state(self.id, &RestStateDefinition::default())

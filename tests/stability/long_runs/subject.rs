@@ -1,4 +1,4 @@
-//! The bodies of the long runs: a shape, and the law that its forces follow.
+//! The bodies of the long runs: a shape, and the law of its forces.
 
 use std::fmt;
 
@@ -13,13 +13,13 @@ use crate::support::solid::{ball, real};
 const YOUNG: f32 = 5400.0;
 const DENSITY: f32 = 1060.0;
 
-/// Of what has no tetrahedra or cells, m.
+/// Thickness of surfaces, m.
 const THICKNESS: f32 = 0.001;
 
-/// Of a body of springs that are given, kg.
+/// Mass of a body of springs of given stiffness, kg.
 const MASS: f32 = 0.2;
 
-/// The part of its length along which a body is held.
+/// The ends, as a fraction of the length of the body.
 const HELD: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,7 +51,7 @@ impl Shape {
         }
     }
 
-    /// `None` where its file is missing.
+    /// `None` if its file is missing.
     fn mesh(self) -> Option<Mesh> {
         let made = match self {
             Shape::Organ => Mesh::organ(0.15, 0.012),
@@ -67,7 +67,7 @@ impl Shape {
         Some(made.expect("a mesh"))
     }
 
-    /// From its free end to the end by which it is held.
+    /// The direction from the free end to the pinned end.
     fn axis(self) -> Vec3 {
         match self {
             Shape::Stomach | Shape::Balloon => Vec3::Y,
@@ -76,7 +76,7 @@ impl Shape {
     }
 }
 
-/// What the forces in a body follow.
+/// The law of the forces in a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// Springs of this stiffness, N/m.
@@ -87,7 +87,7 @@ pub enum Law {
     Elements(f32),
 }
 
-/// What a body has beside its law.
+/// A term beside the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Extra {
     #[default]
@@ -96,19 +96,19 @@ pub enum Extra {
     Volume,
     /// The surface resists bending.
     Bending,
-    /// A spring and a dashpot in series beside what is elastic.
+    /// A spring and a dashpot in series, parallel to the elastic law.
     Maxwell,
-    /// A dashpot beside what is elastic.
+    /// A dashpot parallel to the elastic law.
     Voigt,
-    /// Along the body.
+    /// Fibres along the body.
     Fibres,
     /// Springs stiffen exponentially.
     Exponential,
     /// Springs stiffen with the cube of their strain.
     Cubic,
-    /// Springs are much stiffer from a strain on.
+    /// Springs are much stiffer above a strain.
     Limited,
-    /// Nodes are drawn back to their rest positions.
+    /// Anchor springs pull nodes to their rest positions.
     Home,
 }
 
@@ -134,24 +134,24 @@ impl fmt::Display for Matter {
     }
 }
 
-/// A body that can be made.
+/// A body to be created.
 pub struct Subject {
     pub matter: Matter,
     mesh: Mesh,
-    /// The masses of the nodes, kg.
+    /// Nodal masses, kg.
     pub masses: Vec<f32>,
-    /// The nodes by which it is held, and those at the other end.
+    /// The nodes at the pinned end and at the free end.
     pub ends: [Vec<u32>; 2],
-    /// From its free end to the one by which it is held.
+    /// The direction from the free end to the pinned end.
     pub axis: Vec3,
-    /// Along its axis, m.
+    /// Extent along the axis, m.
     pub length: f32,
     fibres: Vec<Vec3>,
     dampings: Vec<f32>,
 }
 
 impl Subject {
-    /// Its nodes damped at `rate`, 1/s. `None` where a file is missing.
+    /// With node damping of `rate`, 1/s. `None` if a file is missing.
     pub fn new(matter: Matter, rate: f32) -> Option<Self> {
         let mesh = matter.shape.mesh()?;
         let axis = matter.shape.axis();
@@ -190,7 +190,7 @@ impl Subject {
         Some(subject)
     }
 
-    /// At right angles to its axis.
+    /// A direction perpendicular to the axis.
     pub fn across(&self) -> Vec3 {
         self.axis.zxy().abs()
     }
@@ -208,7 +208,7 @@ impl Subject {
             ..BodyDefinition::default()
         };
         let definition = match self.matter.shape {
-            // Its filling hardly gives.
+            // Its filling is nearly incompressible.
             Shape::Balloon => BodyDefinition {
                 pressure: 20.0,
                 enclosed_stiffness: 1e4,

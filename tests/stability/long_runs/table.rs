@@ -14,14 +14,14 @@ pub struct Row {
     pub matter: Matter,
     pub activity: Activity,
     pub solver: Solver,
-    /// Of nodes, 1/s.
+    /// Node damping, 1/s.
     pub damping: f32,
-    /// s
+    /// Step, s.
     pub step: f32,
 }
 
 impl Row {
-    /// Runs it for so many simulated seconds, and processor time at the most, s; `watch` is shown how it goes.
+    /// Runs the row for a simulated time, limited by processor time, both in s; `watch` sees the figures after each check.
     pub fn run(&self, simulated: f64, processor: f64, watch: &mut dyn FnMut(&Figures)) -> Outcome {
         run(self, &Length { simulated, processor }, watch)
     }
@@ -37,15 +37,15 @@ impl fmt::Display for Row {
     }
 }
 
-/// s
+/// The step of a program at 60 Hz, s.
 pub const FRAME: f32 = 1.0 / 60.0;
 
-/// What a body is made of.
+/// Shorthand for tables.
 pub const fn matter(shape: Shape, law: Law, extra: Extra) -> Matter {
     Matter { shape, law, extra }
 }
 
-/// Undamped.
+/// An undamped row.
 pub fn row(matter: Matter, activity: Activity, solver: Solver, step: f32) -> Row {
     Row {
         matter,
