@@ -80,7 +80,9 @@ impl Plucked {
         let mut zeros = Vec::new();
         while zeros.len() < 2 * PERIODS + 1 && figures.time < LONGEST {
             let time = figures.time;
-            self.scene.step(step, figures)?;
+            if !self.scene.step(step, figures) {
+                return None;
+            }
             let now = self.signal();
             if (now > 0.0) != (before > 0.0) {
                 zeros.push(time + f64::from(step) * before / (before - now));

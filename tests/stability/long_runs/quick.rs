@@ -27,6 +27,8 @@ pub fn quick() -> Vec<(Row, f64)> {
         verlet(springs, Hanging, FRAME, 5.0),
         verlet(springs, Hanging, 1e-3, 3.0),
         verlet(cloth, Hanging, FRAME, 8.0),
+        verlet(stiff_cloth, Hanging, FRAME, 8.0),
+        verlet(lattice, Hanging, FRAME, 10.0),
         verlet(small, Led, 1.0 / 120.0, 10.0),
         verlet(small, Hanging, 1.0 / 120.0, 20.0),
         verlet(liver(Young), Hanging, FRAME, 5.0),

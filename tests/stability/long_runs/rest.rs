@@ -37,3 +37,11 @@ pub fn rest_shape(subject: &Subject, gravity: Vec3, is_free: bool) -> Result<Vec
         Ok(scene.body().positions().to_vec())
     })
 }
+
+/// The energy in static equilibrium, J.
+pub fn energy_at_rest(subject: &Subject, gravity: Vec3, is_free: bool) -> Result<f64, Error> {
+    let mut scene = Scene::new(&subject.definition(Solver::Verlet), gravity);
+    let rest = rest_shape(subject, gravity, is_free)?;
+    scene.body_mut().set_positions(&rest).expect("positions");
+    Ok(scene.energy())
+}

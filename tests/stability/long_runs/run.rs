@@ -1,6 +1,6 @@
-//! Runs a row, and checks it about sixty times a simulated second.
+//! Runs a row and checks it.
 
-use super::account::Account;
+use super::account::{Account, CHECKS};
 use super::activity::Activity;
 use super::figures::{Figures, Outcome};
 use super::pluck;
@@ -15,9 +15,6 @@ pub struct Length {
     /// Maximum processor time, s.
     pub processor: f64,
 }
-
-/// Checks in a simulated second.
-const CHECKS: f64 = 60.0;
 
 /// Runs a row; `watch` sees the figures after each check.
 pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outcome {
@@ -38,24 +35,25 @@ fn simulate(
     watch: &mut dyn FnMut(&Figures),
 ) -> Result<Figures, sinew::Error> {
     let mut scene = row.activity.begin(subject, row.solver)?;
-    let (mut account, mut figures) = Account::new(row.activity, subject, row.solver, &scene)?;
+    let (mut account, mut figures) = Account::new(row.activity, subject, &scene)?;
     let mut press = Press::new(row.activity, subject, &mut scene);
     let step = f64::from(row.step);
-    let interval = (1.0 / (CHECKS * step)).round().max(1.0) as usize;
+    let per_second = (1.0 / step).round() as usize;
+    let interval = per_second.div_ceil(CHECKS);
     figures.wanted = length.simulated;
     while figures.time < length.simulated && figures.processor < length.processor && !figures.is_hopeless() {
         if let Some(press) = &mut press {
             press.act(&mut scene, figures.time + step);
         }
-        let Some(substeps) = scene.step(row.step, &mut figures) else {
+        if !scene.step(row.step, &mut figures) {
             break;
-        };
+        }
         if let Some(press) = &press {
             account.add_work(press.work(&scene), &mut figures);
         }
         let is_free = press.as_ref().is_none_or(Press::is_over);
         if is_free && figures.steps.is_multiple_of(interval) {
-            account.check(&scene, &subject.masses, step / f64::from(substeps), &mut figures);
+            account.check(&scene, &subject.masses, per_second / interval, &mut figures);
             watch(&figures);
         }
     }

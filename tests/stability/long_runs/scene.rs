@@ -33,21 +33,21 @@ impl Scene {
         }
     }
 
-    /// Takes a step and returns its substeps. `None` after a fault, which the figures report.
-    pub fn step(&mut self, step: f32, figures: &mut Figures) -> Option<u32> {
+    /// Takes a step. `false` after a fault, which the figures report.
+    pub fn step(&mut self, step: f32, figures: &mut Figures) -> bool {
         let mut result = None;
         figures.processor += clock::time(|| result = Some(self.world.step(step))).processor;
         figures.steps += 1;
         figures.time = figures.steps as f64 * f64::from(step);
-        match result? {
+        match result.expect("it was taken") {
             Ok(report) if report.bodies_restored == 0 => {
                 figures.substeps = figures.substeps.max(report.substeps);
-                return Some(report.substeps.max(1));
+                return true;
             }
             Ok(_) => figures.faults.push(format!("restored in step {}", figures.steps)),
             Err(error) => figures.faults.push(format!("step {}: {error}", figures.steps)),
         }
-        None
+        false
     }
 
     /// Total energy, J.
