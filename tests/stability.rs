@@ -147,4 +147,26 @@ mod long_runs {
         finds("momentum", Activity::Spinning, |v| v + Vec3::splat(1e-5));
         finds("angular momentum", Activity::Spinning, |v| 0.997 * v);
     }
+
+    /// The bound of the mean energy, by leapfrog of one mode: mass and frequency 1, substeps z.
+    #[test]
+    fn mean_energy_stays_below_what_leapfrog_conserves() {
+        for z in [0.1_f64, 0.5, 1.0, 1.6] {
+            let c = 2.0 * (z / 2.0).asin() / (z * (1.0 - z * z / 4.0).sqrt());
+            let [mut x, mut v] = [0.6_f64, 0.8];
+            let conserved = |x: f64, v: f64| c * (v * v + (1.0 - z * z / 4.0) * x * x) / 2.0;
+            let first = conserved(x, v);
+            let (mut sum, count) = (0.0, 100_000);
+            for _ in 0..count {
+                v -= z / 2.0 * x;
+                x += z * v;
+                v -= z / 2.0 * x;
+                sum += (v * v + x * x) / 2.0;
+            }
+            assert!((conserved(x, v) / first - 1.0).abs() < 1e-9, "z {z}");
+            let mean = sum / f64::from(count) / first;
+            let expected = (1.0 - z * z / 8.0) / (c * (1.0 - z * z / 4.0));
+            assert!((mean - expected).abs() < 1e-4 && mean < 1.0, "z {z}: {mean}");
+        }
+    }
 }

@@ -25,7 +25,7 @@ pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outco
         Activity::Plucked => pluck::ring(row, &subject),
         _ => simulate(row, &subject, length, watch),
     };
-    Outcome::Ran(result.unwrap_or_else(|error| Figures::of_fault(format!("no state of rest: {error}"))))
+    Outcome::Ran(result.unwrap_or_else(|error| Figures::of_fault(format!("no start: {error}"))))
 }
 
 fn simulate(
