@@ -11,6 +11,9 @@ const MOMENTUM: f64 = 1e-5;
 /// Relative change of angular momentum.
 const ANGULAR_MOMENTUM: f64 = 2e-3;
 
+/// Kinetic energy of a damped body at the end, over the energy put in.
+const KINETIC: f64 = 1e-6;
+
 /// Relative error of the frequency of the first mode, against the frequency of the formula of the solver.
 const FREQUENCY: f64 = 1e-2;
 
@@ -31,6 +34,8 @@ pub struct Figures {
     exceeded_at: Option<f64>,
     momentum: Option<f64>,
     angular_momentum: Option<f64>,
+    /// Kinetic energy left at the end over the energy put in, if damping should have taken it.
+    pub kinetic: Option<f64>,
     /// Relative error of the frequency of the first mode, against the formula of the solver and against the true frequency.
     pub frequency: Option<[f64; 2]>,
     pub substeps: u32,
@@ -100,6 +105,7 @@ impl Figures {
         let bounds = [
             ("momentum", self.momentum, MOMENTUM),
             ("angular momentum", self.angular_momentum, ANGULAR_MOMENTUM),
+            ("not at rest", self.kinetic, KINETIC),
             ("frequency", self.frequency.map(|[own, _]| own.abs()), FREQUENCY),
         ];
         if let Some(time) = self.exceeded_at {
@@ -117,7 +123,7 @@ impl Figures {
 #[allow(dead_code, reason = "the bench writes a table")]
 impl Outcome {
     /// The column heads of `cells`.
-    pub const HEADS: &str = "verdict | put in, J | energy | momentum | angular momentum | frequency | against true | substeps | ms a step | s |";
+    pub const HEADS: &str = "verdict | put in, J | energy | momentum | angular momentum | kinetic left | frequency | against true | substeps | ms a step | s |";
 
     pub fn has_failed(&self) -> bool {
         matches!(self, Outcome::Ran(figures) if !figures.wrong().is_empty())
@@ -126,7 +132,7 @@ impl Outcome {
     /// A row of a table in Markdown.
     pub fn cells(&self) -> String {
         let Outcome::Ran(figures) = self else {
-            return format!("SKIPPED {}", "|".repeat(10));
+            return format!("SKIPPED {}", "|".repeat(11));
         };
         let optional = |figure: Option<f64>| figure.map_or(String::new(), |figure| format!("{figure:+.1e}"));
         let [own, whole] = [0, 1].map(|which| figures.frequency.map(|errors| errors[which]));
@@ -136,12 +142,13 @@ impl Outcome {
             format!("{:.0}", figures.time)
         };
         format!(
-            "{} | {:.2e} | {} | {} | {} | {} | {} | {} | {:.3} | {ran} |",
+            "{} | {:.2e} | {} | {} | {} | {} | {} | {} | {} | {:.3} | {ran} |",
             self.verdict(),
             figures.put_in,
             optional(figures.energy),
             optional(figures.momentum),
             optional(figures.angular_momentum),
+            optional(figures.kinetic),
             optional(own),
             optional(whole),
             figures.substeps,
@@ -172,6 +179,7 @@ impl fmt::Display for Outcome {
             ("energy", figures.energy),
             ("momentum", figures.momentum),
             ("angular momentum", figures.angular_momentum),
+            ("kinetic left", figures.kinetic),
             ("frequency", figures.frequency.map(|[own, _]| own)),
             ("against true", figures.frequency.map(|[_, whole]| whole)),
         ];

@@ -5,7 +5,7 @@ use sinew::Solver;
 
 use super::activity::Activity;
 use super::subject::{Extra, Law, Matter, Shape};
-use super::table::{FRAME, Row, matter, row};
+use super::table::{DAMPING, FRAME, Row, matter, row};
 use Activity::{Hanging, Led, Plucked, Poked, Pushed, Spinning};
 use Extra::{Bending, Cubic, Exponential, Fibres, Home, Limited, Maxwell, Nothing, Voigt, Volume};
 use Law::{Elements, Springs, Young};
@@ -66,9 +66,6 @@ const OTHERS: [Matter; 31] = [
 const ACTIVITIES: [Activity; 6] = [Hanging, Spinning, Led, Pushed, Poked, Plucked];
 
 const STEPS: [f32; 4] = [FRAME, 1.0 / 30.0, 1.0 / 120.0, 1e-3];
-
-/// Node damping of damped rows, 1/s.
-const DAMPING: f32 = 0.3;
 
 /// NEWTON is slow, and takes part with small bodies.
 fn solvers(matter: Matter) -> &'static [Solver] {

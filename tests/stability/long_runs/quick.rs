@@ -4,7 +4,7 @@ use sinew::Solver;
 
 use super::activity::Activity;
 use super::subject::{Extra, Law, Shape};
-use super::table::{FRAME, Row, matter, row};
+use super::table::{DAMPING, FRAME, Row, matter, row};
 use Activity::{Hanging, Led, Plucked, Poked, Pushed, Spinning};
 use Extra::{Bending, Maxwell, Nothing};
 use Law::{Elements, Young};
@@ -23,6 +23,10 @@ pub fn quick() -> Vec<(Row, f64)> {
     let lattice = matter(Lattice, Young, Nothing);
     let balloon = matter(Balloon, Young, Nothing);
     let liver = |law| matter(Liver, law, Nothing);
+    let damped = |(row, seconds)| {
+        let damping = DAMPING;
+        (Row { damping, ..row }, seconds)
+    };
     vec![
         verlet(springs, Hanging, FRAME, 5.0),
         verlet(springs, Hanging, 1e-3, 3.0),
@@ -32,6 +36,7 @@ pub fn quick() -> Vec<(Row, f64)> {
         verlet(small, Led, 1.0 / 120.0, 10.0),
         verlet(small, Hanging, 1.0 / 120.0, 20.0),
         verlet(liver(Young), Hanging, FRAME, 5.0),
+        damped(verlet(liver(Young), Hanging, FRAME, 5.0)),
         verlet(liver(Elements(0.3)), Hanging, FRAME, 5.0),
         verlet(elements, Hanging, FRAME, 3.0),
         verlet(matter(Organ, Young, Maxwell), Hanging, FRAME, 3.0),
@@ -44,6 +49,7 @@ pub fn quick() -> Vec<(Row, f64)> {
         implicit(elements, Hanging, FRAME, 3.0),
         implicit(stiff_cloth, Hanging, FRAME, 3.0),
         implicit(lattice, Poked, FRAME, 2.0),
+        damped(implicit(lattice, Hanging, FRAME, 110.0)),
         implicit(small, Pushed, FRAME, 3.0),
         implicit(small, Spinning, FRAME, 5.0),
         implicit(balloon, Spinning, 1.0 / 120.0, 5.0),

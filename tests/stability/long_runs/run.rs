@@ -16,6 +16,9 @@ pub struct Length {
     pub processor: f64,
 }
 
+/// Damping times time after which a damped body is at rest: `exp(-30)` of its energy is left.
+const DECAYED: f32 = 30.0;
+
 /// Runs a row; `watch` sees the figures after each check.
 pub fn run(row: &Row, length: &Length, watch: &mut dyn FnMut(&Figures)) -> Outcome {
     let Some(subject) = Subject::new(row.matter, row.damping) else {
@@ -56,6 +59,10 @@ fn simulate(
             account.check(&scene, &subject.masses, per_second / interval, &mut figures);
             watch(&figures);
         }
+    }
+    if row.damping * figures.time as f32 > DECAYED {
+        let energy = scene.body().energy(scene.world.gravity());
+        figures.kinetic = Some(energy.kinetic / figures.put_in);
     }
     Ok(figures)
 }

@@ -40,6 +40,9 @@ impl fmt::Display for Row {
 /// The step of a program at 60 Hz, s.
 pub const FRAME: f32 = 1.0 / 60.0;
 
+/// Node damping of damped rows, 1/s.
+pub const DAMPING: f32 = 0.3;
+
 /// Shorthand for tables.
 pub const fn matter(shape: Shape, law: Law, extra: Extra) -> Matter {
     Matter { shape, law, extra }
