@@ -6,7 +6,7 @@ use super::activity::Activity;
 use super::subject::{Extra, Law, Shape};
 use super::table::{DAMPING, FRAME, Row, matter, row};
 use Activity::{Hanging, Led, Plucked, Poked, Pushed, Spinning};
-use Extra::{Bending, Maxwell, Nothing};
+use Extra::{Bending, Limited, Maxwell, Nothing, Voigt};
 use Law::{Elements, Young};
 use Shape::{Balloon, Cloth, Gallbladder, Lattice, Liver, Organ, SmallOrgan};
 
@@ -40,6 +40,8 @@ pub fn quick() -> Vec<(Row, f64)> {
         verlet(liver(Elements(0.3)), Hanging, FRAME, 5.0),
         verlet(elements, Hanging, FRAME, 3.0),
         verlet(matter(Organ, Young, Maxwell), Hanging, FRAME, 3.0),
+        verlet(matter(Organ, Young, Limited), Hanging, FRAME, 2.0),
+        verlet(matter(Organ, Elements(0.3), Voigt), Hanging, FRAME, 1.0),
         verlet(stiff_cloth, Pushed, FRAME, 5.0),
         verlet(lattice, Poked, FRAME, 5.0),
         verlet(balloon, Led, FRAME, 5.0),
