@@ -861,6 +861,7 @@ typedef struct sinew_cut_report {
   double length;
   /**
    * Of tetrahedra: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
+   * A cell in which the cut ends holds: this can be less than what the blade swept.
    */
   double area;
 } sinew_cut_report;
@@ -1509,6 +1510,7 @@ typedef struct sinew_blade_report {
   uint32_t reserved0;
   /**
    * Of solids: how large the faces are that have opened, at rest, m^2.
+   * A cell in which a stroke ends holds: this can be less than what was swept and resisted.
    */
   double area;
 } sinew_blade_report;

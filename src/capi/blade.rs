@@ -63,6 +63,7 @@ pub struct sinew_blade_report {
     /// 0.
     pub reserved0: u32,
     /// Of solids: how large the faces are that have opened, at rest, m^2.
+    /// A cell in which a stroke ends holds: this can be less than what was swept and resisted.
     pub area: f64,
 }
 

@@ -26,6 +26,7 @@ pub struct sinew_cut_report {
     /// How long the cut is, in the rest shape, m; of tetrahedra on their skin.
     pub length: f64,
     /// Of tetrahedra: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
+    /// A cell in which the cut ends holds: this can be less than what the blade swept.
     pub area: f64,
 }
 

@@ -181,6 +181,33 @@ fn the_work_of_a_stroke_is_toughness_times_area() {
 }
 
 #[test]
+fn a_stroke_that_ends_inside_costs_what_it_sweeps() {
+    // The softer tissue is against its toughness, the more it has stored where it slips off the end of the edge: that is lost.
+    for (toughness, lost) in [(TOUGHNESS, 0.03), (5.0 * TOUGHNESS, 0.1)] {
+        let block = Block {
+            toughness,
+            ..Block::HELD
+        };
+        let (mut world, body) = block.world();
+        let way = [vec3(-0.01, 0.023, 0.02), vec3(0.08, 0.027, 0.02)];
+        let edge = [vec3(0.0, 0.0, -0.04), Vec3::ZERO];
+        let blade = blade_at(&mut world, 500.0, way[0], edge);
+        let mut stroke = Stroke::default();
+        stroke.draw(&mut world, blade, way, 500, 3.0 / 500.0);
+        // Half of the block's section.
+        let swept = 0.06 * 0.02;
+        let cost = stroke.work / (f64::from(toughness) * swept);
+        let opened = stroke.area / swept;
+        let what = format!("toughness {toughness}: {cost} of what it sweeps, {opened} of which has opened");
+        assert!(cost > 0.97 && cost < 1.03 + lost, "{what}");
+        // Cells open whole: along the end of the edge, up to one is left.
+        assert!(opened > 0.5 && opened < 1.03, "{what}");
+        assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 1, "{what}");
+        assert_eq!(*stroke.forces.last().unwrap(), Vec3::ZERO, "{what}");
+    }
+}
+
+#[test]
 fn the_jumps_of_the_force_halve_with_the_step() {
     // Soft enough for some steps of 8 ms before it cuts, and at the skin at the end of a step of each length.
     let jumps: Vec<f32> = [8e-3, 4e-3, 2e-3, 1e-3]

@@ -548,3 +548,51 @@ fn a_stiff_corner_of_a_large_body_stays_stable() {
         still + SHADOW * SHADOW * given + 1e-6 * still,
     );
 }
+
+#[test]
+fn drawn_elements_take_substeps_near_what_their_law_allows() {
+    const NU: f64 = 0.3;
+    let mesh = sinew::mesh::Mesh::block([0.04; 3], [3; 3]).expect("a block");
+    let stable = |stretch: f32, across: f32| {
+        let mut world = sinew::World::new(sinew::WorldDefinition::default()).expect("a world");
+        let definition = sinew::BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            masses: sinew::Values::Uniform(1e-3),
+            mass_scaling: 0.0,
+            material: Some(sinew::Material {
+                model: sinew::Model::Tetrahedra,
+                young_modulus: 1e4,
+                poisson_ratio: NU as f32,
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let body = world.create_body(&definition).expect("a body");
+        let drawn: Vec<_> = mesh
+            .positions
+            .iter()
+            .map(|place| *place * glam::vec3(stretch, across, across))
+            .collect();
+        world
+            .body_mut(body)
+            .expect("a body")
+            .set_positions(&drawn)
+            .expect("positions");
+        f64::from(world.step(1e-7).expect("a step").stable_substep)
+    };
+    // How stiff the law is along a stretch, in parts of E: St Venant and Kirchhoff's with `kappa / 2 (J - 1)^2` for all of lambda.
+    let (lambda, mu) = (NU / ((1.0 + NU) * (1.0 - 2.0 * NU)), 0.5 / (1.0 + NU));
+    let stiff = |stretch: f64, across: f64| {
+        let stress = mu * (stretch * stretch - 1.0);
+        2.0 * mu * stretch * stretch + stress + lambda * across.powi(4)
+    };
+    for (stretch, across) in [(2.0, 0.9), (3.0, 0.8), (5.0, 0.7)] {
+        let found = stable(stretch, across) / stable(1.0, 1.0);
+        let allowed = (stiff(1.0, 1.0) / stiff(f64::from(stretch), f64::from(across))).sqrt();
+        assert!(
+            found > 0.55 * allowed && found < 1.1 * allowed,
+            "{stretch} times as long: {found} of {allowed}"
+        );
+    }
+}

@@ -512,8 +512,11 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for Forces<'_, RINGS, LOAD
                     let tension = tension.greater(L::splat(0.0)).add(load);
                     // 2 sqrt(s) is at most 1 + s.
                     let pressed = pressure.size().multiply(stretch.add(one));
-                    let swollen = constants.kappa.multiply(stretch);
-                    let stiffness = along.add(swollen).multiply_add(stretch, tension.add(pressed));
+                    // Of areas the largest stretch squared is at most the square of that, and the sum of all three.
+                    let [a, b, c] = cofactors;
+                    let areas = dot(a, a).add(dot(b, b)).add(dot(c, c));
+                    let swollen = constants.kappa.multiply(stretch.multiply(stretch).lesser(areas));
+                    let stiffness = along.multiply_add(stretch, tension.add(pressed)).add(swollen);
                     let rates = L::load(group.rates.as_ptr().add(first));
                     highest = highest.greater(stiffness.multiply(whole).multiply(rates));
                     let load = pressure.multiply(minus);
