@@ -10,6 +10,7 @@ impl Body {
             hasher.write_u64(value.to_bits());
         }
         let mut vectors = vec![self.state.positions(), self.state.velocities()];
+        vectors.extend(self.state.remainders());
         // Without damping the forces follow from the positions.
         if self.springs.damped() && self.forces_current {
             vectors.push(self.state.forces());

@@ -289,7 +289,7 @@ impl Body {
             tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
-            state: State::new(node_count)?,
+            state: State::new(node_count, definition.solver == Solver::Verlet)?,
             origin: DVec3::ZERO,
             implicit: None,
             applied: None,
@@ -666,6 +666,7 @@ impl Body {
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
         self.carry.energy.forget();
+        self.state.forget_remainders();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();
             implicit.forget_matrix();

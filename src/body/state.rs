@@ -17,21 +17,31 @@ pub(crate) struct State {
     positions: [Vectors; 3],
     velocities: [Vectors; 2],
     forces: [Vectors; 2],
+    /// What positions lack of where the nodes are, m: less than the last place of their coordinates (Kahan 1965). IMPLICIT and NEWTON
+    /// keep their own.
+    remainders: Option<[Vectors; 2]>,
     /// The place of the current positions.
     current: usize,
     /// The place of the newest positions of the step in progress.
     latest: usize,
     /// The place of the current velocities and forces.
     settled: usize,
+    /// The place of the current remainders.
+    kept: usize,
+    /// The place of those of the step in progress.
+    carried: usize,
 }
 
 saved!(State {
     positions,
     velocities,
     forces,
+    remainders,
     current,
     latest,
-    settled
+    settled,
+    kept,
+    carried
 });
 
 /// What a substep reads and writes.
@@ -47,30 +57,38 @@ pub(crate) struct Substep<'a> {
     pub velocities: &'a mut Vectors,
     /// Where the last substep leaves its spring forces.
     pub forces: &'a mut Vectors,
+    /// What positions lacked when the step began, and lack now, where that is carried on.
+    pub remainders: Option<[&'a mut Vectors; 2]>,
 }
 
 impl State {
     /// Whether it is that of so many nodes, and finite.
     pub fn is_sound(&self, count: usize) -> bool {
-        let mut all = self.positions.iter().chain(&self.velocities).chain(&self.forces);
+        let mut all = (self.positions.iter().chain(&self.velocities).chain(&self.forces))
+            .chain(self.remainders.iter().flatten());
         self.current < self.positions.len()
             && self.latest < self.positions.len()
             && self.settled < self.velocities.len()
+            && self.kept.max(self.carried) < 2
             && all.all(|vectors| vectors.len() == count)
             && [self.positions(), self.velocities()]
                 .into_iter()
                 .all(|vectors| vectors.iter().all(|vector| vector.is_finite()))
     }
 
-    pub fn new(node_count: usize) -> Result<Self> {
+    /// `carries`: whether its substeps may carry on what positions lack.
+    pub fn new(node_count: usize, carries: bool) -> Result<Self> {
         let zeros = || Vectors::zeros(node_count);
         Ok(Self {
             positions: [zeros()?, zeros()?, zeros()?],
             velocities: [zeros()?, zeros()?],
             forces: [zeros()?, zeros()?],
+            remainders: if carries { Some([zeros()?, zeros()?]) } else { None },
             current: 0,
             latest: 0,
             settled: 0,
+            kept: 0,
+            carried: 0,
         })
     }
 
@@ -91,14 +109,17 @@ impl State {
             &mut self.velocities[self.settled],
             &mut self.forces[self.settled],
         ];
-        for vectors in current {
+        let remainders = self.remainders.as_mut().map(|places| &mut places[self.kept]);
+        for vectors in current.into_iter().chain(remainders) {
             vectors.set(node, vectors.get(source));
         }
     }
 
     fn all_mut(&mut self) -> impl Iterator<Item = &mut Vectors> {
         let moving = self.positions.iter_mut().chain(&mut self.velocities);
-        moving.chain(&mut self.forces)
+        moving
+            .chain(&mut self.forces)
+            .chain(self.remainders.iter_mut().flatten())
     }
 
     pub fn positions(&self) -> &Vectors {
@@ -122,9 +143,29 @@ impl State {
         &self.forces[self.settled]
     }
 
+    /// What the current positions lack, where that may be carried on.
+    pub fn remainders(&self) -> Option<&Vectors> {
+        self.remainders.as_ref().map(|places| &places[self.kept])
+    }
+
+    /// The current positions lack nothing.
+    pub fn forget_remainders(&mut self) {
+        if let Some(places) = &mut self.remainders {
+            places[self.kept].clear();
+        }
+    }
+
     /// Starts a step over, from what is current.
     pub fn begin(&mut self) {
         self.latest = self.current;
+        self.carried = self.kept;
+    }
+
+    /// Has the substeps of the step in progress carry on what positions lack.
+    pub fn carry(&mut self) {
+        if self.remainders.is_some() {
+            self.carried = 1 - self.kept;
+        }
     }
 
     pub fn substep(&mut self) -> Substep<'_> {
@@ -140,7 +181,10 @@ impl State {
         };
         let [first_velocities, velocities] = current_and_next(&mut self.velocities, self.settled);
         let [first_forces, forces] = current_and_next(&mut self.forces, self.settled);
+        let carries = self.carried != self.kept;
+        let remainders = self.remainders.as_mut().filter(|_| carries);
         Substep {
+            remainders: remainders.map(|places| current_and_next(places, self.kept)),
             first_velocities,
             first_forces,
             positions,
@@ -151,8 +195,8 @@ impl State {
     }
 
     /// Positions now, those of the next substep, and velocities, of a step that has taken its first substep; the one after
-    /// the next may write over the positions.
-    pub fn two_substeps(&mut self) -> [&mut Vectors; 3] {
+    /// the next may write over the positions. And what positions lack, where that is carried on.
+    pub fn two_substeps(&mut self) -> ([&mut Vectors; 3], Option<&mut Vectors>) {
         assert_ne!(self.latest, self.current, "the current positions must survive");
         let is_swapped = self.latest > self.next();
         let current = self.current;
@@ -161,7 +205,12 @@ impl State {
             unreachable!("there are three places");
         };
         let [latest, next] = if is_swapped { [second, first] } else { [first, second] };
-        [latest, next, &mut self.velocities[1 - self.settled]]
+        let carries = self.carried != self.kept;
+        let remainders = self.remainders.as_mut().filter(|_| carries);
+        (
+            [latest, next, &mut self.velocities[1 - self.settled]],
+            remainders.map(|places| &mut places[self.carried]),
+        )
     }
 
     /// The positions just written become the newest of the step in progress.
@@ -198,9 +247,8 @@ impl State {
             self.positions
                 .iter_mut()
                 .for_each(|positions| positions.set(node, place));
-            self.velocities
-                .iter_mut()
-                .for_each(|velocities| velocities.set(node, Vec3::ZERO));
+            let still = self.velocities.iter_mut().chain(self.remainders.iter_mut().flatten());
+            still.for_each(|vectors| vectors.set(node, Vec3::ZERO));
         }
     }
 
@@ -208,6 +256,7 @@ impl State {
     pub fn commit(&mut self) {
         self.current = self.latest;
         self.settled = 1 - self.settled;
+        self.kept = self.carried;
     }
 
     /// The place that holds neither the first nor the newest positions of the step.

@@ -67,6 +67,8 @@ pub(super) struct TileKick<'a, 'b> {
 pub(super) struct Drift<'a> {
     pub positions: [&'a [f32]; 3],
     pub next_positions: [&'a mut [f32]; 3],
+    /// What positions lack, where that is carried on.
+    pub remainders: Option<[&'a mut [f32]; 3]>,
 }
 
 impl Loops for TileKick<'_, '_> {
@@ -89,7 +91,7 @@ impl Loops for TileKick<'_, '_> {
             }
         }
         kick.lighten(&nodes, forces);
-        let mut drift = drift.map(|drift| (drift.positions, drift.next_positions));
+        let mut drift = drift;
         for (axis, velocities) in velocities.into_iter().enumerate() {
             let axis = Axis {
                 kick,
@@ -98,9 +100,11 @@ impl Loops for TileKick<'_, '_> {
                 gravity: kick.gravity[axis],
                 fall: kick.fall[axis],
                 velocities,
-                drift: drift
-                    .as_mut()
-                    .map(|(positions, next_positions)| (positions[axis], &mut *next_positions[axis])),
+                drift: drift.as_mut().map(|drift| AxisDrift {
+                    positions: drift.positions[axis],
+                    next_positions: &mut *drift.next_positions[axis],
+                    remainders: drift.remainders.as_mut().map(|remainders| &mut *remainders[axis]),
+                }),
             };
             axis.run();
         }
@@ -115,8 +119,14 @@ struct Axis<'a> {
     gravity: f32,
     fall: f32,
     velocities: &'a mut [f32],
-    /// Positions, and where the drift leaves them.
-    drift: Option<(&'a [f32], &'a mut [f32])>,
+    drift: Option<AxisDrift<'a>>,
+}
+
+/// The drift along one axis.
+struct AxisDrift<'a> {
+    positions: &'a [f32],
+    next_positions: &'a mut [f32],
+    remainders: Option<&'a mut [f32]>,
 }
 
 impl Axis<'_> {
@@ -180,13 +190,25 @@ impl Axis<'_> {
                     velocities[place] = kicked(place, forces[place], velocities[place]);
                 }
             }
-            Some((positions, next_positions)) => {
+            Some(drift) => {
                 let substep = self.kick.substep;
-                let (positions, next_positions) = (&positions[..count], &mut next_positions[..count]);
+                let (positions, next_positions) = (&drift.positions[..count], &mut drift.next_positions[..count]);
+                let Some(remainders) = drift.remainders else {
+                    for place in 0..count {
+                        let velocity = kicked(place, forces[place], velocities[place]);
+                        velocities[place] = velocity;
+                        next_positions[place] = rounded(positions[place] + velocity * substep);
+                    }
+                    return;
+                };
+                let remainders = &mut remainders[..count];
                 for place in 0..count {
                     let velocity = kicked(place, forces[place], velocities[place]);
                     velocities[place] = velocity;
-                    next_positions[place] = rounded(positions[place] + velocity * substep);
+                    let way = velocity * substep + remainders[place];
+                    let next = rounded(positions[place] + way);
+                    next_positions[place] = next;
+                    remainders[place] = way - (next - positions[place]);
                 }
             }
         }

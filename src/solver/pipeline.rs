@@ -136,6 +136,8 @@ struct Stretch<'a> {
     /// The positions before and after the first substep, and so on in turn.
     positions: [[&'a mut [f32]; 3]; 2],
     velocities: [&'a mut [f32]; 3],
+    /// What positions lack, where that is carried on.
+    remainders: Option<[&'a mut [f32]; 3]>,
     pins: &'a mut [Pin],
     /// By substeps.
     surveys: &'a mut [Survey; DEEPEST],
@@ -161,6 +163,8 @@ impl Stretch<'_> {
             velocities: self.velocities.each_mut().map(|axis| &mut axis[places.clone()]),
             next_positions: after.each_mut().map(|axis| &mut axis[padded.clone()]),
             forces: [&mut [], &mut [], &mut []],
+            remainders: (self.remainders.as_mut())
+                .map(|axes| axes.each_mut().map(|axis| &mut axis[places.clone()])),
             pins: &mut self.pins[pins],
         };
         let positions = View::new(before.each_ref().map(|axis| &**axis), start);
@@ -197,6 +201,7 @@ impl Common<'_> {
             first_velocities: None,
             first_forces: None,
             damped_velocities: None,
+            first_remainders: None,
         }
     }
 }
@@ -254,22 +259,22 @@ fn run_stretches(
     let first_nodes: [usize; MOST_STRETCHES] = from_fn(|stretch| starts.get(stretch).map_or(0, |&tile| tile * TILE));
     let first_places: [usize; MOST_STRETCHES] =
         from_fn(|stretch| starts.get(stretch).map_or(0, |&tile| Vectors::piece_start(tile)));
-    let [latest, next, velocities] = body.state.two_substeps();
+    let ([latest, next, velocities], remainders) = body.state.two_substeps();
     let parts = (
         latest.pieces_mut(&first_places[..count]),
         next.pieces_mut(&first_places[..count]),
-        velocities
-            .axes_mut()
-            .map(|axis| Ragged::new(axis, &first_nodes[..count])),
+        by_stretches(velocities, &first_nodes[..count]),
+        remainders.map(|remainders| by_stretches(remainders, &first_nodes[..count])),
         body.pins.pieces_mut(&first_pins[..count]),
         Items::new(&mut surveys[..count]),
     );
-    team.pass(count, parts, |stretch, (latest, next, velocities, pins, surveys)| {
+    team.pass(count, parts, |stretch, (latest, next, velocities, remainders, pins, surveys)| {
         let mut forces = TileForces::ZERO;
         let mut stretch_data = Stretch {
             first: starts[stretch],
             positions: [latest, next],
             velocities,
+            remainders,
             pins,
             surveys,
         };
@@ -277,6 +282,11 @@ fn run_stretches(
             stretch_data.take(tile, substep, &common, &mut forces)
         });
     });
+}
+
+/// Cut into stretches that begin with these nodes.
+fn by_stretches<'a>(vectors: &'a mut Vectors, first_nodes: &'a [usize]) -> [Ragged<'a, f32>; 3] {
+    vectors.axes_mut().map(|axis| Ragged::new(axis, first_nodes))
 }
 
 #[cfg(test)]

@@ -111,11 +111,22 @@ impl Part {
     }
 }
 
+/// s
+const SHORT: f32 = 1.0;
+
+/// Whether substeps so long, s, carry on what positions lack.
+fn carries(substep: f32) -> bool {
+    substep < SHORT
+}
+
 /// Changes the velocities by the forces at the latest positions, moves the nodes by them, and puts the pinned ones where
 /// they are led, along the axes that they are held along.
 pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, team: &Team) -> Survey {
     let node_count = body.node_count();
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
+    if part.drifts && carries(part.substep) {
+        body.state.carry();
+    }
     let state = body.state.substep();
     let kick = Kick {
         applied: body.applied.as_ref().filter(|_| body.forces_applied),
@@ -169,6 +180,10 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             closed.write(tile, tile_nodes(tile, node_count), &mut predicted, pins);
         });
     }
+    let (first_remainders, remainders) = match state.remainders {
+        None => (None, None),
+        Some([first, newest]) => (Some(&*first), Some(newest)),
+    };
     let pass = Pass {
         springs: &*body.springs,
         elements,
@@ -187,18 +202,20 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
             Before::Open => body.predicted_velocities.as_ref(),
             _ => body.springs.damped().then_some(state.first_velocities),
         },
+        first_remainders: first_remainders.filter(|_| part.before != Before::Open),
     };
     let written = (
         state.velocities.tiles_mut(),
         state.next_positions.tiles_mut(),
         state.forces.tiles_mut(),
+        remainders.filter(|_| part.drifts).map(|remainders| remainders.tiles_mut()),
         body.pins.tiles_mut(),
         Items::new(&mut body.surveys),
     );
     team.pass(
         tiles,
         written,
-        |tile, (velocities, next_positions, forces, pins, survey): (_, _, _, _, &mut Survey)| {
+        |tile, (velocities, next_positions, forces, remainders, pins, survey): (_, _, _, _, _, &mut Survey)| {
             if is_asleep(tile) {
                 *survey = Survey::NOTHING;
                 return;
@@ -207,6 +224,7 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
                 velocities,
                 next_positions,
                 forces,
+                remainders,
                 pins,
             };
             let mut sums = TileForces::ZERO;
@@ -256,6 +274,8 @@ pub(super) struct Pass<'a> {
     pub first_forces: Option<&'a Vectors>,
     /// The velocities at the time of the positions, where springs are damped.
     pub damped_velocities: Option<&'a Vectors>,
+    /// What positions lack before the drift, where it is not what they lack now.
+    pub first_remainders: Option<&'a Vectors>,
 }
 
 /// What a tile of a substep writes.
@@ -264,6 +284,8 @@ pub(super) struct Written<'a> {
     pub next_positions: [&'a mut [f32]; 3],
     /// Where spring forces are kept; nothing where the nodes drift.
     pub forces: [&'a mut [f32]; 3],
+    /// What positions lack, where that is carried on.
+    pub remainders: Option<[&'a mut [f32]; 3]>,
     pub pins: &'a mut [Pin],
 }
 
@@ -299,6 +321,9 @@ impl Pass<'_> {
         if let Some(first_velocities) = self.first_velocities {
             copy(&mut written.velocities, first_velocities.slices(nodes.clone()));
         }
+        if let (Some(first), Some(remainders)) = (self.first_remainders, &mut written.remainders) {
+            copy(remainders, first.slices(nodes.clone()));
+        }
         if !self.part.drifts {
             copy(&mut written.forces, forces.axes().map(|axis| &axis[..nodes.len()]));
         }
@@ -311,6 +336,7 @@ impl Pass<'_> {
             drift: self.part.drifts.then(|| Drift {
                 positions: self.positions.slices(nodes.clone()),
                 next_positions: written.next_positions.each_mut().map(|axis| &mut **axis),
+                remainders: (written.remainders.as_mut()).map(|axes| axes.each_mut().map(|axis| &mut **axis)),
             }),
         });
         self.lead_pins(&nodes, written);
@@ -345,6 +371,9 @@ impl Pass<'_> {
             pin.put(&mut written.velocities, place, velocity);
             if self.part.drifts {
                 pin.put(&mut written.next_positions, place, pin.place(self.part.end));
+                if let Some(remainders) = &mut written.remainders {
+                    pin.put(remainders, place, Vec3::ZERO);
+                }
             }
         }
     }
