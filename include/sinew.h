@@ -562,8 +562,8 @@ typedef struct sinew_body_def {
    */
   uint32_t reserved1;
   /**
-   * VERLET: what part of the body's mass may be added, in all, to the nodes whose springs would make substeps short, as
-   * those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
+   * VERLET: what part of the body's mass may be added, in all, to the nodes whose springs or elements would make substeps short,
+   * as those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
    * more, and no more than they need; never where the world's substeps are fixed or a tolerance is asked for. It is
    * inertia alone: weight, and the force on a pin, stay as they are. See sinew_solver_report.
    */
@@ -665,7 +665,7 @@ typedef struct sinew_body_def {
   /**
    * s, at least 0, at most 1e6: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness;
    * default 0: there is none. Springs that are added later have none. VERLET takes substeps as short as a dashpot alone asks for: from
-   * some hundredths of a second on IMPLICIT is the solver for it. Below some 5 us slow creep is lost in the rounding of positions.
+   * some hundredths of a second on IMPLICIT is the solver for it.
    */
   float retardation_time;
   /**

@@ -137,6 +137,7 @@ impl Body {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
+            are_heavier: false,
         };
         let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
         elements.find_rates_at(nodes, cells_at, &*self.springs, &masses);
@@ -174,6 +175,7 @@ impl Body {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
+            are_heavier: false,
         };
         let watched = (&mut self.watched, candidates);
         let positions = self.state.positions();

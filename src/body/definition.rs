@@ -179,8 +179,8 @@ pub struct BodyDefinition<'a> {
     /// [`Solver::Implicit`], [`Solver::Newton`]: what may be missing of the solution of a step's equation, as a part of what forces
     /// change in the step; from 1e-6 to 1; 0: 0.01, or 1e-6 with [`Solver::Newton`].
     pub accuracy: f32,
-    /// [`Solver::Verlet`]: what part of the body's mass may be added, in all, to the nodes whose springs would make substeps
-    /// short, as those of slivers are; from 0 to 1; 0: none.
+    /// [`Solver::Verlet`]: what part of the body's mass may be added, in all, to the nodes whose springs or elements would make
+    /// substeps short, as those of slivers are; from 0 to 1; 0: none.
     ///
     /// Mass is added where that saves a quarter of the substeps or more, and no more than they need; never where the
     /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay

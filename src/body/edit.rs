@@ -400,6 +400,7 @@ impl Body {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
+            are_heavier: false,
         };
         let positions = self.state.positions();
         self.carry.stability = stability.changed(nodes, &*self.springs, masses, positions, &mut self.watched);

@@ -78,7 +78,7 @@ use crate::memory;
 use crate::readers::Shown;
 use crate::snapshot::saved;
 use crate::solver::{
-    Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums, Survey,
+    Carried, Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums, Survey,
     Watched, close, write_records,
 };
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
@@ -347,9 +347,11 @@ impl Body {
         if let (Some(implicit), Some(enclosed)) = (&mut body.implicit, &body.enclosed) {
             implicit.enclose(enclosed)?;
         }
-        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 && !body.has_more_than_springs() {
+        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
-            let scaling = MassScaling::new(&*body.springs, &body.masses, uniform, damping, definition.mass_scaling)?;
+            let beside = body.carried_beside_springs()?;
+            let (springs, part) = (&*body.springs, definition.mass_scaling);
+            let scaling = MassScaling::new(springs, &beside, &body.masses, uniform, damping, part)?;
             body.scaling = scaling.map(memory::boxed).transpose()?;
         }
         if needs.tools > 0 {
@@ -450,6 +452,7 @@ impl Body {
         Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
+            are_heavier: false,
         }
     }
 
@@ -458,6 +461,7 @@ impl Body {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
+            are_heavier: false,
         };
         self.watched.gather(&*self.springs, masses);
     }
@@ -475,11 +479,31 @@ impl Body {
         self.elements.is_some() || self.terms.is_some() || self.enclosed.is_some()
     }
 
+    /// What each node carries of elements, terms and what is enclosed; of no nodes where there are none.
+    fn carried_beside_springs(&self) -> Result<Vec<Carried>> {
+        if !self.has_more_than_springs() {
+            return Ok(Vec::new());
+        }
+        let mut carried = memory::filled(Carried::default(), self.node_count())?;
+        let masses = self.masses();
+        if let Some(elements) = &self.elements {
+            elements.add_to(&masses, &mut carried);
+        }
+        if let Some(terms) = &self.terms {
+            terms.add_to(&masses, &mut carried);
+        }
+        if let Some(enclosed) = &self.enclosed {
+            enclosed.add_to(self.state.positions(), &masses, &mut carried)?;
+        }
+        Ok(carried)
+    }
+
     /// The longest substep that elements, terms and what is enclosed allow with the nodes as they are, s; infinity where there are none.
     pub(crate) fn limit_beside_springs(&mut self, team: &Team) -> f32 {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
+            are_heavier: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
         };
         let mut rates = Rates::ZERO;
         if let Some(elements) = &mut self.elements {
@@ -532,6 +556,7 @@ impl Body {
     /// The same, after springs or pins have changed too.
     pub(crate) fn scale_masses(&mut self, step: f32) {
         if let Some(scaling) = &mut self.scaling {
+            let differ = step > 0.0 || scaling.step() > 0.0;
             let heavier = Heavier {
                 masses: &self.masses,
                 inverse_masses: &mut self.inverse_masses,
@@ -539,6 +564,9 @@ impl Body {
                 damping: self.damping.as_mut(),
             };
             scaling.apply(step, heavier);
+            if differ {
+                self.forget_rates();
+            }
         }
     }
 

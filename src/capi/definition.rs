@@ -113,8 +113,8 @@ pub struct sinew_body_def {
     pub accuracy: f32,
     /// 0.
     pub reserved1: u32,
-    /// VERLET: what part of the body's mass may be added, in all, to the nodes whose springs would make substeps short, as
-    /// those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
+    /// VERLET: what part of the body's mass may be added, in all, to the nodes whose springs or elements would make substeps short,
+    /// as those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
     /// more, and no more than they need; never where the world's substeps are fixed or a tolerance is asked for. It is
     /// inertia alone: weight, and the force on a pin, stay as they are. See sinew_solver_report.
     pub mass_scaling: f32,
@@ -174,7 +174,7 @@ pub struct sinew_body_def {
     pub fibre_stiffnesses: *const f32,
     /// s, at least 0, at most 1e6: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness;
     /// default 0: there is none. Springs that are added later have none. VERLET takes substeps as short as a dashpot alone asks for: from
-    /// some hundredths of a second on IMPLICIT is the solver for it. Below some 5 us slow creep is lost in the rounding of positions.
+    /// some hundredths of a second on IMPLICIT is the solver for it.
     pub retardation_time: f32,
     /// s, from 1e-9 to 1e6: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
     /// E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)): the standard linear solid. 0, the default: the dashpot acts

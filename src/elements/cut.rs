@@ -215,19 +215,12 @@ impl Elements {
         for &node in nodes {
             let (mut stiffness, mut carried) = (0.0, 0.0);
             for (corners, rest, _) in cells_at(node).filter_map(|cell| self.cell(cell)) {
-                let sizes = rest.gradients().map(DVec3::length);
-                let free = corners.map(|corner| {
-                    if masses.inverse(corner as usize) > 0.0 {
-                        1.0
-                    } else {
-                        0.0
-                    }
-                });
-                let all: f64 = sizes.iter().zip(free).map(|(size, free)| size * free).sum();
-                for (corner, size) in corners.into_iter().zip(sizes) {
+                let free = corners.map(|corner| masses.inverse(corner as usize) > 0.0);
+                let carried_there = super::rates::carried(self.law, &rest, free);
+                for ((corner, gradient), more) in corners.into_iter().zip(rest.gradients()).zip(carried_there) {
                     if corner == node {
-                        stiffness += rest.volume * whole * size * size;
-                        carried += rest.volume * whole * size * all;
+                        stiffness += rest.volume * whole * gradient.length_squared();
+                        carried += more;
                     }
                 }
             }

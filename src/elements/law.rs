@@ -85,6 +85,11 @@ impl Law {
     pub fn whole(&self) -> f32 {
         self.lambda + 2.0 * self.mu + self.kappa
     }
+
+    /// At most so stiff is a tetrahedron at rest, Pa, of which shear counts as this part.
+    pub fn stiffest(&self, part: f32) -> f32 {
+        self.lambda.max(0.0) + self.kappa + 2.0 * self.mu * part
+    }
 }
 
 /// What acts in a tetrahedron on top of its elastic stresses, Pa.

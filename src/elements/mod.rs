@@ -29,6 +29,7 @@ pub(crate) use law::{Deformed, Law, Load, Rest};
 use offsets::Offsets;
 use parts::{Copies, Part};
 use past::Memory;
+pub(crate) use rates::LEAST_SHEAR;
 use rings::{Pressures, Rings};
 
 /// The tetrahedra of a body that are elements.

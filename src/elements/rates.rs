@@ -1,15 +1,42 @@
 //! What elements allow an explicit solver: a bound on the squares of frequencies, that goes with how they are deformed.
 //!
-//! The matrix of an element with the blocks K_ab is positive semidefinite but for what pressure takes, so with any parts p_a that add
-//! up to 1 it is at most K_aa / p_a at each corner, and with parts by the gradients g_a of the corners' functions a node carries at most
-//! `V c |g_a| sum |g_b|` of each element, c the largest stiffness of the law: lambda + 2 mu at rest, and what `Groups::forces` has for any
-//! deformation. What a node and its springs carry over its mass bounds the squares of frequencies.
+//! With u_a the ways of an element's corners, g_a the gradients of their functions and H = sum u_a g_a^T, the energy at rest is a form of
+//! (tr H)² and of |sym H|², which is at most |H|². With parts p_a = |g_a| / sum |g_b| Cauchy's inequality gives
+//! `(tr H)² <= sum |g_a|² |u_a|² / p_a` and `|H|² <= gamma sum |g_a|² |u_a|² / p_a`, gamma the largest eigenvalue of `sum p_a n_a n_a^T`, n_a the
+//! direction of g_a: a third in an even tetrahedron, 1 in one that is flat. So a node carries `V c |g_a| sum |g_b|` of each element,
+//! `c = lambda + 2 mu gamma`. Where an element is deformed by R U, its form is that of the ways `U R^T u_a`, and with the cofactors of U for what
+//! keeps volume: `Groups::forces` has what c becomes of that, and of stress. What a node and its springs carry over its mass bounds the squares
+//! of frequencies. No pinned corner goes any way: it is left out.
 
 use glam::DVec3;
 
-use super::Elements;
-use crate::solver::{Masses, Rates};
+use super::{Elements, Law, Rest};
+use crate::solver::{Carried, Masses, Rates};
 use crate::springs::Springs;
+
+/// The least that shear counts for: a third of the sum of three eigenvalues, which is 1.
+pub(crate) const LEAST_SHEAR: f32 = 1.0 / 3.0;
+
+/// What each corner of a tetrahedron at rest carries, N/m, where those that are not free go no way.
+pub(super) fn carried(law: Law, rest: &Rest, free: [bool; 4]) -> [f64; 4] {
+    let gradients = rest.gradients();
+    let sizes = gradients.map(DVec3::length);
+    let all: f64 = sizes.iter().zip(free).filter(|(_, free)| *free).map(|(size, _)| size).sum();
+    let (mut diagonal, mut across) = (DVec3::ZERO, DVec3::ZERO);
+    for ((gradient, size), free) in gradients.iter().zip(sizes).zip(free) {
+        if free {
+            let part = *gradient / (size * all);
+            diagonal += part * *gradient;
+            across += part * DVec3::new(gradient.y, gradient.z, gradient.x);
+        }
+    }
+    // Eigenvalues are no further from their mean than twice this.
+    let deviation = diagonal - f64::from(LEAST_SHEAR);
+    let spread = ((deviation.length_squared() + 2.0 * across.length_squared()) / 6.0).sqrt();
+    let shear = (f64::from(LEAST_SHEAR) + 2.0 * spread).min(1.0);
+    let stiffest = f64::from(law.stiffest(shear as f32));
+    sizes.map(|size| rest.volume * stiffest * size * all)
+}
 
 impl Elements {
     /// Adds up how stiff the elements at each node are at rest.
@@ -31,15 +58,7 @@ impl Elements {
         }
         let mut carried = std::mem::take(&mut self.carried);
         carried.fill(0.0);
-        let whole = f64::from(self.law.whole());
-        self.visit(&mut |corners, rest| {
-            let free = corners.map(|node| if masses.inverse(node as usize) > 0.0 { 1.0 } else { 0.0 });
-            let sizes = rest.gradients().map(DVec3::length);
-            let all: f64 = sizes.iter().zip(free).map(|(size, free)| size * free).sum();
-            for (node, size) in corners.into_iter().zip(sizes) {
-                carried[node as usize] += (rest.volume * whole * size * all) as f32;
-            }
-        });
+        self.add_carried(masses, |node, more| carried[node] += more as f32);
         self.most_damped = 0.0;
         for (node, carried) in carried.iter_mut().enumerate() {
             let of_springs = Rates::anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
@@ -50,6 +69,23 @@ impl Elements {
         self.carried = carried;
         self.rates_known = true;
         false
+    }
+
+    /// Adds what the nodes that are free carry at rest.
+    pub fn add_to(&self, masses: &Masses, all: &mut [Carried]) {
+        let viscosity = self.memory.as_ref().map(|memory| memory.viscosity);
+        self.add_carried(masses, |node, more| {
+            all[node].add(more as f32, viscosity.unwrap_or_default());
+        });
+    }
+
+    fn add_carried(&self, masses: &Masses, mut add: impl FnMut(usize, f64)) {
+        self.visit(&mut |corners, rest| {
+            let free = corners.map(|node| masses.inverse(node as usize) > 0.0);
+            for (node, more) in corners.into_iter().zip(carried(self.law, rest, free)) {
+                add(node as usize, more);
+            }
+        });
     }
 
     /// Masses, pins or springs have changed.

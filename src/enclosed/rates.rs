@@ -9,8 +9,12 @@
 use glam::DVec3;
 
 use super::Enclosed;
+use crate::body::Vectors;
+use crate::error::Result;
+use crate::material::Viscosity;
+use crate::memory;
 use crate::snapshot::saved;
-use crate::solver::{Masses, Rates};
+use crate::solver::{Carried, Masses, Rates};
 use crate::springs::Springs;
 
 /// What a triangle counts for: the factors of the square of its vector, and of its longest edge, 1/kg.
@@ -106,6 +110,28 @@ impl Enclosed {
         }
         self.rates_known = true;
         false
+    }
+
+    /// Adds what the nodes that are free carry of cavities, as they are with nodes at `positions`, by the parts that they have in volumes.
+    pub fn add_to(&self, positions: &Vectors, masses: &Masses, all: &mut [Carried]) -> Result<()> {
+        let mut sums = memory::filled(0.0, self.cavities.len())?;
+        let size = |triangles: &[u32]| {
+            let at = |node: usize| positions.get(node).as_dvec3();
+            self.surface.gradient(triangles, &at).length()
+        };
+        let is_free = |node: usize| masses.inverse(node) > 0.0;
+        self.surface.visit(&mut |node, cavity, triangles| {
+            if is_free(node) {
+                sums[cavity] += size(triangles);
+            }
+        });
+        self.surface.visit(&mut |node, cavity, triangles| {
+            if is_free(node) {
+                let stiffness = f64::from(self.stiffness) / self.cavities[cavity].rest_volume;
+                all[node].add((stiffness * size(triangles) * sums[cavity]) as f32, Viscosity::default());
+            }
+        });
+        Ok(())
     }
 
     /// Masses, pins or springs have changed.

@@ -16,7 +16,7 @@ use crate::solver::Rates;
 pub struct Viscosity {
     /// The dashpot's viscosity over the stiffness, s, at least 0, at most 1e6; 0: there is none. VERLET takes substeps as short as a dashpot
     /// alone asks for, `2 / w² retardation_time` with w the highest frequency: from some hundredths of a second on IMPLICIT is the solver for
-    /// it. Below some 5 us slow creep is lost in the rounding of positions.
+    /// it.
     pub retardation_time: f32,
     /// Of the dashpot and the spring in its row, s, from 1e-9 to 1e6, or 0: there is no such spring, and the dashpot acts alone (Kelvin and
     /// Voigt). Forces on tetrahedra are then of order 1 in the step, all others of order 2.

@@ -14,7 +14,7 @@ use crate::snapshot::saved;
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
-const RESERVE: f32 = 0.8;
+pub(super) const RESERVE: f32 = 0.8;
 
 /// The part that is used of the substep that is stable wherever the nodes go: nothing is to be made up for as they move.
 const RESERVE_ANYWHERE: f32 = 0.9;
@@ -137,6 +137,11 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
 
 /// What a step of VERLET begins with, and the longest stable substep as far as springs are not concerned, s.
 fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) {
+    if body.has_more_than_springs() {
+        // What else there is asks for substeps by the masses that the step is taken with.
+        let scaled = fewer_substeps(body, request, 0.0);
+        body.use_masses_for(scaled.map_or(0.0, |(_, masses_for)| masses_for));
+    }
     let beside_springs = body.limit_beside_springs(team);
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
@@ -185,19 +190,21 @@ pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Nee
     let stable_substep = first_substep(body, &start, beside_springs);
     match fewer_substeps(body, request, stable_substep) {
         Some((substeps, masses_for)) => Need {
-            start: Carry {
-                stability: start.stability.shortened_to(stable_substep),
-                ..start
-            },
-            substeps,
+            start: with_less_stability(start, stable_substep),
+            substeps: substeps.max(as_count(substeps_needed(request, beside_springs))),
             masses_for,
         },
         None => Need {
             start,
-            substeps: substeps_needed(request, stable_substep).clamp(1.0, f64::from(u32::MAX)) as u32,
+            substeps: as_count(substeps_needed(request, stable_substep)),
             masses_for: 0.0,
         },
     }
+}
+
+/// A number of substeps, 1 at least.
+fn as_count(substeps: f64) -> u32 {
+    substeps.clamp(1.0, f64::from(u32::MAX)) as u32
 }
 
 /// Takes a step that is stable however long it is.
@@ -243,6 +250,7 @@ fn run_stably(
     team: &Team,
 ) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = first_substep(body, &start, beside_springs);
+    let mut beside_springs = beside_springs;
     for attempt in 0..=ATTEMPTS {
         if attempt == ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
@@ -252,35 +260,34 @@ fn run_stably(
             } else {
                 anywhere
             });
+            beside_springs *= 0.5;
         }
-        let stability = start.stability.shortened_to(stable_substep);
-        if let Some((substeps, masses_for)) = fewer_substeps(body, request, stable_substep) {
-            if substeps > request.max_substeps {
-                break;
+        let (substeps, start, masses_for) = match fewer_substeps(body, request, stable_substep) {
+            Some((substeps, masses_for)) => {
+                let needed = as_count(substeps_needed(request, beside_springs));
+                (substeps.max(needed), with_less_stability(start, stable_substep), masses_for)
             }
-            let substeps = refined(substeps, &start, request);
-            let taken = verlet::run(
-                body,
-                request,
-                substeps,
-                middle(substeps),
-                Carry { stability, ..start },
-                masses_for,
-                team,
-            )?;
-            return Ok((substeps, taken));
-        }
-        let needed = substeps_needed(request, stable_substep);
-        if needed > f64::from(request.max_substeps) {
+            None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
+        };
+        if substeps > request.max_substeps || substeps == u32::MAX {
             break;
         }
-        let substeps = refined(needed.max(1.0) as u32, &start, request);
-        match verlet::run(body, request, substeps, middle(substeps), start, 0.0, team) {
+        let substeps = refined(substeps, &start, request);
+        match verlet::run(body, request, substeps, middle(substeps), start, masses_for, team) {
             Ok(taken) => return Ok((substeps, taken)),
-            Err(found) => stable_substep = stable_substep.min(found.stable_substep),
+            Err(found) => {
+                stable_substep = stable_substep.min(found.stable_substep);
+                beside_springs = beside_springs.min(found.stable_substep);
+            }
         }
     }
     Err(TooLong { stable_substep })
+}
+
+/// What a step begins with, where springs are found to be stable in no longer substeps than this, s.
+fn with_less_stability(start: Carry, stable_substep: f32) -> Carry {
+    let stability = start.stability.shortened_to(stable_substep);
+    Carry { stability, ..start }
 }
 
 /// As many times more substeps than stability asks for as the energy of the body does, as far as they are allowed.
@@ -326,9 +333,13 @@ fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Op
     if request.substeps > 0 || request.tolerance > 0.0 {
         return None;
     }
-    let needed = substeps_needed(request, stable_substep);
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let scaling = body.scaling.as_ref()?;
+    let needed = if body.has_more_than_springs() {
+        scaling.needed_at_rest(request.dt)
+    } else {
+        substeps_needed(request, stable_substep)
+    };
     scaling.fewer_substeps(request.dt, needed, masses, inverse_masses)
 }
 
@@ -356,7 +367,7 @@ fn run_to_tolerance(
     let mut error = 0.0;
     compare(body, request, &carry);
     loop {
-        let stable_substep = carry.stability.limit().unwrap_or(f32::INFINITY);
+        let stable_substep = newest_limit(body, &carry);
         substeps = substeps.saturating_mul(2);
         middle = middle.saturating_mul(2);
         if substeps > request.max_substeps || substeps == u32::MAX {
@@ -380,10 +391,16 @@ fn run_to_tolerance(
 fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
     let (positions, velocities) = body.state.newest();
     // 1 over the highest frequency.
-    let time = (0.5 * carry.stability.limit().unwrap_or(f32::INFINITY)).min(request.dt);
+    let time = (0.5 * newest_limit(body, carry)).min(request.dt);
     body.coarse
         .as_mut()
         .map_or(0.0, |coarse| coarse.pass_end(positions, velocities, time))
+}
+
+/// The longest stable substep with the nodes where a step has led them, s; infinity where any is.
+fn newest_limit(body: &Body, carry: &Carry) -> f32 {
+    let with = |limit: f32| limit.min(body.newest_limit_beside_springs());
+    carry.limit().map_or(f32::INFINITY, with)
 }
 
 pub(super) fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Outcome {

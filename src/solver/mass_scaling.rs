@@ -1,12 +1,17 @@
-//! Selective mass scaling: the few nodes whose springs would make substeps short are made heavier, as explicit
+//! Selective mass scaling: the few nodes whose springs, or elements, would make substeps short are made heavier, as explicit
 //! finite-element codes do (Belytschko, Liu, Moran 2000, section 6.2).
 //!
 //! With `q(x_i - x_j) <= 2 q(x_i) + 2 q(x_j)` for the form of every spring, leapfrog is stable for a substep `h` where
 //! each node has at least the mass `h (h S / 2 + C)`, with S and C the sums of its springs' stiffnesses and dampings:
 //! wherever the nodes are, so that nothing has to be estimated on the way. Inertia grows and weight does not.
+//!
+//! Elements, terms and cavities have such sums too, but at rest alone: masses are made for those, and how short substeps have to be with these
+//! masses is found as it is with any others.
 
 use crate::body::NodeDamping;
+use super::attempt::RESERVE as RESERVE_AT_REST;
 use crate::error::Result;
+use crate::material::Viscosity;
 use crate::memory;
 use crate::snapshot::saved;
 use crate::springs::Springs;
@@ -24,11 +29,36 @@ const WORTH_KEEPING: f64 = 1.125;
 /// So many nodes are asked for what they need before the sum is looked at.
 const TOGETHER: usize = 256;
 
+/// What a node carries of forces that are not those of springs, at rest: twice the sum over all nodes bounds their form.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Carried {
+    /// N/m
+    pub stiffness: f32,
+    /// N s/m
+    damping: f32,
+}
+
+saved!(Carried { stiffness, damping });
+
+impl Carried {
+    /// Adds what forces give with this stiffness, N/m, that have such an arm beside them.
+    pub fn add(&mut self, stiffness: f32, viscosity: Viscosity) {
+        let stiffness = 0.5 * stiffness;
+        self.stiffness += stiffness;
+        match viscosity.stiffening() {
+            Some(stiffening) => self.stiffness += stiffness * stiffening as f32,
+            None => self.damping += stiffness * viscosity.retardation_time,
+        }
+    }
+}
+
 /// A node that may be made heavier.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sliver {
     pub node: u32,
-    /// The sum over its springs, N/m.
+    /// What it carries beside its springs.
+    beside: Carried,
+    /// The sum over its springs, and what is beside them, N/m.
     stiffness: f32,
     /// N s/m, along them.
     damping: f32,
@@ -40,6 +70,7 @@ pub(crate) struct Sliver {
 
 saved!(Sliver {
     node,
+    beside,
     stiffness,
     damping,
     rate,
@@ -60,7 +91,7 @@ impl Sliver {
 
     /// Takes the sums over its springs anew.
     fn add_up(&mut self, springs: &dyn Springs) {
-        (self.stiffness, self.damping) = (0.0, 0.0);
+        (self.stiffness, self.damping) = (self.beside.stiffness, self.beside.damping);
         springs.visit(self.node as usize, &mut |link| {
             self.stiffness += link.stiffness;
             self.damping += link.damping;
@@ -82,6 +113,10 @@ pub(crate) struct Heavier<'a> {
 pub(crate) struct MassScaling {
     /// kg, in all.
     most: f64,
+    /// The part that is used of the substep that masses are made for.
+    reserve: f64,
+    /// The longest stable substep with masses as they are, s, wherever nodes are or at rest.
+    unscaled: f64,
     /// The inverse mass of every node as it is, where they all have the same.
     uniform_inverse_mass: Option<f32>,
     /// In the order of their nodes.
@@ -94,6 +129,8 @@ pub(crate) struct MassScaling {
 
 saved!(MassScaling {
     most,
+    reserve,
+    unscaled,
     uniform_inverse_mass,
     slivers,
     complete_to,
@@ -102,9 +139,10 @@ saved!(MassScaling {
 
 impl MassScaling {
     /// Finds the nodes of a body that are to be made heavier where it takes the longest substeps that `fraction` of its mass
-    /// can make stable; `None`: that is no gain.
+    /// can make stable; `None`: that is no gain. `beside` is what nodes carry beside their springs, of no nodes where that is nothing.
     pub fn new(
         springs: &dyn Springs,
+        beside: &[Carried],
         masses: &[f32],
         uniform_inverse_mass: Option<f32>,
         damping: Option<&NodeDamping>,
@@ -116,6 +154,7 @@ impl MassScaling {
         for (node, &mass) in (0..).zip(masses) {
             let mut sliver = Sliver {
                 node,
+                beside: beside.get(node as usize).copied().unwrap_or_default(),
                 stiffness: 0.0,
                 damping: 0.0,
                 rate: damping.map_or(0.0, |damping| damping.rates()[node as usize]),
@@ -153,6 +192,12 @@ impl MassScaling {
         slivers.sort_unstable_by_key(|sliver| sliver.node);
         Ok(Some(Self {
             most,
+            reserve: if beside.is_empty() {
+                RESERVE
+            } else {
+                f64::from(RESERVE_AT_REST)
+            },
+            unscaled: first,
             uniform_inverse_mass,
             slivers,
             complete_to,
@@ -180,10 +225,15 @@ impl MassScaling {
         if self.step > 0.0 { &self.slivers } else { &[] }
     }
 
+    /// How many substeps a step of `dt` seconds takes at rest with masses as they are.
+    pub fn needed_at_rest(&self, dt: f32) -> f64 {
+        (f64::from(dt) / (self.reserve * self.unscaled)).ceil()
+    }
+
     /// In how few substeps a step of `dt` seconds can be taken, and for what substep masses are to be made; `None`: that
     /// saves too little of the `needed` ones.
     pub fn fewer_substeps(&self, dt: f32, needed: f64, masses: &[f32], inverse_masses: &[f32]) -> Option<(u32, f32)> {
-        let longest = f64::from(dt) / RESERVE;
+        let longest = f64::from(dt) / self.reserve;
         let fits = |substeps: u32| {
             let step = longest / f64::from(substeps);
             step <= self.complete_to && self.has_mass_for(step, masses, inverse_masses)
@@ -269,6 +319,7 @@ impl MassScaling {
             Err(place) => {
                 let mut sliver = Sliver {
                     node,
+                    beside: Carried::default(),
                     stiffness: 0.0,
                     damping: 0.0,
                     rate: rates.map_or(0.0, |rates| rates[node as usize]),

@@ -66,7 +66,12 @@ impl Rates {
         let inverse_mass = masses.inverse(node);
         let mut rates = Self::ZERO;
         springs.visit(node, &mut |link| {
-            let inverse_mass = inverse_mass + masses.inverse(link.neighbour as usize);
+            // Masses that were added are what a node needs by itself, with half of each spring.
+            let inverse_mass = if masses.are_heavier {
+                2.0 * inverse_mass
+            } else {
+                inverse_mass + masses.inverse(link.neighbour as usize)
+            };
             rates.stiffest += link.stiffness * inverse_mass;
             rates.most_damped += link.damping * inverse_mass;
         });
@@ -74,20 +79,24 @@ impl Rates {
     }
 }
 
-/// The masses of a body as they are, whatever is added to them.
+/// The masses of a body as they are, or with what is added to them.
 #[derive(Clone, Copy)]
 pub(crate) struct Masses<'a> {
     /// kg
     pub masses: &'a [f32],
     /// 0 for nodes that are pinned.
     pub inverse_masses: &'a [f32],
+    /// Whether with what is added to them.
+    pub are_heavier: bool,
 }
 
 impl Masses<'_> {
     /// 1/kg, 0 for a node that is pinned.
     #[inline(always)]
     pub fn inverse(&self, node: usize) -> f32 {
-        if self.inverse_masses[node] > 0.0 {
+        if self.are_heavier {
+            self.inverse_masses[node]
+        } else if self.inverse_masses[node] > 0.0 {
             1.0 / self.masses[node]
         } else {
             0.0

@@ -212,7 +212,6 @@ impl<'a> Step<'a> {
         let mut part = Part::opening(substep);
         let mut change = request.gravity.as_dvec3() * f64::from(part.duration);
         let same_masses = carry.masses_for == self.masses_for;
-        body.use_masses_for(carry.masses_for);
         match carry.closing.take() {
             None => {}
             Some(closing) if same_masses && closing.joins(body, substep, request.gravity) => {
@@ -220,6 +219,7 @@ impl<'a> Step<'a> {
                 change += closing.fall();
             }
             Some(closing) => {
+                body.use_masses_for(carry.masses_for);
                 close_aside(body, &closing, &mut carry.gravity, team);
                 part.before = Before::Closed;
             }

@@ -29,7 +29,7 @@ use crate::error::Result;
 use crate::material::{Course, Viscosity};
 use crate::memory;
 use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
-use crate::solver::{Masses, Rates};
+use crate::solver::{Carried, Masses, Rates};
 use crate::springs::{Change, ChosenKernel, Springs, TileForces, tile_count};
 use crate::threads::Team;
 use arms::Arms;
@@ -96,6 +96,9 @@ trait Term: Debug + Send + Sync {
 
     /// Adds what bounds the squares of frequencies to each node, 1/s².
     fn add_rates(&self, masses: &Masses, rates: &mut [f32]);
+
+    /// Shows what each node carries of each term, N/m, where those that are not free go no way.
+    fn show_carried(&self, masses: &Masses, see: &mut dyn FnMut(usize, f32));
 
     /// Takes away what has an edge between two nodes: how many terms.
     fn remove_edge(&mut self, a: u32, b: u32) -> usize;
@@ -375,7 +378,15 @@ impl Terms {
             return;
         }
         self.sums.fill(0.0);
-        self.laws.iter().for_each(|law| law.add_rates(masses, &mut self.sums));
+        for law in &self.laws {
+            if masses.are_heavier {
+                law.show_carried(masses, &mut |node, stiffness| {
+                    self.sums[node] += stiffness * masses.inverse(node);
+                });
+            } else {
+                law.add_rates(masses, &mut self.sums);
+            }
+        }
         let mut most = Rates::ZERO;
         for (node, &sum) in self.sums.iter().enumerate() {
             let of_springs = Rates::anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
@@ -384,6 +395,13 @@ impl Terms {
         }
         self.rates = most;
         self.rates_known = true;
+    }
+
+    /// Adds what the nodes that are free carry.
+    pub fn add_to(&self, masses: &Masses, all: &mut [Carried]) {
+        for law in &self.laws {
+            law.show_carried(masses, &mut |node, stiffness| all[node].add(stiffness, self.viscosity));
+        }
     }
 
     /// Forces are about to be worked out for other positions.

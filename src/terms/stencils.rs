@@ -1,5 +1,6 @@
 //! Terms of a few nodes each, kept by the tiles that have one of their nodes.
 
+use std::array::from_fn;
 use std::fmt::Debug;
 use std::ops::Range;
 
@@ -458,6 +459,21 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
                 if inverse_mass > 0.0 {
                     rates[node as usize] += rate as f32;
                 }
+            }
+        }
+    }
+
+    fn show_carried(&self, masses: &Masses, see: &mut dyn FnMut(usize, f32)) {
+        for stencil in self.there() {
+            // The square of what each node takes part with: the rate where it alone has a mass, of 1 kg.
+            let parts: [f64; N] = from_fn(|node| {
+                let is_free = masses.inverse(stencil.nodes[node] as usize) > 0.0;
+                let alone = from_fn(|other| if is_free && other == node { 1.0 } else { 0.0 });
+                self.law.rate(&stencil.shape, alone).sqrt()
+            });
+            let all: f64 = parts.iter().sum();
+            for (&node, part) in stencil.nodes.iter().zip(parts) {
+                see(node as usize, (f64::from(stencil.stiffness) * part * all) as f32);
             }
         }
     }

@@ -286,3 +286,35 @@ fn a_pendulum_from_150_degrees_keeps_its_period() {
         "{period} s, by formula {lengthened} s"
     );
 }
+
+/// Two nodes sink in thick air at a speed at which a short substep takes them less than the last place of their coordinates.
+#[test]
+fn slow_motion_is_not_lost_in_short_substeps() {
+    const RATE: f32 = 100.0;
+    const G: f32 = 0.01;
+    const TIME: f64 = 2.0;
+    for (dt, substeps) in [(1.0 / 60.0, 100), (1.0 / 60.0, 300), (1.0 / 60.0, 1000), (1e-5, 1)] {
+        let mut parts = Parts::nodes(vec![Vec3::X * -0.1, Vec3::X * 0.1], 1e-3);
+        parts.join(0, 1, 1.0);
+        parts.node_dampings = vec![RATE * 1e-3; 2];
+        let world = WorldDefinition {
+            gravity: Vec3::NEG_X * G,
+            substeps,
+            ..FREE
+        };
+        let mut scene = Scene::new(&parts, world);
+        let start = scene.positions();
+        let steps = (TIME / f64::from(dt)).round();
+        scene.run(dt, steps as usize);
+        // v' = -G - RATE v from rest.
+        let (rate, time) = (f64::from(RATE), steps * f64::from(dt));
+        let expected = -f64::from(G) / rate * (time - (1.0 - (-rate * time).exp()) / rate);
+        for (place, start) in scene.positions().iter().zip(start) {
+            let way = place.x - start.x;
+            assert!(
+                (way / expected - 1.0).abs() < 1e-3,
+                "{dt} s in {substeps}: {way:e} m of {expected:e}"
+            );
+        }
+    }
+}

@@ -14,7 +14,7 @@ use super::algebra::{
 use super::lanes::Lanes;
 use super::{ChosenKernel, WithLanes};
 use crate::body::Record;
-use crate::elements::Law;
+use crate::elements::{LEAST_SHEAR, Law};
 use crate::snapshot::saved;
 
 /// Tetrahedra side by side.
@@ -465,8 +465,10 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for Forces<'_, RINGS, LOAD
         unsafe {
             let constants = Constants::<L>::new(law);
             let (one, half) = (L::splat(1.0), L::splat(0.5));
-            let whole = L::splat(1.0 / law.whole());
-            let along = L::splat(law.lambda.max(0.0) + 2.0 * law.mu);
+            // Of what rates are made for, tension is most where shear counts most, all else where it counts least.
+            let least = L::splat(1.0 / law.stiffest(LEAST_SHEAR));
+            let most = L::splat(1.0 / law.stiffest(1.0));
+            let along = L::splat(law.lambda.max(0.0) + 2.0 * law.mu * LEAST_SHEAR);
             let mut highest = L::splat(0.0);
             for (index, group) in of.groups.iter().enumerate() {
                 for first in turns::<L>() {
@@ -511,14 +513,13 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for Forces<'_, RINGS, LOAD
                     let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
                     let tension = tension.greater(L::splat(0.0)).add(load);
                     // 2 sqrt(s) is at most 1 + s.
-                    let pressed = pressure.size().multiply(stretch.add(one));
-                    // Of areas the largest stretch squared is at most the square of that, and the sum of all three.
-                    let [a, b, c] = cofactors;
-                    let areas = dot(a, a).add(dot(b, b)).add(dot(c, c));
-                    let swollen = constants.kappa.multiply(stretch.multiply(stretch).lesser(areas));
-                    let stiffness = along.multiply_add(stretch, tension.add(pressed)).add(swollen);
+                    let pressed = pressure.size().multiply(stretch.add(one)).multiply(half);
+                    let swollen = constants.kappa.multiply(stretch);
+                    let stiffness = along.add(swollen).multiply_add(stretch, pressed);
+                    let stiffness = stiffness.multiply(least);
+                    let stiffness = tension.multiply_add(most, stiffness);
                     let rates = L::load(group.rates.as_ptr().add(first));
-                    highest = highest.greater(stiffness.multiply(whole).multiply(rates));
+                    highest = highest.greater(stiffness.multiply(rates));
                     let load = pressure.multiply(minus);
                     let first_stress = scaled_matrix(cofactors, load);
                     of.spread(group, first, add_times(first_stress, gradient, stress), inverse);
