@@ -512,10 +512,24 @@ impl<const RINGS: bool, const LOADED: bool> WithLanes for Forces<'_, RINGS, LOAD
                     let tension = constants.mu.multiply(stretch.subtract(one));
                     let tension = constants.lambda.multiply(twice_trace).multiply_add(half, tension);
                     let tension = tension.greater(L::splat(0.0)).add(load);
-                    // 2 sqrt(s) is at most 1 + s.
-                    let pressed = pressure.size().multiply(stretch.add(one)).multiply(half);
-                    let swollen = constants.kappa.multiply(stretch);
-                    let stiffness = along.add(swollen).multiply_add(stretch, pressed);
+                    // Pressure turns with the root of that, which is below its tangents: at 1, 9 and 81.
+                    let root = stretch.multiply_add(half, half);
+                    let root = root.lesser(stretch.multiply_add(L::splat(1.0 / 6.0), L::splat(1.5)));
+                    let root = root.lesser(stretch.multiply_add(L::splat(1.0 / 18.0), L::splat(4.5)));
+                    let pressed = pressure.size().multiply(root);
+                    // Volume grows with areas: the square of the largest.
+                    let [ab, bc, ca] = cofactors;
+                    let areas = [
+                        dot(ab, ab),
+                        dot(ab, bc),
+                        dot(ab, ca),
+                        dot(bc, bc),
+                        dot(bc, ca),
+                        dot(ca, ca),
+                    ];
+                    let area = largest(areas).greater(stretch);
+                    let stiffness = along.multiply_add(stretch, pressed);
+                    let stiffness = constants.kappa.multiply_add(area, stiffness);
                     let stiffness = stiffness.multiply(least);
                     let stiffness = tension.multiply_add(most, stiffness);
                     let rates = L::load(group.rates.as_ptr().add(first));
