@@ -211,8 +211,16 @@ fn what_is_viscous_keeps_its_angular_momentum() {
         ..BodyDefinition::default()
     });
     let body = body.expect("a body");
-    let velocities: Vec<Vec3> = mesh.positions.iter().map(|place| Vec3::Y.cross(*place) * SPIN).collect();
-    world.body_mut(body).expect("the body").set_velocities(&velocities).expect("velocities");
+    let velocities: Vec<Vec3> = mesh
+        .positions
+        .iter()
+        .map(|place| Vec3::Y.cross(*place) * SPIN)
+        .collect();
+    world
+        .body_mut(body)
+        .expect("the body")
+        .set_velocities(&velocities)
+        .expect("velocities");
     let momentum = |world: &World| -> DVec3 {
         let body = world.body(body).expect("the body");
         let places = body.positions().iter().zip(body.velocities()).enumerate();
