@@ -64,8 +64,8 @@ pub(crate) struct Substep<'a> {
 impl State {
     /// Whether it is that of so many nodes, and finite.
     pub fn is_sound(&self, count: usize) -> bool {
-        let mut all = (self.positions.iter().chain(&self.velocities).chain(&self.forces))
-            .chain(self.remainders.iter().flatten());
+        let mut all =
+            (self.positions.iter().chain(&self.velocities).chain(&self.forces)).chain(self.remainders.iter().flatten());
         self.current < self.positions.len()
             && self.latest < self.positions.len()
             && self.settled < self.velocities.len()

@@ -21,7 +21,12 @@ pub(crate) const LEAST_SHEAR: f32 = 1.0 / 3.0;
 pub(super) fn carried(law: Law, rest: &Rest, free: [bool; 4]) -> [f64; 4] {
     let gradients = rest.gradients();
     let sizes = gradients.map(DVec3::length);
-    let all: f64 = sizes.iter().zip(free).filter(|(_, free)| *free).map(|(size, _)| size).sum();
+    let all: f64 = sizes
+        .iter()
+        .zip(free)
+        .filter(|(_, free)| *free)
+        .map(|(size, _)| size)
+        .sum();
     let (mut diagonal, mut across) = (DVec3::ZERO, DVec3::ZERO);
     for ((gradient, size), free) in gradients.iter().zip(sizes).zip(free) {
         if free {

@@ -128,7 +128,10 @@ impl Enclosed {
         self.surface.visit(&mut |node, cavity, triangles| {
             if is_free(node) {
                 let stiffness = f64::from(self.stiffness) / self.cavities[cavity].rest_volume;
-                all[node].add((stiffness * size(triangles) * sums[cavity]) as f32, Viscosity::default());
+                all[node].add(
+                    (stiffness * size(triangles) * sums[cavity]) as f32,
+                    Viscosity::default(),
+                );
             }
         });
         Ok(())

@@ -265,7 +265,11 @@ fn run_stably(
         let (substeps, start, masses_for) = match fewer_substeps(body, request, stable_substep) {
             Some((substeps, masses_for)) => {
                 let needed = as_count(substeps_needed(request, beside_springs));
-                (substeps.max(needed), with_less_stability(start, stable_substep), masses_for)
+                (
+                    substeps.max(needed),
+                    with_less_stability(start, stable_substep),
+                    masses_for,
+                )
             }
             None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
         };

@@ -8,8 +8,8 @@
 //! Elements, terms and cavities have such sums too, but at rest alone: masses are made for those, and how short substeps have to be with these
 //! masses is found as it is with any others.
 
-use crate::body::NodeDamping;
 use super::attempt::RESERVE as RESERVE_AT_REST;
+use crate::body::NodeDamping;
 use crate::error::Result;
 use crate::material::Viscosity;
 use crate::memory;

@@ -163,8 +163,7 @@ impl Stretch<'_> {
             velocities: self.velocities.each_mut().map(|axis| &mut axis[places.clone()]),
             next_positions: after.each_mut().map(|axis| &mut axis[padded.clone()]),
             forces: [&mut [], &mut [], &mut []],
-            remainders: (self.remainders.as_mut())
-                .map(|axes| axes.each_mut().map(|axis| &mut axis[places.clone()])),
+            remainders: (self.remainders.as_mut()).map(|axes| axes.each_mut().map(|axis| &mut axis[places.clone()])),
             pins: &mut self.pins[pins],
         };
         let positions = View::new(before.each_ref().map(|axis| &**axis), start);
@@ -268,20 +267,24 @@ fn run_stretches(
         body.pins.pieces_mut(&first_pins[..count]),
         Items::new(&mut surveys[..count]),
     );
-    team.pass(count, parts, |stretch, (latest, next, velocities, remainders, pins, surveys)| {
-        let mut forces = TileForces::ZERO;
-        let mut stretch_data = Stretch {
-            first: starts[stretch],
-            positions: [latest, next],
-            velocities,
-            remainders,
-            pins,
-            surveys,
-        };
-        order(stretch, &mut |tile, substep| {
-            stretch_data.take(tile, substep, &common, &mut forces)
-        });
-    });
+    team.pass(
+        count,
+        parts,
+        |stretch, (latest, next, velocities, remainders, pins, surveys)| {
+            let mut forces = TileForces::ZERO;
+            let mut stretch_data = Stretch {
+                first: starts[stretch],
+                positions: [latest, next],
+                velocities,
+                remainders,
+                pins,
+                surveys,
+            };
+            order(stretch, &mut |tile, substep| {
+                stretch_data.take(tile, substep, &common, &mut forces)
+            });
+        },
+    );
 }
 
 /// Cut into stretches that begin with these nodes.

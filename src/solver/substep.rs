@@ -204,7 +204,9 @@ pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part
         state.velocities.tiles_mut(),
         state.next_positions.tiles_mut(),
         state.forces.tiles_mut(),
-        remainders.filter(|_| part.drifts).map(|remainders| remainders.tiles_mut()),
+        remainders
+            .filter(|_| part.drifts)
+            .map(|remainders| remainders.tiles_mut()),
         body.pins.tiles_mut(),
         Items::new(&mut body.surveys),
     );
