@@ -25,9 +25,11 @@ pub(super) struct Noise {
     pub error: f64,
     /// The product of the residual and what the preconditioner makes of it.
     pub square: f64,
+    /// What the stored energy is off, which no inertia holds up.
+    pub energy: f64,
 }
 
-saved!(Noise { error, square });
+saved!(Noise { error, square, energy });
 
 /// What of the stiffness of rings stands on the diagonal, as a part of what it were if each tetrahedron kept its volume: about a node in
 /// the middle of even ones, of which some twenty have it in common.
@@ -165,6 +167,7 @@ impl Blocks {
                 let share = stiffness / (stiffness + inertia);
                 noise.error += inertia * share * share;
                 noise.square += stiffness * share;
+                noise.energy += stiffness;
             }
         }
         noise

@@ -113,7 +113,7 @@ impl Substep<'_> {
         let work = self.work(body, &implicit.histories[next].ways);
         let after = elastic.plus(kinetic);
         let allowed = before.total.energy + work + before.credit;
-        let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).square;
+        let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).energy;
         if !(after.energy.is_finite() && after.size.is_finite() && work.is_finite()) {
             return End::NotFinite;
         }

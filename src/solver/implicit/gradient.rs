@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::Implicit;
 use super::coarse::Coarse;
 use crate::body::{Body, Pins, Records, Vectors, WriteRecords};
+use crate::contact::Contacts;
 use crate::snapshot::saved;
 use crate::springs::{Course, Loops, Tangent, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
@@ -68,7 +69,7 @@ impl Implicit {
         };
         self.search(body, 0.0, team);
         while solved.products < goal.budget && square > 0.0 {
-            let curvature = self.multiply(body, positions, tangent, team);
+            let curvature = self.multiply(body, positions, tangent, body.contacts.as_ref(), team);
             solved.products += 1;
             // Rounding may leave nothing to go along; what was found before that stands.
             if !(curvature > 0.0 && curvature.is_finite()) {
@@ -101,8 +102,15 @@ impl Implicit {
         solved
     }
 
-    /// The matrix times the search direction: the product of both.
-    fn multiply(&mut self, body: &Body, positions: &Vectors, tangent: Tangent, team: &Team) -> f64 {
+    /// The matrix, with what these contacts add to it, times the search direction: the product of both.
+    pub(super) fn multiply(
+        &mut self,
+        body: &Body,
+        positions: &Vectors,
+        tangent: Tangent,
+        contacts: Option<&Contacts>,
+        team: &Team,
+    ) -> f64 {
         let node_count = positions.len();
         if let (Some(elements), Some(changes)) = (&body.elements, &mut self.changes)
             && let (Some(positions), Some(searches)) = (&body.records, &self.search_records)
@@ -144,7 +152,7 @@ impl Implicit {
                 changes: &changes,
                 products: &mut products,
             });
-            if let Some(contacts) = &body.contacts {
+            if let Some(contacts) = contacts {
                 let search = |node: usize| searches.get(node);
                 partial.first += contacts.holds.add_products(&nodes, search, &mut products);
             }

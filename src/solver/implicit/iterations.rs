@@ -4,12 +4,12 @@ use glam::Vec3;
 
 use super::Implicit;
 use super::gradient::Goal;
-use super::loops::{Add, Residual, Slope};
+use super::loops::{Add, Refine, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
 use crate::body::{Body, Pin, Vectors};
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::springs::{ChosenKernel, Motion, TILE, TileForces, tile_count, tile_nodes};
+use crate::springs::{ChosenKernel, Motion, TILE, Tangent, TileForces, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// Linearised equations solved in a step at most.
@@ -20,6 +20,9 @@ const OTHER: f64 = 0.3;
 
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
+
+/// Up to so many times what rounding leaves, what it makes of the residual is taken off again: beyond that it does not count.
+const FINE: f64 = 1e4;
 
 impl Substep<'_> {
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
@@ -104,7 +107,7 @@ impl Substep<'_> {
         // What each of n equations lacks of its ways goes into the velocity too, and grows as n² by the step's end.
         let part = self.end - self.start;
         let tolerated = 0.1 * f64::from(self.request.tolerance) * part * part;
-        let absolute = f64::max(tolerated.powi(2) * all_inertia, noise.error);
+        let absolute = tolerated.powi(2) * all_inertia;
         let relative = f64::from(implicit.accuracy).powi(2);
         let whole_budget = self.budget(implicit);
         let mut products = 0;
@@ -130,6 +133,10 @@ impl Substep<'_> {
                 error = solved_error.max(noise.error);
                 is_solved = true;
                 break;
+            }
+            if square <= FINE * noise.square {
+                self.refine(body, implicit);
+                square = implicit.precondition(body, 0.0, self.team).first;
             }
             implicit.spectrum.begin();
             let remaining = square * implicit.spectrum.factor();
@@ -164,9 +171,11 @@ impl Substep<'_> {
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.let_go();
             }
-            // Where the correction itself is no more than what may be left, there is no need to look at what it led to: but what
+            // Where the correction itself is no more than rounding, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
-            if solved.size.max(solved.error) <= absolute && is_held && implicit.stiffened.is_empty() {
+            let is_small = solved.size <= f64::max(absolute, noise.error)
+                && solved.error <= absolute.max(relative * f64::max(size, solved.size));
+            if is_small && is_held && implicit.stiffened.is_empty() {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
                 error = solved.error;
@@ -216,6 +225,29 @@ impl Substep<'_> {
         let error = (error / all_inertia).sqrt() as f32;
         implicit.report.error = implicit.report.error.max(error);
         square.is_finite()
+    }
+
+    /// Has the residual be that of where the nodes are, not of where their positions are rounded to.
+    fn refine(&self, body: &Body, implicit: &mut Implicit) {
+        self.find_lacks(body, implicit);
+        // What is lacking has no speed.
+        let tangent = Tangent {
+            rate: 0.0,
+            ..self.tangent()
+        };
+        implicit.multiply(body, body.state.next_positions(), tangent, None, self.team);
+        let node_count = body.node_count();
+        let (inertia, searches, products) = (&implicit.inertia, &implicit.searches, &implicit.products);
+        let written = implicit.residuals.tiles_mut();
+        self.team.pass(tile_count(node_count), written, |tile, mut residuals| {
+            let nodes = tile_nodes(tile, node_count);
+            body.kernel.run(Refine {
+                inertia: &inertia[nodes.clone()],
+                ways: searches.slices(nodes.clone()),
+                products: products.slices(nodes),
+                residuals: &mut residuals,
+            });
+        });
     }
 
     /// Goes along the correction, as far as the forces do not turn against it, and on where they still pull along it, as they do

@@ -56,6 +56,61 @@ impl Loops for Place<'_, '_> {
     }
 }
 
+/// What these positions lack of where the nodes are with these pushes, m.
+pub(super) struct Lack<'a, 'b> {
+    pub carried: f32,
+    pub time: f32,
+    pub positions: [&'a [f32]; 3],
+    pub velocities: [&'a [f32]; 3],
+    pub ways: [&'a [f32]; 3],
+    pub pushes: [&'a [f32]; 3],
+    pub remainders: [&'a [f32]; 3],
+    pub next: [&'a [f32]; 3],
+    pub lacks: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Lack<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (axis, lacks) in self.lacks.iter_mut().enumerate() {
+            let count = lacks.len();
+            let (positions, velocities) = (&self.positions[axis][..count], &self.velocities[axis][..count]);
+            let (ways, pushes) = (&self.ways[axis][..count], &self.pushes[axis][..count]);
+            let (remainders, next) = (&self.remainders[axis][..count], &self.next[axis][..count]);
+            for place in 0..count {
+                let way = self.carried * ways[place] + self.time * velocities[place] + pushes[place];
+                lacks[place] = (way + remainders[place]) - (next[place] - positions[place]);
+            }
+        }
+    }
+}
+
+/// Adds to residuals what the matrix without inertia makes of ways.
+pub(super) struct Refine<'a, 'b> {
+    pub inertia: &'a [f32],
+    pub ways: [&'a [f32]; 3],
+    pub products: [&'a [f32]; 3],
+    pub residuals: &'b mut [&'a mut [f32]; 3],
+}
+
+impl Loops for Refine<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.inertia.len();
+        for (axis, residuals) in self.residuals.iter_mut().enumerate() {
+            let (ways, products) = (&self.ways[axis][..count], &self.products[axis][..count]);
+            let residuals = &mut residuals[..count];
+            for place in 0..count {
+                residuals[place] += self.inertia[place] * ways[place] - products[place];
+            }
+        }
+    }
+}
+
 /// The velocities with these pushes.
 pub(super) struct Predict<'a, 'b> {
     pub time: f32,

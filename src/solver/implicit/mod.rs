@@ -487,6 +487,7 @@ impl Implicit {
         Noise {
             error: square * self.noise.error,
             square: square * self.noise.square,
+            energy: square * self.noise.energy,
         }
     }
 

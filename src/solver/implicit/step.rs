@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::energy::Before;
-use super::loops::{Add, Finish, Place, Predict, Remain};
+use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Lapse, Records, Vectors, WriteRecords};
 use crate::diagnostics::SolverReport;
@@ -308,6 +308,11 @@ impl Substep<'_> {
         }
     }
 
+    /// c of its formula.
+    pub(super) fn carried(&self) -> f64 {
+        self.formula.carried
+    }
+
     /// The tangent of the springs for this step.
     pub(super) fn tangent(&self) -> Tangent {
         Tangent {
@@ -461,6 +466,42 @@ impl Substep<'_> {
         );
     }
 
+    /// Makes the search direction what the next positions lack of where `pushes` has the nodes.
+    pub(super) fn find_lacks(&self, body: &Body, implicit: &mut Implicit) {
+        let node_count = body.node_count();
+        let (positions, velocities) = body.state.newest();
+        let next = body.state.next_positions();
+        let place = implicit.place(self.is_first);
+        let (history, pushes) = (&implicit.histories[place], &implicit.pushes);
+        let time = self.formula.time as f32;
+        let carried = self.formula.carried as f32;
+        let records = implicit.search_records.as_mut().map(Records::tiles_mut);
+        let written = (implicit.searches.tiles_mut(), records);
+        let kernel = body.kernel;
+        self.team
+            .pass(tile_count(node_count), written, |tile, (mut lacks, records)| {
+                let nodes = tile_nodes(tile, node_count);
+                kernel.run(Lack {
+                    carried,
+                    time,
+                    positions: positions.slices(nodes.clone()),
+                    velocities: velocities.slices(nodes.clone()),
+                    ways: history.ways.slices(nodes.clone()),
+                    pushes: pushes.slices(nodes.clone()),
+                    remainders: history.remainders.slices(nodes.clone()),
+                    next: next.slices(nodes.clone()),
+                    lacks: &mut lacks,
+                });
+                for pin in body.pins.of_tile(tile) {
+                    pin.put(&mut lacks, pin.node as usize - nodes.start, Vec3::ZERO);
+                }
+                if let Some(records) = records {
+                    let axes = lacks.each_ref().map(|axis| &**axis);
+                    kernel.run(WriteRecords { axes, records });
+                }
+            });
+    }
+
     /// How many products this equation may take: its share of what is left, and one at least.
     pub(super) fn budget(&self, implicit: &Implicit) -> u32 {
         (implicit.left / self.equations).max(1)
@@ -512,6 +553,7 @@ impl Substep<'_> {
         implicit.taken = self.formula;
         implicit.latest = self.step as f32;
         let node_count = body.node_count();
+        let turn = self.lost_turn(body, implicit);
         let (kernel, dt, part) = (body.kernel, self.request.dt, (self.end - self.start) as f32);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
@@ -558,6 +600,9 @@ impl Substep<'_> {
                     ways: &mut ways,
                     gains: &mut gains,
                 });
+                if let Some(turn) = &turn {
+                    turn.add(positions.slices(nodes.clone()), &mut velocities, &mut gains);
+                }
                 if let Some(mut remainders) = remainders {
                     if let Some(from) = from {
                         for (to, from) in remainders.iter_mut().zip(from.remainders.slices(nodes.clone())) {
