@@ -65,6 +65,8 @@ pub(crate) struct EnergyAccount {
     comparisons: f64,
     /// Half the mean square of its changes, J².
     variance: f64,
+    /// The mean of `sum f²/m / 8`, J/s², over many comparisons.
+    agitation: f64,
     /// The most kinetic energy of late, J.
     kinetic: f64,
     /// How much was taken off in about the last second, as a part of that.
@@ -81,6 +83,7 @@ saved!(EnergyAccount {
     time,
     comparisons,
     variance,
+    agitation,
     kinetic,
     removed,
     refinement
@@ -95,6 +98,7 @@ impl EnergyAccount {
         time: 0.0,
         comparisons: 0.0,
         variance: 0.0,
+        agitation: 0.0,
         kinetic: 0.0,
         removed: 0.0,
         refinement: 1,
@@ -163,9 +167,11 @@ impl EnergyAccount {
         }
     }
 
-    /// Decides how short substeps are. What is compared depends on them: it is less by `per_square` times the square of the substep.
-    fn refine(&mut self, substep: f64, per_square: f64) {
+    /// Decides how short substeps are. What is compared depends on them: it is less by `agitation` times the square of the substep.
+    fn refine(&mut self, substep: f64, agitation: f64) {
         let refinement = self.refinement;
+        // Substeps change just when much happens: going by what it is then would let in a little each time.
+        self.agitation += (agitation - self.agitation) / self.comparisons.max(1.0).powi(2);
         if self.removed > TOO_MUCH && refinement < FINEST {
             self.refinement *= 2;
             self.removed = 0.5 * TOO_MUCH;
@@ -174,7 +180,7 @@ impl EnergyAccount {
         }
         if let Some(known) = &mut self.known {
             let next = substep * f64::from(refinement) / f64::from(self.refinement);
-            let more = per_square * (substep * substep - next * next);
+            let more = self.agitation * (substep * substep - next * next);
             known.iter_mut().for_each(|energy| *energy += more);
         }
     }
@@ -189,6 +195,7 @@ impl EnergyAccount {
             self.time,
             self.comparisons,
             self.variance,
+            self.agitation,
             self.kinetic,
             self.removed,
         ];
@@ -259,9 +266,9 @@ impl Account<'_> {
         let sums = sums(body, self.request.gravity, team);
         let held = body.held_axes();
         let elastic = elastic(body, team);
-        let per_square = 0.125 * sums.agitation;
+        let agitation = 0.125 * sums.agitation;
         let fall = -sums.moment.dot(self.request.gravity.as_dvec3());
-        let energy = sums.kinetic + elastic + fall - per_square * substep * substep;
+        let energy = sums.kinetic + elastic + fall - agitation * substep * substep;
         // What is common to all of a body that nothing holds is not looked at closely.
         let common = DVec3::select(held, DVec3::ZERO, sums.momentum).length_squared() / (2.0 * sums.free_mass);
         let own = (sums.kinetic - common).max(0.0);
@@ -274,7 +281,7 @@ impl Account<'_> {
                 0.0
             };
             account.remove(removed);
-            account.refine(substep, per_square);
+            account.refine(substep, agitation);
             account.start_over();
         } else {
             account.forget();
