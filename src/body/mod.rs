@@ -78,8 +78,8 @@ use crate::memory;
 use crate::readers::Shown;
 use crate::snapshot::saved;
 use crate::solver::{
-    Carried, Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums, Survey,
-    Watched, close, write_records,
+    Carried, Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums,
+    Survey, Watched, close, write_records,
 };
 use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
 use crate::terms::Terms;

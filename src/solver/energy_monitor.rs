@@ -6,9 +6,8 @@
 //! was and what gravity, forces, pins and tools have put in since. What is too much is taken off the velocities, and while much has
 //! to be taken off, substeps are shorter.
 //!
-//! What is compared is `sum m v- . v+ / 2 + V = E - h²/8 sum f²/m`, with the velocities half a substep before and after the
-//! positions: leapfrog conserves it exactly where forces are linear, so that the motion of a body that behaves is not touched
-//! (Hairer, Lubich, Wanner 2006, section IX.4).
+//! Where motion is nonlinear, energy as it is measured swings to and fro about what leapfrog conserves. So a mean over many comparisons
+//! decides, and what stands out from the usual at once. A body that conserves its energy is not touched.
 
 use glam::{BVec3, DMat3, DVec3, Vec3};
 
@@ -27,9 +26,15 @@ const PERIOD: u32 = 64;
 /// So much more energy than there was is borne, as a part of the most kinetic energy of late.
 const BAND: f64 = 5e-4;
 
-/// The energy is a mean over so many comparisons: where motion is nonlinear it swings to and fro, by a percent where springs are stretched
-/// by a tenth with the longest stable substep. Nothing is taken off before it was compared half as often.
-const SAMPLES: f64 = 8.0;
+/// The energy is a mean over so many comparisons. It swings by a percent where springs are stretched by a tenth with the longest stable
+/// substep.
+const SAMPLES: f64 = 32.0;
+
+/// After so many comparisons it is known what is usual, and nothing is taken off before.
+const LEARNED: f64 = 8.0;
+
+/// What is so many standard deviations more than usual is taken off at once.
+const UNUSUAL: f64 = 8.0;
 
 /// What was lost may come back, as far as it is no more than this part of the kinetic energy.
 const CREDIT: f64 = 0.1;
@@ -40,11 +45,14 @@ const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 /// The kinetic energy of late is that of about so many seconds.
 const MEMORY: f64 = 5.0;
 
-/// Substeps are halved where more than this part of the kinetic energy had to be taken off in about a second.
+/// Substeps are halved where more than this part of the kinetic energy had to be taken off in about [`TRIAL`] seconds.
 const TOO_MUCH: f64 = 5e-3;
 
 /// They are doubled again where it is less than this.
-const LITTLE: f64 = 1e-3;
+const LITTLE: f64 = 5e-4;
+
+/// Seconds; how long substeps are tried.
+const TRIAL: f64 = 10.0;
 
 /// Substeps are at most so many times shorter than stability asks for.
 const FINEST: u32 = 4;
@@ -52,7 +60,7 @@ const FINEST: u32 = 4;
 /// What is known of the energy that a body may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyAccount {
-    /// What the energy was when it was compared last, its mean of late, and what that may be, J; `None`: not known since something changed it.
+    /// The energy when it was compared last, its mean of late, and what that may be, J; `None`: not known since something changed it.
     known: Option<[f64; 3]>,
     /// What was put in since it was compared, J.
     work: f64,
@@ -65,11 +73,9 @@ pub(crate) struct EnergyAccount {
     comparisons: f64,
     /// Half the mean square of its changes, J².
     variance: f64,
-    /// The mean of `sum f²/m / 8`, J/s², over many comparisons.
-    agitation: f64,
     /// The most kinetic energy of late, J.
     kinetic: f64,
-    /// How much was taken off in about the last second, as a part of that.
+    /// How much was taken off of late, as a part of that.
     removed: f64,
     /// How many times shorter substeps are than stability asks for.
     refinement: u32,
@@ -83,7 +89,6 @@ saved!(EnergyAccount {
     time,
     comparisons,
     variance,
-    agitation,
     kinetic,
     removed,
     refinement
@@ -98,7 +103,6 @@ impl EnergyAccount {
         time: 0.0,
         comparisons: 0.0,
         variance: 0.0,
-        agitation: 0.0,
         kinetic: 0.0,
         removed: 0.0,
         refinement: 1,
@@ -125,63 +129,52 @@ impl EnergyAccount {
         self.refinement
     }
 
-    /// Takes in what the energy is, J, of which the motion is that much and may lack `rounding`: by how much it is more than it may be.
-    fn compare(&mut self, energy: f64, kinetic: f64, rounding: f64) -> f64 {
+    /// Takes in what the energy is, J, of which the motion is that much and may lack `rounding`: by how much it is more than it may be,
+    /// in what stands out and in the mean.
+    fn compare(&mut self, energy: f64, kinetic: f64, rounding: f64) -> [f64; 2] {
         self.kinetic = kinetic.max(self.kinetic / (1.0 + self.time / MEMORY));
-        self.removed /= 1.0 + self.time;
+        self.removed /= 1.0 + self.time / TRIAL;
         let Some(known) = self.known else {
             (self.known, self.comparisons) = (Some([energy; 3]), 1.0);
-            return 0.0;
+            return [0.0; 2];
         };
-        let [last, mean, least] = known.map(|energy| energy + self.work);
-        self.comparisons = (self.comparisons + 1.0).min(SAMPLES);
-        let is_learning = self.comparisons <= 0.5 * SAMPLES;
-        let mean = mean + (energy - mean) / self.comparisons;
-        let least = if is_learning {
-            mean
+        let [last, mean, most] = known.map(|energy| energy + self.work);
+        let usual = BAND * self.kinetic + rounding + UNUSUAL * self.variance.sqrt();
+        let is_learned = self.comparisons >= LEARNED;
+        let at_once = if is_learned && energy - most > usual {
+            energy - most
         } else {
-            least.min(mean + CREDIT * self.kinetic)
+            0.0
         };
-        self.known = Some([energy, mean, least]);
-        self.variance += (0.5 * (energy - last).powi(2) - self.variance) / self.comparisons;
-        let allowed = least + BAND * self.kinetic + rounding;
-        // What the mean does not show yet, and is more than usual.
-        let surge = energy - allowed - 2.0 * self.variance.sqrt();
-        if is_learning {
-            return 0.0;
-        }
-        if surge > 0.0 {
-            self.removed += surge / (SAMPLES * self.kinetic);
-        }
-        (mean - allowed).max(0.0)
+        let expected = energy - at_once;
+        self.comparisons = (self.comparisons + 1.0).min(SAMPLES);
+        self.variance += (0.5 * (expected - last).powi(2) - self.variance) / self.comparisons;
+        let mean = mean + (expected - mean) / self.comparisons;
+        let most = if is_learned {
+            most.min(mean + CREDIT * self.kinetic)
+        } else {
+            mean
+        };
+        self.known = Some([energy, mean, most]);
+        [at_once, (mean - (most + BAND * self.kinetic + rounding)).max(0.0)]
     }
 
-    /// So much kinetic energy was taken off, J.
-    fn remove(&mut self, energy: f64) {
+    /// So much kinetic energy was taken off, J, `at_once` of it before it counts in the mean.
+    fn remove(&mut self, removed: f64, at_once: f64) {
         if let Some([last, mean, _]) = &mut self.known {
-            *last -= energy;
-            *mean -= energy;
+            *last -= removed;
+            *mean -= (removed - at_once).max(0.0);
         }
-        if energy > 0.0 {
-            self.removed += energy / self.kinetic;
-        }
+        self.removed += removed / self.kinetic;
     }
 
-    /// Decides how short substeps are. What is compared depends on them: it is less by `agitation` times the square of the substep.
-    fn refine(&mut self, substep: f64, agitation: f64) {
-        let refinement = self.refinement;
-        // Substeps change just when much happens: going by what it is then would let in a little each time.
-        self.agitation += (agitation - self.agitation) / self.comparisons.max(1.0).powi(2);
-        if self.removed > TOO_MUCH && refinement < FINEST {
+    /// Decides how short substeps are.
+    fn refine(&mut self) {
+        if self.removed > TOO_MUCH && self.refinement < FINEST {
             self.refinement *= 2;
             self.removed = 0.5 * TOO_MUCH;
-        } else if self.removed < LITTLE && refinement > 1 {
+        } else if self.removed < LITTLE && self.refinement > 1 {
             self.refinement /= 2;
-        }
-        if let Some(known) = &mut self.known {
-            let next = substep * f64::from(refinement) / f64::from(self.refinement);
-            let more = self.agitation * (substep * substep - next * next);
-            known.iter_mut().for_each(|energy| *energy += more);
         }
     }
 
@@ -195,7 +188,6 @@ impl EnergyAccount {
             self.time,
             self.comparisons,
             self.variance,
-            self.agitation,
             self.kinetic,
             self.removed,
         ];
@@ -207,12 +199,11 @@ impl EnergyAccount {
     }
 }
 
-/// A step that has just been taken, of so many substeps of `substep` seconds.
+/// A step that has just been taken, of so many substeps.
 #[derive(Clone, Copy)]
 pub(super) struct Account<'a> {
     pub request: &'a StepRequest<'a>,
     pub substeps: u32,
-    pub substep: f32,
     /// Whether its velocities are at the time of its positions, and its energy is to be compared.
     pub compares: bool,
 }
@@ -262,26 +253,20 @@ impl Account<'_> {
 
     /// Takes off what there is too much of, and decides how short the next substeps are.
     fn compare(&self, body: &mut Body, account: &mut EnergyAccount, team: &Team) {
-        let substep = f64::from(self.substep);
-        let sums = sums(body, self.request.gravity, team);
+        let sums = sums(body, team);
         let held = body.held_axes();
         let elastic = elastic(body, team);
-        let agitation = 0.125 * sums.agitation;
-        let fall = -sums.moment.dot(self.request.gravity.as_dvec3());
-        let energy = sums.kinetic + elastic + fall - agitation * substep * substep;
+        let energy = sums.kinetic + elastic - sums.moment.dot(self.request.gravity.as_dvec3());
         // What is common to all of a body that nothing holds is not looked at closely.
         let common = DVec3::select(held, DVec3::ZERO, sums.momentum).length_squared() / (2.0 * sums.free_mass);
         let own = (sums.kinetic - common).max(0.0);
         let rounding = ROUNDING[0] * (own + elastic.abs()) + ROUNDING[1] * common;
         if energy.is_finite() && rounding.is_finite() {
-            let gained = account.compare(energy, own, rounding);
-            let removed = if gained > 0.0 {
-                slow_down(body, held, gained)
-            } else {
-                0.0
-            };
-            account.remove(removed);
-            account.refine(substep, agitation);
+            let [at_once, in_mean] = account.compare(energy, own, rounding);
+            if at_once + in_mean > 0.0 {
+                account.remove(slow_down(body, held, at_once + in_mean), at_once);
+            }
+            account.refine();
             account.start_over();
         } else {
             account.forget();
@@ -294,8 +279,6 @@ impl Account<'_> {
 pub(crate) struct Sums {
     /// Of what is free to move, J.
     kinetic: f64,
-    /// The sum of `f²/m` of what is free to move, N²/kg.
-    agitation: f64,
     /// Of what is free to move, kg m/s.
     momentum: DVec3,
     /// The sum of `m x`, kg m.
@@ -307,7 +290,6 @@ pub(crate) struct Sums {
 
 saved!(Sums {
     kinetic,
-    agitation,
     momentum,
     moment,
     mass,
@@ -319,7 +301,6 @@ impl Sums {
     fn plus(self, other: &Self) -> Self {
         Self {
             kinetic: self.kinetic + other.kinetic,
-            agitation: self.agitation + other.agitation,
             momentum: self.momentum + other.momentum,
             moment: self.moment + other.moment,
             mass: self.mass + other.mass,
@@ -329,29 +310,21 @@ impl Sums {
     }
 }
 
-/// Adds up the newest positions, velocities and forces of a body; the moment is that about the origin of the world.
-fn sums(body: &mut Body, gravity: Vec3, team: &Team) -> Sums {
+/// Adds up the newest positions and velocities of a body; the moment is that about the origin of the world.
+fn sums(body: &mut Body, team: &Team) -> Sums {
     let kernel = body.kernel;
     let state = body.state.substep();
-    let (positions, velocities, forces) = (state.positions, &*state.velocities, &*state.forces);
-    let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+    let (positions, velocities) = (state.positions, &*state.velocities);
     let (masses, inverse_masses, pins) = (&body.masses, &body.inverse_masses, &body.pins);
     let count = masses.len();
     team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
         let nodes = tile_nodes(tile, count);
-        let elastic = sums.elastic;
-        *sums = Sums {
-            elastic,
-            ..Sums::default()
-        };
+        *sums = Sums::default();
         for axis in 0..3 {
             kernel.run(OfAxis {
                 axis,
-                gravity: gravity[axis],
                 positions: &positions.axes()[axis][nodes.clone()],
                 velocities: &velocities.axes()[axis][nodes.clone()],
-                forces: &forces.axes()[axis][nodes.clone()],
-                applied: applied.map(|applied| &applied.axes()[axis][nodes.clone()]),
                 masses: &masses[nodes.clone()],
                 inverse_masses: &inverse_masses[nodes.clone()],
                 sums,
@@ -359,15 +332,10 @@ fn sums(body: &mut Body, gravity: Vec3, team: &Team) -> Sums {
         }
         for pin in pins.of_tile(tile).iter().filter(|pin| pin.is_partial()) {
             let node = pin.node as usize;
-            let mut force = forces.get(node) + masses[node] * gravity;
-            if let Some(applied) = applied {
-                force += applied.get(node);
-            }
             let inverse_mass = f64::from(inverse_masses[node]);
             if inverse_mass > 0.0 {
                 let velocity = pin.held(velocities.get(node)).as_dvec3();
                 sums.kinetic -= 0.5 * velocity.length_squared() / inverse_mass;
-                sums.agitation -= pin.held(force).as_dvec3().length_squared() * inverse_mass;
                 sums.momentum -= velocity / inverse_mass;
             }
         }
@@ -383,11 +351,8 @@ fn sums(body: &mut Body, gravity: Vec3, team: &Team) -> Sums {
 /// What the nodes of a tile add to its sums along one axis.
 struct OfAxis<'a> {
     axis: usize,
-    gravity: f32,
     positions: &'a [f32],
     velocities: &'a [f32],
-    forces: &'a [f32],
-    applied: Option<&'a [f32]>,
     masses: &'a [f32],
     inverse_masses: &'a [f32],
     sums: &'a mut Sums,
@@ -401,33 +366,29 @@ impl Loops for OfAxis<'_> {
 
     #[inline(always)]
     fn run(self) {
-        // kinetic, agitation, momentum, moment, mass, free mass
-        let mut lanes = [[0.0_f64; LANES]; 6];
+        // kinetic, momentum, moment, mass, free mass
+        let mut lanes = [[0.0_f64; LANES]; 5];
         let count = self.masses.len();
         for start in (0..count).step_by(LANES) {
             for lane in 0..LANES.min(count - start) {
                 let node = start + lane;
                 let inverse_mass = self.inverse_masses[node];
-                let mass = self.masses[node];
+                let mass = f64::from(self.masses[node]);
                 let free_mass = if inverse_mass > 0.0 {
                     f64::from(1.0 / inverse_mass)
                 } else {
                     0.0
                 };
                 let velocity = f64::from(self.velocities[node]);
-                let applied = self.applied.map_or(0.0, |applied| applied[node]);
-                let force = f64::from(self.forces[node] + applied + mass * self.gravity);
                 lanes[0][lane] += free_mass * velocity * velocity;
-                lanes[1][lane] += force * force * f64::from(inverse_mass);
-                lanes[2][lane] += free_mass * velocity;
-                lanes[3][lane] += f64::from(mass) * f64::from(self.positions[node]);
-                lanes[4][lane] += f64::from(mass);
-                lanes[5][lane] += free_mass;
+                lanes[1][lane] += free_mass * velocity;
+                lanes[2][lane] += mass * f64::from(self.positions[node]);
+                lanes[3][lane] += mass;
+                lanes[4][lane] += free_mass;
             }
         }
-        let [kinetic, agitation, momentum, moment, mass, free_mass] = lanes.map(|lanes| lanes.into_iter().sum::<f64>());
+        let [kinetic, momentum, moment, mass, free_mass] = lanes.map(|lanes| lanes.into_iter().sum::<f64>());
         self.sums.kinetic += 0.5 * kinetic;
-        self.sums.agitation += agitation;
         self.sums.momentum[self.axis] += momentum;
         self.sums.moment[self.axis] += moment;
         if self.axis == 0 {

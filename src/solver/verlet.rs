@@ -191,7 +191,6 @@ impl<'a> Step<'a> {
         let account = Account {
             request,
             substeps,
-            substep,
             compares,
         };
         account.settle(body, &mut carry.energy, team);
