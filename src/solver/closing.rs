@@ -44,7 +44,7 @@ impl ClosingKick {
     }
 
     /// It as a kick of nodes with these masses; the factors of damping were prepared for its substep.
-    fn kick<'a>(&self, fall: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
+    pub(super) fn kick<'a>(&self, fall: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
         Kick {
             duration: 0.5 * self.substep,
             substep: self.substep,

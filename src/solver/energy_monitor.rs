@@ -11,13 +11,14 @@
 
 use glam::{BVec3, DMat3, DVec3, Vec3};
 
-use super::attempt::StepRequest;
-use crate::body::{Body, Vectors};
+use super::attempt::{Carry, StepRequest};
+use super::closing::Closed;
+use crate::body::{Body, Inertia, Vectors};
 use crate::contact::Contacts;
 use crate::diagnostics::StateHasher;
 use crate::snapshot::saved;
 use crate::solver::write_records;
-use crate::springs::{Loops, tile_count, tile_nodes};
+use crate::springs::{Loops, TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// The energy is compared after so many substeps at least: it takes about as long as two of them.
@@ -204,15 +205,16 @@ impl EnergyAccount {
 pub(super) struct Account<'a> {
     pub request: &'a StepRequest<'a>,
     pub substeps: u32,
-    /// Whether its velocities are at the time of its positions, and its energy is to be compared.
+    /// Whether its energy is to be compared.
     pub compares: bool,
 }
 
 impl Account<'_> {
     /// Takes the step into account.
-    pub fn settle(&self, body: &mut Body, account: &mut EnergyAccount, team: &Team) {
-        // What is held by a tool, or sleeps in part, is not alone.
-        if body.is_grasped() || body.sleeps() {
+    pub fn settle(&self, body: &mut Body, carry: &mut Carry, team: &Team) {
+        let account = &mut carry.energy;
+        // What is held by a tool, or sleeps in part, is not alone; fixed substeps are taken as they are.
+        if body.is_grasped() || body.sleeps() || self.request.substeps > 0 {
             account.forget();
             return;
         }
@@ -224,7 +226,7 @@ impl Account<'_> {
         account.time += f64::from(self.request.dt);
         account.work += self.work(body);
         if self.compares {
-            self.compare(body, account, team);
+            self.compare(body, carry, team);
         }
     }
 
@@ -252,8 +254,9 @@ impl Account<'_> {
     }
 
     /// Takes off what there is too much of, and decides how short the next substeps are.
-    fn compare(&self, body: &mut Body, account: &mut EnergyAccount, team: &Team) {
-        let sums = sums(body, team);
+    fn compare(&self, body: &mut Body, carry: &mut Carry, team: &Team) {
+        let sums = sums(body, carry, team);
+        let account = &mut carry.energy;
         let held = body.held_axes();
         let elastic = elastic(body, team);
         let energy = sums.kinetic + elastic - sums.moment.dot(self.request.gravity.as_dvec3());
@@ -311,20 +314,41 @@ impl Sums {
 }
 
 /// Adds up the newest positions and velocities of a body; the moment is that about the origin of the world.
-fn sums(body: &mut Body, team: &Team) -> Sums {
+fn sums(body: &mut Body, carry: &Carry, team: &Team) -> Sums {
     let kernel = body.kernel;
+    let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
     let (positions, velocities) = (state.positions, &*state.velocities);
+    // Velocities that are half a substep older are brought up to the time of the positions to the side, so that comparing changes nothing.
+    let closed = carry.closing.map(|closing| Closed {
+        springs: &*body.springs,
+        elements: None,
+        terms: None,
+        enclosed: None,
+        kernel,
+        kick: closing.kick({ carry.gravity }.next(closing.fall()), inertia, body.damping.as_ref()),
+        positions,
+        velocities,
+    });
     let (masses, inverse_masses, pins) = (&body.masses, &body.inverse_masses, &body.pins);
     let count = masses.len();
     team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
         let nodes = tile_nodes(tile, count);
         *sums = Sums::default();
+        let mut axes = [[0.0_f32; TILE]; 3];
+        let velocities = match &closed {
+            None => velocities.slices(nodes.clone()),
+            Some(closed) => {
+                let mut axes = axes.each_mut().map(|axis| &mut axis[..nodes.len()]);
+                closed.write(tile, nodes.clone(), &mut axes, pins.of_tile(tile));
+                axes.map(|axis| &*axis)
+            }
+        };
         for axis in 0..3 {
             kernel.run(OfAxis {
                 axis,
                 positions: &positions.axes()[axis][nodes.clone()],
-                velocities: &velocities.axes()[axis][nodes.clone()],
+                velocities: velocities[axis],
                 masses: &masses[nodes.clone()],
                 inverse_masses: &inverse_masses[nodes.clone()],
                 sums,
@@ -334,7 +358,8 @@ fn sums(body: &mut Body, team: &Team) -> Sums {
             let node = pin.node as usize;
             let inverse_mass = f64::from(inverse_masses[node]);
             if inverse_mass > 0.0 {
-                let velocity = pin.held(velocities.get(node)).as_dvec3();
+                let velocity = Vec3::from(velocities.map(|axis| axis[node - nodes.start]));
+                let velocity = pin.held(velocity).as_dvec3();
                 sums.kinetic -= 0.5 * velocity.length_squared() / inverse_mass;
                 sums.momentum -= velocity / inverse_mass;
             }

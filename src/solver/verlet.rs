@@ -119,8 +119,9 @@ impl<'a> Step<'a> {
         let mut carry = start;
         let mut finite = true;
         begin(body, request);
-        let compares = carry.energy.is_due(substeps);
-        let may_stay_open = may_stay_open(body) && !compares && !body.pins.are_led();
+        // Fixed substeps are taken as they are.
+        let compares = request.substeps == 0 && carry.energy.is_due(substeps);
+        let may_stay_open = may_stay_open(body) && !body.pins.are_led();
         let mut part = self.opening(body, &mut carry);
         if let Some(damping) = &mut body.damping {
             damping.prepare(substep);
@@ -193,7 +194,7 @@ impl<'a> Step<'a> {
             substeps,
             compares,
         };
-        account.settle(body, &mut carry.energy, team);
+        account.settle(body, &mut carry, team);
         Ok(Some(Taken { carry, finite }))
     }
 

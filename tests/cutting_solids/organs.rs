@@ -184,6 +184,8 @@ fn organs_in_motion_keep_mass_momentum_and_volume() {
                     tetrahedra: &cells,
                     stiffnesses: Values::Uniform(if has_elements { 0.0 } else { 5.0 }),
                     material: has_elements.then_some(elements),
+                    // What is added is found anew after a cut, and its motion counts.
+                    mass_scaling: 0.0,
                     spare_nodes: 60_000,
                     solver,
                     storage: Storage::Packed,

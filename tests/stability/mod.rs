@@ -112,7 +112,7 @@ const STRETCH: &str = "error of the stretch";
 const SAG: &str = "error of the sag";
 const SHAPE: &str = "error of the rest shape over the size";
 
-pub const KNOWN: [Known; 13] = [
+pub const KNOWN: [Known; 12] = [
     // 1.65e-3 of the stretch.
     known(LOST, "masses 1 : 1e6", &[(STRETCH, 3.0)], |setup| {
         is_full(setup) && is_verlet_at(setup, 1e-5)
@@ -168,17 +168,6 @@ pub const KNOWN: [Known; 13] = [
         fails: &[
             ("momentum lost over that of the parts", 4.0),
             ("angular momentum lost over that of the parts", 5e6),
-        ],
-        hangs_on_bits: false,
-    },
-    Known {
-        case: "springs removed in motion",
-        applies: |setup| setup.solver != Solver::Verlet && setup.step > 5e-4,
-        figure: "implicit formulas keep momentum, and lose angular momentum",
-        // Of the second all at most; a millionth is what rounding may take.
-        fails: &[
-            ("momentum lost over that of the parts", 4.0),
-            ("angular momentum lost over that of the parts", 1e6),
         ],
         hangs_on_bits: false,
     },
