@@ -11,7 +11,7 @@ use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::filter::{BodyContact, CollisionFilter};
 use super::holds::Holds;
-use super::impulses::{SWEEPS, way_out};
+use super::impulses::{PUSHED_OUT, SWEEPS};
 use super::meet::{meet_mesh, meet_plane, meet_rounded};
 use super::path::{Motion, Solid, ToolPath};
 use super::press::{Presses, solve_alone};
@@ -588,8 +588,7 @@ impl Contacts {
         if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
-                    let way = way_out(constraint.depth, slice.duration);
-                    constraint.push_out(meeting.next_positions, way);
+                    constraint.push_out(meeting.next_positions, PUSHED_OUT * constraint.depth);
                 }
             }
             // What an equation that was not solved to the end has let in.

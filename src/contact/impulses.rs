@@ -6,17 +6,8 @@ pub(super) const SWEEPS: u32 = 128;
 /// What a sweep changes is nothing, as a part of what the first one did.
 const CONVERGED: f32 = 1e-5;
 
-/// The part of how deep something began inside that it is moved out by in a substep, at most.
-const PUSHED_OUT: f32 = 0.2;
-
-/// How fast it is moved out at most, m/s. Without a bound shorter substeps would deform tissue faster, and viscous tissue would need ever shorter
-/// ones.
-const OUTWARD_SPEED: f32 = 0.25;
-
-/// How far something is moved out within so many seconds that began so deep inside.
-pub(super) fn way_out(depth: f32, duration: f32) -> f32 {
-    (PUSHED_OUT * depth).min(OUTWARD_SPEED * duration).max(0.0)
-}
+/// The part of how deep something began inside that it is moved out by in a substep.
+pub(super) const PUSHED_OUT: f32 = 0.2;
 
 /// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
 /// need more, and cannot be had: where nothing gives way, the tool goes in.

@@ -3,7 +3,7 @@
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyContact, BodyDefinition, Material, Model, Pose, Shape, ToolId, Values, Viscosity, World};
+use sinew::{BodyDefinition, Pose, Shape, ToolId, Values, World};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
@@ -49,57 +49,6 @@ fn a_tool_made_inside_pushes_the_body_out_of_it() {
                 .map(|position| radius - position.distance(place))
                 .fold(f32::NEG_INFINITY, f32::max);
             assert!(deepest < 0.001, "radius {radius} at {place}, dt {dt}: {deepest} m deep");
-        }
-    }
-}
-
-#[test]
-fn viscous_tissue_made_within_a_planes_reach_is_moved_out() {
-    const THICKNESS: f32 = 0.03;
-    const MASS: f32 = 6.4;
-    for retardation_time in [0.0, 0.01] {
-        for dt in [0.005, 1.0 / 60.0] {
-            let mut world = World::new(sinew::WorldDefinition {
-                gravity: DOWN,
-                max_substeps: 5000,
-                ..Default::default()
-            })
-            .expect("a world");
-            tool(&mut world, Shape::Plane, 0.5, Vec3::ZERO, Quat::IDENTITY);
-            let mesh = moved(Mesh::block([1.0; 3], [3; 3]).expect("a block"), 0.5 * Vec3::Y);
-            let cube = world
-                .create_body(&BodyDefinition {
-                    positions: &mesh.positions,
-                    tetrahedra: &mesh.tetrahedra,
-                    masses: Values::Uniform(MASS / mesh.positions.len() as f32),
-                    material: Some(Material {
-                        model: Model::Tetrahedra,
-                        young_modulus: 1e4,
-                        poisson_ratio: 0.4,
-                        ..Default::default()
-                    }),
-                    viscosity: Viscosity {
-                        retardation_time,
-                        ..Default::default()
-                    },
-                    contact: BodyContact {
-                        thickness: THICKNESS,
-                        ..Default::default()
-                    },
-                    ..Default::default()
-                })
-                .expect("a body");
-            let case = format!("retardation time {retardation_time} s, dt {dt} s");
-            // The work by which it is lifted is all that there is to be had.
-            let lift = f64::from(MASS * -DOWN.y * THICKNESS);
-            for _ in 0..(1.0 / dt) as u32 {
-                world.step(dt).unwrap_or_else(|error| panic!("{case}: {error}"));
-                let energy = kinetic(&world, cube);
-                assert!(energy < lift, "{case}: {energy} J");
-            }
-            let positions = body(&world, cube).positions();
-            let lowest = positions.iter().map(|place| place.y).fold(f32::INFINITY, f32::min);
-            assert!(lowest > 0.999 * THICKNESS, "{case}: {lowest} m");
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::{BVec3, Vec3};
 
 use super::skin::Skin;
 use crate::body::Body;
-use crate::contact::impulses::{LEVERAGE, way_out};
+use crate::contact::impulses::LEVERAGE;
 use crate::contact::supports::MOST;
 use crate::snapshot::saved;
 
@@ -163,9 +163,9 @@ impl Link {
         }
     }
 
-    /// The ways, m, by which nodes of the sides that began too close come apart within so many seconds.
-    pub fn parting(&self, duration: f32) -> impl Iterator<Item = (usize, usize, Vec3)> + '_ {
-        let push = self.normal * (way_out(self.depth, duration) * self.mass);
+    /// The ways, m, by which nodes of the sides come apart by `part` of how much too close they began.
+    pub fn parting(&self, part: f32) -> impl Iterator<Item = (usize, usize, Vec3)> + '_ {
+        let push = self.normal * (self.depth.max(0.0) * part * self.mass);
         (0..2).flat_map(move |side| {
             let sign = [1.0, -1.0][side];
             let (body, movers) = (self.sides[side].body, self.movers[side]);

@@ -26,7 +26,7 @@ pub(crate) use self::skin::Skin;
 use glam::Vec3;
 
 use crate::body::{Body, Bounds};
-use crate::contact::impulses::{SWEEPS, Sweep, relax};
+use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
 use crate::error::Result;
 use crate::memory;
 use crate::slots::Slots;
@@ -288,7 +288,7 @@ impl Tissue {
         }
         self.bonds.give(bodies, &self.skins, moment);
         if moment.drifts {
-            self.part(bodies, moment.duration, Body::part_substep);
+            self.part(bodies, Body::part_substep);
             self.bonds.part(bodies, moment.duration);
         }
     }
@@ -360,9 +360,9 @@ impl Tissue {
     }
 
     /// Moves what began too close apart.
-    fn part(&self, bodies: &mut Slots<Body>, duration: f32, part: impl Fn(&mut Body, usize, Vec3)) {
+    fn part(&self, bodies: &mut Slots<Body>, part: impl Fn(&mut Body, usize, Vec3)) {
         for link in self.links.iter().filter(|link| link.depth > 0.0) {
-            for (place, node, way) in link.parting(duration) {
+            for (place, node, way) in link.parting(PUSHED_OUT) {
                 if let Some(body) = bodies.at_mut(place) {
                     part(body, node, way);
                 }
