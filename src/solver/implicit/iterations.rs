@@ -22,7 +22,7 @@ const OTHER: f64 = 0.3;
 const NEARLY: f64 = 100.0;
 
 /// Up to so many times what rounding leaves, what it makes of the residual is taken off again: beyond that it does not count.
-const FINE: f64 = 100.0;
+const FINE: f64 = 1e4;
 
 impl Substep<'_> {
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
