@@ -38,6 +38,9 @@ const LEARNED: f64 = 8.0;
 /// What is so many standard deviations more than usual is taken off at once.
 const UNUSUAL: f64 = 8.0;
 
+/// A body that is slower than this in the mean is at rest but for rounding, and nothing is taken off, m/s.
+const STILL: f64 = 1e-4;
+
 /// What was lost may come back, as far as it is no more than this part of the kinetic energy.
 const CREDIT: f64 = 0.1;
 
@@ -267,7 +270,7 @@ impl Account<'_> {
         let rounding = ROUNDING[0] * (own + elastic.abs()) + ROUNDING[1] * common;
         if energy.is_finite() && rounding.is_finite() {
             let [at_once, in_mean] = account.compare(energy, own, rounding);
-            if at_once + in_mean > 0.0 {
+            if at_once + in_mean > 0.0 && own > 0.5 * sums.free_mass * STILL * STILL {
                 account.remove(slow_down(body, held, at_once + in_mean), at_once);
             }
             account.refine();
