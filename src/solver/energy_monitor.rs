@@ -348,11 +348,11 @@ fn sums(body: &mut Body, carry: &Carry, team: &Team) -> Sums {
                 axes.map(|axis| &*axis)
             }
         };
-        for axis in 0..3 {
+        for (axis, &velocities) in velocities.iter().enumerate() {
             kernel.run(OfAxis {
                 axis,
                 positions: &positions.axes()[axis][nodes.clone()],
-                velocities: velocities[axis],
+                velocities,
                 masses: &masses[nodes.clone()],
                 inverse_masses: &inverse_masses[nodes.clone()],
                 sums,
@@ -396,11 +396,10 @@ impl Loops for OfAxis<'_> {
     #[inline(always)]
     fn run(self) {
         // kinetic, momentum, moment, mass, free mass
-        let mut lanes = [[0.0_f64; LANES]; 5];
+        let mut lanes = [[0.0_f64; 5]; LANES];
         let count = self.masses.len();
         for start in (0..count).step_by(LANES) {
-            for lane in 0..LANES.min(count - start) {
-                let node = start + lane;
+            for (lane, node) in lanes.iter_mut().zip(start..count) {
                 let inverse_mass = self.inverse_masses[node];
                 let mass = f64::from(self.masses[node]);
                 let free_mass = if inverse_mass > 0.0 {
@@ -409,14 +408,15 @@ impl Loops for OfAxis<'_> {
                     0.0
                 };
                 let velocity = f64::from(self.velocities[node]);
-                lanes[0][lane] += free_mass * velocity * velocity;
-                lanes[1][lane] += free_mass * velocity;
-                lanes[2][lane] += mass * f64::from(self.positions[node]);
-                lanes[3][lane] += mass;
-                lanes[4][lane] += free_mass;
+                lane[0] += free_mass * velocity * velocity;
+                lane[1] += free_mass * velocity;
+                lane[2] += mass * f64::from(self.positions[node]);
+                lane[3] += mass;
+                lane[4] += free_mass;
             }
         }
-        let [kinetic, momentum, moment, mass, free_mass] = lanes.map(|lanes| lanes.into_iter().sum::<f64>());
+        let [kinetic, momentum, moment, mass, free_mass] =
+            [0, 1, 2, 3, 4].map(|sum| lanes.iter().map(|lane| lane[sum]).sum::<f64>());
         self.sums.kinetic += 0.5 * kinetic;
         self.sums.momentum[self.axis] += momentum;
         self.sums.moment[self.axis] += moment;
