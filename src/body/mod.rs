@@ -575,7 +575,7 @@ impl Body {
             Some(contacts) => contacts.reserve(tools)?,
             None => {
                 let surface = self.order.own_triangles(&self.surface)?;
-                self.contacts = Some(Contacts::new(self.node_count(), &surface, &self.contact, tools)?);
+                self.contacts = Some(Contacts::new(self.state.positions(), &surface, &self.contact, tools)?);
             }
         }
         if self.cuttable.is_some() {

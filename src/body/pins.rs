@@ -144,6 +144,11 @@ impl Pins {
         Ragged::new(&mut self.pins, starts)
     }
 
+    /// Whether some are held along some axes alone.
+    pub fn have_partial(&self) -> bool {
+        self.partial_count > 0
+    }
+
     pub fn get(&self, node: u32) -> Option<&Pin> {
         self.find(node).ok().map(|index| &self.pins[index])
     }

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::features::{Feature, Features};
 use super::filter::CollisionFilter;
+use super::mesh_solid::MeshSolid;
 use super::path::{Placement, Solid, ToolPath};
 use super::room::{Room, sides_of};
 use super::sweep::Corners;
@@ -15,12 +16,18 @@ use crate::snapshot::{saved, saved_enum};
 /// A list that is good for so many substeps more is kept.
 const WORTH_KEEPING: f32 = 4.0;
 
+/// How much deeper than its corners an edge or face may reach into a tool, as a part of the tool's radius or of half a mesh's least extent: where it
+/// cannot, its corners alone meet the tool.
+const SAG: f32 = 0.04;
+
 /// Features that can meet a tool before anything moves further than the slack that they were gathered with.
 ///
 /// Being in the list has no other consequence than being looked at, so that results do not depend on when it is made.
 #[derive(Debug)]
 pub(super) struct Candidates {
-    near: Vec<u32>,
+    pub near: Vec<u32>,
+    /// Which of the zones each of them may come to, a bit for each; the last bit stands for the rest too.
+    pub masks: Vec<u32>,
     /// The room that the list covers, one for each tool that the body meets.
     zones: Vec<Zone>,
     /// How far nodes may still move, m.
@@ -32,6 +39,10 @@ pub(super) struct Candidates {
     firsts: Vectors,
     /// The corners of what is near, each once; none where only planes are.
     corners: Vec<Corner>,
+    /// Of each node, while the list is made, the closest point of the meshes that it may meet.
+    surface: Vec<NearestPlane>,
+    /// The same for the nodes of the list, as it was found last.
+    pub planes: Vec<NearestPlane>,
     /// No edge of what is near can be longer while the list is good, m.
     longest: f32,
     /// Of each node, while the list is made, on which sides of all that the zones reach it is, a bit for each; then, of those that are
@@ -41,6 +52,7 @@ pub(super) struct Candidates {
 
 saved!(Candidates {
     near,
+    masks,
     zones,
     slack,
     reach,
@@ -48,8 +60,39 @@ saved!(Candidates {
     firsts,
     corners,
     longest,
+    surface,
+    planes,
     marks
 });
+
+/// The plane through the point of a mesh that is closest to a node, across the way to it, in the mesh's own frame: as the mesh is seen from
+/// near by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NearestPlane {
+    /// The tool's place in the world; [`NearestPlane::NONE`]: nothing is known.
+    pub slot: u32,
+    /// Where the node was.
+    pub point: Vec3,
+    /// How far the mesh is, m, below 0 inside; where there is no normal, at least so far.
+    pub distance: f32,
+    pub normal: Vec3,
+}
+
+saved!(NearestPlane {
+    slot,
+    point,
+    distance,
+    normal
+});
+
+impl NearestPlane {
+    pub const NONE: Self = Self {
+        slot: u32::MAX,
+        point: Vec3::ZERO,
+        distance: f32::INFINITY,
+        normal: Vec3::ZERO,
+    };
+}
 
 /// A corner of what is near, over a slice.
 #[derive(Clone, Copy, Debug)]
@@ -91,12 +134,15 @@ impl Candidates {
     pub fn new(features: &Features) -> Result<Self> {
         Ok(Self {
             near: memory::reserved(features.count())?,
+            masks: memory::reserved(features.count())?,
             zones: Vec::new(),
             slack: -1.0,
             reach: 0.0,
             whole_slack: -1.0,
             firsts: Vectors::zeros(features.node_count as usize)?,
             longest: 0.0,
+            surface: memory::filled(NearestPlane::NONE, features.node_count as usize)?,
+            planes: memory::reserved(features.node_count as usize)?,
             corners: memory::reserved(features.node_count as usize)?,
             marks: memory::filled(0, features.node_count as usize)?,
         })
@@ -104,8 +150,11 @@ impl Candidates {
 
     /// Makes room for so many features, of so many nodes.
     pub fn reserve_features(&mut self, count: usize, nodes: usize) -> Result<()> {
-        self.near.try_reserve(count.saturating_sub(self.near.len()))?;
+        memory::reserve(&mut self.near, count)?;
+        memory::reserve(&mut self.masks, count)?;
         self.corners.try_reserve(nodes.saturating_sub(self.corners.len()))?;
+        memory::reserve(&mut self.surface, nodes)?;
+        memory::reserve(&mut self.planes, nodes)?;
         Ok(self.marks.try_reserve(nodes.saturating_sub(self.marks.len()))?)
     }
 
@@ -162,6 +211,7 @@ impl Candidates {
         [margin, slack]: [f32; 2],
     ) {
         self.near.clear();
+        self.masks.clear();
         self.corners.clear();
         self.zones.clear();
         self.slack = slack;
@@ -204,6 +254,25 @@ impl Candidates {
             features.node_count as usize
         };
         let is_told = self.find_sides((positions, bindings), reach);
+        let meshes = || {
+            let zones = self.zones.iter().zip(tools.clone());
+            zones.filter_map(|(zone, tool)| Some((zone, tool.mesh()?)))
+        };
+        let has_meshes = meshes().next().is_some() && self.surface.len() == features.node_count as usize;
+        if has_meshes {
+            let edges = (features.node_count..count as u32).filter_map(|index| features.get(index));
+            let edges = edges.map(|edge| longest_edge(&corners_of(edge, (positions, bindings))[..edge.nodes().len()]));
+            // Where one corner is near, the others are known too.
+            let within = reach + 2.0 * edges.fold(0.0, f32::max);
+            let mut surface = std::mem::take(&mut self.surface);
+            measure_nodes(&mut surface, (positions, bindings), meshes(), within);
+            self.surface = surface;
+        }
+        let meshes = || {
+            let zones = self.zones.iter().zip(tools.clone());
+            zones.filter_map(|(zone, tool)| Some((zone, tool.mesh()?)))
+        };
+        self.planes.clear();
         for index in 0..count as u32 {
             let Some(feature) = features.get(index) else {
                 continue;
@@ -221,10 +290,28 @@ impl Candidates {
             let meets = |(zone, tool): (&Zone, &ToolPath)| {
                 (corners.len() == 1 || zone.is_bounded())
                     && zone.meets(&bounds, reach)
-                    && zone.reaches(tool, corners, reach)
+                    && tool
+                        .radius()
+                        .is_none_or(|radius| sags(corners.len(), features.length(index), radius))
+                    && (tool.mesh().is_none() || !has_meshes)
             };
-            if self.zones.iter().zip(tools.clone()).any(meets) {
+            let of_meshes = has_meshes
+                && meets_mesh(
+                    &self.surface,
+                    (feature, features.length(index)),
+                    corners,
+                    meshes(),
+                    reach,
+                );
+            let mask = self.zones.iter().zip(tools.clone()).enumerate();
+            let mask = mask.filter(|&(_, (zone, tool))| of_meshes && tool.mesh().is_some() || meets((zone, tool)));
+            let mask = mask.fold(0, |mask, (place, _)| mask | zone_bit(place));
+            if mask != 0 {
                 self.near.push(index);
+                self.masks.push(mask);
+                if corners.len() == 1 {
+                    self.planes.push(self.surface[index as usize]);
+                }
             }
         }
         self.list_corners(features, (positions, bindings));
@@ -329,6 +416,8 @@ impl Candidates {
     ) {
         self.whole_slack = -1.0;
         self.marks.resize(features.node_count as usize, 0);
+        self.surface.resize(features.node_count as usize, NearestPlane::NONE);
+        self.planes.clear();
         if self.slack < 0.0 {
             return;
         }
@@ -356,6 +445,10 @@ impl Candidates {
             self.zones.iter().any(meets) && self.near.binary_search(&index).is_err()
         });
         memory::merge(&mut self.near, fresh, |&index| index);
+        let nodes = self.near.partition_point(|&index| index < features.node_count);
+        self.planes.resize(nodes, NearestPlane::NONE);
+        self.masks.clear();
+        self.masks.resize(self.near.len(), !0);
         self.list_corners(features, (positions, Some(bindings)));
     }
 }
@@ -379,6 +472,120 @@ fn corners_of(feature: Feature, (positions, bindings): (&Vectors, Option<&Bindin
         };
     }
     corners
+}
+
+/// The bit of a zone in a mask.
+pub(super) fn zone_bit(place: usize) -> u32 {
+    1 << place.min(31)
+}
+
+/// The length of the longest edge between these corners, m.
+fn longest_edge(corners: &[Vec3]) -> f32 {
+    let from = |start: usize| {
+        corners[start + 1..]
+            .iter()
+            .map(move |end| end.distance_squared(corners[start]))
+    };
+    (0..corners.len()).flat_map(from).fold(0.0, f32::max).sqrt()
+}
+
+/// Whether a feature of so many corners and this longest edge may reach noticeably deeper into a round tool of this radius than its corners do. A chord
+/// within a circle of radius r about its corners lies at most r² / 2R below the arc of a tool of radius R.
+fn sags(corners: usize, length: f32, radius: f32) -> bool {
+    let within = match corners {
+        1 => return true,
+        2 => length * length / 4.0,
+        _ => length * length / 3.0,
+    };
+    within > 2.0 * radius * (SAG * radius)
+}
+
+/// Finds the point of the meshes that is closest to each node, where that is no further than `within` and what the mesh may move.
+fn measure_nodes<'a>(
+    surface: &mut [NearestPlane],
+    (positions, bindings): (&Vectors, Option<&Bindings>),
+    meshes: impl Iterator<Item = (&'a Zone, &'a MeshSolid)> + Clone,
+    within: f32,
+) {
+    for (node, nearest) in surface.iter_mut().enumerate() {
+        *nearest = NearestPlane::NONE;
+        let place = match bindings {
+            None => positions.get(node),
+            Some(bindings) => bindings.vector(positions, node),
+        };
+        for (zone, solid) in meshes.clone() {
+            let &Zone::Mesh {
+                slot,
+                bounds,
+                standing,
+                allowance,
+            } = zone
+            else {
+                continue;
+            };
+            if sides_of(&bounds.extended(within), place) != 0 {
+                continue;
+            }
+            let point = standing.own(place);
+            let reach = (within + allowance).min(nearest.distance);
+            if let Some(closest) = solid.closest(&[point], reach, false) {
+                *nearest = NearestPlane {
+                    slot: slot as u32,
+                    point,
+                    distance: closest.distance,
+                    normal: closest.normal,
+                };
+            }
+        }
+    }
+}
+
+/// Whether a feature with these corners may come to one of the meshes when it moves by `reach`, and is a node or may reach noticeably deeper
+/// into it than its corners do: where the surface turns from one to another, or has a ridge between them.
+fn meets_mesh<'a>(
+    surface: &[NearestPlane],
+    (feature, first_length): (Feature, f32),
+    corners: &[Vec3],
+    meshes: impl Iterator<Item = (&'a Zone, &'a MeshSolid)> + Clone,
+    reach: f32,
+) -> bool {
+    let allowances = meshes.clone().map(|(zone, _)| match zone {
+        Zone::Mesh { allowance, .. } => *allowance,
+        _ => 0.0,
+    });
+    let reach = reach + allowances.fold(0.0, f32::max);
+    let nearest = || feature.nodes().iter().map(|&node| &surface[node as usize]);
+    let length = longest_edge(corners);
+    // No part of a feature is further from its corners than they are from each other.
+    let distance = nearest().map(|nearest| nearest.distance).fold(f32::INFINITY, f32::min);
+    if !(distance <= reach + length) {
+        return false;
+    }
+    if corners.len() == 1 {
+        return true;
+    }
+    let depth = SAG
+        * meshes
+            .clone()
+            .map(|(_, solid)| solid.thickness())
+            .fold(f32::INFINITY, f32::min);
+    let first = &surface[feature.nodes()[0] as usize];
+    let is_one = nearest().all(|nearest| nearest.slot == first.slot && nearest.normal != Vec3::ZERO);
+    let cosine = nearest()
+        .map(|nearest| nearest.normal.dot(first.normal))
+        .fold(1.0, f32::min);
+    // A chord across which the surface turns evenly by an angle lies an eighth of its length times that below.
+    let turn = (2.0 * (1.0 - cosine)).max(0.0).sqrt();
+    if !is_one || !(first_length * turn <= 8.0 * depth) {
+        return true;
+    }
+    meshes.into_iter().any(|(zone, solid)| match zone {
+        Zone::Mesh { standing, .. } => {
+            let own = Bounds::of(corners.iter().map(|&corner| standing.own(corner)));
+            solid.has_ridge(&own, reach.min(0.5 * length), first_length, depth)
+        }
+        _ => true,
+    })
 }
 
 /// Those of the tools that a body with this filter meets: the others are as if they were not there.
@@ -450,31 +657,6 @@ impl Zone {
             ) => slot == other && point == there && normal == turned,
             _ => false,
         }
-    }
-
-    /// Whether a feature with these corners may come to the tool itself when it moves by `reach`.
-    fn reaches(&self, tool: &ToolPath, places: &[Vec3], reach: f32) -> bool {
-        let (
-            Zone::Mesh {
-                standing, allowance, ..
-            },
-            Some(solid),
-        ) = (self, tool.mesh())
-        else {
-            return true;
-        };
-        let mut corners = [Vec3::ZERO; 3];
-        for (corner, &place) in corners.iter_mut().zip(places) {
-            *corner = standing.own(place);
-        }
-        // No part of a feature is further from its corners than they are from each other.
-        let corners = &corners[..places.len()];
-        let spread = corners
-            .iter()
-            .fold(0.0_f32, |spread, corner| spread.max(corner.distance(corners[0])));
-        solid
-            .closest(&corners[..1], reach + allowance + spread, false)
-            .is_some()
     }
 
     /// Whether something within `bounds` may come into the zone when it moves by `reach`.

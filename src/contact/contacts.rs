@@ -6,15 +6,17 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
-use super::candidates::{Candidates, met};
+use super::candidates::{Candidates, met, zone_bit};
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::filter::{BodyContact, CollisionFilter};
 use super::holds::Holds;
 use super::impulses::{PUSHED_OUT, SWEEPS};
-use super::meet::{meet_mesh, meet_plane, meet_rounded};
+use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded};
+use super::node_contacts::{NodeContact, NodeContacts, NodeLook};
 use super::path::{Motion, Solid, ToolPath};
 use super::press::{Presses, solve_alone};
+use super::press_nodes::{PressNodes, PressingSolid};
 use super::report::Touch;
 use super::supports::{MOST, Supports};
 use super::sweep::Corners;
@@ -22,6 +24,7 @@ use crate::body::{Bindings, Bounds, Mobility, Pins, Vectors};
 use crate::error::Result;
 use crate::memory;
 use crate::snapshot::saved;
+use crate::springs::ChosenKernel;
 
 /// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
 const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;
@@ -60,6 +63,9 @@ pub(crate) struct Contacts {
     pub(super) features: Features,
     pub(super) candidates: Candidates,
     constraints: Vec<Constraint>,
+    nodes: NodeContacts,
+    /// Nodes that may touch a round tool within a slice.
+    undecided: Vec<u32>,
     presses: Presses,
     /// How many of them are solved together.
     together: usize,
@@ -73,6 +79,8 @@ pub(crate) struct Contacts {
     touches: Vec<Touch>,
     /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
     pub(super) touched: Vec<[bool; 2]>,
+    /// In how many slices the last substep was.
+    slices: u32,
     /// The box of all velocities that contacts gave in this substep.
     given: Bounds,
     /// Whether the step that was begun last became current.
@@ -89,6 +97,8 @@ saved!(Contacts {
     features,
     candidates,
     constraints,
+    nodes,
+    undecided,
     presses,
     together,
     holds,
@@ -96,6 +106,7 @@ saved!(Contacts {
     pressed_for,
     touches,
     touched,
+    slices,
     given,
     committed,
     held,
@@ -104,6 +115,7 @@ saved!(Contacts {
 
 /// One substep of a body near tools.
 pub(crate) struct Meeting<'a> {
+    pub kernel: ChosenKernel,
     pub tools: &'a [ToolPath],
     /// Where the body's coordinates begin.
     pub origin: DVec3,
@@ -146,14 +158,16 @@ pub(super) struct Slice {
 }
 
 impl Contacts {
-    /// For a body with this surface, of which this is asked, in a world with `tools` tools.
-    pub fn new(node_count: usize, surface: &[[u32; 3]], contact: &BodyContact, tools: usize) -> Result<Self> {
-        let features = Features::new(node_count, surface)?;
+    /// For a body with nodes in these places and this surface, of which this is asked, in a world with `tools` tools.
+    pub fn new(positions: &Vectors, surface: &[[u32; 3]], contact: &BodyContact, tools: usize) -> Result<Self> {
+        let features = Features::new(positions.len(), surface, |node| positions.get(node))?;
         let mut contacts = Self {
             thickness: contact.thickness,
             filter: contact.filter,
             candidates: Candidates::new(&features)?,
             constraints: Vec::new(),
+            nodes: NodeContacts::default(),
+            undecided: Vec::new(),
             presses: Presses::default(),
             together: 0,
             holds: Holds::default(),
@@ -162,6 +176,7 @@ impl Contacts {
             pressed_for: 0.0,
             touches: Vec::new(),
             touched: Vec::new(),
+            slices: 1,
             given: Bounds::EMPTY,
             committed: true,
             held: Vec::new(),
@@ -187,6 +202,8 @@ impl Contacts {
         self.constraints
             .try_reserve(together.saturating_sub(self.constraints.len()))?;
         self.presses.reserve(together)?;
+        self.nodes.reserve(together)?;
+        memory::reserve(&mut self.undecided, self.features.node_count as usize)?;
         self.touches.try_reserve(together.saturating_sub(self.touches.len()))?;
         self.together = together;
         Ok(())
@@ -223,18 +240,29 @@ impl Contacts {
             if let Some(pair) = self.touched.get_mut(tool.slot) {
                 pair[0] = load.impulse != DVec3::ZERO;
             }
-            let pressing = self.constraints.iter();
-            let pressing = pressing.filter(|constraint| constraint.tool == place && constraint.given() != Vec3::ZERO);
-            for constraint in pressing.take(self.touches.capacity() - self.touches.len()) {
+            let force = |given: Vec3| (-given / self.pressed_for).clamp(Vec3::MIN, Vec3::MAX);
+            let features = self.constraints.iter().filter(|constraint| constraint.tool == place);
+            let features = features.map(|constraint| {
                 let nodes = constraint.feature.nodes();
-                self.touches.push(Touch {
+                Touch {
                     slot: tool.slot,
                     nodes: [0, 1, 2].map(|corner| nodes[corner.min(nodes.len() - 1)]),
                     weights: constraint.weights,
                     normal: constraint.normal,
-                    force: (-constraint.given() / self.pressed_for).clamp(Vec3::MIN, Vec3::MAX),
-                });
-            }
+                    force: force(constraint.given()),
+                }
+            });
+            let nodes = self.nodes.iter().filter(|contact| contact.tool == place);
+            let nodes = nodes.map(|contact| Touch {
+                slot: tool.slot,
+                nodes: [contact.node; 3],
+                weights: [1.0, 0.0, 0.0],
+                normal: contact.normal,
+                force: force(contact.given()),
+            });
+            let pressing = nodes.chain(features).filter(|touch| touch.force != Vec3::ZERO);
+            let room = self.touches.capacity() - self.touches.len();
+            self.touches.extend(pressing.take(room));
         }
     }
 
@@ -334,6 +362,11 @@ impl Contacts {
         self.candidates.invalidate();
     }
 
+    /// In how many slices the last substep was: so many times shorter it would be one.
+    pub fn slices(&self) -> u32 {
+        self.slices
+    }
+
     /// Whether no tool was near in the last substep.
     pub fn are_far(&self) -> bool {
         self.loads.is_empty() || self.candidates.near().is_empty()
@@ -347,6 +380,12 @@ impl Contacts {
                     see(node as usize, (constraint.friction == 0.0).then_some(constraint.normal));
                 }
             }
+        }
+        for contact in self.nodes.iter().filter(|contact| contact.given() != Vec3::ZERO) {
+            see(
+                contact.node as usize,
+                (contact.friction == 0.0).then_some(contact.normal),
+            );
         }
     }
 
@@ -367,12 +406,12 @@ impl Contacts {
     /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m.
     pub fn foresee(&mut self, mut meeting: Meeting, stiffness_of: impl Fn(usize) -> f32) {
         self.holds.clear();
-        self.constraints.clear();
+        self.clear_contacts();
         if meeting.tools.is_empty() {
             return;
         }
         self.find_candidates(&meeting);
-        if self.candidates.near().is_empty() || self.slices(&meeting) > 1 {
+        if self.candidates.near().is_empty() || self.needed_slices(&meeting) > 1 {
             return;
         }
         let slice = Slice::ahead(&meeting);
@@ -393,15 +432,16 @@ impl Contacts {
         }
         self.find_candidates(&meeting);
         if self.candidates.near().is_empty() && self.holds.is_empty() {
-            self.constraints.clear();
+            self.clear_contacts();
             return;
         }
         let is_foreseen = !self.holds.is_empty();
         let slices = if meeting.drifts && !is_foreseen {
-            self.slices(&meeting)
+            self.needed_slices(&meeting)
         } else {
             1
         };
+        self.slices = slices;
         self.pressed_for = meeting.kick() / slices as f32;
         for index in 0..slices {
             let part = |index: u32| f64::from(index) / f64::from(slices);
@@ -416,7 +456,7 @@ impl Contacts {
             if is_foreseen {
                 self.take_up(&meeting);
             } else {
-                self.constraints.clear();
+                self.clear_contacts();
             }
             let ends = [fraction(part(index)), fraction(part(index + 1))];
             self.find(&mut meeting, &slice, ends);
@@ -445,18 +485,48 @@ impl Contacts {
         }
     }
 
+    fn clear_contacts(&mut self) {
+        self.constraints.clear();
+        self.nodes.clear();
+    }
+
     /// Adds the contacts of a slice between these fractions of the step.
     fn find(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
+        // Contacts that an equation is to know of, or has seen, are constraints all of them.
+        let node_by_node = !slice.foresees && self.holds.is_empty();
+        let count = self.candidates.near().len();
+        let all = self.candidates.masks.iter().fold(0, |all, mask| all | mask);
+        let is_alone = all.count_ones() == 1
+            && all.leading_zeros() > 0
+            && self
+                .candidates
+                .near()
+                .last()
+                .is_some_and(|&last| last < self.features.node_count);
+        let mut zone = 0;
         for (place, tool) in meeting.tools.iter().enumerate() {
             if !tool.filter.meets(self.filter) {
                 continue;
             }
+            let bit = zone_bit(zone);
+            zone += 1;
+            if all & bit == 0 {
+                continue;
+            }
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
             let room = motion.room(meeting, slice);
-            if let Some(room) = &room {
+            let first = if node_by_node {
+                self.find_nodes(meeting, slice, (place, &motion), (bit, is_alone))
+            } else {
+                0
+            };
+            if let Some(room) = room.as_ref().filter(|_| first < count) {
                 self.candidates.see_corners(room, |corner| meeting.way(slice, corner));
             }
-            for candidate in 0..self.candidates.near().len() {
+            for candidate in first..count {
+                if self.candidates.masks[candidate] & bit == 0 {
+                    continue;
+                }
                 let Some(feature) = self.features.get(self.candidates.near()[candidate]) else {
                     continue;
                 };
@@ -469,8 +539,104 @@ impl Contacts {
         }
     }
 
+    /// Adds the contacts of nodes with a tool: how many of the candidates are nodes. Points that are bound to nodes are none, and left.
+    fn find_nodes(
+        &mut self,
+        meeting: &mut Meeting,
+        slice: &Slice,
+        (tool, motion): (usize, &Motion),
+        (bit, is_alone): (u32, bool),
+    ) -> usize {
+        let near = self.candidates.near();
+        let count = near.partition_point(|&index| index < self.features.node_count);
+        let look = NodeLook::new(meeting, slice, motion, meeting.tools[tool].slot);
+        let is_even = is_alone && meeting.is_even(slice) && self.held.is_empty();
+        let is_pressed = is_even && self.press_nodes(meeting, (tool, motion), &look, count);
+        let left = if is_pressed { self.undecided.len() } else { count };
+        for place in 0..left {
+            let (node, candidate) = match self.undecided.get(place).filter(|_| is_pressed) {
+                Some(&node) => (node, count),
+                None if self.candidates.masks[place] & bit == 0 => continue,
+                None => (self.candidates.near()[place], place),
+            };
+            if meeting.bindings.is_some_and(|bindings| bindings.get(node).is_some()) {
+                continue;
+            }
+            let plane = self.candidates.planes.get_mut(candidate);
+            let Some(geometry) = look.meet(meeting, slice, node as usize, plane) else {
+                continue;
+            };
+            if self.is_held(Feature::node(node), look.slot, meeting.bindings) {
+                continue;
+            }
+            let Some(mut contact) = NodeContact::new(meeting, slice, (node, tool), &geometry, motion.friction) else {
+                continue;
+            };
+            // What another tool gives may bring it nearer.
+            if is_alone && contact.is_idle(meeting.velocities) {
+                continue;
+            }
+            if !self.nodes.push(contact) {
+                contact.solve_alone(meeting.velocities);
+                self.settle_node(meeting, slice, &contact);
+            }
+        }
+        count
+    }
+
+    /// Gives the impulses of a round tool or a mesh to the nodes that it touches, in closed form; nodes whose motion has to be swept are left to be
+    /// looked at. `false`: it is neither.
+    fn press_nodes(
+        &mut self,
+        meeting: &mut Meeting,
+        (tool, motion): (usize, &Motion),
+        look: &NodeLook,
+        count: usize,
+    ) -> bool {
+        let solid = match (motion.from, motion.to) {
+            (Solid::Rounded { .. }, _) => PressingSolid::Round {
+                segment: look.segment,
+                spin: motion.spin,
+            },
+            (Solid::Mesh(from), Solid::Mesh(to)) => {
+                for (&node, plane) in self.candidates.near[..count].iter().zip(&mut self.candidates.planes) {
+                    look.refresh(meeting, meeting.positions.get(node as usize), plane);
+                }
+                PressingSolid::Mesh {
+                    planes: &self.candidates.planes[..count],
+                    slot: look.slot as u32,
+                    from,
+                    to,
+                    flat: look.flat(),
+                }
+            }
+            _ => return false,
+        };
+        self.undecided.clear();
+        let pressed = meeting.kernel.run(PressNodes {
+            nodes: &self.candidates.near[..count],
+            positions: meeting.positions.axes(),
+            velocities: meeting.velocities.axes_mut(),
+            next_positions: meeting.next_positions.axes_mut(),
+            inverse_masses: meeting.mobility.inverse_masses,
+            damping: meeting.mobility.damping,
+            substep: meeting.substep,
+            solid,
+            thickness: meeting.thickness,
+            closing: look.closing,
+            centre: motion.centre,
+            friction: motion.friction,
+            undecided: &mut self.undecided,
+        });
+        let load = &mut self.loads[tool];
+        load.impulse += pressed.impulse;
+        load.angular_impulse += pressed.angular_impulse;
+        self.given = self.given.and(&pressed.velocities);
+        true
+    }
+
     /// How many slices a substep needs. Only tools whose way comes near the body count: what is far changes nothing.
-    fn slices(&self, meeting: &Meeting) -> u32 {
+    fn needed_slices(&self, meeting: &Meeting) -> u32 {
         let mut slices = 1.0_f32;
         for tool in met(meeting.tools, self.filter) {
             let Some(sweep) = tool.sweep(meeting.origin) else {
@@ -497,7 +663,13 @@ impl Contacts {
             return;
         }
         let bounds = meeting.bounds();
-        let slack = (8.0 * travel).max(0.005 * (bounds.max - bounds.min).length());
+        // Good for the rest of the step, where that is no more than a part of the body.
+        let size = (bounds.max - bounds.min).length();
+        let left = ((1.0 - meeting.start) / (meeting.end - meeting.start).max(1e-9)) as f32;
+        let slack = (left.max(8.0) * travel)
+            .min(0.05 * size)
+            .max(8.0 * travel)
+            .max(0.02 * size);
         self.candidates.gather(
             &self.features,
             (meeting.positions, meeting.bindings),
@@ -516,17 +688,16 @@ impl Contacts {
         (tool, motion): (usize, &Motion),
         feature: Feature,
     ) {
-        if let Solid::HalfSpace { point, .. } = motion.from
-            && feature.nodes().len() == 1
+        if let &[node] = feature.nodes()
             && !self.is_known(slice, (tool, feature, 0))
             && !self.is_held(feature, meeting.tools[tool].slot, meeting.bindings)
         {
-            let found = meet_plane(meeting, slice, motion, feature, point);
-            self.add(meeting, slice, tool, found);
+            let found = meet_plane(meeting, slice, motion, node as usize);
+            self.add(meeting, slice, (tool, motion.friction), (feature, 0), found);
         }
     }
 
-    /// Adds the contacts of one feature with a tool of any other shape.
+    /// Adds the contact of one feature with a tool of any other shape.
     fn touch(
         &mut self,
         meeting: &mut Meeting,
@@ -537,11 +708,11 @@ impl Contacts {
         if self.is_held(feature, meeting.tools[tool].slot, meeting.bindings) {
             return;
         }
-        let part = (feature, corners);
+        let of_tool = (tool, motion.friction);
         if let (Solid::Mesh(from), Solid::Mesh(to)) = (motion.from, motion.to) {
             if !self.is_known(slice, (tool, feature, 0)) {
-                let found = meet_mesh(meeting, slice, motion, part, [&from, &to]);
-                self.add(meeting, slice, tool, found);
+                let found = meet_mesh(meeting, slice, motion, (feature, corners), [&from, &to]);
+                self.add(meeting, slice, of_tool, (feature, 0), found);
             }
             return;
         }
@@ -552,8 +723,8 @@ impl Contacts {
                 continue;
             }
             let met = if has_tips { segment.end(tip.into()) } else { segment };
-            let found = meet_rounded(meeting, slice, motion, part, (&met, tip));
-            self.add(meeting, slice, tool, found);
+            let found = meet_rounded(meeting, slice, motion, corners, &met);
+            self.add(meeting, slice, of_tool, (feature, tip), found);
         }
     }
 
@@ -562,11 +733,20 @@ impl Contacts {
         !slice.foresees && self.holds.know(met)
     }
 
-    fn add(&mut self, meeting: &mut Meeting, slice: &Slice, tool: usize, found: Option<Constraint>) {
-        let Some(mut constraint) = found else {
+    fn add(
+        &mut self,
+        meeting: &mut Meeting,
+        slice: &Slice,
+        (tool, friction): (usize, f32),
+        (feature, tip): (Feature, u8),
+        found: Option<ContactGeometry>,
+    ) {
+        let found = found.and_then(|geometry| meeting.constraint(slice, feature, &geometry, friction));
+        let Some(found) = found else {
             return;
         };
-        constraint.tool = tool;
+        let mut constraint = found;
+        (constraint.tool, constraint.tip) = (tool, tip);
         if self.constraints.len() < self.together {
             self.constraints.push(constraint);
         } else if !slice.foresees {
@@ -576,6 +756,23 @@ impl Contacts {
     }
 
     fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {
+        if self.constraints.is_empty() {
+            self.solve_nodes(meeting, slice);
+            return;
+        }
+        // Edges and faces share nodes: all contacts are solved together.
+        for index in 0..self.nodes.len() {
+            let contact = *self.nodes.get(index);
+            let geometry = contact.geometry(meeting);
+            self.add(
+                meeting,
+                slice,
+                (contact.tool, contact.friction),
+                (Feature::node(contact.node), 0),
+                Some(geometry),
+            );
+        }
+        self.nodes.clear();
         let first = self
             .presses
             .solve(&mut self.constraints, meeting.velocities, slice.sweeps);
@@ -598,6 +795,43 @@ impl Contacts {
                     self.constraints[index].push_out(meeting.next_positions, lacks as f32);
                 }
             }
+        }
+    }
+
+    /// Solves contacts of nodes alone, each node by itself.
+    fn solve_nodes(&mut self, meeting: &mut Meeting, slice: &Slice) {
+        self.nodes.solve(meeting.velocities, slice.sweeps);
+        for index in 0..self.nodes.len() {
+            let contact = *self.nodes.get(index);
+            self.settle_node(meeting, slice, &contact);
+        }
+        if meeting.drifts {
+            for contact in self.nodes.iter().filter(|contact| contact.depth > 0.0) {
+                contact.push_out(meeting.next_positions, PUSHED_OUT * contact.depth);
+            }
+        }
+    }
+
+    /// Adds what the contact of a node gave to its tool's load, and moves the node.
+    fn settle_node(&mut self, meeting: &mut Meeting, slice: &Slice, contact: &NodeContact) {
+        if contact.given() == Vec3::ZERO {
+            return;
+        }
+        let load = &mut self.loads[contact.tool];
+        let received = -contact.given().as_dvec3();
+        load.impulse += received;
+        load.angular_impulse += contact.arm.as_dvec3().cross(received);
+        let node = contact.node as usize;
+        if let Some(pin) = meeting.pins.get_mut(contact.node) {
+            pin.force_sum += received / f64::from(meeting.substep);
+        }
+        let velocity = meeting.velocities.get(node);
+        self.given = self.given.with(velocity);
+        if meeting.drifts {
+            let held = meeting.pins.partial_axes_of(contact.node);
+            let led = meeting.next_positions.get(node);
+            let moved = contact.start + velocity * slice.remains;
+            meeting.next_positions.set(node, Vec3::select(held, led, moved));
         }
     }
 
@@ -643,6 +877,12 @@ impl Slice {
 }
 
 impl Meeting<'_> {
+    /// Whether the slice is the whole of a substep in which every node moves by its mass alone: none is held along some axes, asleep, or bound to others.
+    fn is_even(&self, slice: &Slice) -> bool {
+        let is_whole = slice.first && slice.duration == self.substep && self.drifts && !self.mobility.half;
+        is_whole && !self.pins.have_partial() && self.mobility.sleeper.is_none() && self.bindings.is_none()
+    }
+
     /// The axes along which nodes of a feature are held that are free along others.
     pub(super) fn held_axes(&self, supports: &Supports) -> [BVec3; MOST] {
         let mut held = [BVec3::FALSE; MOST];
@@ -672,7 +912,7 @@ impl Meeting<'_> {
 
     /// Where a corner is when the slice begins, and how far it goes in it if nothing touches it; with the last half kick of a step it has come
     /// to its end, and what is not touched there is a matter of the next.
-    fn way(&self, slice: &Slice, corner: usize) -> (Vec3, Vec3) {
+    pub(super) fn way(&self, slice: &Slice, corner: usize) -> (Vec3, Vec3) {
         let step = if self.drifts {
             self.vector(self.velocities, corner) * slice.duration
         } else {

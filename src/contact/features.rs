@@ -1,5 +1,7 @@
 //! The parts of a body that a tool can meet: its nodes, and the edges and faces of its surface.
 
+use glam::Vec3;
+
 use super::edges::EdgeUses;
 use crate::error::Result;
 use crate::memory;
@@ -14,6 +16,10 @@ pub(super) struct Features {
     /// One that is gone leaves a [`HOLE`] for another.
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
+    /// The longest edge of each edge and face, m, as they were at first: whether a tool needs them is not to change from step to step. Those that
+    /// are new since have none.
+    edge_lengths: Vec<f32>,
+    face_lengths: Vec<f32>,
     /// For surfaces that change.
     uses: Option<Box<EdgeUses>>,
 }
@@ -22,6 +28,8 @@ saved!(Features {
     node_count,
     edges,
     faces,
+    edge_lengths,
+    face_lengths,
     uses
 });
 
@@ -38,6 +46,13 @@ pub(super) struct Feature {
 saved!(Feature { nodes, count });
 
 impl Feature {
+    pub fn node(node: u32) -> Self {
+        Self {
+            nodes: [node, 0, 0],
+            count: 1,
+        }
+    }
+
     pub fn nodes(&self) -> &[u32] {
         &self.nodes[..self.count as usize]
     }
@@ -62,13 +77,34 @@ impl Feature {
 }
 
 impl Features {
-    pub fn new(node_count: usize, surface: &[[u32; 3]]) -> Result<Self> {
+    /// Of a surface of nodes that are where `position` tells.
+    pub fn new(node_count: usize, surface: &[[u32; 3]], position: impl Fn(usize) -> Vec3) -> Result<Self> {
+        let edges = mesh::edges(surface, &[])?;
+        let length = |a: u32, b: u32| position(a as usize).distance(position(b as usize));
+        let mut edge_lengths = memory::reserved(edges.len())?;
+        edge_lengths.extend(edges.iter().map(|&[a, b]| length(a, b)));
+        let mut face_lengths = memory::reserved(surface.len())?;
+        face_lengths.extend((surface.iter()).map(|&[a, b, c]| length(a, b).max(length(b, c)).max(length(c, a))));
         Ok(Self {
             node_count: node_count as u32,
-            edges: mesh::edges(surface, &[])?,
+            edges,
             faces: memory::copied(surface)?,
+            edge_lengths,
+            face_lengths,
             uses: None,
         })
+    }
+
+    /// The longest edge of feature number `index` as it was at first, m; 0 of a node, infinite where it is not known.
+    pub fn length(&self, index: u32) -> f32 {
+        let Some(edge) = index.checked_sub(self.node_count) else {
+            return 0.0;
+        };
+        let length = match (edge as usize).checked_sub(self.edges.len()) {
+            None => self.edge_lengths.get(edge as usize),
+            Some(face) => self.face_lengths.get(face),
+        };
+        length.copied().unwrap_or(f32::INFINITY)
     }
 
     /// How many there are: nodes, then edges, then faces.
@@ -85,10 +121,7 @@ impl Features {
     #[inline]
     pub fn get(&self, index: u32) -> Option<Feature> {
         let Some(edge) = index.checked_sub(self.node_count) else {
-            return Some(Feature {
-                nodes: [index, 0, 0],
-                count: 1,
-            });
+            return Some(Feature::node(index));
         };
         match self.edges.get(edge as usize) {
             Some(&HOLE) => None,
@@ -120,7 +153,17 @@ impl Features {
 
     /// Makes triangle number `index` one with these corners, or adds it behind the last, where there is room: shows which edges are new, by
     /// their numbers among edges. What the surface does not have any more is dropped by [`Self::drop_edges_of`].
-    pub fn set_face(&mut self, index: usize, corners: [u32; 3], new: impl FnMut(u32)) {
+    pub fn set_face(&mut self, index: usize, corners: [u32; 3], mut new: impl FnMut(u32)) {
+        if let Some(length) = self.face_lengths.get_mut(index) {
+            *length = f32::INFINITY;
+        }
+        let lengths = &mut self.edge_lengths;
+        let new = |edge: u32| {
+            if let Some(length) = lengths.get_mut(edge as usize) {
+                *length = f32::INFINITY;
+            }
+            new(edge);
+        };
         match self.faces.get_mut(index) {
             Some(face) => *face = corners,
             None => self.faces.push(corners),
@@ -163,7 +206,7 @@ mod tests {
         let count = 40;
         let mut corner = |_| random.below(count) as u32;
         let mut surface: Vec<[u32; 3]> = (0..60).map(|_| [0; 3].map(&mut corner)).collect();
-        let mut features = Features::new(count, &surface).expect("memory");
+        let mut features = Features::new(count, &surface, |_| Vec3::ZERO).expect("memory");
         for round in 0..300 {
             let index = corner(0) as usize;
             let corners = [0; 3].map(&mut corner);
@@ -179,7 +222,7 @@ mod tests {
                 features.set_face(surface.len(), corners, |edge| new.push(edge));
                 surface.push(corners);
             }
-            let whole = Features::new(count, &surface).expect("memory");
+            let whole = Features::new(count, &surface, |_| Vec3::ZERO).expect("memory");
             assert_eq!(all(&features), all(&whole), "{round}");
             for (number, edge) in (0..).zip(&features.edges) {
                 let is_new = *edge != HOLE && edges.get(number as usize) != Some(edge);

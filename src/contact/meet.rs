@@ -1,4 +1,4 @@
-//! Where a feature of a body first meets a tool, as a contact.
+//! Where a feature of a body first meets a tool.
 
 use glam::Vec3;
 
@@ -7,7 +7,24 @@ use super::contacts::{Meeting, Slice};
 use super::features::Feature;
 use super::path::{Motion, Placement, Solid};
 use super::supports::{MOST, Supports};
-use super::sweep::{Corners, Segment};
+use super::sweep::{Corners, Segment, Separation};
+
+/// How a feature meets a tool over a slice.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ContactGeometry {
+    /// The feature's point, as weights of its corners.
+    pub weights: [f32; 3],
+    /// Away from the tool, of unit length.
+    pub normal: Vec3,
+    /// Velocity of the tool's surface there, m/s.
+    pub surface_velocity: Vec3,
+    /// From the tool's position to the contact, m.
+    pub arm: Vec3,
+    /// Between the tool and the feature's point as the slice begins, m; below 0 inside.
+    pub gap: f32,
+    /// For a rounded tool: the ends of its segment when the slice ends, and the radius at which it is met.
+    pub rounded: Option<([Vec3; 2], f32)>,
+}
 
 /// What contacts that are solved together may leave open between a node and a plane that touch, as a part of the way
 /// that they would come nearer in a slice.
@@ -50,18 +67,11 @@ impl Motion<'_> {
     }
 }
 
-/// The contact of a node with a plane over the slice.
-pub(super) fn meet_plane(
-    meeting: &Meeting,
-    slice: &Slice,
-    motion: &Motion,
-    feature: Feature,
-    point: Vec3,
-) -> Option<Constraint> {
-    let (Solid::HalfSpace { normal: first, .. }, Solid::HalfSpace { normal, .. }) = (motion.from, motion.to) else {
+/// How a node meets a plane over the slice.
+pub(super) fn meet_plane(meeting: &Meeting, slice: &Slice, motion: &Motion, node: usize) -> Option<ContactGeometry> {
+    let (Solid::HalfSpace { point, normal: first }, Solid::HalfSpace { normal, .. }) = (motion.from, motion.to) else {
         return None;
     };
-    let node = feature.nodes()[0] as usize;
     let position = meeting.position(slice, node);
     let gap = (position - point).dot(first);
     let foot = position - first * gap;
@@ -74,25 +84,24 @@ pub(super) fn meet_plane(
     } else {
         LEFT * closing * slice.duration + ROUNDING * position.abs().max(point.abs()).max_element()
     };
-    if !(gap <= meeting.thickness + ahead) {
-        return None;
-    }
-    let mut constraint = meeting.constraint(slice, feature, [1.0, 0.0, 0.0], normal)?;
-    constraint.surface_velocity = surface_velocity;
-    constraint.arm = foot - motion.centre;
-    constraint.friction = motion.friction;
-    constraint.allow_gap(gap - meeting.thickness, slice.duration);
-    Some(constraint)
+    (gap <= meeting.thickness + ahead).then_some(ContactGeometry {
+        weights: [1.0, 0.0, 0.0],
+        normal,
+        surface_velocity,
+        arm: foot - motion.centre,
+        gap,
+        rounded: None,
+    })
 }
 
-/// The contact of a feature with a rounded tool, or one tip of it, over the slice.
+/// How a feature meets a rounded tool, or one tip of it, over the slice.
 pub(super) fn meet_rounded(
     meeting: &Meeting,
     slice: &Slice,
     motion: &Motion,
-    (feature, corners): (Feature, &Corners),
-    (segment, tip): (&Segment, u8),
-) -> Option<Constraint> {
+    corners: &Corners,
+    segment: &Segment,
+) -> Option<ContactGeometry> {
     let around = Segment {
         radius: segment.radius + meeting.thickness,
         ..*segment
@@ -101,6 +110,20 @@ pub(super) fn meet_rounded(
     if !separation.inside {
         return None;
     }
+    let points = corners.points.iter().zip(separation.weights);
+    let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
+    Some(round_geometry(meeting, slice, motion, segment, (&separation, matter)))
+}
+
+/// The contact of a round tool with a point of a feature, which is separated from it so.
+#[inline]
+pub(super) fn round_geometry(
+    meeting: &Meeting,
+    slice: &Slice,
+    motion: &Motion,
+    segment: &Segment,
+    (separation, matter): (&Separation, Vec3),
+) -> ContactGeometry {
     let step = segment.steps[0].lerp(segment.steps[1], separation.along);
     let start = segment.ends[0].lerp(segment.ends[1], separation.along);
     let axis_velocity = if meeting.drifts {
@@ -114,30 +137,26 @@ pub(super) fn meet_rounded(
         .try_normalize()
         .or_else(|| axis_velocity.try_normalize())
         .unwrap_or(Vec3::Y);
-    let weights = separation.weights;
-    let mut constraint = meeting.constraint(slice, feature, weights, normal)?;
-    constraint.tip = tip;
-    let points = corners.points.iter().zip(weights);
-    let matter: Vec3 = points.map(|(point, weight)| *point * weight).sum();
     let surface = normal * segment.radius;
-    constraint.surface_velocity = axis_velocity + motion.spin.cross(surface);
-    constraint.arm = start + step + surface - motion.centre;
-    constraint.friction = motion.friction;
-    let gap = (matter - start).dot(normal) - segment.radius;
-    constraint.allow_gap(gap - meeting.thickness, slice.duration);
     let ends = [0, 1].map(|end| segment.ends[end] + segment.steps[end]);
-    constraint.rounded = Some((ends, around.radius));
-    Some(constraint)
+    ContactGeometry {
+        weights: separation.weights,
+        normal,
+        surface_velocity: axis_velocity + motion.spin.cross(surface),
+        arm: start + step + surface - motion.centre,
+        gap: (matter - start).dot(normal) - segment.radius,
+        rounded: Some((ends, segment.radius + meeting.thickness)),
+    }
 }
 
-/// The contact of a feature with what a mesh encloses over the slice.
+/// How a feature meets what a mesh encloses over the slice.
 pub(super) fn meet_mesh(
     meeting: &Meeting,
     slice: &Slice,
     motion: &Motion,
     (feature, corners): (Feature, &Corners),
     [from, to]: [&Placement; 2],
-) -> Option<Constraint> {
+) -> Option<ContactGeometry> {
     let solid = motion.mesh?;
     let count = corners.count;
     // In the mesh's own frame, where it stands still.
@@ -171,29 +190,61 @@ pub(super) fn meet_mesh(
         from.orientation
     };
     let normal = orientation * closest.normal;
-    let mut constraint = meeting.constraint(slice, feature, weights, normal)?;
+    Some(mesh_geometry(
+        meeting,
+        slice,
+        motion,
+        [from, to],
+        (surface, normal, gap, weights),
+    ))
+}
+
+/// The contact of a mesh, at a point of its surface in its own frame, with the point of a feature of these weights.
+pub(super) fn mesh_geometry(
+    meeting: &Meeting,
+    slice: &Slice,
+    motion: &Motion,
+    [from, to]: [&Placement; 2],
+    (surface, normal, gap, weights): (Vec3, Vec3, f32, [f32; 3]),
+) -> ContactGeometry {
     let [start, end] = [from, to].map(|placement| placement.placed(surface));
-    if meeting.drifts {
-        constraint.surface_velocity = (end - start) / slice.duration;
-        constraint.arm = end - motion.centre;
+    let (surface_velocity, met) = if meeting.drifts {
+        ((end - start) / slice.duration, end)
     } else {
-        constraint.surface_velocity = motion.velocity_at(start);
-        constraint.arm = start - motion.centre;
+        (motion.velocity_at(start), start)
+    };
+    ContactGeometry {
+        weights,
+        normal,
+        surface_velocity,
+        arm: met - motion.centre,
+        gap,
+        rounded: None,
     }
-    constraint.friction = motion.friction;
-    constraint.allow_gap(gap - meeting.thickness, slice.duration);
-    Some(constraint)
 }
 
 impl Meeting<'_> {
-    /// A contact of a feature at the point of these weights; `None` where none of its nodes can move along the normal.
-    fn constraint(&self, slice: &Slice, feature: Feature, weights: [f32; 3], normal: Vec3) -> Option<Constraint> {
+    /// The contact of a feature that meets a tool thus; `None` where none of its nodes can move along the normal.
+    pub(super) fn constraint(
+        &self,
+        slice: &Slice,
+        feature: Feature,
+        geometry: &ContactGeometry,
+        friction: f32,
+    ) -> Option<Constraint> {
         let supports = Supports::of(feature, self.bindings);
         let mut starts = [Vec3::ZERO; MOST];
         for (start, &node) in starts.iter_mut().zip(supports.nodes()) {
             *start = self.position(slice, node as usize);
         }
         let held = self.held_axes(&supports);
-        Constraint::new((feature, weights), &supports, starts, normal, &self.mobility, held)
+        let (weights, normal) = (geometry.weights, geometry.normal);
+        let mut constraint = Constraint::new((feature, weights), &supports, starts, normal, &self.mobility, held)?;
+        constraint.surface_velocity = geometry.surface_velocity;
+        constraint.arm = geometry.arm;
+        constraint.friction = friction;
+        constraint.rounded = geometry.rounded;
+        constraint.allow_gap(geometry.gap - self.thickness, slice.duration);
+        Some(constraint)
     }
 }

@@ -9,6 +9,8 @@ use super::distance_field::DistanceField;
 use super::exact::ExactSolid;
 use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
+use super::ridges::Ridges;
+
 use super::tool::Detection;
 use crate::body::{Bounds, not_negative};
 use crate::diagnostics::StateHasher;
@@ -24,6 +26,7 @@ pub(crate) struct MeshSolid {
     found: Found,
     /// Its corners, edges and sides, past which something that passed into it is led out; as it is found, where that is by these.
     exact: ExactSolid,
+    ridges: Ridges,
     bounds: Bounds,
     reach: f32,
     hash: u64,
@@ -49,6 +52,7 @@ impl Saved for Arc<MeshSolid> {
             surface,
             found,
             exact: _,
+            ridges: _,
             bounds: _,
             reach: _,
             hash,
@@ -157,6 +161,7 @@ impl MeshSolid {
         let solid = Self {
             found,
             exact,
+            ridges: Ridges::of(&surface)?,
             bounds,
             reach: surface
                 .positions()
@@ -198,6 +203,12 @@ impl MeshSolid {
     /// Of everything that what it answers depends on.
     pub fn hash(&self) -> u64 {
         self.hash
+    }
+
+    /// Whether a ridge within `reach` of these bounds may be deeper than `depth` within an edge or face whose corners lie on the surface and of
+    /// which no edge is longer than `length`, m.
+    pub(super) fn has_ridge(&self, bounds: &Bounds, reach: f32, length: f32, depth: f32) -> bool {
+        self.ridges.are_near(bounds, reach, length, depth)
     }
 
     /// The closest that a node, edge or face with these corners comes; `None`: no closer than `within`. One that is pinned somewhere

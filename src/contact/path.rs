@@ -205,6 +205,14 @@ impl ToolPath {
         }
     }
 
+    /// The least radius that its surface is curved with outward, m, where it is round.
+    pub(super) fn radius(&self) -> Option<f32> {
+        match self.form {
+            Form::Rounded { radius, .. } => Some(radius),
+            _ => None,
+        }
+    }
+
     /// What its mesh encloses, where it is one.
     pub(super) fn mesh(&self) -> Option<&MeshSolid> {
         match &self.form {

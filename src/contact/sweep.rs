@@ -11,7 +11,7 @@ use super::distance::{closest_of_segments, closest_on_segment, closest_on_triang
 pub(super) const TOUCHING: f32 = 1e-4;
 
 /// A way of this part of half a mesh's least extent is not searched: it is too short to pass anything.
-const FLAT: f32 = 0.01;
+pub(super) const FLAT: f32 = 0.01;
 
 /// Advances of one search. A search that takes more grazes the tool, and ends where it is, still clear of it.
 const ADVANCES: u32 = 32;
@@ -72,6 +72,15 @@ impl Segment {
 }
 
 impl Corners {
+    /// Of a node.
+    pub fn of_node(point: Vec3, step: Vec3) -> Self {
+        Self {
+            points: [point; 3],
+            steps: [step; 3],
+            count: 1,
+        }
+    }
+
     /// The closest points at `time`, a fraction of the substep. A face is compared with the segment's first end alone:
     /// its interior is closest to one of the ends, its border is the edges' concern.
     pub fn separation(&self, segment: &Segment, time: f32) -> Separation {

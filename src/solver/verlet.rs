@@ -304,6 +304,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
     let fastest = velocities.min.abs().max(velocities.max.abs()).length();
     let state = body.state.substep();
     contacts.resolve(Meeting {
+        kernel: body.kernel,
         tools: request.tools,
         origin: body.origin,
         dt: request.dt,
