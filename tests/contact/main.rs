@@ -18,6 +18,7 @@ mod mesh_momentum;
 mod mesh_refused;
 mod mesh_sweep;
 mod momentum;
+mod node_by_node;
 mod press;
 mod query;
 mod rest;

@@ -1,0 +1,184 @@
+//! Nodes that meet a tool one by one: a round tool, the same as a mesh, and what happens between nodes.
+
+use crate::support::solid::ball;
+use crate::support::tissue::*;
+use glam::{Quat, Vec3};
+use sinew::{BodyDefinition, BodyId, Material, Model, Pose, Shape, Solver, ToolDefinition, ToolId, World};
+
+const FRAME: f32 = 1.0 / 60.0;
+const SIZE: f32 = 0.2;
+const RADIUS: f32 = 0.03;
+const TISSUE: Tissue = Tissue {
+    mass: 0.1,
+    stiffness: 100.0,
+    drag: 4.0,
+    spring_damping: 0.0,
+};
+
+/// A cloth that is held at its rim, and this tool above its middle.
+fn above(cells: u32, shape: Shape, friction: f32) -> (World, BodyId, ToolId) {
+    let mut world = world(Vec3::ZERO);
+    let cloth = TISSUE.put(&mut world, &square(SIZE, cells));
+    pin_all(&mut world, cloth, &rim(cells));
+    let tool = tool(&mut world, shape, friction, Vec3::Y * RADIUS, Quat::IDENTITY);
+    (world, cloth, tool)
+}
+
+/// Presses the tool `depth` into the cloth within half a second, moves it `aside`, and waits: the force on it.
+fn press(world: &mut World, tool: ToolId, depth: f32, aside: f32, mut look: impl FnMut(&World)) -> Vec3 {
+    for frame in 1..=90 {
+        let [down, along] = [frame, frame - 30].map(|frame| (frame as f32 / 30.0).clamp(0.0, 1.0));
+        let place = Vec3::new(aside * along, RADIUS - depth * down, 0.0);
+        world.set_pose(tool, place, None).expect("a pose");
+        world.step(FRAME).expect("a step");
+        look(world);
+    }
+    world.wrench(tool).expect("a tool").0
+}
+
+/// A chord of length l within a ball of radius R sags by l² / 8R, a triangle by no more than l² / 6R; the cloth may stretch by a third on the way.
+#[test]
+fn between_nodes_a_cloth_is_no_deeper_than_a_chord_of_the_ball() {
+    for cells in [20, 40, 60] {
+        let shape = Shape::Sphere { radius: RADIUS };
+        let (mut world, cloth, ball) = above(cells, shape, 0.0);
+        let triangles = square(SIZE, cells).triangles;
+        let diagonal = std::f32::consts::SQRT_2 * SIZE / cells as f32 * (4.0 / 3.0);
+        let mut deepest = [f32::MIN; 2];
+        press(&mut world, ball, 0.03, 0.0, |world| {
+            let pose = world.pose(ball).expect("a ball");
+            let positions = body(world, cloth).positions();
+            let depth = |point: Vec3| RADIUS - point.distance(pose.position);
+            for &node in positions {
+                deepest[0] = deepest[0].max(depth(node));
+            }
+            for corners in &triangles {
+                let middle = corners.map(|node| positions[node as usize]).iter().sum::<Vec3>() / 3.0;
+                deepest[1] = deepest[1].max(depth(middle));
+            }
+        });
+        let [nodes, middles] = deepest;
+        assert!(nodes < 1e-4 * RADIUS, "{cells}: nodes {nodes} m deep");
+        let sag = diagonal * diagonal / (6.0 * RADIUS);
+        assert!(
+            middles < sag,
+            "{cells}: middles of faces {middles} m deep, {sag} allowed"
+        );
+        assert!(middles > 0.0, "{cells}: nothing lay on the ball");
+    }
+}
+
+/// A ball of triangles lies within the round one by a chord of its edges: the same press but for that.
+#[test]
+fn a_mesh_of_a_ball_presses_as_the_ball_does() {
+    let mesh = ball(RADIUS, 4);
+    for (friction, aside) in [(0.0, 0.0), (0.4, 0.03)] {
+        let (mut world, _, round) = above(40, Shape::Sphere { radius: RADIUS }, friction);
+        let exact = press(&mut world, round, 0.03, aside, |_| ());
+        let shape = Shape::Mesh {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+        };
+        let (mut world, _, meshed) = above(40, shape, friction);
+        let found = press(&mut world, meshed, 0.03, aside, |_| ());
+        assert!(exact.y > 0.1, "nothing to be measured: {exact}");
+        assert!(
+            found.distance(exact) < 0.02 * exact.length(),
+            "friction {friction}: {found} N by the mesh, {exact} N by the ball"
+        );
+    }
+}
+
+/// What two tools give to nodes that they share is found together: pressed from both sides, each feels what the other does.
+#[test]
+fn balls_on_both_sides_of_a_cloth_feel_each_other() {
+    let (mut world, cloth, upper) = above(40, Shape::Sphere { radius: RADIUS }, 0.3);
+    let lower = tool(
+        &mut world,
+        Shape::Sphere { radius: RADIUS },
+        0.3,
+        Vec3::NEG_Y * RADIUS,
+        Quat::IDENTITY,
+    );
+    for frame in 1..=60 {
+        let way = 0.002 * (frame as f32 / 30.0).min(1.0);
+        world
+            .set_pose(upper, Vec3::Y * (RADIUS + 0.001 - way), None)
+            .expect("a pose");
+        world
+            .set_pose(lower, Vec3::NEG_Y * (RADIUS + 0.001), None)
+            .expect("a pose");
+        world.step(FRAME).expect("a step");
+    }
+    let [up, down] = [upper, lower].map(|tool| world.wrench(tool).expect("a tool").0);
+    let carried = pin_forces(&world, cloth, &rim(40)).as_vec3();
+    let sum = up + down;
+    assert!(
+        sum.distance(carried) < 0.02 * up.length() + 1e-4,
+        "{up} and {down} N on the balls, {carried} N on the rim"
+    );
+}
+
+/// An organ pressed by a ball, in few products with the matrix a frame, against VERLET in some twenty substeps.
+#[test]
+fn few_iterations_a_frame_press_as_many_substeps_do() {
+    let mesh = sinew::mesh::Mesh::organ(0.2, 0.012).expect("an organ");
+    let top = mesh
+        .positions
+        .iter()
+        .copied()
+        .max_by(|a, b| a.y.total_cmp(&b.y))
+        .expect("a node");
+    let left = mesh.positions.iter().map(|place| place.x).fold(f32::MAX, f32::min);
+    let press = |solver, iterations| {
+        let mut world = world(Vec3::ZERO);
+        let organ = world
+            .create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                tetrahedra: &mesh.tetrahedra,
+                material: Some(Material {
+                    model: Model::Springs,
+                    young_modulus: 5000.0,
+                    poisson_ratio: 0.25,
+                    density: 1060.0,
+                    ..Material::default()
+                }),
+                solver,
+                iterations,
+                ..Default::default()
+            })
+            .expect("an organ");
+        for (node, _) in (0..).zip(&mesh.positions).filter(|(_, place)| place.x < left + 0.03) {
+            world.body_mut(organ).expect("an organ").pin(node).expect("a pin");
+        }
+        let radius = 0.02;
+        let pose = |frame: usize| Pose {
+            position: top + Vec3::Y * (radius - 0.006 * (frame as f32 / 30.0).min(1.0)),
+            ..Pose::IDENTITY
+        };
+        let ball = world
+            .create_tool(&ToolDefinition {
+                pose: pose(0),
+                ..ToolDefinition::new(Shape::Sphere { radius })
+            })
+            .expect("a ball");
+        let (mut force, mut most) = (Vec3::ZERO, 0);
+        for frame in 1..=180 {
+            world.set_pose(ball, pose(frame).position, None).expect("a pose");
+            world.step(FRAME).expect("a step");
+            most = most.max(body(&world, organ).solver_report().iterations);
+            if frame > 120 {
+                force += world.wrench(ball).expect("a ball").0 / 60.0;
+            }
+        }
+        (force, most)
+    };
+    let (exact, _) = press(Solver::Verlet, 0);
+    let (found, most) = press(Solver::Implicit, 16);
+    assert!(exact.y > 0.01, "nothing to be measured: {exact}");
+    assert!(
+        found.distance(exact) < 0.03 * exact.length(),
+        "{found} N with 16 iterations a frame, {exact} N with VERLET"
+    );
+    assert!(most <= 2 * 16, "{most} iterations in a frame");
+}
