@@ -289,7 +289,11 @@ impl Body {
             tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
-            state: State::new(node_count, definition.solver == Solver::Verlet)?,
+            state: State::new(
+                node_count,
+                definition.solver == Solver::Verlet,
+                definition.solver == Solver::Verlet && definition.contact.with_bodies,
+            )?,
             origin: DVec3::ZERO,
             implicit: None,
             applied: None,

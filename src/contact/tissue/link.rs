@@ -30,6 +30,8 @@ pub(super) struct Link {
     pub least_speed: f32,
     /// How much closer than they may be they were when the step began, m.
     pub depth: f32,
+    /// Whether they were one until a cut parted them.
+    pub is_parted: bool,
     pub friction: f32,
     /// The nodes that move each side, with their parts of it; of those that there are not the part is 0. They are the side's own but where
     /// it is bound to others.
@@ -47,6 +49,7 @@ saved!(Link {
     normal,
     least_speed,
     depth,
+    is_parted,
     friction,
     movers,
     answers,
@@ -94,12 +97,13 @@ fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -
 }
 
 impl Link {
-    /// A contact that has given nothing yet; `None` where neither side can move.
-    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2]) -> Option<Self> {
+    /// A contact that has given nothing yet, of bodies of which these give way; `None` where neither side can move.
+    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2], moves: [bool; 2]) -> Option<Self> {
         let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
         let movers = [0, 1].map(|side| sides[side].movers(bodies[side]));
-        for (movers, (body, answers)) in movers.iter().zip(bodies.into_iter().zip(&mut answers)) {
+        let of_sides = movers.iter().zip(bodies.into_iter().zip(&mut answers)).zip(moves);
+        for ((movers, (body, answers)), _) in of_sides.filter(|(_, moves)| *moves) {
             for (answer, &(node, weight)) in answers.iter_mut().zip(movers) {
                 let mobility = body.inverse_masses[node as usize] * weight;
                 let held: BVec3 = body.pins.partial_axes_of(node);
@@ -113,6 +117,7 @@ impl Link {
             normal,
             least_speed: 0.0,
             depth: 0.0,
+            is_parted: false,
             friction: 0.0,
             movers,
             answers,
@@ -163,9 +168,16 @@ impl Link {
         }
     }
 
-    /// The ways, m, by which nodes of the sides come apart by `part` of how much too close they began.
-    pub fn parting(&self, part: f32) -> impl Iterator<Item = (usize, usize, Vec3)> + '_ {
-        let push = self.normal * (self.depth.max(0.0) * part * self.mass);
+    /// The ways, m, by which nodes of the sides come apart by `part` of how much too close they began, in a substep of `duration` seconds.
+    ///
+    /// Sides that a cut has parted begin too close: they go no further than they were kept from going, so that nothing parts them where nothing
+    /// presses.
+    pub fn parting(&self, part: f32, duration: f32) -> impl Iterator<Item = (usize, usize, Vec3)> + '_ {
+        let mut push = self.depth.max(0.0) * part * self.mass;
+        if self.is_parted {
+            push = push.min(self.impulse * duration);
+        }
+        let push = self.normal * push;
         (0..2).flat_map(move |side| {
             let sign = [1.0, -1.0][side];
             let (body, movers) = (self.sides[side].body, self.movers[side]);

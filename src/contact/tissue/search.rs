@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::link::Side;
-use super::skin::{NONE, PARTED, Skin};
+use super::skin::{Clearance, NONE, PARTED, Skin};
 use crate::body::Bounds;
 use crate::contact::sweep::{Corners, Segment, Separation};
 
@@ -30,6 +30,8 @@ pub(super) struct Touch {
     pub normal: Vec3,
     /// How far apart they are along it when the step begins, less what they keep off, m.
     pub gap: f32,
+    /// Whether they were one until a cut parted them.
+    pub is_parted: bool,
 }
 
 /// A search over a step of `dt` seconds for what comes closer than `radius`, m.
@@ -84,7 +86,7 @@ impl Search<'_> {
                 steps: [step; 2],
                 radius: self.radius,
             };
-            let mut touched: Option<(f32, usize, (Separation, f32))> = None;
+            let mut touched: Option<(f32, usize, (Separation, Clearance))> = None;
             // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
             let mut nearest = (f32::INFINITY, 0.0_f32);
             let mut behind: Option<(usize, Separation)> = None;
@@ -123,11 +125,11 @@ impl Search<'_> {
             let is_behind = behind.is_some();
             let closest = match behind {
                 Some((triangle, start)) => {
-                    (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, self.radius)))
+                    (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, Clearance::of(self.radius))))
                 }
                 None => touched.map(|(_, triangle, found)| (triangle, found)),
             };
-            if let Some((triangle, (found, radius))) = closest {
+            if let Some((triangle, (found, clearance))) = closest {
                 let nodes = of_faces.skin.triangles[triangle];
                 let sides = [
                     Side {
@@ -142,7 +144,7 @@ impl Search<'_> {
                     },
                 ];
                 let offset = if is_behind { found.offset } else { -found.offset };
-                self.show(sides, offset, (radius, shift), see);
+                self.show(sides, offset, (clearance, shift), see);
             }
         }
     }
@@ -159,7 +161,7 @@ impl Search<'_> {
                 steps: ways.map(|(_, step)| step),
                 radius: self.radius,
             };
-            let mut closest: Option<(f32, [u32; 2], (Separation, f32))> = None;
+            let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
             let mut see_edges = |edges: [u32; 3]| {
                 for other in second.skin.sound(edges) {
                     if self.is_of_one()
@@ -174,7 +176,8 @@ impl Search<'_> {
                     if self.is_far(second.skin, start) {
                         continue;
                     }
-                    let Some((found, radius)) = self.approach(second.skin, (edge, &segment), (&other, &corners)) else {
+                    let met = self.approach(second.skin, (edge, &segment), (&other, &corners));
+                    let Some((found, clearance)) = met else {
                         continue;
                     };
                     // At an end of either it is a node that meets.
@@ -182,7 +185,7 @@ impl Search<'_> {
                         let is_closer =
                             |(least, known, _): (f32, [u32; 2], _)| start < least || start == least && other < known;
                         if closest.is_none_or(is_closer) {
-                            closest = Some((start, other, (found, radius)));
+                            closest = Some((start, other, (found, clearance)));
                         }
                     }
                 }
@@ -213,7 +216,7 @@ impl Search<'_> {
                     }
                 }
             }
-            if let Some((_, other, (found, radius))) = closest {
+            if let Some((_, other, (found, clearance))) = closest {
                 let sides = [
                     Side {
                         body: first.place,
@@ -226,7 +229,7 @@ impl Search<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, -found.offset, (radius, shift), see);
+                self.show(sides, -found.offset, (clearance, shift), see);
             }
         }
     }
@@ -237,22 +240,24 @@ impl Search<'_> {
         skin: &Skin,
         (nodes, segment): ([u32; 2], &Segment),
         (others, corners): (&[u32], &Corners),
-    ) -> Option<(Separation, f32)> {
+    ) -> Option<(Separation, Clearance)> {
         let found = corners.approach(segment, 0.0)?;
         if !self.is_of_one() {
-            return Some((found, self.radius));
+            return Some((found, Clearance::of(self.radius)));
         }
-        let radius = skin.keeps(nodes, (others, found.weights), self.radius)?;
-        if radius == self.radius {
-            return Some((found, radius));
+        let clearance = skin.keeps(nodes, (others, found.weights), self.radius)?;
+        // Without a thickness what a cut has parted keeps as far apart as all else does.
+        if clearance == Clearance::of(self.radius) {
+            return Some((found, clearance));
         }
         // What was one place has no side yet.
+        let radius = clearance.radius;
         let start = corners.separation(segment, 0.0).offset.length_squared();
         if start < (PARTED * radius) * (PARTED * radius) {
             return None;
         }
         let segment = Segment { radius, ..*segment };
-        Some((corners.approach(&segment, 0.0)?, radius))
+        Some((corners.approach(&segment, 0.0)?, clearance))
     }
 
     /// Shows what meets in this direction, of sides that keep so far apart, and in coordinates so far apart.
@@ -260,7 +265,7 @@ impl Search<'_> {
         &self,
         sides: [Side; 2],
         offset: Vec3,
-        (radius, shift): (f32, Vec3),
+        (clearance, shift): (Clearance, Vec3),
         see: &mut impl FnMut(Touch),
     ) {
         if let Some(normal) = offset.try_normalize() {
@@ -268,7 +273,8 @@ impl Search<'_> {
             see(Touch {
                 sides,
                 normal,
-                gap: apart.dot(normal) - radius,
+                gap: apart.dot(normal) - clearance.radius,
+                is_parted: clearance.is_parted,
             });
         }
     }

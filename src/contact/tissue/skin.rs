@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
-use super::LEAST_THICKNESS;
 use super::change::Changing;
 use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
+use super::{LEAST_THICKNESS, Moment};
 use crate::body::{Bindings, Body, Bounds, Vectors};
 use crate::contact::BodyContact;
 use crate::contact::forest::Forest;
@@ -99,6 +99,25 @@ const CROSSING: f32 = 0.01;
 
 /// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
+
+/// How far two features keep apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Clearance {
+    /// m
+    pub radius: f32,
+    /// Whether they were one until a cut parted them: they begin closer than this without anything that presses them.
+    pub is_parted: bool,
+}
+
+impl Clearance {
+    /// That of features which were never one.
+    pub fn of(radius: f32) -> Self {
+        Self {
+            radius,
+            is_parted: false,
+        }
+    }
+}
 
 /// No edge.
 pub(super) const NONE: u32 = u32::MAX;
@@ -221,10 +240,16 @@ impl Skin {
     /// How far a node or an edge, and the point of an edge or a face of the same body with these weights, keep apart that would keep apart
     /// `radius`, m; `None`: they do not meet. What was as near as that at first is exempt, or neighbours would meet; but what is there since a cut
     /// meets as a surface without thickness, as what was parted has nothing between it.
-    pub fn keeps(&self, nodes: [u32; 2], (others, weights): (&[u32], [f32; 3]), radius: f32) -> Option<f32> {
+    pub(super) fn keeps(
+        &self,
+        nodes: [u32; 2],
+        (others, weights): (&[u32], [f32; 3]),
+        radius: f32,
+    ) -> Option<Clearance> {
         let apart = self.first_distance(nodes, others)?;
+        let whole = Clearance::of(radius);
         let Some(changing) = &self.changing else {
-            return (apart > radius).then_some(radius);
+            return (apart > radius).then_some(whole);
         };
         let mut used = others.iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
         if let Some(wound) = &changing.wound
@@ -233,17 +258,17 @@ impl Skin {
             return None;
         }
         if apart > radius {
-            return Some(radius);
+            return Some(whole);
         }
         let is_later = |node: u32| node >= changing.first_later;
         if !nodes.into_iter().any(is_later) && !used.any(|(&other, _)| is_later(other)) {
             return None;
         }
         let least = self.least_thickness();
-        Some(if apart <= PARTED * least {
-            least
-        } else {
-            least.min(0.5 * apart)
+        let is_parted = apart <= PARTED * least;
+        Some(Clearance {
+            radius: if is_parted { least } else { least.min(0.5 * apart) },
+            is_parted,
         })
     }
 
@@ -300,14 +325,15 @@ impl Skin {
         })
     }
 
-    /// Takes a substep of `duration` seconds as it is to be.
-    pub fn follow(&mut self, body: &mut Body, duration: f32) {
+    /// Takes a substep as it is to be.
+    pub fn follow(&mut self, body: &mut Body, moment: &Moment) {
+        let duration = moment.duration;
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
         let state = body.state.substep();
         let (starts, velocities) = (state.positions, &*state.velocities);
         let bindings = body.bindings.as_ref();
-        match &body.implicit {
+        match body.implicit.as_ref().filter(|_| !moment.shows) {
             None => self.take(origin, bindings, duration, |node| {
                 (starts.get(node), velocities.get(node))
             }),

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::link::Side;
 use super::search::{Search, Touch};
-use super::skin::{NONE, Skin};
+use super::skin::{Clearance, NONE, Skin};
 use crate::body::{Body, Bounds, Vectors};
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::error::Result;
@@ -200,7 +200,7 @@ impl Search<'_> {
                         weights: over.weights,
                     },
                 ];
-                self.show(sides, normal, (0.0, Vec3::ZERO), see);
+                self.show(sides, normal, (Clearance::of(0.0), Vec3::ZERO), see);
             }
         }
     }
@@ -278,7 +278,7 @@ impl Search<'_> {
                         weights: found.weights,
                     },
                 ];
-                self.show(sides, normal, (0.0, Vec3::ZERO), see);
+                self.show(sides, normal, (Clearance::of(0.0), Vec3::ZERO), see);
             }
         }
     }
