@@ -1,18 +1,26 @@
 //! Keeps a body that VERLET moves from gaining energy that nobody put in.
 //!
-//! Leapfrog conserves the energy of a linear oscillator at any substep below the limit, but not that of a spring which turns by a
-//! good part of a radian within a substep, as compressed springs do when their ends pass each other. Such a body gains a little
-//! energy each time, and without damping it gains without end. So every [`PERIOD`] substeps the energy is compared with what there
-//! was and what gravity, forces, pins and tools have put in since. What is too much is taken off the velocities, and while much has
-//! to be taken off, substeps are shorter.
+//! Leapfrog conserves the energy of a linear oscillator at any substep below the limit, but not that of a spring that turns by a good
+//! part of a radian within a substep, as compressed springs do when their ends pass each other. Such a body gains a little energy each
+//! time, and without damping it gains without end. So every [`PERIOD`] substeps the energy is compared with a reference: the energy at the
+//! first comparison, plus the work of gravity, forces, pins and tools since. Excess energy is taken off the velocities, and a body that
+//! often has some takes shorter substeps.
 //!
-//! Where motion is nonlinear, energy as it is measured swings to and fro about what leapfrog conserves. So a mean over many comparisons
-//! decides, and what stands out from the usual at once. A body that conserves its energy is not touched.
+//! Kinetic plus elastic energy would not do: it oscillates by `(h omega)²/4` in a linear mode that leapfrog follows without a fault. The
+//! energy measured here is the shadow energy of leapfrog, of order 4 in the substep `h`. With `v⁻⁻`, `v⁻` and `v⁺` the velocities of three
+//! successive half steps, of which the positions lie between the last two, it is
+//!
+//! `V + Σ m/2 (v⁻·v⁺ + (v⁻·v⁻ - v⁻⁻·v⁺) / 6) = K + V + h² (v·V''·v / 12 - f·f / 24m) + O(h⁴)`.
+//!
+//! Both parts of the sum are conserved exactly in a linear mode, `S` and `(h omega)² S / 6`. Energy that nonlinear forces move between
+//! slow and fast modes leaves the sum as it is up to order 4. The mean of `K + V` is below it by about `h² f·f / 24m`, and so the
+//! reference bounds the energy at any substep.
 
 use glam::{BVec3, DMat3, DVec3, Vec3};
 
 use super::attempt::{Carry, StepRequest};
 use super::closing::Closed;
+use super::substep::{Before, Part};
 use crate::body::{Body, Inertia, Vectors};
 use crate::contact::Contacts;
 use crate::diagnostics::StateHasher;
@@ -21,63 +29,42 @@ use crate::solver::write_records;
 use crate::springs::{Loops, TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
-/// The energy is compared after so many substeps at least: it takes about as long as two of them.
+/// Substeps between two comparisons, at least: a comparison takes about as long as two substeps.
 const PERIOD: u32 = 64;
 
-/// So much more energy than there was is borne, as a part of the most kinetic energy of late. What leapfrog makes of the energy of a linear
-/// oscillator swings by as much where the substep is 0.8 of the limit; compared at even intervals it may seem to grow for long.
-const BAND: f64 = 1.0;
+/// Excess that is tolerated, as a part of the kinetic energy: the shadow energy of nonlinear motion fluctuates.
+const BAND: f64 = 5e-4;
 
-/// The energy is a mean over so many comparisons. It swings by a percent where springs are stretched by a tenth with the longest stable
-/// substep.
-const SAMPLES: f64 = 32.0;
-
-/// After so many comparisons it is known what is usual, and nothing is taken off before.
-const LEARNED: f64 = 8.0;
-
-/// What is so many standard deviations more than usual is taken off at once.
-const UNUSUAL: f64 = 8.0;
-
-/// A body that is slower than this in the mean is at rest but for rounding, and nothing is taken off, m/s.
+/// A body whose mean speed is lower is at rest but for rounding, m/s.
 const STILL: f64 = 1e-4;
 
-/// What was lost may come back, as far as it is no more than this part of the kinetic energy.
-const CREDIT: f64 = 0.1;
-
-/// What rounding may add, as a part of the energy, and of the energy of motion that is common to all of a body.
+/// Rounding errors, as parts of the energy and of the kinetic energy of the motion as a whole.
 const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 
-/// The kinetic energy of late is that of about so many seconds.
+/// The time in which older comparisons lose half their weight, s.
 const MEMORY: f64 = 5.0;
 
-/// Substeps are halved where more than this part of the kinetic energy had to be taken off in about [`TRIAL`] seconds.
+/// Substeps are halved while more than this part of the kinetic energy has been taken off within [`MEMORY`].
 const TOO_MUCH: f64 = 5e-3;
 
-/// They are doubled again where it is less than this.
+/// Substeps are doubled again when it is less than this.
 const LITTLE: f64 = 5e-4;
 
-/// Seconds; how long substeps are tried.
-const TRIAL: f64 = 10.0;
-
-/// Substeps are at most so many times shorter than stability asks for.
-const FINEST: u32 = 4;
+/// How many times shorter substeps may be than stability asks for.
+const FINEST: u32 = 8;
 
 /// What is known of the energy that a body may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyAccount {
-    /// The energy when it was compared last, its mean of late, and what that may be, J; `None`: not known since something changed it.
-    known: Option<[f64; 3]>,
-    /// What was put in since it was compared, J.
+    /// The energy that the body had when it was compared last, or might have had, J; `None` after a change from outside.
+    reference: Option<f64>,
+    /// The work since the last comparison, J.
     work: f64,
-    /// The gravity with which it was compared, m/s².
+    /// The gravity of the last step, m/s².
     gravity: Vec3,
-    /// Substeps since, and seconds.
+    /// Substeps and seconds since the last comparison.
     substeps: u32,
     time: f64,
-    /// How often it was compared, up to as often as matters.
-    comparisons: f64,
-    /// Half the mean square of its changes, J².
-    variance: f64,
     /// The most kinetic energy of late, J.
     kinetic: f64,
     /// How much was taken off of late, as a part of that.
@@ -87,13 +74,11 @@ pub(crate) struct EnergyAccount {
 }
 
 saved!(EnergyAccount {
-    known,
+    reference,
     work,
     gravity,
     substeps,
     time,
-    comparisons,
-    variance,
     kinetic,
     removed,
     refinement
@@ -101,13 +86,11 @@ saved!(EnergyAccount {
 
 impl EnergyAccount {
     pub const UNKNOWN: Self = Self {
-        known: None,
+        reference: None,
         work: 0.0,
         gravity: Vec3::ZERO,
         substeps: 0,
         time: 0.0,
-        comparisons: 0.0,
-        variance: 0.0,
         kinetic: 0.0,
         removed: 0.0,
         refinement: 1,
@@ -115,17 +98,16 @@ impl EnergyAccount {
 
     /// The energy is not what it was when the last step ended.
     pub fn forget(&mut self) {
-        self.known = None;
+        self.reference = None;
         self.start_over();
     }
 
-    /// Nothing was put in yet since now.
     fn start_over(&mut self) {
         (self.work, self.substeps, self.time) = (0.0, 0, 0.0);
     }
 
     /// Whether a step of so many substeps ends with a comparison.
-    pub fn is_due(&self, substeps: u32) -> bool {
+    fn is_due(&self, substeps: u32) -> bool {
         self.substeps.saturating_add(substeps) >= PERIOD
     }
 
@@ -134,47 +116,24 @@ impl EnergyAccount {
         self.refinement
     }
 
-    /// Takes in what the energy is, J, of which the motion is that much and may lack `rounding`: by how much it is more than it may be,
-    /// in what stands out and in the mean.
-    fn compare(&mut self, energy: f64, kinetic: f64, rounding: f64) -> [f64; 2] {
-        self.kinetic = kinetic.max(self.kinetic / (1.0 + self.time / MEMORY));
-        self.removed /= 1.0 + self.time / TRIAL;
-        let Some(known) = self.known else {
-            (self.known, self.comparisons) = (Some([energy; 3]), 1.0);
-            return [0.0; 2];
-        };
-        let [last, mean, most] = known.map(|energy| energy + self.work);
-        let usual = BAND * self.kinetic + rounding + UNUSUAL * self.variance.sqrt();
-        let is_learned = self.comparisons >= LEARNED;
-        let at_once = if is_learned {
-            (energy - most - usual).max(0.0)
-        } else {
-            0.0
-        };
-        let expected = energy - at_once;
-        self.comparisons = (self.comparisons + 1.0).min(SAMPLES);
-        self.variance += (0.5 * (expected - last).powi(2) - self.variance) / self.comparisons;
-        let mean = mean + (expected - mean) / self.comparisons;
-        let most = if is_learned {
-            most.min(mean + CREDIT * self.kinetic)
-        } else {
-            mean
-        };
-        self.known = Some([energy, mean, most]);
-        [at_once, (mean - (most + BAND * self.kinetic + rounding)).max(0.0)]
+    /// The excess of the energy, J, given the kinetic energy and the rounding error.
+    fn compare(&mut self, energy: f64, kinetic: f64, rounding: f64) -> f64 {
+        let fading = 1.0 / (1.0 + self.time / MEMORY);
+        self.kinetic = kinetic.max(self.kinetic * fading);
+        self.removed *= fading;
+        // Lost energy may come back, up to the kinetic energy of late: a body that has come to rest stays so.
+        let allowed = self.reference.map_or(energy, |reference| reference + self.work);
+        let allowed = allowed.min(energy + self.kinetic);
+        self.reference = Some(allowed);
+        self.start_over();
+        (energy - allowed - BAND * self.kinetic - rounding).max(0.0)
     }
 
-    /// So much kinetic energy was taken off, J, `at_once` of it before it counts in the mean.
-    fn remove(&mut self, removed: f64, at_once: f64) {
-        if let Some([last, mean, _]) = &mut self.known {
-            *last -= removed;
-            *mean -= (removed - at_once).max(0.0);
+    /// Decides how short substeps are, after so much kinetic energy was taken off, J.
+    fn refine(&mut self, removed: f64) {
+        if removed > 0.0 {
+            self.removed += removed / self.kinetic;
         }
-        self.removed += removed / self.kinetic;
-    }
-
-    /// Decides how short substeps are.
-    fn refine(&mut self) {
         if self.removed > TOO_MUCH && self.refinement < FINEST {
             self.refinement *= 2;
             self.removed = 0.5 * TOO_MUCH;
@@ -184,18 +143,8 @@ impl EnergyAccount {
     }
 
     pub fn hash(&self, hasher: &mut StateHasher) {
-        let [last, mean, least] = self.known.unwrap_or([f64::NAN; 3]);
-        let numbers = [
-            last,
-            mean,
-            least,
-            self.work,
-            self.time,
-            self.comparisons,
-            self.variance,
-            self.kinetic,
-            self.removed,
-        ];
+        let reference = self.reference.unwrap_or(f64::NAN);
+        let numbers = [reference, self.work, self.time, self.kinetic, self.removed];
         numbers
             .into_iter()
             .for_each(|number| hasher.write_u64(number.to_bits()));
@@ -204,21 +153,42 @@ impl EnergyAccount {
     }
 }
 
-/// A step that has just been taken, of so many substeps.
+/// The account of one step.
 #[derive(Clone, Copy)]
 pub(super) struct Account<'a> {
-    pub request: &'a StepRequest<'a>,
-    pub substeps: u32,
-    /// Whether its energy is to be compared.
+    request: &'a StepRequest<'a>,
+    substeps: u32,
+    /// Whether the body is watched.
+    watches: bool,
+    /// Whether the step ends with a comparison.
     pub compares: bool,
 }
 
-impl Account<'_> {
-    /// Takes the step into account.
-    pub fn settle(&self, body: &mut Body, carry: &mut Carry, team: &Team) {
-        let account = &mut carry.energy;
+impl<'a> Account<'a> {
+    pub fn new(body: &Body, carry: &Carry, request: &'a StepRequest<'a>, substeps: u32) -> Self {
         // What is held by a tool, or sleeps in part, is not alone; fixed substeps are taken as they are.
-        if body.is_grasped() || body.sleeps() || self.request.substeps > 0 {
+        let watches = request.substeps == 0 && !body.is_grasped() && !body.sleeps();
+        Self {
+            request,
+            substeps,
+            watches,
+            compares: watches && carry.energy.is_due(substeps),
+        }
+    }
+
+    /// Keeps the velocities before the last kick, where forces are kept at the end of a step.
+    pub fn keep_velocities(&self, body: &mut Body, last: &Part) {
+        let state = body.state.substep();
+        state.forces.copy_from(match last.before {
+            Before::Current | Before::CurrentOpen => state.first_velocities,
+            Before::Closed | Before::Open => state.velocities,
+        });
+    }
+
+    /// Takes the step into account. `sums` are those of the open velocities, if it ends with a comparison.
+    pub fn settle(&self, body: &mut Body, carry: &mut Carry, sums: Option<Sums>, team: &Team) {
+        let account = &mut carry.energy;
+        if !self.watches {
             account.forget();
             return;
         }
@@ -229,8 +199,8 @@ impl Account<'_> {
         account.substeps = account.substeps.saturating_add(self.substeps);
         account.time += f64::from(self.request.dt);
         account.work += self.work(body);
-        if self.compares {
-            self.compare(body, carry, team);
+        if let Some(sums) = sums {
+            self.compare(body, carry, sums, team);
         }
     }
 
@@ -257,27 +227,27 @@ impl Account<'_> {
         work
     }
 
-    /// Takes off what there is too much of, and decides how short the next substeps are.
-    fn compare(&self, body: &mut Body, carry: &mut Carry, team: &Team) {
-        let sums = sums(body, carry, team);
-        let account = &mut carry.energy;
+    /// Takes off the excess energy, and decides how short the next substeps are.
+    fn compare(&self, body: &mut Body, carry: &mut Carry, open: Sums, team: &Team) {
         let held = body.held_axes();
-        let elastic = elastic(body, team);
-        let energy = sums.kinetic + elastic - sums.moment.dot(self.request.gravity.as_dvec3());
-        // What is common to all of a body that nothing holds is not looked at closely.
-        let common = DVec3::select(held, DVec3::ZERO, sums.momentum).length_squared() / (2.0 * sums.free_mass);
-        let own = (sums.kinetic - common).max(0.0);
+        let [closing, elastic] = close(body, carry, team);
+        let energy = open.shadow + closing + elastic - open.moment.dot(self.request.gravity.as_dvec3());
+        // The motion as a whole of a body that nothing holds is left as it is.
+        let common = DVec3::select(held, DVec3::ZERO, open.momentum).length_squared() / (2.0 * open.free_mass);
+        let own = (open.kinetic - common).max(0.0);
         let rounding = ROUNDING[0] * (own + elastic.abs()) + ROUNDING[1] * common;
-        if energy.is_finite() && rounding.is_finite() {
-            let [at_once, in_mean] = account.compare(energy, own, rounding);
-            if at_once + in_mean > 0.0 && own > 0.5 * sums.free_mass * STILL * STILL {
-                account.remove(slow_down(body, held, at_once + in_mean), at_once);
-            }
-            account.refine();
-            account.start_over();
-        } else {
+        let account = &mut carry.energy;
+        if !(energy.is_finite() && rounding.is_finite()) {
             account.forget();
+            return;
         }
+        let excess = account.compare(energy, own, rounding);
+        let is_still = own <= 0.5 * open.free_mass * STILL * STILL;
+        account.refine(if excess > 0.0 && !is_still {
+            slow_down(body, held, excess)
+        } else {
+            0.0
+        });
     }
 }
 
@@ -292,6 +262,8 @@ pub(crate) struct Sums {
     moment: DVec3,
     mass: f64,
     free_mass: f64,
+    /// The kinetic part of the shadow energy: what open velocities give, then what closed ones add to it, J.
+    shadow: f64,
     elastic: f64,
 }
 
@@ -301,6 +273,7 @@ saved!(Sums {
     moment,
     mass,
     free_mass,
+    shadow,
     elastic
 });
 
@@ -312,20 +285,163 @@ impl Sums {
             moment: self.moment + other.moment,
             mass: self.mass + other.mass,
             free_mass: self.free_mass + other.free_mass,
+            shadow: self.shadow + other.shadow,
             elastic: self.elastic + other.elastic,
+        }
+    }
+
+    /// Those of the newest positions and open velocities, after the kick `last`; the moment is about the origin of the world.
+    ///
+    /// With `v` the closed velocities, `v⁺` is `2 v - v⁻`, and the kinetic part of the shadow energy is
+    /// `Σ m (v·u + v⁻·v⁻ / 12 - v⁻·u / 2)` with `u = v⁻ - v⁻⁻ / 6`. Here `u` goes to where the next positions will be.
+    pub(super) fn of_open(body: &mut Body, last: &Part, team: &Team) -> Self {
+        let (kernel, masses, inverse_masses, pins) = (body.kernel, &body.masses, &body.inverse_masses, &body.pins);
+        let state = body.state.substep();
+        let (positions, before, velocities) = (state.positions, &*state.forces, &*state.velocities);
+        let kicks = last.duration / last.substep;
+        let count = masses.len();
+        let written = (state.next_positions.tiles_mut(), Items::new(&mut body.tile_sums));
+        team.pass(tile_count(count), written, |tile, (mut changes, sums)| {
+            let nodes = tile_nodes(tile, count);
+            *sums = Sums::default();
+            for (axis, changes) in changes.iter_mut().enumerate() {
+                kernel.run(OfAxis {
+                    axis,
+                    kicks,
+                    positions: &positions.axes()[axis][nodes.clone()],
+                    before: &before.axes()[axis][nodes.clone()],
+                    velocities: &velocities.axes()[axis][nodes.clone()],
+                    masses: &masses[nodes.clone()],
+                    inverse_masses: &inverse_masses[nodes.clone()],
+                    shares: changes,
+                    sums,
+                });
+            }
+            for pin in pins.of_tile(tile).iter().filter(|pin| pin.is_partial()) {
+                let node = pin.node as usize;
+                let inverse_mass = f64::from(inverse_masses[node]);
+                if inverse_mass > 0.0 {
+                    let place = node - nodes.start;
+                    let velocity = pin.held(velocities.get(node)).as_dvec3();
+                    let share = DVec3::from(changes.each_ref().map(|axis| f64::from(axis[place])));
+                    sums.kinetic -= 0.5 * velocity.length_squared() / inverse_mass;
+                    sums.momentum -= velocity / inverse_mass;
+                    sums.shadow -= (velocity.length_squared() / 12.0 - 0.5 * velocity.dot(share)) / inverse_mass;
+                    pin.put(&mut changes, place, Vec3::ZERO);
+                }
+            }
+        });
+        let mut sums = body
+            .tile_sums
+            .iter()
+            .fold(Sums::default(), |sums, tile| sums.plus(tile));
+        sums.moment += sums.mass * body.origin;
+        sums
+    }
+}
+
+/// What the nodes of a tile add to its sums along one axis.
+struct OfAxis<'a> {
+    axis: usize,
+    /// How long the last kick was, in substeps.
+    kicks: f32,
+    positions: &'a [f32],
+    /// The velocities before and after it.
+    before: &'a [f32],
+    velocities: &'a [f32],
+    masses: &'a [f32],
+    inverse_masses: &'a [f32],
+    shares: &'a mut [f32],
+    sums: &'a mut Sums,
+}
+
+/// Sums that are made side by side, so that none waits for itself.
+const LANES: usize = 8;
+
+/// The mass of a node as far as it moves freely, kg.
+#[inline(always)]
+fn free_mass(inverse_mass: f32) -> f64 {
+    if inverse_mass > 0.0 {
+        f64::from(1.0 / inverse_mass)
+    } else {
+        0.0
+    }
+}
+
+impl Loops for OfAxis<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // Kinetic energy, momentum, moment, mass, free mass, shadow energy.
+        let mut lanes = [[0.0_f64; 6]; LANES];
+        let count = self.masses.len();
+        let part = 1.0 / (6.0 * self.kicks);
+        for start in (0..count).step_by(LANES) {
+            for (lane, node) in lanes.iter_mut().zip(start..count) {
+                let mass = f64::from(self.masses[node]);
+                let free_mass = free_mass(self.inverse_masses[node]);
+                let velocity = self.velocities[node];
+                // A kick of another length stands for one of a substep.
+                let share = velocity * (5.0 / 6.0) + (velocity - self.before[node]) * part;
+                self.shares[node] = share;
+                let [velocity, share] = [velocity, share].map(f64::from);
+                lane[0] += free_mass * velocity * velocity;
+                lane[1] += free_mass * velocity;
+                lane[2] += mass * f64::from(self.positions[node]);
+                lane[3] += mass;
+                lane[4] += free_mass;
+                lane[5] += free_mass * velocity * (velocity / 12.0 - 0.5 * share);
+            }
+        }
+        let [kinetic, momentum, moment, mass, free_mass, shadow] =
+            [0, 1, 2, 3, 4, 5].map(|sum| lanes.iter().map(|lane| lane[sum]).sum::<f64>());
+        self.sums.kinetic += 0.5 * kinetic;
+        self.sums.momentum[self.axis] += momentum;
+        self.sums.moment[self.axis] += moment;
+        self.sums.shadow += shadow;
+        if self.axis == 0 {
+            self.sums.mass = mass;
+            self.sums.free_mass = free_mass;
         }
     }
 }
 
-/// Adds up the newest positions and velocities of a body; the moment is that about the origin of the world.
-fn sums(body: &mut Body, carry: &Carry, team: &Team) -> Sums {
-    let kernel = body.kernel;
-    let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
+/// The sum of `m a b` along one axis.
+struct Product<'a>([&'a [f32]; 2], &'a [f32]);
+
+impl Loops for Product<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self([a, b], inverse_masses) = self;
+        let mut lanes = [0.0_f64; LANES];
+        for start in (0..a.len()).step_by(LANES) {
+            for (lane, node) in lanes.iter_mut().zip(start..a.len()) {
+                *lane += free_mass(inverse_masses[node]) * f64::from(a[node]) * f64::from(b[node]);
+            }
+        }
+        lanes.iter().sum()
+    }
+}
+
+/// What closed velocities add to the shadow energy, and the energy of all inner forces at the newest positions, less the work of a
+/// constant pressure, J.
+fn close(body: &mut Body, carry: &Carry, team: &Team) -> [f64; 2] {
+    let (kernel, springs) = (body.kernel, &*body.springs);
+    let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
+    let (inverse_masses, pins) = (&body.inverse_masses, &body.pins);
+    let inertia = Inertia::of(body.uniform_inverse_mass, inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
-    let (positions, velocities) = (state.positions, &*state.velocities);
-    // Velocities that are half a substep older are brought up to the time of the positions to the side, so that comparing changes nothing.
+    let (positions, velocities, shares) = (state.positions, &*state.velocities, &*state.next_positions);
+    if let Some(records) = &mut body.records {
+        write_records(kernel, positions, records, team);
+    }
+    let view = positions.view().with_records(body.records.as_ref());
+    // Open velocities are closed to the side, so that comparing changes nothing.
     let closed = carry.closing.map(|closing| Closed {
-        springs: &*body.springs,
+        springs,
         elements: None,
         terms: None,
         enclosed: None,
@@ -334,11 +450,9 @@ fn sums(body: &mut Body, carry: &Carry, team: &Team) -> Sums {
         positions,
         velocities,
     });
-    let (masses, inverse_masses, pins) = (&body.masses, &body.inverse_masses, &body.pins);
-    let count = masses.len();
+    let count = positions.len();
     team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
         let nodes = tile_nodes(tile, count);
-        *sums = Sums::default();
         let mut axes = [[0.0_f32; TILE]; 3];
         let velocities = match &closed {
             None => velocities.slices(nodes.clone()),
@@ -348,102 +462,19 @@ fn sums(body: &mut Body, carry: &Carry, team: &Team) -> Sums {
                 axes.map(|axis| &*axis)
             }
         };
-        for (axis, &velocities) in velocities.iter().enumerate() {
-            kernel.run(OfAxis {
-                axis,
-                positions: &positions.axes()[axis][nodes.clone()],
-                velocities,
-                masses: &masses[nodes.clone()],
-                inverse_masses: &inverse_masses[nodes.clone()],
-                sums,
-            });
-        }
-        for pin in pins.of_tile(tile).iter().filter(|pin| pin.is_partial()) {
-            let node = pin.node as usize;
-            let inverse_mass = f64::from(inverse_masses[node]);
-            if inverse_mass > 0.0 {
-                let velocity = Vec3::from(velocities.map(|axis| axis[node - nodes.start]));
-                let velocity = pin.held(velocity).as_dvec3();
-                sums.kinetic -= 0.5 * velocity.length_squared() / inverse_mass;
-                sums.momentum -= velocity / inverse_mass;
-            }
-        }
-    });
-    let mut sums = body
-        .tile_sums
-        .iter()
-        .fold(Sums::default(), |sums, tile| sums.plus(tile));
-    sums.moment += sums.mass * body.origin;
-    sums
-}
-
-/// What the nodes of a tile add to its sums along one axis.
-struct OfAxis<'a> {
-    axis: usize,
-    positions: &'a [f32],
-    velocities: &'a [f32],
-    masses: &'a [f32],
-    inverse_masses: &'a [f32],
-    sums: &'a mut Sums,
-}
-
-/// Sums that are made side by side, so that none waits for itself.
-const LANES: usize = 8;
-
-impl Loops for OfAxis<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        // kinetic, momentum, moment, mass, free mass
-        let mut lanes = [[0.0_f64; 5]; LANES];
-        let count = self.masses.len();
-        for start in (0..count).step_by(LANES) {
-            for (lane, node) in lanes.iter_mut().zip(start..count) {
-                let inverse_mass = self.inverse_masses[node];
-                let mass = f64::from(self.masses[node]);
-                let free_mass = if inverse_mass > 0.0 {
-                    f64::from(1.0 / inverse_mass)
-                } else {
-                    0.0
-                };
-                let velocity = f64::from(self.velocities[node]);
-                lane[0] += free_mass * velocity * velocity;
-                lane[1] += free_mass * velocity;
-                lane[2] += mass * f64::from(self.positions[node]);
-                lane[3] += mass;
-                lane[4] += free_mass;
-            }
-        }
-        let [kinetic, momentum, moment, mass, free_mass] =
-            [0, 1, 2, 3, 4].map(|sum| lanes.iter().map(|lane| lane[sum]).sum::<f64>());
-        self.sums.kinetic += 0.5 * kinetic;
-        self.sums.momentum[self.axis] += momentum;
-        self.sums.moment[self.axis] += moment;
-        if self.axis == 0 {
-            self.sums.mass = mass;
-            self.sums.free_mass = free_mass;
-        }
-    }
-}
-
-/// The energy of all inner forces at the newest positions, less the work of a constant pressure, J.
-fn elastic(body: &mut Body, team: &Team) -> f64 {
-    let (kernel, springs) = (body.kernel, &*body.springs);
-    let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
-    let positions = body.state.substep().positions;
-    if let Some(records) = &mut body.records {
-        write_records(kernel, positions, records, team);
-    }
-    let view = positions.view().with_records(body.records.as_ref());
-    let count = positions.len();
-    team.pass(tile_count(count), Items::new(&mut body.tile_sums), |tile, sums| {
-        sums.elastic = springs.half_energy(tile_nodes(tile, count), view);
+        let products = velocities.into_iter().zip(shares.slices(nodes.clone()));
+        sums.shadow = products
+            .map(|(velocities, shares)| kernel.run(Product([velocities, shares], &inverse_masses[nodes.clone()])))
+            .sum();
+        sums.elastic = springs.half_energy(nodes, view);
         if let Some(terms) = terms {
             sums.elastic += terms.energy_of_tile(tile, &|node| view.get(node).as_dvec3());
         }
     });
-    let of_tiles: f64 = body.tile_sums.iter().map(|sums| sums.elastic).sum();
+    let sums = body.tile_sums.iter();
+    let [closing, of_tiles] = sums.fold([0.0; 2], |[closing, elastic], sums| {
+        [closing + sums.shadow, elastic + sums.elastic]
+    });
     let of_elements = match (&mut body.elements, &body.records) {
         (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
         _ => 0.0,
@@ -451,7 +482,7 @@ fn elastic(body: &mut Body, team: &Team) -> f64 {
     let [of_cavities, work] = enclosed.map_or([0.0; 2], |enclosed| {
         enclosed.energy(&|node| positions.get(node).as_dvec3())
     });
-    of_tiles + of_elements + of_cavities - work
+    [closing, of_tiles + of_elements + of_cavities - work]
 }
 
 /// Takes this much kinetic energy off the newest velocities, J, or all there is that nothing conserves: how much it was. A body that nothing

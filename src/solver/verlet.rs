@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
-use super::energy_monitor::Account;
+use super::energy_monitor::{Account, Sums};
 use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
@@ -119,8 +119,7 @@ impl<'a> Step<'a> {
         let mut carry = start;
         let mut finite = true;
         begin(body, request);
-        // Fixed substeps are taken as they are.
-        let compares = request.substeps == 0 && carry.energy.is_due(substeps);
+        let account = Account::new(body, &carry, request, substeps);
         let may_stay_open = may_stay_open(body) && !body.pins.are_led();
         let mut part = self.opening(body, &mut carry);
         if let Some(damping) = &mut body.damping {
@@ -129,7 +128,11 @@ impl<'a> Step<'a> {
         let mut index = 0;
         while index < substeps {
             let mut parts = [part; DEEPEST];
-            let depth = if index == 0 { 1 } else { self.depth(index, &carry) };
+            let depth = match index {
+                0 => 1,
+                // The last substep before a comparison is taken alone.
+                _ => self.depth(substeps - index - u32::from(account.compares), &carry),
+            };
             for (index, part) in (index..).zip(&mut parts[..depth]) {
                 if index > 0 {
                     part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
@@ -139,6 +142,10 @@ impl<'a> Step<'a> {
                 part.end = f64::from(index + 1) / f64::from(substeps);
             }
             let parts = &parts[..depth];
+            part = parts[depth - 1];
+            if account.compares && index + 1 == substeps {
+                account.keep_velocities(body, &part);
+            }
             if let (2.., Some(plan)) = (depth, self.pipeline) {
                 let surveys = pipeline::run(body, request, parts, plan, team);
                 for survey in &surveys[..depth - 1] {
@@ -174,6 +181,7 @@ impl<'a> Step<'a> {
             }
             check_beside_springs(body, substep)?;
         }
+        let sums = account.compares.then(|| Sums::of_open(body, &part, team));
         // What a tool touches is closed with it.
         if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
             carry.closing = Some(ClosingKick {
@@ -189,12 +197,7 @@ impl<'a> Step<'a> {
             finite = pass(body, request, &part, &mut carry, team);
             check_beside_springs(body, substep)?;
         }
-        let account = Account {
-            request,
-            substeps,
-            compares,
-        };
-        account.settle(body, &mut carry, team);
+        account.settle(body, &mut carry, sums, team);
         Ok(Some(Taken { carry, finite }))
     }
 
@@ -230,13 +233,13 @@ impl<'a> Step<'a> {
         part
     }
 
-    /// How many substeps are taken next in one go: as many as a pipeline takes, in even parts, where the substep is stable
+    /// How many of the substeps that are left are taken next in one go: as many as a pipeline takes, in even parts, where the substep is stable
     /// wherever the nodes are, else as the motion is known to be stable for if it does not become twice as fast.
-    fn depth(&self, index: u32, carry: &Carry) -> usize {
+    fn depth(&self, left: u32, carry: &Carry) -> usize {
         let Some(plan) = self.pipeline else {
             return 1;
         };
-        let left = (self.substeps - index) as usize;
+        let left = left.max(1) as usize;
         let depth = left.div_ceil(left.div_ceil(plan.depth));
         if self.masses_for > 0.0 || carry.stability.for_short(self.substep).is_some() {
             return depth;
