@@ -6,7 +6,7 @@ use super::activity::Activity;
 use super::subject::{Extra, Law, Shape};
 use super::table::{DAMPING, FRAME, Row, matter, row};
 use Activity::{Hanging, Led, Plucked, Poked, Pushed, Spinning};
-use Extra::{Bending, Maxwell, Nothing, Voigt};
+use Extra::{Bending, Limited, Maxwell, Nothing, Voigt};
 use Law::{Elements, Young};
 use Shape::{Balloon, Cloth, Gallbladder, Lattice, Liver, Organ, SmallOrgan};
 
@@ -31,6 +31,16 @@ pub fn quick() -> Vec<(Row, f64)> {
         verlet(elements, Hanging, FRAME, 3.0),
         verlet(matter(Organ, Young, Maxwell), Hanging, FRAME, 3.0),
         verlet(matter(Organ, Elements(0.3), Voigt), Hanging, FRAME, 1.0),
+        verlet(springs, Hanging, FRAME, 10.0),
+        verlet(springs, Hanging, 1e-3, 5.0),
+        verlet(matter(Organ, Young, Limited), Hanging, FRAME, 5.0),
+        verlet(matter(Cloth, Young, Nothing), Hanging, FRAME, 10.0),
+        verlet(stiff_cloth, Hanging, FRAME, 10.0),
+        verlet(lattice, Hanging, FRAME, 10.0),
+        verlet(small, Led, FRAME, 10.0),
+        verlet(small, Hanging, FRAME, 10.0),
+        verlet(liver(Young), Hanging, FRAME, 10.0),
+        damped(verlet(liver(Young), Hanging, FRAME, 10.0)),
         verlet(stiff_cloth, Pushed, FRAME, 5.0),
         verlet(lattice, Poked, FRAME, 5.0),
         verlet(balloon, Led, FRAME, 5.0),
