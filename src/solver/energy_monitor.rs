@@ -2,7 +2,7 @@
 //!
 //! Leapfrog conserves the energy of a linear oscillator at any substep below the limit, but not that of a spring that turns by a good
 //! part of a radian within a substep, as compressed springs do when their ends pass each other. Such a body gains a little energy each
-//! time, and without damping it gains without end. So every [`PERIOD`] substeps the energy is compared with a reference: the energy at the
+//! time, and without damping it gains without end. So every 64 substeps or so the energy is compared with a reference: the energy at the
 //! first comparison, plus the work of gravity, forces, pins and tools since. Excess energy is taken off the velocities, and a body that
 //! often has some takes shorter substeps.
 //!
@@ -29,8 +29,12 @@ use crate::solver::write_records;
 use crate::springs::{Loops, TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
-/// Substeps between two comparisons, at least: a comparison takes about as long as two substeps.
-const PERIOD: u32 = 64;
+/// Substeps between two comparisons, at least, and how many more there may be: at even intervals, comparisons might meet a mode in its
+/// turning points alone. A comparison takes about as long as two substeps.
+const PERIOD: [u32; 2] = [52, 25];
+
+/// The number of comparisons after which the kinetic energy is known. Nothing is taken off before.
+const LEARNED: u32 = 4;
 
 /// Excess that is tolerated, as a part of the kinetic energy: the shadow energy of nonlinear motion fluctuates.
 const BAND: f64 = 5e-4;
@@ -65,6 +69,8 @@ pub(crate) struct EnergyAccount {
     /// Substeps and seconds since the last comparison.
     substeps: u32,
     time: f64,
+    /// How often the energy was compared since a change from outside.
+    comparisons: u32,
     /// The most kinetic energy of late, J.
     kinetic: f64,
     /// How much was taken off of late, as a part of that.
@@ -79,6 +85,7 @@ saved!(EnergyAccount {
     gravity,
     substeps,
     time,
+    comparisons,
     kinetic,
     removed,
     refinement
@@ -91,6 +98,7 @@ impl EnergyAccount {
         gravity: Vec3::ZERO,
         substeps: 0,
         time: 0.0,
+        comparisons: 0,
         kinetic: 0.0,
         removed: 0.0,
         refinement: 1,
@@ -98,7 +106,7 @@ impl EnergyAccount {
 
     /// The energy is not what it was when the last step ended.
     pub fn forget(&mut self) {
-        self.reference = None;
+        (self.reference, self.comparisons) = (None, 0);
         self.start_over();
     }
 
@@ -108,7 +116,8 @@ impl EnergyAccount {
 
     /// Whether a step of so many substeps ends with a comparison.
     fn is_due(&self, substeps: u32) -> bool {
-        self.substeps.saturating_add(substeps) >= PERIOD
+        let [least, more] = PERIOD;
+        self.substeps.saturating_add(substeps) >= least + self.comparisons.wrapping_mul(11) % more
     }
 
     /// How many times as many substeps are to be taken as stability asks for.
@@ -126,6 +135,10 @@ impl EnergyAccount {
         let allowed = allowed.min(energy + self.kinetic);
         self.reference = Some(allowed);
         self.start_over();
+        self.comparisons = self.comparisons.saturating_add(1);
+        if self.comparisons < LEARNED {
+            return 0.0;
+        }
         (energy - allowed - BAND * self.kinetic - rounding).max(0.0)
     }
 
@@ -150,6 +163,7 @@ impl EnergyAccount {
             .for_each(|number| hasher.write_u64(number.to_bits()));
         hasher.write_floats(&self.gravity.to_array());
         hasher.write_u64(u64::from(self.substeps) << 32 | u64::from(self.refinement));
+        hasher.write_u64(u64::from(self.comparisons));
     }
 }
 
