@@ -1,4 +1,4 @@
-//! The rows of `cargo test`. Undamped springs that fold and elements that swing far gain energy with VERLET, and are in the whole table alone.
+//! The rows of `cargo test`.
 
 use sinew::Solver;
 
