@@ -2,7 +2,7 @@
 //!
 //! Leapfrog conserves the energy of a linear oscillator at any substep below the limit, but not that of a spring that turns by a good
 //! part of a radian within a substep, as compressed springs do when their ends pass each other. Such a body gains a little energy each
-//! time, and without damping it gains without end. So every 64 substeps or so the energy is compared with a reference: the energy at the
+//! time, and without damping it gains without end. So every 80 substeps or so the energy is compared with a reference: the energy at the
 //! first comparison, plus the work of forces, pins and tools since. Excess energy is taken off the velocities. A body that often has
 //! some takes shorter substeps.
 //!
@@ -33,10 +33,10 @@ use crate::threads::{Items, Team};
 
 /// Substeps between two comparisons, at least, and how many more there may be: at even intervals, comparisons might meet a mode in its
 /// turning points alone. A comparison takes about as long as two substeps.
-const PERIOD: [u32; 2] = [52, 25];
+const PERIOD: [u32; 2] = [66, 25];
 
 /// The number of comparisons after which the kinetic energy is known. Nothing is taken off before.
-const LEARNED: u32 = 4;
+const LEARNED: u32 = 3;
 
 /// Excess that is tolerated, as a part of the kinetic energy: the shadow energy of nonlinear motion fluctuates.
 const BAND: f64 = 5e-4;
