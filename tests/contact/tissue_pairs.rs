@@ -270,7 +270,7 @@ fn what_an_implicit_body_bears_is_shown_at_rest() {
         substeps = step(&mut world, DT).substeps;
     }
     let half_kick = 0.5 * 9.81 * DT / substeps as f32;
-    let mut means = vec![0.0; 2];
+    let mut means = [0.0; 2];
     for _ in 0..10 {
         step(&mut world, DT);
         for (mean, id) in means.iter_mut().zip([low, high]) {
