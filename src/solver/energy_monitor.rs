@@ -50,9 +50,12 @@ const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 /// The time in which older comparisons lose half their weight, s.
 const MEMORY: f64 = 5.0;
 
-/// Substeps are halved while more than this part of the kinetic energy has been taken off of late. They are doubled again when it is less
-/// than [`BAND`].
+/// Substeps are halved when more than this part of the kinetic energy has been taken off of late.
 const TOO_MUCH: f64 = 5e-3;
+
+/// Substeps are doubled again when the kinetic energy is less than this part of that with which they were halved. A body that moves as
+/// fast as before would gain energy again.
+const SLOWER: f64 = 0.5;
 
 /// How many times shorter substeps may be than stability asks for.
 const FINEST: u32 = 8;
@@ -77,6 +80,8 @@ pub(crate) struct EnergyAccount {
     removed: f64,
     /// How many times shorter substeps are than stability asks for.
     refinement: u32,
+    /// The most kinetic energy of late when that changed, J.
+    refined_at: f64,
 }
 
 saved!(EnergyAccount {
@@ -88,7 +93,8 @@ saved!(EnergyAccount {
     comparisons,
     kinetic,
     removed,
-    refinement
+    refinement,
+    refined_at
 });
 
 impl EnergyAccount {
@@ -102,6 +108,7 @@ impl EnergyAccount {
         kinetic: 0.0,
         removed: 0.0,
         refinement: 1,
+        refined_at: 0.0,
     };
 
     /// The energy is not what it was when the last step ended.
@@ -149,15 +156,24 @@ impl EnergyAccount {
         }
         if self.removed > TOO_MUCH && self.refinement < FINEST {
             self.refinement *= 2;
-            self.removed = 0.5 * TOO_MUCH;
-        } else if self.removed < BAND && self.refinement > 1 {
+        } else if self.kinetic < SLOWER * self.refined_at && self.refinement > 1 {
             self.refinement /= 2;
+        } else {
+            return;
         }
+        (self.removed, self.refined_at) = (0.0, self.kinetic);
     }
 
     pub fn hash(&self, hasher: &mut StateHasher) {
         let reference = self.reference.unwrap_or(f64::NAN);
-        let numbers = [reference, self.work, self.time, self.kinetic, self.removed];
+        let numbers = [
+            reference,
+            self.work,
+            self.time,
+            self.kinetic,
+            self.removed,
+            self.refined_at,
+        ];
         numbers
             .into_iter()
             .for_each(|number| hasher.write_u64(number.to_bits()));
