@@ -44,6 +44,9 @@ const BAND: f64 = 5e-4;
 /// A body whose mean speed is lower is at rest but for rounding, m/s.
 const STILL: f64 = 1e-4;
 
+/// So is one whose nodes move by less than this part of its extent in a substep: coordinates are rounded by about as much, and forces with them.
+const UNSEEN: f64 = 4.0 * f32::EPSILON as f64;
+
 /// Rounding errors, as parts of the energy and of the kinetic energy of the motion as a whole.
 const ROUNDING: [f64; 2] = [1e-6, 1e-4];
 
@@ -272,7 +275,10 @@ impl<'a> Account<'a> {
             return;
         }
         let excess = account.compare(energy, own, rounding);
-        let is_still = own <= 0.5 * open.free_mass * STILL * STILL;
+        let substep = f64::from(self.request.dt) / f64::from(self.substeps);
+        let still = STILL.max(UNSEEN * f64::from(body.extent()) / substep);
+        let is_still = own <= 0.5 * open.free_mass * still * still;
+        let account = &mut carry.energy;
         account.refine(if excess > 0.0 && !is_still {
             slow_down(body, held, excess)
         } else {
