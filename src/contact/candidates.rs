@@ -22,7 +22,8 @@ const SAG: f32 = 0.04;
 
 /// Features that can meet a tool before anything moves further than the slack that they were gathered with.
 ///
-/// Being in the list has no other consequence than being looked at, so that results do not depend on when it is made.
+/// Being in the list has no other consequence than being looked at. Where a mesh is near, or the list is all nodes of one tool, when it was made may show in
+/// the last bits all the same: planes through a mesh's closest points are kept as long as the list, and nodes are taken side by side.
 #[derive(Debug)]
 pub(super) struct Candidates {
     pub near: Vec<u32>,
@@ -179,6 +180,11 @@ impl Candidates {
         let mut zones = self.zones.iter();
         let are_covered = met(tools, filter).all(|tool| zones.next().is_some_and(|zone| zone.covers(tool, origin)));
         are_covered && zones.next().is_none()
+    }
+
+    /// Whether the list stays good while nodes move by so much more, m.
+    pub fn lasts_for(&self, distance: f32) -> bool {
+        self.slack >= distance
     }
 
     /// Takes `distance` from the slack: whether the list is still good when the nodes have moved so far.

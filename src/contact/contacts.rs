@@ -362,6 +362,23 @@ impl Contacts {
         self.candidates.invalidate();
     }
 
+    /// Whether no tool can come near within `duration` seconds, where no node is faster than `fastest`, m/s.
+    pub fn stay_far(&self, tools: &[ToolPath], dt: f32, duration: f32, fastest: f32) -> bool {
+        let travel = duration * (fastest + self.tool_speed(tools, dt));
+        self.loads.is_empty() || self.candidates.near().is_empty() && self.candidates.lasts_for(travel)
+    }
+
+    /// A substep without tools near has been taken: whether the list of what is near is still good.
+    pub fn pass_far(&mut self, tools: &[ToolPath], dt: f32, substep: f32, fastest: f32) -> bool {
+        let travel = substep * (fastest + self.tool_speed(tools, dt));
+        self.loads.is_empty() || self.candidates.spend(travel)
+    }
+
+    /// The speed of the fastest tool that the body meets, m/s.
+    fn tool_speed(&self, tools: &[ToolPath], dt: f32) -> f32 {
+        met(tools, self.filter).map(|tool| tool.speed(dt)).fold(0.0, f32::max)
+    }
+
     /// In how many slices the last substep was: so many times shorter it would be one.
     pub fn slices(&self) -> u32 {
         self.slices
@@ -656,8 +673,7 @@ impl Contacts {
 
     fn find_candidates(&mut self, meeting: &Meeting) {
         let tools = met(meeting.tools, self.filter);
-        let speeds = tools.clone().map(|tool| tool.speed(meeting.dt));
-        let tool_speed = speeds.fold(0.0, f32::max);
+        let tool_speed = self.tool_speed(meeting.tools, meeting.dt);
         let travel = meeting.substep * (meeting.fastest + tool_speed);
         if self.candidates.spend(travel) || self.candidates.renew(meeting.positions, travel) {
             return;

@@ -53,7 +53,7 @@ pub(super) fn run(
         ..Step::of(request, substeps, masses_for, team)
     };
     // What must be known between substeps cannot be known in a pipeline.
-    if substeps > 2 && may_stay_open(body) && body.contacts.is_none() && !body.sleeps() {
+    if substeps > 2 && may_stay_open(body) && !body.is_grasped() && !body.sleeps() {
         step.pipeline = Plan::of(&*body.springs, body.node_count());
     }
     if let Some(taken) = step.take(body, start)? {
@@ -133,6 +133,12 @@ impl<'a> Step<'a> {
                 // The last substep before a comparison is taken alone.
                 _ => self.depth(substeps - index - u32::from(account.compares), &carry),
             };
+            // Tools are not looked for between the substeps of a pipeline.
+            let depth = if depth > 1 && !self.stays_far(body, depth, &carry.gravity.velocities) {
+                1
+            } else {
+                depth
+            };
             for (index, part) in (index..).zip(&mut parts[..depth]) {
                 if index > 0 {
                     part.go_on(carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
@@ -154,6 +160,11 @@ impl<'a> Step<'a> {
                             Some(anywhere) => carry.stability = anywhere,
                             None => return Ok(None),
                         }
+                    }
+                }
+                for survey in &surveys[..depth] {
+                    if !self.has_stayed_far(body, &survey.velocities) {
+                        return Ok(None);
                     }
                 }
                 carry.gravity.velocities = surveys[depth - 1].velocities;
@@ -233,6 +244,23 @@ impl<'a> Step<'a> {
         part
     }
 
+    /// Whether no tool comes near within so many substeps, if the motion does not become twice as fast.
+    fn stays_far(&self, body: &Body, depth: usize, velocities: &Bounds) -> bool {
+        let duration = depth as f32 * self.substep;
+        body.contacts.as_ref().is_none_or(|contacts| {
+            let StepRequest { tools, dt, .. } = *self.request;
+            contacts.stay_far(tools, dt, duration, 2.0 * fastest(velocities))
+        })
+    }
+
+    /// Takes a substep with velocities in this box into account: whether no tool has come near.
+    fn has_stayed_far(&self, body: &mut Body, velocities: &Bounds) -> bool {
+        body.contacts.as_mut().is_none_or(|contacts| {
+            let StepRequest { tools, dt, .. } = *self.request;
+            contacts.pass_far(tools, dt, self.substep, fastest(velocities))
+        })
+    }
+
     /// How many of the substeps that are left are taken next in one go: as many as a pipeline takes, in even parts, where the substep is stable
     /// wherever the nodes are, else as the motion is known to be stable for if it does not become twice as fast.
     fn depth(&self, left: u32, carry: &Carry) -> usize {
@@ -248,6 +276,11 @@ impl<'a> Step<'a> {
         let stable = carry.stability.substeps_of(travel).min(depth as f32) as usize;
         stable.max(1)
     }
+}
+
+/// No node is faster, m/s.
+fn fastest(velocities: &Bounds) -> f32 {
+    velocities.min.abs().max(velocities.max.abs()).length()
 }
 
 /// How fast two nodes may be against each other, m/s.
@@ -304,7 +337,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
     let Some(contacts) = &mut body.contacts else {
         return velocities;
     };
-    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
+    let fastest = fastest(&velocities);
     let state = body.state.substep();
     contacts.resolve(Meeting {
         kernel: body.kernel,

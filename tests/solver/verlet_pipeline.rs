@@ -82,3 +82,32 @@ fn many_substeps_in_a_step_are_as_many_steps() {
         }
     }
 }
+
+#[test]
+fn a_tool_far_away_changes_no_bit_of_a_large_body() {
+    let parts = sheet(230, 0, 1e-4, &mut Random::new(82));
+    let run = |tool: Option<Vec3>| {
+        let mut scene = moving(&parts, world(40, 2));
+        if let Some(position) = tool {
+            let shape = sinew::Shape::Sphere { radius: 0.1 };
+            let pose = sinew::Pose {
+                position,
+                ..sinew::Pose::IDENTITY
+            };
+            let definition = sinew::ToolDefinition {
+                pose,
+                ..sinew::ToolDefinition::new(shape)
+            };
+            scene.world.create_tool(&definition).expect("a tool");
+        }
+        for _ in 0..6 {
+            scene.step(40.0 / 4096.0);
+        }
+        (scene.positions(), scene.velocities())
+    };
+    let alone = run(None);
+    // Far away, and so near that the margin of the list of what is near is used up on the way: 0.2 m/s for 60 ms.
+    for position in [Vec3::Y * 50.0, Vec3::new(1.0, 0.14, 1.0)] {
+        assert_eq!(run(Some(position)), alone, "{position}");
+    }
+}
