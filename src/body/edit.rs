@@ -479,7 +479,6 @@ impl Body {
     fn set_velocity(&mut self, node: u32, velocity: Vec3) {
         let own = self.order.own(node) as usize;
         self.state.velocities_mut().set(own, velocity);
-        self.state.forget_support(own);
         self.published.forget_velocities();
         self.carry.energy.forget();
         if self.springs.damped() {

@@ -289,11 +289,7 @@ impl Body {
             tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
-            state: State::new(
-                node_count,
-                definition.solver == Solver::Verlet,
-                definition.solver == Solver::Verlet && definition.contact.with_bodies,
-            )?,
+            state: State::new(node_count, definition.solver == Solver::Verlet)?,
             origin: DVec3::ZERO,
             implicit: None,
             applied: None,

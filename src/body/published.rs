@@ -6,7 +6,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use glam::{DVec3, Vec3};
 
 use super::origin::Bounds;
-use super::{Bindings, Body, Vectors};
+use super::{Bindings, Body};
 use crate::error::Result;
 use crate::memory;
 use crate::snapshot::{Reader, Saved, Writer};
@@ -137,9 +137,6 @@ impl Body {
             let closing = self.carry.closing;
             if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
                 put(0..self.node_count(), self.state.velocities().axes());
-            }
-            for (node, support) in (0..).zip(self.state.supports().into_iter().flat_map(Vectors::iter)) {
-                to[self.order.caller(node) as usize] += support;
             }
             for bound in self.bindings.iter().flat_map(Bindings::iter) {
                 let velocity = bound.of(|node| to[self.order.caller(node as u32) as usize]);

@@ -20,11 +20,6 @@ pub(crate) struct State {
     /// What positions lack of where the nodes are, m: less than the last place of their coordinates (Kahan 1965). IMPLICIT and NEWTON
     /// keep their own.
     remainders: Option<[Vectors; 2]>,
-    /// What velocities are shown to have beside what the step goes on with, m/s, in the places of velocities: bodies of implicit solvers close no
-    /// step with half a kick, so that what bears on them lacks the half of theirs until the next step begins.
-    supports: Option<[Vectors; 2]>,
-    /// Whether there is any in each place; where there is none, what is in it means nothing.
-    are_supported: [bool; 2],
     /// The place of the current positions.
     current: usize,
     /// The place of the newest positions of the step in progress.
@@ -42,8 +37,6 @@ saved!(State {
     velocities,
     forces,
     remainders,
-    supports,
-    are_supported,
     current,
     latest,
     settled,
@@ -71,9 +64,8 @@ pub(crate) struct Substep<'a> {
 impl State {
     /// Whether it is that of so many nodes, and finite.
     pub fn is_sound(&self, count: usize) -> bool {
-        let moving = self.positions.iter().chain(&self.velocities).chain(&self.forces);
-        let lacking = self.remainders.iter().chain(&self.supports).flatten();
-        let mut all = moving.chain(lacking);
+        let mut all =
+            (self.positions.iter().chain(&self.velocities).chain(&self.forces)).chain(self.remainders.iter().flatten());
         self.current < self.positions.len()
             && self.latest < self.positions.len()
             && self.settled < self.velocities.len()
@@ -84,16 +76,14 @@ impl State {
                 .all(|vectors| vectors.iter().all(|vector| vector.is_finite()))
     }
 
-    /// `carries`: whether its substeps may carry on what positions lack; `bears`: whether implicit solvers may bear it.
-    pub fn new(node_count: usize, carries: bool, bears: bool) -> Result<Self> {
+    /// `carries`: whether its substeps may carry on what positions lack.
+    pub fn new(node_count: usize, carries: bool) -> Result<Self> {
         let zeros = || Vectors::zeros(node_count);
         Ok(Self {
             positions: [zeros()?, zeros()?, zeros()?],
             velocities: [zeros()?, zeros()?],
             forces: [zeros()?, zeros()?],
             remainders: if carries { Some([zeros()?, zeros()?]) } else { None },
-            supports: if bears { Some([zeros()?, zeros()?]) } else { None },
-            are_supported: [false; 2],
             current: 0,
             latest: 0,
             settled: 0,
@@ -120,8 +110,7 @@ impl State {
             &mut self.forces[self.settled],
         ];
         let remainders = self.remainders.as_mut().map(|places| &mut places[self.kept]);
-        let supports = self.supports.as_mut().map(|places| &mut places[self.settled]);
-        for vectors in current.into_iter().chain(remainders).chain(supports) {
+        for vectors in current.into_iter().chain(remainders) {
             vectors.set(node, vectors.get(source));
         }
     }
@@ -130,7 +119,7 @@ impl State {
         let moving = self.positions.iter_mut().chain(&mut self.velocities);
         moving
             .chain(&mut self.forces)
-            .chain(self.remainders.iter_mut().chain(&mut self.supports).flatten())
+            .chain(self.remainders.iter_mut().flatten())
     }
 
     pub fn positions(&self) -> &Vectors {
@@ -166,35 +155,10 @@ impl State {
         }
     }
 
-    /// What the current velocities are shown to have beside themselves, where there is something.
-    pub fn supports(&self) -> Option<&Vectors> {
-        let supports = self.supports.as_ref().filter(|_| self.are_supported[self.settled]);
-        supports.map(|places| &places[self.settled])
-    }
-
-    /// A node has been given its current velocity as it is to be shown.
-    pub fn forget_support(&mut self, node: usize) {
-        if let (Some(places), true) = (&mut self.supports, self.are_supported[self.settled]) {
-            places[self.settled].set(node, Vec3::ZERO);
-        }
-    }
-
-    /// Has the velocity that the step in progress leads a node to be shown with so much more, m/s.
-    pub fn support(&mut self, node: usize, more: Vec3) {
-        let place = 1 - self.settled;
-        if let Some(places) = &mut self.supports {
-            if !std::mem::replace(&mut self.are_supported[place], true) {
-                places[place].clear();
-            }
-            places[place].set(node, more);
-        }
-    }
-
     /// Starts a step over, from what is current.
     pub fn begin(&mut self) {
         self.latest = self.current;
         self.carried = self.kept;
-        self.are_supported[1 - self.settled] = false;
     }
 
     /// Has the substeps of the step in progress carry on what positions lack.
@@ -283,8 +247,7 @@ impl State {
             self.positions
                 .iter_mut()
                 .for_each(|positions| positions.set(node, place));
-            let lacking = self.remainders.iter_mut().chain(&mut self.supports).flatten();
-            let still = self.velocities.iter_mut().chain(lacking);
+            let still = self.velocities.iter_mut().chain(self.remainders.iter_mut().flatten());
             still.for_each(|vectors| vectors.set(node, Vec3::ZERO));
         }
     }

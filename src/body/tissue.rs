@@ -78,15 +78,6 @@ impl Body {
         }
     }
 
-    /// Has a node be shown with this velocity as the step in progress ends, m/s: what bears it has no part in how the step goes on.
-    pub(crate) fn support(&mut self, node: usize, velocity: Vec3) {
-        let more = velocity - self.state.substep().velocities.get(node);
-        if self.inverse_masses[node] > 0.0 && more != Vec3::ZERO {
-            self.state
-                .support(node, Vec3::select(self.pins.axes_of(node as u32), Vec3::ZERO, more));
-        }
-    }
-
     /// Makes room for forces on nodes that are attached.
     pub(crate) fn reserve_bonds(&mut self) -> Result<()> {
         if self.applied.is_none() {

@@ -532,11 +532,13 @@ impl Contacts {
             }
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
             let room = motion.room(meeting, slice);
-            let first = if node_by_node {
+            let nodes = if node_by_node {
                 self.find_nodes(meeting, slice, (place, &motion), (bit, is_alone))
             } else {
                 0
             };
+            // Points that are bound to nodes are left.
+            let first = if meeting.bindings.is_none() { nodes } else { 0 };
             if let Some(room) = room.as_ref().filter(|_| first < count) {
                 self.candidates.see_corners(room, |corner| meeting.way(slice, corner));
             }
@@ -544,7 +546,12 @@ impl Contacts {
                 if self.candidates.masks[candidate] & bit == 0 {
                     continue;
                 }
-                let Some(feature) = self.features.get(self.candidates.near()[candidate]) else {
+                let index = self.candidates.near()[candidate];
+                let is_bound = || meeting.bindings.is_some_and(|bindings| bindings.get(index).is_some());
+                if candidate < nodes && !is_bound() {
+                    continue;
+                }
+                let Some(feature) = self.features.get(index) else {
                     continue;
                 };
                 if room.is_none() {
@@ -556,7 +563,7 @@ impl Contacts {
         }
     }
 
-    /// Adds the contacts of nodes with a tool: how many of the candidates are nodes. Points that are bound to nodes are none, and left.
+    /// Adds the contacts of nodes with a tool, but for points that are bound to nodes: how many of the candidates are either.
     fn find_nodes(
         &mut self,
         meeting: &mut Meeting,

@@ -161,7 +161,6 @@ impl Together<'_> {
         let mut moment = Moment {
             duration: substep,
             drifts: true,
-            shows: false,
         };
         for index in 0..substeps {
             tissue.bonds.load(bodies);
@@ -214,7 +213,6 @@ impl Together<'_> {
             check_beside_springs(body, substep)
         })?;
         tissue.meet(group, bodies, &moment);
-        tissue.support(group, bodies, substep);
         each(bodies, walks, |_, body, _| {
             body.feel_what_grasps_handed_on(request.tools);
             Ok(())

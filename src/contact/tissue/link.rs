@@ -97,13 +97,12 @@ fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -
 }
 
 impl Link {
-    /// A contact that has given nothing yet, of bodies of which these give way; `None` where neither side can move.
-    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2], moves: [bool; 2]) -> Option<Self> {
+    /// A contact that has given nothing yet; `None` where neither side can move.
+    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2]) -> Option<Self> {
         let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
         let movers = [0, 1].map(|side| sides[side].movers(bodies[side]));
-        let of_sides = movers.iter().zip(bodies.into_iter().zip(&mut answers)).zip(moves);
-        for ((movers, (body, answers)), _) in of_sides.filter(|(_, moves)| *moves) {
+        for (movers, (body, answers)) in movers.iter().zip(bodies.into_iter().zip(&mut answers)) {
             for (answer, &(node, weight)) in answers.iter_mut().zip(movers) {
                 let mobility = body.inverse_masses[node as usize] * weight;
                 let held: BVec3 = body.pins.partial_axes_of(node);

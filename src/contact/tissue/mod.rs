@@ -57,25 +57,12 @@ pub(crate) struct Moment {
     pub duration: f32,
     /// Whether positions change: not with the last half kick of a step.
     pub drifts: bool,
-    /// Whether it is looked at for what velocities are shown alone: implicit solvers are at its end already, and bear what comes against them.
-    pub shows: bool,
 }
 
 impl Moment {
     /// Whether a body has a part in it: that which closes a step is VERLET's.
     fn concerns(&self, body: &Body) -> bool {
-        self.drifts || self.shows || body.implicit.is_none()
-    }
-
-    /// Whether contacts of two bodies are looked at: what is over for both has been.
-    fn concerns_both(&self, bodies: [&Body; 2]) -> bool {
-        let is_over = self.shows && bodies.iter().all(|body| body.implicit.is_some());
-        !is_over && bodies.into_iter().all(|body| self.concerns(body))
-    }
-
-    /// Whether a body gives way in it.
-    fn moves(&self, body: &Body) -> bool {
-        !self.shows || body.implicit.is_none()
+        self.drifts || body.implicit.is_none()
     }
 }
 
@@ -281,7 +268,7 @@ impl Tissue {
                 && self.groups.of(place) == Some(group)
                 && moment.concerns(body)
             {
-                skin.follow(body, moment);
+                skin.follow(body, moment.duration);
             }
         }
         self.bonds.follow(bodies, &self.skins, moment);
@@ -306,43 +293,6 @@ impl Tissue {
         }
     }
 
-    /// Finds what the velocities of VERLET lack as a step ends, where implicit solvers bear its bodies: `substep` seconds are what the half kick that
-    /// closed it is half of.
-    pub fn support(&mut self, group: usize, bodies: &mut Slots<Body>, substep: f32) {
-        let is_of_group = |place: usize| self.groups.of(place) == Some(group);
-        let of_group = || (0..self.skins.len()).filter(|&place| self.skins[place].is_some() && is_of_group(place));
-        let is_implicit = |place: usize| bodies.at(place).is_some_and(|body| body.implicit.is_some());
-        if !of_group().any(is_implicit) || of_group().all(is_implicit) {
-            return;
-        }
-        let moment = Moment {
-            duration: substep,
-            drifts: false,
-            shows: true,
-        };
-        self.links.clear();
-        for (place, skin) in self.skins.iter_mut().enumerate() {
-            if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
-                && self.groups.of(place) == Some(group)
-            {
-                skin.follow(body, &moment);
-            }
-        }
-        self.draw(group, bodies, &moment);
-        self.solve(group, bodies, &moment);
-        for link in &self.links {
-            for (index, side) in link.sides.iter().enumerate() {
-                if let (Some(skin), Some(body)) = (&self.skins[side.body], bodies.at_mut(side.body))
-                    && body.implicit.is_none()
-                {
-                    for (node, _) in link.movers(index) {
-                        body.support(node as usize, skin.velocities.get(node as usize));
-                    }
-                }
-            }
-        }
-    }
-
     /// Draws what of each surface is near others that it is found by in images, as the substep begins.
     fn draw(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
         for a in 0..self.skins.len() {
@@ -359,7 +309,7 @@ impl Tissue {
                 for (b, other) in self.skins.iter().enumerate() {
                     if let (Some(other), Some(other_body)) = (other, bodies.at(b))
                         && self.groups.of(b) == Some(group)
-                        && moment.concerns_both([body, other_body])
+                        && moment.concerns(other_body)
                         && meet_in_images(&first, other)
                     {
                         let parties = [(a, &first), (b, other)].map(|(place, skin)| Party { place, skin });
@@ -383,7 +333,7 @@ impl Tissue {
                 self.go_on(group, bodies, moment);
             }
             self.find(group, bodies, moment);
-            if self.links.len() == known && (first.is_some() || moment.shows || !self.bonds.act()) {
+            if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
                 break;
             }
             let Self {
@@ -392,12 +342,7 @@ impl Tissue {
             first = Some(relax(SWEEPS, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
-                let largest = changes.fold(0.0, f32::max);
-                if moment.shows {
-                    largest
-                } else {
-                    largest.max(bonds.sweep(skins, moment))
-                }
+                changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment))
             }));
         }
     }
@@ -448,7 +393,7 @@ impl Tissue {
                     continue;
                 };
                 let second = Party { place: b, skin };
-                let is_looked_at = moment.concerns_both([body_a, body_b]);
+                let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
                 let Some(radius) = radius(&first, &second, [body_a, body_b])
                     .filter(|_| is_looked_at && [groups.of(a), groups.of(b)] == [Some(group); 2])
                 else {
@@ -470,8 +415,7 @@ impl Tissue {
                         return;
                     }
                     let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
-                    let moves = of_sides.map(|body| moment.moves(body));
-                    if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides, moves) {
+                    if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
                         link.friction = friction;
                         link.is_parted = touch.is_parted;
                         link.allow_gap(touch.gap, moment.duration);

@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
+use super::LEAST_THICKNESS;
 use super::change::Changing;
 use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
-use super::{LEAST_THICKNESS, Moment};
 use crate::body::{Bindings, Body, Bounds, Vectors};
 use crate::contact::BodyContact;
 use crate::contact::forest::Forest;
@@ -325,15 +325,14 @@ impl Skin {
         })
     }
 
-    /// Takes a substep as it is to be.
-    pub fn follow(&mut self, body: &mut Body, moment: &Moment) {
-        let duration = moment.duration;
+    /// Takes a substep of `duration` seconds as it is to be.
+    pub fn follow(&mut self, body: &mut Body, duration: f32) {
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
         let state = body.state.substep();
         let (starts, velocities) = (state.positions, &*state.velocities);
         let bindings = body.bindings.as_ref();
-        match body.implicit.as_ref().filter(|_| !moment.shows) {
+        match &body.implicit {
             None => self.take(origin, bindings, duration, |node| {
                 (starts.get(node), velocities.get(node))
             }),
