@@ -286,7 +286,7 @@ fn jaw(scene: &mut Scene) -> Result<(), Error> {
         .fold((Vec3::MAX, Vec3::MIN), |(low, high), place| {
             (low.min(*place), high.max(*place))
         });
-    let middle = 0.5 * (low + high);
+    let middle = (0.5 * (low + high)).with_y(low.y);
     let longest = (high - low).max_element();
     let positions: Vec<Vec3> = mesh
         .positions
@@ -299,6 +299,6 @@ fn jaw(scene: &mut Scene) -> Result<(), Error> {
             triangles: &triangles,
         },
         0.3,
-        |frame| at(top(0.0) + Vec3::Y * (0.012 - 0.006 * ramp(frame, 20.0))),
+        |frame| at(top(0.0) + Vec3::Y * (0.001 - 0.005 * ramp(frame, 20.0))),
     )
 }

@@ -16,7 +16,7 @@ use crate::snapshot::{saved, saved_enum};
 /// A list that is good for so many substeps more is kept.
 const WORTH_KEEPING: f32 = 4.0;
 
-/// How much deeper than its corners an edge or face may reach into a tool, as a part of the tool's radius or of half a mesh's least extent: where it
+/// How much deeper than its corners an edge or face of a sheet may reach into a tool, as a part of the tool's radius or of half a mesh's least extent: where it
 /// cannot, its corners alone meet the tool.
 const SAG: f32 = 0.04;
 
@@ -293,22 +293,15 @@ impl Candidates {
             let corners = corners_of(feature, (positions, bindings));
             let corners = &corners[..feature.nodes().len()];
             let bounds = Bounds::of(corners.iter().copied());
+            // Where a sheet is stretched a tool is the smaller beside its edges.
+            let length = features.length(index).max(longest_edge(corners));
             let meets = |(zone, tool): (&Zone, &ToolPath)| {
                 (corners.len() == 1 || zone.is_bounded())
                     && zone.meets(&bounds, reach)
-                    && tool
-                        .radius()
-                        .is_none_or(|radius| sags(corners.len(), features.length(index), radius))
+                    && tool.radius().is_none_or(|radius| sags(corners.len(), length, radius))
                     && (tool.mesh().is_none() || !has_meshes)
             };
-            let of_meshes = has_meshes
-                && meets_mesh(
-                    &self.surface,
-                    (feature, features.length(index)),
-                    corners,
-                    meshes(),
-                    reach,
-                );
+            let of_meshes = has_meshes && meets_mesh(&self.surface, (feature, length), corners, meshes(), reach);
             let mask = self.zones.iter().zip(tools.clone()).enumerate();
             let mask = mask.filter(|&(_, (zone, tool))| of_meshes && tool.mesh().is_some() || meets((zone, tool)));
             let mask = mask.fold(0, |mask, (place, _)| mask | zone_bit(place));
@@ -550,7 +543,7 @@ fn measure_nodes<'a>(
 /// into it than its corners do: where the surface turns from one to another, or has a ridge between them.
 fn meets_mesh<'a>(
     surface: &[NearestPlane],
-    (feature, first_length): (Feature, f32),
+    (feature, length): (Feature, f32),
     corners: &[Vec3],
     meshes: impl Iterator<Item = (&'a Zone, &'a MeshSolid)> + Clone,
     reach: f32,
@@ -561,10 +554,10 @@ fn meets_mesh<'a>(
     });
     let reach = reach + allowances.fold(0.0, f32::max);
     let nearest = || feature.nodes().iter().map(|&node| &surface[node as usize]);
-    let length = longest_edge(corners);
+    let spread = longest_edge(corners);
     // No part of a feature is further from its corners than they are from each other.
     let distance = nearest().map(|nearest| nearest.distance).fold(f32::INFINITY, f32::min);
-    if !(distance <= reach + length) {
+    if !(distance <= reach + spread) {
         return false;
     }
     if corners.len() == 1 {
@@ -582,13 +575,13 @@ fn meets_mesh<'a>(
         .fold(1.0, f32::min);
     // A chord across which the surface turns evenly by an angle lies an eighth of its length times that below.
     let turn = (2.0 * (1.0 - cosine)).max(0.0).sqrt();
-    if !is_one || !(first_length * turn <= 8.0 * depth) {
+    if !is_one || !(length * turn <= 8.0 * depth) {
         return true;
     }
     meshes.into_iter().any(|(zone, solid)| match zone {
         Zone::Mesh { standing, .. } => {
             let own = Bounds::of(corners.iter().map(|&corner| standing.own(corner)));
-            solid.has_ridge(&own, reach.min(0.5 * length), first_length, depth)
+            solid.has_ridge(&own, reach.min(0.5 * spread), length, depth)
         }
         _ => true,
     })

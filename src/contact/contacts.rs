@@ -79,8 +79,6 @@ pub(crate) struct Contacts {
     touches: Vec<Touch>,
     /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
     pub(super) touched: Vec<[bool; 2]>,
-    /// In how many slices the last substep was.
-    slices: u32,
     /// The box of all velocities that contacts gave in this substep.
     given: Bounds,
     /// Whether the step that was begun last became current.
@@ -106,7 +104,6 @@ saved!(Contacts {
     pressed_for,
     touches,
     touched,
-    slices,
     given,
     committed,
     held,
@@ -176,7 +173,6 @@ impl Contacts {
             pressed_for: 0.0,
             touches: Vec::new(),
             touched: Vec::new(),
-            slices: 1,
             given: Bounds::EMPTY,
             committed: true,
             held: Vec::new(),
@@ -379,11 +375,6 @@ impl Contacts {
         met(tools, self.filter).map(|tool| tool.speed(dt)).fold(0.0, f32::max)
     }
 
-    /// In how many slices the last substep was: so many times shorter it would be one.
-    pub fn slices(&self) -> u32 {
-        self.slices
-    }
-
     /// Whether no tool was near in the last substep.
     pub fn are_far(&self) -> bool {
         self.loads.is_empty() || self.candidates.near().is_empty()
@@ -458,7 +449,6 @@ impl Contacts {
         } else {
             1
         };
-        self.slices = slices;
         self.pressed_for = meeting.kick() / slices as f32;
         for index in 0..slices {
             let part = |index: u32| f64::from(index) / f64::from(slices);
@@ -513,7 +503,8 @@ impl Contacts {
         let node_by_node = !slice.foresees && self.holds.is_empty();
         let count = self.candidates.near().len();
         let all = self.candidates.masks.iter().fold(0, |all, mask| all | mask);
-        let is_alone = all.count_ones() == 1
+        let is_alone = meeting.bindings.is_none()
+            && all.count_ones() == 1
             && all.leading_zeros() > 0
             && self
                 .candidates

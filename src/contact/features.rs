@@ -16,8 +16,7 @@ pub(super) struct Features {
     /// One that is gone leaves a [`HOLE`] for another.
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
-    /// The longest edge of each edge and face, m, as they were at first: whether a tool needs them is not to change from step to step. Those that
-    /// are new since have none.
+    /// The longest edge of each edge and face of a sheet, m, as they were at first. Those of a closed surface, and those that are new since, have none.
     edge_lengths: Vec<f32>,
     face_lengths: Vec<f32>,
     /// For surfaces that change.
@@ -80,7 +79,15 @@ impl Features {
     /// Of a surface of nodes that are where `position` tells.
     pub fn new(node_count: usize, surface: &[[u32; 3]], position: impl Fn(usize) -> Vec3) -> Result<Self> {
         let edges = mesh::edges(surface, &[])?;
-        let length = |a: u32, b: u32| position(a as usize).distance(position(b as usize));
+        // Each edge of a closed surface has two faces.
+        let is_closed = 2 * edges.len() == 3 * surface.len();
+        let length = |a: u32, b: u32| {
+            if is_closed {
+                f32::INFINITY
+            } else {
+                position(a as usize).distance(position(b as usize))
+            }
+        };
         let mut edge_lengths = memory::reserved(edges.len())?;
         edge_lengths.extend(edges.iter().map(|&[a, b]| length(a, b)));
         let mut face_lengths = memory::reserved(surface.len())?;
@@ -95,7 +102,8 @@ impl Features {
         })
     }
 
-    /// The longest edge of feature number `index` as it was at first, m; 0 of a node, infinite where it is not known.
+    /// The longest edge of feature number `index` as it was at first, m; 0 of a node, infinite where it is not known or the surface is closed: a tool
+    /// that presses into a solid by little is told by how its faces lie between nodes.
     pub fn length(&self, index: u32) -> f32 {
         let Some(edge) = index.checked_sub(self.node_count) else {
             return 0.0;

@@ -3,7 +3,7 @@
 use crate::support::solid::ball;
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
-use sinew::{BodyDefinition, BodyId, Material, Model, Pose, Shape, Solver, ToolDefinition, ToolId, World};
+use sinew::{BodyId, Shape, ToolId, World};
 
 const FRAME: f32 = 1.0 / 60.0;
 const SIZE: f32 = 0.2;
@@ -119,66 +119,34 @@ fn balls_on_both_sides_of_a_cloth_feel_each_other() {
     );
 }
 
-/// An organ pressed by a ball, in few products with the matrix a frame, against VERLET in some twenty substeps.
+/// A cloth is stretched to several times its length under a ball, and the ball becomes small beside its edges: they take part as soon as they are long.
 #[test]
-fn few_iterations_a_frame_press_as_many_substeps_do() {
-    let mesh = sinew::mesh::Mesh::organ(0.2, 0.012).expect("an organ");
-    let top = mesh
-        .positions
-        .iter()
-        .copied()
-        .max_by(|a, b| a.y.total_cmp(&b.y))
-        .expect("a node");
-    let left = mesh.positions.iter().map(|place| place.x).fold(f32::MAX, f32::min);
-    let press = |solver, iterations| {
+fn a_cloth_that_is_stretched_lets_no_ball_through() {
+    for (cells, times) in [(20, 3.0), (40, 4.0)] {
+        let edge = SIZE / cells as f32;
+        let radius = times * edge;
         let mut world = world(Vec3::ZERO);
-        let organ = world
-            .create_body(&BodyDefinition {
-                positions: &mesh.positions,
-                tetrahedra: &mesh.tetrahedra,
-                material: Some(Material {
-                    model: Model::Springs,
-                    young_modulus: 5000.0,
-                    poisson_ratio: 0.25,
-                    density: 1060.0,
-                    ..Material::default()
-                }),
-                solver,
-                iterations,
-                ..Default::default()
-            })
-            .expect("an organ");
-        for (node, _) in (0..).zip(&mesh.positions).filter(|(_, place)| place.x < left + 0.03) {
-            world.body_mut(organ).expect("an organ").pin(node).expect("a pin");
-        }
-        let radius = 0.02;
-        let pose = |frame: usize| Pose {
-            position: top + Vec3::Y * (radius - 0.006 * (frame as f32 / 30.0).min(1.0)),
-            ..Pose::IDENTITY
+        let soft = Tissue {
+            stiffness: 20.0,
+            ..TISSUE
         };
-        let ball = world
-            .create_tool(&ToolDefinition {
-                pose: pose(0),
-                ..ToolDefinition::new(Shape::Sphere { radius })
-            })
-            .expect("a ball");
-        let (mut force, mut most) = (Vec3::ZERO, 0);
-        for frame in 1..=180 {
-            world.set_pose(ball, pose(frame).position, None).expect("a pose");
+        let cloth = soft.put(&mut world, &square(SIZE, cells));
+        pin_all(&mut world, cloth, &rim(cells));
+        let start = Vec3::new(edge / 2.0, radius + 0.002, edge / 2.0);
+        let ball = tool(&mut world, Shape::Sphere { radius }, 0.0, start, Quat::IDENTITY);
+        let mut before = 0.0;
+        for frame in 1..=120 {
+            let place = start - Vec3::Y * (0.2 * frame as f32 / 150.0);
+            world.set_pose(ball, place, None).expect("a pose");
             world.step(FRAME).expect("a step");
-            most = most.max(body(&world, organ).solver_report().iterations);
-            if frame > 120 {
-                force += world.wrench(ball).expect("a ball").0 / 60.0;
+            if frame % 20 == 0 {
+                let force = world.wrench(ball).expect("a ball").0.y;
+                assert!(
+                    force > before,
+                    "{cells} cells: {force} N after {before} N: it went through"
+                );
+                before = force;
             }
         }
-        (force, most)
-    };
-    let (exact, _) = press(Solver::Verlet, 0);
-    let (found, most) = press(Solver::Implicit, 16);
-    assert!(exact.y > 0.01, "nothing to be measured: {exact}");
-    assert!(
-        found.distance(exact) < 0.03 * exact.length(),
-        "{found} N with 16 iterations a frame, {exact} N with VERLET"
-    );
-    assert!(most <= 2 * 16, "{most} iterations in a frame");
+    }
 }

@@ -12,11 +12,8 @@ use crate::contact::{Contacts, Meeting};
 use crate::solver::kick::look;
 use crate::springs::{tile_count, tile_nodes};
 
-/// The longest step near a tool, s, where the budget lasts for such steps.
+/// The longest step near a tool, s.
 pub(super) const LONGEST: f64 = 1e-3;
-
-/// A smaller budget leaves so many products to each step near a tool, and steps are longer.
-const EQUATION: u32 = 8;
 
 /// How far an open contact may be to belong to an equation, as a part of the body's extent.
 const SLACK: f32 = 0.002;
@@ -30,7 +27,7 @@ impl Substep<'_> {
     /// Finds the contacts that belong to the equation. What they do begins and ends within a step, so that it is one of order 1
     /// where there are some.
     pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Self {
-        if self.step > self.longest || !is_near(body) {
+        if self.step > LONGEST || !is_near(body) {
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.clear();
             }
@@ -155,7 +152,7 @@ impl Substep<'_> {
         if contacts.are_far() {
             return End::Fine;
         }
-        if self.step > self.longest {
+        if self.step > LONGEST {
             return End::Near;
         }
         let history = &mut implicit.histories[next];
@@ -195,12 +192,6 @@ impl Substep<'_> {
 }
 
 impl Implicit {
-    /// The longest equation near a tool in a step of `dt` seconds, s.
-    pub(super) fn longest(&self, dt: f32) -> f64 {
-        let equations = (self.budget / EQUATION).max(1);
-        LONGEST.max(f64::from(dt) / f64::from(equations))
-    }
-
     /// How fast a node goes on its way in the substep that was just solved, m/s.
     pub fn mean(&self, node: usize) -> Vec3 {
         let history = &self.histories[1 - self.settled];

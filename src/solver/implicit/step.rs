@@ -6,7 +6,6 @@ use super::energy::Before;
 use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Lapse, Records, Vectors, WriteRecords};
-use crate::contact::Contacts;
 use crate::diagnostics::SolverReport;
 use crate::snapshot::saved;
 use crate::solver::attempt::{Carry, StepRequest};
@@ -76,10 +75,7 @@ pub(in crate::solver) fn run(
     if let Some(mut implicit) = body.implicit.take() {
         implicit.report = SolverReport::BEFORE;
         implicit.left = implicit.budget.saturating_mul(request.substeps.max(1));
-        // No further against a tool in a part than half its radius, as far as it went last.
-        let slices = body.contacts.as_ref().map_or(1, Contacts::slices);
-        let longest = (implicit.longest(request.dt) / f64::from(slices)).max(contact::LONGEST);
-        let short = (f64::from(request.dt) / (f64::from(substeps) * longest))
+        let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
             .max(1.0);
         let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
@@ -98,7 +94,7 @@ pub(in crate::solver) fn run(
             }
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
             let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS;
-            end = run_in_parts(body, &mut implicit, request, whole, (longest, is_last_resort), team);
+            end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
             match end {
                 End::Fine => break,
                 End::Near => {
@@ -135,13 +131,13 @@ fn run_in_parts(
     implicit: &mut Implicit,
     request: &StepRequest,
     [substeps, middle]: [u32; 2],
-    near: (f64, bool),
+    is_last_resort: bool,
     team: &Team,
 ) -> End {
     begin(body, request);
     implicit.begin();
     for index in 0..substeps {
-        let end = take_part(body, implicit, request, [index, substeps], near, team);
+        let end = take_part(body, implicit, request, [index, substeps], is_last_resort, team);
         if end != End::Fine {
             return end;
         }
@@ -161,7 +157,7 @@ fn take_part(
     implicit: &mut Implicit,
     request: &StepRequest,
     [index, substeps]: [u32; 2],
-    (longest, is_last_resort): (f64, bool),
+    is_last_resort: bool,
     team: &Team,
 ) -> End {
     let step = f64::from(request.dt) / f64::from(substeps);
@@ -172,7 +168,6 @@ fn take_part(
         start: f64::from(index) / f64::from(substeps),
         end: f64::from(index + 1) / f64::from(substeps),
         is_first: index == 0,
-        longest,
         equations: substeps - index,
         formula: Formula::new(order, step, f64::from(implicit.last(index == 0).step)),
         team,
@@ -227,8 +222,7 @@ pub(in crate::solver) fn next_part(
     let Some(mut implicit) = body.implicit.take() else {
         return true;
     };
-    let near = (contact::LONGEST, is_last_resort);
-    let end = take_part(body, &mut implicit, request, part_of, near, team);
+    let end = take_part(body, &mut implicit, request, part_of, is_last_resort, team);
     body.implicit = Some(implicit);
     end == End::Fine
 }
@@ -243,8 +237,6 @@ pub(super) struct Substep<'a> {
     pub start: f64,
     pub end: f64,
     pub is_first: bool,
-    /// The longest equation near a tool, s.
-    pub longest: f64,
     /// With those that come after it in the step.
     equations: u32,
     formula: Formula,
