@@ -255,7 +255,8 @@ fn one_of_two_is_scaled(asked: Asked, kept: (Storage, Solver), stiffness: f32, l
         let way = largest_difference(&expected, &start[nodes.clone()]);
         let off = largest_difference(&moved[nodes.clone()], &expected);
         // What the formula of IMPLICIT takes of the angular momentum is given back to a body as a whole: to both blocks together, or to each.
-        let allowed = if kept.1 == Solver::Implicit { 4e-3 } else { 2e-4 };
+        // (Without that they agree within 2e-3.)
+        let allowed = if kept.1 == Solver::Implicit { 1e-2 } else { 2e-4 };
         assert!(off < allowed * way, "{label} from {}: {off} of {way} m", nodes.start);
     }
 }
