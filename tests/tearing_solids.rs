@@ -456,7 +456,8 @@ fn without_room_the_step_goes_on_and_no_solid_tears() {
     assert!(without_room > 0);
     // At a corner one is enough.
     assert!(tears <= 1);
-    assert!(world.body(body).unwrap().surface().len() <= surface.len() + 2 * tears as usize);
+    // A tear opens a face to both sides, and at a corner a second one with it, where what is left would hang by an edge.
+    assert!(world.body(body).unwrap().surface().len() <= surface.len() + 4 * tears as usize);
     made.pieces(world.body(body).unwrap());
 }
 
