@@ -617,8 +617,11 @@ impl Contacts {
                 for (&node, plane) in self.candidates.near[..count].iter().zip(&mut self.candidates.planes) {
                     look.refresh(meeting, meeting.positions.get(node as usize), plane);
                 }
+                let Some(planes) = self.candidates.planes.get(..count) else {
+                    return false;
+                };
                 PressingSolid::Mesh {
-                    planes: &self.candidates.planes[..count],
+                    planes,
                     slot: look.slot as u32,
                     from,
                     to,
