@@ -27,7 +27,7 @@ pub(crate) struct Walk {
     part: Part,
 }
 
-/// The bodies that go together, in groups, as `tissue` tells; `walks` has a place for each body.
+/// The bodies that go together, in islands, as `tissue` tells; `walks` has a place for each body.
 pub(crate) struct Together<'a> {
     pub tissue: &'a mut Tissue,
     pub walks: &'a mut [Option<Walk>],
@@ -36,16 +36,16 @@ pub(crate) struct Together<'a> {
 }
 
 impl Together<'_> {
-    /// Takes the step of all groups without making it current.
+    /// Takes the step of all islands without making it current.
     pub fn attempt(&mut self, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
-        for group in 0..self.tissue.groups() {
-            self.attempt_group(group, bodies, outcomes);
+        for island in 0..self.tissue.islands.count() {
+            self.attempt_island(island, bodies, outcomes);
         }
     }
 
-    fn attempt_group(&mut self, group: usize, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+    fn attempt_island(&mut self, island: usize, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
         let request = self.request;
-        let [mut substeps, needed] = self.set_out(group, bodies, outcomes);
+        let [mut substeps, needed] = self.set_out(island, bodies, outcomes);
         if substeps == 0 {
             return;
         }
@@ -67,7 +67,7 @@ impl Together<'_> {
             false
         };
         for attempt in (0..=allowed).filter(|_| !is_beyond) {
-            match self.go(group, bodies, substeps, attempt == allowed) {
+            match self.go(island, bodies, substeps, attempt == allowed) {
                 Ok(()) => {
                     is_taken = true;
                     break;
@@ -83,11 +83,12 @@ impl Together<'_> {
             }
         }
         self.tissue.bonds.unload(bodies);
-        for (place, (walk, outcome)) in self.walks.iter().zip(outcomes).enumerate() {
-            let (Some(walk), Some(body)) = (walk, bodies.at(place)) else {
+        for &place in self.tissue.islands.members(island) {
+            let place = place as usize;
+            let (Some(walk), Some(body)) = (self.walks[place].take(), bodies.at(place)) else {
                 continue;
             };
-            *outcome = Some(if is_taken {
+            outcomes[place] = Some(if is_taken {
                 let taken = Taken {
                     carry: walk.carry,
                     finite: body.state.newest_is_finite(),
@@ -102,14 +103,12 @@ impl Together<'_> {
         }
     }
 
-    /// Makes a way for each body of a group: in how many substeps, 0: it has none, and how many of them VERLET needs.
-    fn set_out(&mut self, group: usize, bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>]) -> [u32; 2] {
+    /// Makes a way for each body of an island: in how many substeps, 0: it has none, and how many of them VERLET needs.
+    fn set_out(&mut self, island: usize, bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>]) -> [u32; 2] {
         let [mut substeps, mut needed] = [0; 2];
-        for (place, walk) in self.walks.iter_mut().enumerate() {
-            *walk = None;
-            if let Some(body) = bodies.at_mut(place)
-                && self.tissue.group(place) == Some(group)
-            {
+        for &place in self.tissue.islands.members(island) {
+            let place = place as usize;
+            if let Some(body) = bodies.at_mut(place) {
                 let (begun, wanted) = Walk::of(body, self.request, self.team);
                 substeps = substeps.max(wanted);
                 match &mut body.implicit {
@@ -118,19 +117,19 @@ impl Together<'_> {
                     Some(implicit) if outcomes[place].is_none() => implicit.attempt(),
                     Some(implicit) => implicit.put_back(),
                 }
-                *walk = Some(begun);
+                self.walks[place] = Some(begun);
             }
         }
         if substeps > 0 && self.request.substeps == 0 {
             // A wish, where stability is a need.
-            let wished = self.tissue.substeps_wished(group, bodies, self.request.dt);
+            let wished = self.tissue.substeps_wished(island, bodies, self.request.dt);
             substeps = substeps.max(wished.min(self.request.max_substeps));
         }
         [substeps, needed]
     }
 
     /// Takes it in so many substeps, the last time that it is tried or not.
-    fn go(&mut self, group: usize, bodies: &mut Slots<Body>, substeps: u32, is_last: bool) -> Result<(), TooLong> {
+    fn go(&mut self, island: usize, bodies: &mut Slots<Body>, substeps: u32, is_last: bool) -> Result<(), TooLong> {
         let Self {
             tissue,
             walks,
@@ -142,7 +141,7 @@ impl Together<'_> {
         let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
         let gravity = request.gravity.as_dvec3();
         tissue.bonds.begin(request.dt);
-        each(bodies, walks, |_, body, walk| {
+        each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
             walk.carry = walk.start;
             if body.implicit.is_some() {
                 begin_parts(body, request, substeps);
@@ -164,7 +163,7 @@ impl Together<'_> {
         };
         for index in 0..substeps {
             tissue.bonds.load(bodies);
-            each(bodies, walks, |_, body, walk| {
+            each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
                 if body.implicit.is_some() {
                     // There may be no more parts to try it in.
                     let is_last = is_last || substeps >= PARTS;
@@ -182,8 +181,8 @@ impl Together<'_> {
                 pass(body, request, &walk.part, &mut walk.carry, team);
                 Ok(())
             })?;
-            tissue.meet(group, bodies, &moment);
-            each(bodies, walks, |place, body, walk| {
+            tissue.meet(island, bodies, &moment);
+            each(bodies, walks, tissue.islands.members(island), |place, body, walk| {
                 if let Some(implicit) = &mut body.implicit {
                     implicit.settle_deflection();
                     body.state.advance();
@@ -203,7 +202,7 @@ impl Together<'_> {
         }
         moment.drifts = false;
         tissue.bonds.load(bodies);
-        each(bodies, walks, |_, body, walk| {
+        each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
             if body.implicit.is_some() {
                 return Ok(());
             }
@@ -212,8 +211,8 @@ impl Together<'_> {
             pass(body, request, &walk.part, &mut walk.carry, team);
             check_beside_springs(body, substep)
         })?;
-        tissue.meet(group, bodies, &moment);
-        each(bodies, walks, |_, body, _| {
+        tissue.meet(island, bodies, &moment);
+        each(bodies, walks, tissue.islands.members(island), |_, body, _| {
             body.feel_what_grasps_handed_on(request.tools);
             Ok(())
         })
@@ -246,10 +245,12 @@ impl Walk {
 fn each(
     bodies: &mut Slots<Body>,
     walks: &mut [Option<Walk>],
+    members: &[u32],
     mut act: impl FnMut(usize, &mut Body, &mut Walk) -> Result<(), TooLong>,
 ) -> Result<(), TooLong> {
-    for (place, walk) in walks.iter_mut().enumerate() {
-        if let (Some(walk), Some(body)) = (walk, bodies.at_mut(place)) {
+    for &place in members {
+        let place = place as usize;
+        if let (Some(walk), Some(body)) = (&mut walks[place], bodies.at_mut(place)) {
             act(place, body, walk)?;
         }
     }

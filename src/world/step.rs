@@ -129,11 +129,12 @@ impl World {
         tissue.plan(bodies, dt);
         // What meets other tissue, or is joined to it, does not sleep.
         for (place, body) in bodies.iter_mut() {
-            if tissue.group(place).is_some() {
+            if tissue.islands.has(place) {
                 body.wake_to_step();
             }
         }
-        attempt_bodies(bodies, outcomes, &request, |place| tissue.group(place).is_none(), team);
+        let islands = &tissue.islands;
+        attempt_bodies(bodies, outcomes, &request, |place| !islands.has(place), team);
         loop {
             tissue.find_crossings(bodies, false);
             let mut together = Together {
@@ -143,7 +144,7 @@ impl World {
                 team,
             };
             together.attempt(bodies, outcomes);
-            if !tissue.plan_again(bodies) {
+            if !tissue.plan_again(bodies, dt) {
                 break;
             }
         }

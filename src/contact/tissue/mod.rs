@@ -8,8 +8,8 @@
 mod bonds;
 mod change;
 mod crossing;
-mod groups;
 mod images;
+mod islands;
 mod link;
 mod nearby;
 mod search;
@@ -18,12 +18,12 @@ mod wound;
 
 pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
 pub(crate) use self::change::{SkinChange, SurfaceToBe};
-use self::groups::Groups;
+use self::islands::{Islands, Reach};
 use self::link::Link;
 use self::link::Side;
 use self::search::{Party, Search};
 pub(crate) use self::skin::Skin;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::body::{Body, Bounds};
 use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
@@ -43,6 +43,16 @@ const FASTER: f32 = 2.0;
 
 /// How far bodies come against each other in a substep, as a part of the short edges.
 const TRAVEL: f32 = 0.5;
+
+/// How fast what began too close is moved apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so it
+/// bounds the energy that they gain.
+const PARTING_SPEED: f32 = 0.1;
+
+/// Sweeps over what began too close.
+const PARTING_SWEEPS: u32 = 4;
+
+/// How much further than they can come bodies count as near, as a part of their extents.
+const MARGIN: f32 = 0.005;
 
 /// What moves three corners, each of them bound to four nodes at most.
 const MOST_MOVERS: usize = 12;
@@ -69,7 +79,7 @@ impl Moment {
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
 pub(crate) struct Tissue {
-    groups: Groups,
+    pub islands: Islands,
     /// By a body's place in the world.
     skins: Vec<Option<Skin>>,
     links: Vec<Link>,
@@ -80,7 +90,7 @@ pub(crate) struct Tissue {
 }
 
 saved!(Tissue {
-    groups,
+    islands,
     skins,
     links,
     known,
@@ -92,7 +102,7 @@ impl Tissue {
     pub fn join(&mut self, place: usize, body: &Body) -> Result<()> {
         let mut skin = Skin::new(body)?;
         self.add_images(&mut skin)?;
-        self.groups.make_place(place)?;
+        self.islands.make_place(place)?;
         let more = ROOM * skin.room;
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
@@ -107,7 +117,7 @@ impl Tissue {
     /// Makes room for so many attachments between the bodies at these places.
     pub fn reserve_bonds(&mut self, places: [usize; 2], count: usize) -> Result<()> {
         for place in places {
-            self.groups.make_place(place)?;
+            self.islands.make_place(place)?;
         }
         self.bonds.reserve(count)
     }
@@ -148,107 +158,134 @@ impl Tissue {
     /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
     /// and by themselves those that meet themselves.
     pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
-        self.groups.part(|place| {
+        self.islands.part(|place| {
             let meets_itself = |body: &Body| body.meets_tissue() && body.contact.with_itself;
             bodies.at(place).is_some_and(meets_itself)
         });
         for [first, second] in self.bonds.bodies() {
-            self.groups.join(first, second);
+            self.islands.join(first, second);
         }
-        self.join_those(bodies, |first, second| reach(first, dt).overlaps(&reach(second, dt)));
+        let common = self.common_velocity(bodies);
+        let origin = self.origin(bodies);
+        let reaches = meeting(&self.skins, bodies).map(|(place, body)| {
+            let margin = body.contact.thickness + MARGIN * body.extent();
+            let bounds = body.local_bounds().moved(body.origin - origin).extended(margin);
+            Reach::new(place, bounds, &velocities(body), common, FASTER * dt)
+        });
+        let are_near = |one: &Reach, other: &Reach| {
+            let both = [one, other].map(|reach| bodies.at(reach.place as usize));
+            let [Some(first), Some(second)] = both else {
+                return false;
+            };
+            let travel = FASTER * dt * relative_speed(first, second);
+            meet_each_other(first, second) && one.bounds.extended(travel).overlaps(&other.bounds)
+        };
+        self.islands.join_near(reaches, are_near);
+        self.islands.settle();
     }
 
-    /// Has bodies go together that came near each other in a step that was tried, and did not go together: whether there are such.
-    pub fn plan_again(&mut self, bodies: &Slots<Body>) -> bool {
-        self.join_those(bodies, |first, second| swept(first).overlaps(&swept(second)))
+    /// Has bodies go together that came near each other in a step that was tried, and were not known to: whether there are such.
+    pub fn plan_again(&mut self, bodies: &Slots<Body>, dt: f32) -> bool {
+        let origin = self.origin(bodies);
+        let common = self.common_velocity(bodies) * dt;
+        let reaches = meeting(&self.skins, bodies).map(|(place, body)| Reach {
+            place: place as u32,
+            bounds: swept(body, common).moved(body.origin - origin),
+            travel: 0.0,
+        });
+        let are_near = |one: &Reach, other: &Reach| {
+            let both = [one, other].map(|reach| bodies.at(reach.place as usize));
+            matches!(both, [Some(first), Some(second)] if meet_each_other(first, second))
+        };
+        let is_changed = self.islands.join_near(reaches, are_near);
+        self.islands.settle();
+        is_changed
     }
 
-    /// Joins the groups of bodies that meet each other and are near, as this tells: whether that changed any.
-    fn join_those(&mut self, bodies: &Slots<Body>, are_near: impl Fn(&Body, &Body) -> bool) -> bool {
-        let mut changed = false;
-        for a in 0..self.skins.len() {
-            for b in 0..a {
-                let has_skin = |place: usize| self.skins[place].is_some();
-                if !(has_skin(a) && has_skin(b)) || self.groups.are_one(a, b) {
-                    continue;
-                }
-                if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
-                    && meet_each_other(first, second)
-                    && are_near(first, second)
-                {
-                    self.groups.join(a, b);
-                    changed = true;
-                }
-            }
-        }
-        changed
+    /// The mean of the velocities in the middle of what bodies have, m/s.
+    fn common_velocity(&self, bodies: &Slots<Body>) -> Vec3 {
+        let middles = meeting(&self.skins, bodies).map(|(_, body)| {
+            let all = velocities(body);
+            0.5 * (all.min + all.max)
+        });
+        let (count, sum) = middles.fold((0, Vec3::ZERO), |(count, sum), middle| (count + 1, sum + middle));
+        sum / (count.max(1) as f32)
     }
 
-    /// How many groups there may be: their numbers are below.
-    pub fn groups(&self) -> usize {
-        self.groups.count()
-    }
-
-    /// The group of bodies that the one at a place takes its substeps together with.
-    pub fn group(&self, place: usize) -> Option<usize> {
-        self.groups.of(place)
+    /// Where the coordinates begin in which bodies are compared.
+    fn origin(&self, bodies: &Slots<Body>) -> DVec3 {
+        meeting(&self.skins, bodies)
+            .next()
+            .map_or(DVec3::ZERO, |(_, body)| body.origin)
     }
 
     /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
     /// there are.
     pub fn find_crossings(&mut self, bodies: &Slots<Body>, at_end: bool) -> u32 {
-        let mut count = 0_u32;
-        for (place, skin) in self.skins.iter_mut().enumerate() {
-            if let (Some(skin), Some(body)) = (skin, bodies.at(place))
-                && self.groups.of(place).is_some()
-            {
+        for &place in self.islands.all_members() {
+            let place = place as usize;
+            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place)) {
                 skin.stand(body, at_end);
+                skin.pierces.fill(false);
             }
         }
-        for a in 0..self.skins.len() {
-            // It is written to while others are read.
-            let Some(mut first) = self.skins[a].take() else {
-                continue;
-            };
-            let mut pierces = std::mem::take(&mut first.pierces);
-            pierces.fill(false);
-            if let (Some(body), true) = (bodies.at(a), self.groups.of(a).is_some()) {
-                let join = |b: usize, edge: &[u32], triangle: &[u32]| {
-                    !self.bonds.are_none() && join_movers(&self.bonds, bodies, [a, b], [edge, triangle])
-                };
-                if body.contact.with_itself {
-                    let are_joined = |edge: &[u32], triangle: &[u32]| {
-                        edge.iter().any(|node| triangle.contains(node)) || join(a, edge, triangle)
-                    };
-                    count = count.saturating_add(crossing::mark(&first, &first, are_joined, &mut pierces));
+        let mut count = 0_u32;
+        let islands = std::mem::take(&mut self.islands);
+        for island in 0..islands.count() {
+            for &a in islands.members(island) {
+                let a = a as usize;
+                if bodies.at(a).is_some_and(|body| body.contact.with_itself) {
+                    count = count.saturating_add(self.mark_crossings(bodies, [a; 2]));
                 }
-                for (b, second) in self.skins.iter().enumerate() {
-                    if let (Some(second), Some(other)) = (second, bodies.at(b))
-                        && self.groups.are_one(a, b)
-                        && meet_each_other(body, other)
-                    {
-                        let are_joined = |edge: &[u32], triangle: &[u32]| join(b, edge, triangle);
-                        count = count.saturating_add(crossing::mark(&first, second, are_joined, &mut pierces));
+            }
+            for [a, b] in islands.pairs(island) {
+                if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
+                    && meet_each_other(first, second)
+                {
+                    for pair in [[a, b], [b, a]] {
+                        count = count.saturating_add(self.mark_crossings(bodies, pair));
                     }
                 }
             }
+        }
+        self.islands = islands;
+        count
+    }
+
+    /// Marks the edges of the first of two bodies, or of one, that pass through triangles of the second: how many there are.
+    fn mark_crossings(&mut self, bodies: &Slots<Body>, [a, b]: [usize; 2]) -> u32 {
+        // It is written to while both are read.
+        let Some(Some(first)) = self.skins.get_mut(a) else {
+            return 0;
+        };
+        let mut pierces = std::mem::take(&mut first.pierces);
+        let mut count = 0;
+        if let (Some(Some(first)), Some(Some(second))) = (self.skins.get(a), self.skins.get(b)) {
+            let are_joined = |edge: &[u32], triangle: &[u32]| {
+                a == b && edge.iter().any(|node| triangle.contains(node))
+                    || !self.bonds.are_none() && join_movers(&self.bonds, bodies, [a, b], [edge, triangle])
+            };
+            count = crossing::mark(first, second, are_joined, &mut pierces);
+        }
+        if let Some(Some(first)) = self.skins.get_mut(a) {
             first.pierces = pierces;
-            self.skins[a] = Some(first);
         }
         count
     }
 
-    /// In how many substeps bodies of a group come no further against each other in one than what they are made of is small.
-    pub fn substeps_wished(&self, group: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
-        let members = self.skins.iter().enumerate().filter_map(|(place, skin)| {
-            let skin = skin.as_ref().filter(|_| self.groups.of(place) == Some(group))?;
-            Some((skin.short, speed(bodies.at(place)?)))
-        });
-        let (shortest, speeds) = members.fold((f32::INFINITY, 0.0), |(least, sum), (shortest, speed)| {
-            (shortest.min(least), sum + speed)
-        });
-        let wished = (dt * speeds / (TRAVEL * shortest)).ceil();
-        wished.clamp(1.0, 1e6) as u32
+    /// In how many substeps bodies of an island come no further against each other in one, or parts of one that meets itself, than what they are
+    /// made of is small.
+    pub fn substeps_wished(&self, island: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
+        let short = |place: usize| self.skins.get(place)?.as_ref().map(|skin| skin.short);
+        let wished = |[a, b]: [usize; 2]| {
+            let speed = relative_speed(bodies.at(a)?, bodies.at(b)?);
+            Some(dt * speed / (TRAVEL * short(a)?.min(short(b)?)))
+        };
+        let members = self.islands.members(island).iter().map(|&place| place as usize);
+        let meets_itself = |place: &usize| bodies.at(*place).is_some_and(|body| body.contact.with_itself);
+        let of_one = members.filter(meets_itself).map(|place| [place; 2]);
+        let all = of_one.chain(self.islands.pairs(island)).filter_map(wished);
+        all.fold(1.0, f32::max).ceil().min(1e6) as u32
     }
 
     /// The box of all velocities of a body, given that of those before the contacts of a substep.
@@ -260,20 +297,20 @@ impl Tissue {
         }
     }
 
-    /// Stops what meets in a substep of the bodies of a group.
-    pub fn meet(&mut self, group: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+    /// Stops what meets in a substep of the bodies of an island.
+    pub fn meet(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         self.links.clear();
-        for (place, skin) in self.skins.iter_mut().enumerate() {
-            if let (Some(skin), Some(body)) = (skin, bodies.at_mut(place))
-                && self.groups.of(place) == Some(group)
+        for &place in self.islands.members(island) {
+            let place = place as usize;
+            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place))
                 && moment.concerns(body)
             {
                 skin.follow(body, moment.duration);
             }
         }
         self.bonds.follow(bodies, &self.skins, moment);
-        self.draw(group, bodies, moment);
-        self.solve(group, bodies, moment);
+        self.draw(island, bodies, moment);
+        self.solve(island, bodies, moment);
         for link in &self.links {
             for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
@@ -288,27 +325,27 @@ impl Tissue {
         }
         self.bonds.give(bodies, &self.skins, moment);
         if moment.drifts {
-            self.part(bodies, moment.duration, Body::part_substep);
+            self.part(bodies, moment.duration);
             self.bonds.part(bodies, moment.duration);
         }
     }
 
     /// Draws what of each surface is near others that it is found by in images, as the substep begins.
-    fn draw(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
-        for a in 0..self.skins.len() {
+    fn draw(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+        for member in 0..self.islands.members(island).len() {
+            let a = self.islands.members(island)[member] as usize;
             // It is written to while others are read.
-            let Some(mut first) = self.skins[a].take() else {
+            let Some(mut first) = self.skins.get_mut(a).and_then(Option::take) else {
                 continue;
             };
             if let Some(body) = bodies.at(a)
                 && first.images.is_some()
-                && self.groups.of(a) == Some(group)
                 && moment.concerns(body)
             {
                 let mut part = Bounds::EMPTY;
-                for (b, other) in self.skins.iter().enumerate() {
-                    if let (Some(other), Some(other_body)) = (other, bodies.at(b))
-                        && self.groups.of(b) == Some(group)
+                for &b in self.islands.members(island) {
+                    let b = b as usize;
+                    if let (Some(Some(other)), Some(other_body)) = (self.skins.get(b), bodies.at(b))
                         && moment.concerns(other_body)
                         && meet_in_images(&first, other)
                     {
@@ -325,14 +362,14 @@ impl Tissue {
     }
 
     /// Finds contacts and gives their impulses, until they lead to no others.
-    fn solve(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn solve(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
         let mut first = None;
         for _ in 0..SEARCHES {
             let known = self.links.len();
             if first.is_some() {
-                self.go_on(group, bodies, moment);
+                self.go_on(island, bodies, moment);
             }
-            self.find(group, bodies, moment);
+            self.find(island, bodies, moment);
             if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
                 break;
             }
@@ -348,10 +385,10 @@ impl Tissue {
     }
 
     /// Has what impulses did to nodes be seen in what is bound to them.
-    fn go_on(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
-        for (place, skin) in self.skins.iter_mut().enumerate() {
-            if let (Some(skin), Some(body)) = (skin, bodies.at(place))
-                && self.groups.of(place) == Some(group)
+    fn go_on(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+        for &place in self.islands.members(island) {
+            let place = place as usize;
+            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place))
                 && moment.concerns(body)
             {
                 skin.go_on(body, moment.duration);
@@ -359,70 +396,81 @@ impl Tissue {
         }
     }
 
-    /// Moves what began too close apart.
-    fn part(&self, bodies: &mut Slots<Body>, duration: f32, part: impl Fn(&mut Body, usize, Vec3)) {
-        for link in self.links.iter().filter(|link| link.depth > 0.0) {
-            for (place, node, way) in link.parting(PUSHED_OUT, duration) {
+    /// Moves what began too close apart, without giving it speed: displacements that are found like impulses, each no larger than needed.
+    fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
+        let Self { links, skins, .. } = self;
+        links.retain(|link| link.depth > 0.0);
+        for link in &mut *links {
+            let extents = link
+                .sides
+                .map(|side| skins[side.body].as_ref().map_or(0.0, |skin| skin.extent));
+            let speed = (PARTING_SPEED * extents[0].min(extents[1])).min(PUSHED_OUT * link.depth / duration);
+            link.begin_parting(speed, skins);
+        }
+        for _ in 0..PARTING_SWEEPS {
+            links.iter_mut().for_each(|link| link.part(skins));
+        }
+        for link in &*links {
+            link.take_displacements(duration, skins, |place, node, displacement| {
                 if let Some(body) = bodies.at_mut(place) {
-                    part(body, node, way);
+                    body.part_substep(node, displacement);
                 }
-            }
+            });
         }
     }
 
     /// Adds the contacts that are not known yet, of those that meet.
-    fn find(&mut self, group: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
             skins,
             links,
             known,
             bonds,
-            groups,
+            islands,
         } = self;
         let key = |link: &Link| link.sides.map(|side| side.key());
         known.clear();
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
-        for (a, of_a) in skins.iter().enumerate() {
-            let (Some(skin), Some(body_a)) = (of_a, bodies.at(a)) else {
+        let of_one = islands.members(island).iter().map(|&place| [place as usize; 2]);
+        for [a, b] in of_one.chain(islands.pairs(island)) {
+            let party = |place: usize| {
+                let skin = skins.get(place)?.as_ref()?;
+                Some(Party { place, skin })
+            };
+            let (Some(first), Some(second)) = (party(a), party(b)) else {
                 continue;
             };
-            let first = Party { place: a, skin };
-            for (b, of_b) in skins.iter().enumerate().skip(a) {
-                let (Some(skin), Some(body_b)) = (of_b, bodies.at(b)) else {
-                    continue;
-                };
-                let second = Party { place: b, skin };
-                let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
-                let Some(radius) = radius(&first, &second, [body_a, body_b])
-                    .filter(|_| is_looked_at && [groups.of(a), groups.of(b)] == [Some(group); 2])
-                else {
-                    continue;
-                };
-                let friction = body_a.contact.friction.max(body_b.contact.friction);
-                let search = Search {
-                    parties: [first, second],
-                    dt: moment.duration,
-                    radius,
-                    in_images: a != b && meet_in_images(first.skin, skin),
-                };
-                search.run(|touch| {
-                    let sides = touch.sides.map(|side| side.key());
-                    let is_known = known
-                        .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
-                        .is_ok();
-                    if is_known || links.len() == links.capacity() || are_joined(bonds, bodies, &touch.sides) {
-                        return;
-                    }
-                    let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
-                    if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
-                        link.friction = friction;
-                        link.is_parted = touch.is_parted;
-                        link.allow_gap(touch.gap, moment.duration);
-                        links.push(link);
-                    }
-                });
-            }
+            let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
+                continue;
+            };
+            let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
+            let Some(radius) = radius(&first, &second, [body_a, body_b]).filter(|_| is_looked_at) else {
+                continue;
+            };
+            let friction = body_a.contact.friction.max(body_b.contact.friction);
+            let search = Search {
+                parties: [first, second],
+                dt: moment.duration,
+                radius,
+                in_images: a != b && meet_in_images(first.skin, second.skin),
+            };
+            search.run(|touch| {
+                let sides = touch.sides.map(|side| side.key());
+                let is_known = known
+                    .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
+                    .is_ok();
+                if is_known || links.len() == links.capacity() || are_joined(bonds, bodies, &touch.sides) {
+                    return;
+                }
+                let of_sides = touch.sides.map(|side| if side.body == a { body_a } else { body_b });
+                if let Some(mut link) = Link::new(touch.sides, touch.normal, of_sides) {
+                    link.friction = friction;
+                    link.is_parted = touch.is_parted;
+                    link.allow_gap(touch.gap, moment.duration);
+                    links.push(link);
+                }
+            });
         }
     }
 }
@@ -482,28 +530,37 @@ fn meet_each_other(first: &Body, second: &Body) -> bool {
     a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
 }
 
-/// A box about what a body may touch in a step of `dt` seconds, in the caller's coordinates.
-fn reach(body: &Body, dt: f32) -> Bounds {
-    let way = FASTER * speed(body) * dt;
-    let bounds = body.local_bounds();
-    let origin = body.origin.as_vec3();
-    Bounds {
-        min: bounds.min + origin,
-        max: bounds.max + origin,
-    }
-    .extended(way + 2.0 * body.contact.thickness + 0.01 * body.extent())
+/// The bodies that meet tissue, with their places in the world.
+fn meeting<'a>(
+    skins: &'a [Option<Skin>],
+    bodies: &'a Slots<Body>,
+) -> impl Iterator<Item = (usize, &'a Body)> + use<'a> {
+    let with_skin = skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
+    with_skin.filter_map(|(place, _)| Some((place, bodies.at(place)?)))
 }
 
-/// No node of a body is faster, m/s, as far as that is kept.
-fn speed(body: &Body) -> f32 {
+/// A box about the velocities of a body, m/s, as far as that is kept.
+fn velocities(body: &Body) -> Bounds {
     let velocities = body.carry.gravity.velocities;
-    let fastest = velocities.min.abs().max(velocities.max.abs()).length();
-    if fastest.is_finite() { fastest } else { 0.0 }
+    if velocities.min.is_finite() && velocities.max.is_finite() {
+        velocities
+    } else {
+        Bounds {
+            min: Vec3::ZERO,
+            max: Vec3::ZERO,
+        }
+    }
 }
 
-/// A box about a body as a step that was tried begins and as it ends, and what keeps off it, in the caller's coordinates.
-fn swept(body: &Body) -> Bounds {
-    let origin = body.origin.as_vec3();
-    let both = body.state.positions().iter().chain(body.state.newest().0.iter());
-    Bounds::of(both.map(|position| position + origin)).extended(body.contact.thickness + 1e-3 * body.extent())
+/// No node of a body is faster against one of another, or of the same, m/s, as far as their velocities are kept.
+fn relative_speed(first: &Body, second: &Body) -> f32 {
+    let [a, b] = [first, second].map(velocities);
+    (a.max - b.min).abs().max((b.max - a.min).abs()).length()
+}
+
+/// A box about a body as a step that was tried begins, and as it ends beside the displacement that all bodies have in common, and what keeps off it,
+/// in its own coordinates.
+fn swept(body: &Body, common: Vec3) -> Bounds {
+    let ends = body.state.newest().0.iter().map(|position| position - common);
+    Bounds::of(body.state.positions().iter().chain(ends)).extended(body.contact.thickness + 1e-3 * body.extent())
 }

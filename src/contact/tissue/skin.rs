@@ -45,6 +45,8 @@ pub(crate) struct Skin {
     pub given: Bounds,
     /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
     pub short: f32,
+    /// How far it reached along an axis at first, m.
+    pub extent: f32,
     /// Where nodes were at first, in the body's coordinates, where it meets itself.
     pub(super) firsts: Option<Vectors>,
     /// How far any node goes, m.
@@ -80,6 +82,7 @@ saved!(Skin {
     spread,
     given,
     short,
+    extent,
     firsts,
     travel,
     meets_bodies,
@@ -177,7 +180,9 @@ impl Skin {
                 .max((bounds.max - bounds.min).max_element() / PIXELS)
                 .max(f32::MIN_POSITIVE)
         };
+        let bounds = forest.bounds();
         let mut skin = Self {
+            extent: (bounds.max - bounds.min).max_element(),
             room: nodes.len() + edges.len() + triangles.len(),
             short: short_of(lengths(), edges.len())?,
             firsts,
