@@ -106,7 +106,8 @@ fn broken_links(document: &Path, text: &str) -> Vec<String> {
         let Some(target) = target.filter(|target| root().join(target).exists()) else {
             return true;
         };
-        !anchor.is_empty() && !(is_document(&target) && anchors(&read(target)).iter().any(|there| there == anchor))
+        let has_anchor = || is_document(&target) && anchors(&read(&target)).iter().any(|there| there == anchor);
+        !anchor.is_empty() && !has_anchor()
     };
     links(text).into_iter().filter(is_broken).collect()
 }
