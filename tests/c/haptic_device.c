@@ -1,4 +1,4 @@
-/* A device's driver beside a handle, as the README shows it: a hand presses a cloth until both are at rest, and feels what it presses with. */
+/* A device's driver beside a handle, as docs/guide/haptics.md shows it: a hand presses a cloth until both are at rest, and feels what it presses with. */
 #include "scene.h"
 
 enum { TICKS = 1500, TICKS_A_STEP = 16 };

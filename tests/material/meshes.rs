@@ -1,5 +1,5 @@
 //! What springs from Young's modulus make of meshes that are no lattices, and of a beam that bends. The figures are those of
-//! ARCHITECTURE.md and of `Model::Springs`.
+//! docs/methods/materials.md and of `Model::Springs`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
