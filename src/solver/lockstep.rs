@@ -160,8 +160,10 @@ impl Together<'_> {
         let mut moment = Moment {
             duration: substep,
             drifts: true,
+            begins: true,
         };
         for index in 0..substeps {
+            moment.begins = index == 0;
             tissue.bonds.load(bodies);
             each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
                 if body.implicit.is_some() {
@@ -201,6 +203,7 @@ impl Together<'_> {
             })?;
         }
         moment.drifts = false;
+        moment.begins = false;
         tissue.bonds.load(bodies);
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
             if body.implicit.is_some() {

@@ -136,6 +136,11 @@ impl Link {
         self.least_speed = -gap.max(0.0) / duration;
     }
 
+    /// What it has given along the normal, N s.
+    pub fn impulse(&self) -> f32 {
+        self.impulse
+    }
+
     /// Whether it has given anything.
     pub fn presses(&self) -> bool {
         self.impulse > 0.0

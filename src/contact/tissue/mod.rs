@@ -7,6 +7,7 @@
 
 mod bonds;
 mod change;
+mod clearances;
 mod crossing;
 mod images;
 mod islands;
@@ -18,10 +19,11 @@ mod wound;
 
 pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
 pub(crate) use self::change::{SkinChange, SurfaceToBe};
+use self::clearances::Clearances;
 use self::islands::{Islands, Reach};
 use self::link::Link;
 use self::link::Side;
-use self::search::{Party, Search};
+use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
 use glam::{DVec3, Vec3};
 
@@ -46,7 +48,11 @@ const TRAVEL: f32 = 0.5;
 
 /// How fast what began too close is moved apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so it
 /// bounds the energy that they gain.
-const PARTING_SPEED: f32 = 0.1;
+const PARTING_SPEED: f32 = 1.0;
+
+/// All contacts together part a body with a force that would take this long to make it as fast, s. So where bodies hold each other, or others press
+/// them together, nothing is wound up.
+const PARTING_TIME: f32 = 0.1;
 
 /// Sweeps over what began too close.
 const PARTING_SWEEPS: u32 = 4;
@@ -67,6 +73,8 @@ pub(crate) struct Moment {
     pub duration: f32,
     /// Whether positions change: not with the last half kick of a step.
     pub drifts: bool,
+    /// Whether it begins a step.
+    pub begins: bool,
 }
 
 impl Moment {
@@ -82,6 +90,8 @@ pub(crate) struct Tissue {
     pub islands: Islands,
     /// By a body's place in the world.
     skins: Vec<Option<Skin>>,
+    /// Likewise, of bodies that meet others.
+    clearances: Vec<Option<Clearances>>,
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
@@ -92,6 +102,7 @@ pub(crate) struct Tissue {
 saved!(Tissue {
     islands,
     skins,
+    clearances,
     links,
     known,
     bonds
@@ -107,9 +118,19 @@ impl Tissue {
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
+        let spare = body.spare_nodes();
+        let clearances = if body.contact.with_bodies {
+            Some(Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?)
+        } else {
+            None
+        };
         while self.skins.len() <= place {
             memory::push(&mut self.skins, None)?;
         }
+        while self.clearances.len() <= place {
+            memory::push(&mut self.clearances, None)?;
+        }
+        self.clearances[place] = clearances;
         self.skins[place] = Some(skin);
         Ok(())
     }
@@ -147,6 +168,9 @@ impl Tissue {
         self.bonds.leave(bodies, place);
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
+        }
+        if let Some(clearances) = self.clearances.get_mut(place) {
+            *clearances = None;
         }
     }
 
@@ -369,7 +393,7 @@ impl Tissue {
             if first.is_some() {
                 self.go_on(island, bodies, moment);
             }
-            self.find(island, bodies, moment);
+            self.find(island, bodies, moment, moment.begins && first.is_none());
             if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
                 break;
             }
@@ -400,11 +424,17 @@ impl Tissue {
     fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
         let Self { links, skins, .. } = self;
         links.retain(|link| link.depth > 0.0);
+        let count = links.len() as f32;
         for link in &mut *links {
-            let extents = link
-                .sides
-                .map(|side| skins[side.body].as_ref().map_or(0.0, |skin| skin.extent));
-            let speed = (PARTING_SPEED * extents[0].min(extents[1])).min(PUSHED_OUT * link.depth / duration);
+            let skin = |side: usize| skins[link.sides[side].body].as_ref();
+            let (Some(first), Some(second)) = (skin(0), skin(1)) else {
+                continue;
+            };
+            let speed = PARTING_SPEED * first.extent.min(second.extent);
+            // What presses harder than this would have work done to be parted.
+            let most = first.mass.min(second.mass) * speed / (PARTING_TIME * count);
+            let ease = (1.0 - link.impulse() / (most * duration)).max(0.0);
+            let speed = (speed * ease).min(PUSHED_OUT * link.depth / duration);
             link.begin_parting(speed, skins);
         }
         for _ in 0..PARTING_SWEEPS {
@@ -420,9 +450,10 @@ impl Tissue {
     }
 
     /// Adds the contacts that are not known yet, of those that meet.
-    fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment, measures: bool) {
         let Self {
             skins,
+            clearances,
             links,
             known,
             bonds,
@@ -449,13 +480,25 @@ impl Tissue {
                 continue;
             };
             let friction = body_a.contact.friction.max(body_b.contact.friction);
-            let search = Search {
+            let mut search = Search {
                 parties: [first, second],
                 dt: moment.duration,
                 radius,
                 in_images: a != b && meet_in_images(first.skin, second.skin),
+                measures: Measure::Nothing,
             };
-            search.run(|touch| {
+            // A place is lent to neither where it is its own partner.
+            let mut none = [None, None];
+            let [kept_a, kept_b] = match clearances.get_disjoint_mut([a, b]) {
+                Ok(both) => both,
+                Err(_) => none.each_mut(),
+            };
+            if measures && [&*kept_a, &*kept_b].into_iter().flatten().any(|kept| kept.is_new) {
+                search.measures = Measure::Reductions;
+                search.run([&mut *kept_a, &mut *kept_b], |_| {});
+            }
+            search.measures = if measures { Measure::Distances } else { Measure::Nothing };
+            search.run([kept_a, kept_b], |touch| {
                 let sides = touch.sides.map(|side| side.key());
                 let is_known = known
                     .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
@@ -471,6 +514,13 @@ impl Tissue {
                     links.push(link);
                 }
             });
+        }
+        if measures {
+            for &place in islands.members(island) {
+                if let Some(Some(kept)) = clearances.get_mut(place as usize) {
+                    kept.settle();
+                }
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::clearances::{Clearances, Part};
 use super::link::Side;
 use super::skin::{Clearance, NONE, PARTED, Skin};
 use crate::body::Bounds;
@@ -41,17 +42,31 @@ pub(super) struct Search<'a> {
     pub radius: f32,
     /// Whether they find each other in images.
     pub in_images: bool,
+    pub measures: Measure,
+}
+
+/// What of two bodies that are near each other is remembered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measure {
+    Nothing,
+    /// How near they are.
+    Distances,
+    /// That they were made so near.
+    Reductions,
 }
 
 impl Search<'_> {
-    /// Shows all that meets.
-    pub fn run(&self, mut see: impl FnMut(Touch)) {
+    /// Shows all that meets. `kept` are the clearances of two bodies, by the same order.
+    pub fn run(&self, kept: [&mut Option<Clearances>; 2], mut see: impl FnMut(Touch)) {
         let [first, second] = self.parties;
-        self.nodes_with_faces(first, second, &mut see);
+        let [of_first, of_second] = kept.map(Option::as_mut);
+        let of_first = of_first.filter(|_| !self.is_of_one());
+        let mut of_first = of_first;
+        self.nodes_with_faces(first, second, of_first.as_deref_mut(), &mut see);
         if !self.is_of_one() {
-            self.nodes_with_faces(second, first, &mut see);
+            self.nodes_with_faces(second, first, of_second, &mut see);
         }
-        self.edges_with_edges(first, second, &mut see);
+        self.edges_with_edges(first, second, of_first, &mut see);
         if self.is_of_one() {
             self.across_wounds(&mut see);
             self.edges_across_wounds(&mut see);
@@ -77,15 +92,41 @@ impl Search<'_> {
         self.is_of_one() && distance > self.radius + 2.0 * skin.spread
     }
 
-    fn nodes_with_faces(&self, of_nodes: Party, of_faces: Party, see: &mut impl FnMut(Touch)) {
+    /// How far a part of a surface keeps from another body, m.
+    fn radius_of(&self, kept: Option<&Clearances>, part: Part) -> f32 {
+        let allowed = kept.map_or(f32::INFINITY, |kept| kept.allowed(part));
+        let [first, second] = self.parties.map(|party| party.skin.least_thickness());
+        self.radius.min(allowed.max(first.min(second)))
+    }
+
+    /// Remembers how near to a part of a surface another body is where the step begins.
+    fn measure(&self, kept: Option<&mut Clearances>, part: Part, nearest: f32) {
+        if let Some(kept) = kept.filter(|_| nearest < self.radius) {
+            match self.measures {
+                Measure::Nothing => {}
+                Measure::Distances => kept.see(part, nearest),
+                Measure::Reductions => kept.reduce(part, nearest),
+            }
+        }
+    }
+
+    fn nodes_with_faces(
+        &self,
+        of_nodes: Party,
+        of_faces: Party,
+        mut kept: Option<&mut Clearances>,
+        see: &mut impl FnMut(Touch),
+    ) {
         let shift = shift(of_nodes.skin, of_faces.skin);
         for (corner, &node) in of_nodes.skin.nodes.iter().enumerate() {
             let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
+            let radius = self.radius_of(kept.as_deref(), Part::Corner(corner));
             let segment = Segment {
                 ends: [place; 2],
                 steps: [step; 2],
-                radius: self.radius,
+                radius,
             };
+            let mut front = f32::INFINITY;
             let mut touched: Option<(f32, usize, (Separation, Clearance))> = None;
             // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
             let mut nearest = (f32::INFINITY, 0.0_f32);
@@ -106,6 +147,9 @@ impl Search<'_> {
                     return;
                 }
                 let height = if is_solid { height(&corners, &start) } else { 0.0 };
+                if height >= 0.0 {
+                    front = front.min(distance);
+                }
                 let is_nearer = distance < nearest.0 * (1.0 - SAME)
                     || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
                 if is_solid && is_nearer {
@@ -121,11 +165,13 @@ impl Search<'_> {
                     touched = Some((distance, triangle, found));
                 }
             });
+            let nearest_there = if behind.is_some() { 0.0 } else { front };
+            self.measure(kept.as_deref_mut(), Part::Corner(corner), nearest_there);
             // On the wrong side it is led out, or let out where it is deep.
             let is_behind = behind.is_some();
             let closest = match behind {
                 Some((triangle, start)) => {
-                    (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, Clearance::of(self.radius))))
+                    (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, Clearance::of(radius))))
                 }
                 None => touched.map(|(_, triangle, found)| (triangle, found)),
             };
@@ -149,7 +195,13 @@ impl Search<'_> {
         }
     }
 
-    fn edges_with_edges(&self, first: Party, second: Party, see: &mut impl FnMut(Touch)) {
+    fn edges_with_edges(
+        &self,
+        first: Party,
+        second: Party,
+        mut kept: Option<&mut Clearances>,
+        see: &mut impl FnMut(Touch),
+    ) {
         let shift = shift(first.skin, second.skin);
         for (index, &edge) in first.skin.edges.iter().enumerate() {
             if first.skin.pierces[index] || edge[0] == NONE {
@@ -159,8 +211,9 @@ impl Search<'_> {
             let segment = Segment {
                 ends: ways.map(|(place, _)| place),
                 steps: ways.map(|(_, step)| step),
-                radius: self.radius,
+                radius: self.radius_of(kept.as_deref(), Part::Edge(index)),
             };
+            let mut nearest = f32::INFINITY;
             let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
             let mut see_edges = |edges: [u32; 3]| {
                 for other in second.skin.sound(edges) {
@@ -176,6 +229,7 @@ impl Search<'_> {
                     if self.is_far(second.skin, start) {
                         continue;
                     }
+                    nearest = nearest.min(start);
                     let met = self.approach(second.skin, (edge, &segment), (&other, &corners));
                     let Some((found, clearance)) = met else {
                         continue;
@@ -216,6 +270,7 @@ impl Search<'_> {
                     }
                 }
             }
+            self.measure(kept.as_deref_mut(), Part::Edge(index), nearest);
             if let Some((_, other, (found, clearance))) = closest {
                 let sides = [
                     Side {
@@ -243,7 +298,7 @@ impl Search<'_> {
     ) -> Option<(Separation, Clearance)> {
         let found = corners.approach(segment, 0.0)?;
         if !self.is_of_one() {
-            return Some((found, Clearance::of(self.radius)));
+            return Some((found, Clearance::of(segment.radius)));
         }
         let clearance = skin.keeps(nodes, (others, found.weights), self.radius)?;
         // Without a thickness what a cut has parted keeps as far apart as all else does.
