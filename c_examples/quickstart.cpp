@@ -9,11 +9,11 @@ int main() try {
   cloth_def.positions = shape.positions, cloth_def.node_count = shape.node_count;
   cloth_def.triangles = shape.triangles, cloth_def.triangle_count = shape.triangle_count;
   cloth_def.node_mass = 1e-4f, cloth_def.node_damping = 1e-3f, cloth_def.stiffness = 100; // kg, N s/m, N/m
-  const auto cloth = world.create_body(cloth_def);
+  auto cloth = world.create_body(cloth_def);
   for (const unsigned corner : {0u, 20u, 420u, 440u}) cloth.pin(corner);
   sinew::tool_def ball_def;
   ball_def.shape = SINEW_SHAPE_SPHERE, ball_def.radius = 0.02f, ball_def.position[1] = 0.03f;
-  const auto ball = world.create_tool(ball_def);
+  auto ball = world.create_tool(ball_def);
   float height = ball_def.position[1];
   for (int frame = 0; frame < 60; frame++, height -= 0.001f) {
     ball.set_position({0, height, 0});

@@ -3,7 +3,8 @@
 // - Owners (world, mesh, reader, haptic, detector, embedding) are moved, not copied. Moved from, they are empty: every call on them fails.
 // - body, tool, blade and attachment are ids with the world they belong to: copied freely, ended by their world or by destroy(). They
 //   must not be used after the world's end. After their own they are refused, as in C.
-// - Threads, units, and how long views live: as sinew.h says. A function that is const here may be called by any number of threads.
+// - Threads, units, and how long views live: as sinew/base.h says. Any number of threads may call functions that are const here at the
+//   same time. Other functions, and constructors of reader and haptic, need exclusive access to the world.
 // - Errors: sinew::error. Programs without exceptions define SINEW_ON_ERROR(status, message), before they include this, as
 //   something that does not return. Where a status is an answer like any other, call the C function with get() or with world() and id.
 #ifndef SINEW_HPP
@@ -182,13 +183,13 @@ private:
 class attachment : public part<sinew_attachment_id> {
 public:
   using part::part;
-  void release() const { check(sinew_attachment_release(world(), id)); }
+  void release() { check(sinew_attachment_release(world(), id)); }
   vec3 force() const {
     vec3 out{};
     return check(sinew_attachment_get_force(world(), id, out.data())), out;
   }
   // Of a suture:
-  void set_length(float length) const { check(sinew_suture_set_length(world(), id, length)); }
+  void set_length(float length) { check(sinew_suture_set_length(world(), id, length)); }
   sinew_suture_report suture_report() const {
     auto out = sized<sinew_suture_report>();
     return check(sinew_suture_get_report(world(), id, &out)), out;
@@ -198,14 +199,14 @@ public:
 class tool : public part<sinew_tool_id> {
 public:
   using part::part;
-  void destroy() const { check(sinew_tool_destroy(world(), id)); }
-  void set_position(vec3 position) const { check(sinew_tool_set_pose(world(), id, position.data(), nullptr)); }
-  void set_pose(vec3 position, quat orientation) const {
+  void destroy() { check(sinew_tool_destroy(world(), id)); }
+  void set_position(vec3 position) { check(sinew_tool_set_pose(world(), id, position.data(), nullptr)); }
+  void set_pose(vec3 position, quat orientation) {
     check(sinew_tool_set_pose(world(), id, position.data(), orientation.data()));
   }
-  void set_friction(float friction) const { check(sinew_tool_set_friction(world(), id, friction)); }
-  void set_force_limit(float limit) const { check(sinew_tool_set_force_limit(world(), id, limit)); }
-  void set_collision(std::uint32_t category, std::uint32_t mask) const {
+  void set_friction(float friction) { check(sinew_tool_set_friction(world(), id, friction)); }
+  void set_force_limit(float limit) { check(sinew_tool_set_force_limit(world(), id, limit)); }
+  void set_collision(std::uint32_t category, std::uint32_t mask) {
     check(sinew_tool_set_collision(world(), id, category, mask));
   }
   sinew::pose pose() const {
@@ -229,8 +230,8 @@ public:
 class blade : public part<sinew_blade_id> {
 public:
   using part::part;
-  void destroy() const { check(sinew_blade_destroy(world(), id)); }
-  void set_pose(vec3 position, quat orientation) const {
+  void destroy() { check(sinew_blade_destroy(world(), id)); }
+  void set_pose(vec3 position, quat orientation) {
     check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
   }
   sinew_blade_report report() const {
@@ -244,7 +245,7 @@ public:
   using part::part;
   using nodes = span<const std::uint32_t>;
   using floats = span<const float>;
-  void destroy() const { check(sinew_body_destroy(world(), id)); }
+  void destroy() { check(sinew_body_destroy(world(), id)); }
 
   vec3_view positions() const { return viewed<vec3_view>(sinew_body_get_positions); }
   vec3_view velocities() const { return viewed<vec3_view>(sinew_body_get_velocities); }
@@ -252,37 +253,37 @@ public:
     const auto view = viewed<sinew_triangle_view>(sinew_body_get_triangles);
     return {view.data, 3 * view.count};
   }
-  void set_positions(floats positions) const { check(sinew_body_set_positions(world(), id, positions.data(), thirds(positions))); }
-  void set_velocities(floats velocities) const { check(sinew_body_set_velocities(world(), id, velocities.data(), thirds(velocities))); }
-  void apply_force(std::uint32_t node, vec3 force) const { check(sinew_body_apply_force(world(), id, node, force.data())); }
-  void apply_forces(nodes at, floats forces) const {
+  void set_positions(floats positions) { check(sinew_body_set_positions(world(), id, positions.data(), thirds(positions))); }
+  void set_velocities(floats velocities) { check(sinew_body_set_velocities(world(), id, velocities.data(), thirds(velocities))); }
+  void apply_force(std::uint32_t node, vec3 force) { check(sinew_body_apply_force(world(), id, node, force.data())); }
+  void apply_forces(nodes at, floats forces) {
     expect(forces.size() == 3 * at.size(), "forces: 3 floats for each node");
     check(sinew_body_apply_forces(world(), id, at.data(), forces.data(), at.size()));
   }
   bool is_closed() const { return viewed<std::uint32_t>(sinew_body_is_closed) != 0; }
-  void set_collision(std::uint32_t category, std::uint32_t mask) const {
+  void set_collision(std::uint32_t category, std::uint32_t mask) {
     check(sinew_body_set_collision(world(), id, category, mask));
   }
 
-  void pin(std::uint32_t node) const { check(sinew_body_pin(world(), id, node)); }
-  void pin_axes(std::uint32_t node, std::uint32_t axes) const { check(sinew_body_pin_axes(world(), id, node, axes)); }
-  void unpin(std::uint32_t node) const { check(sinew_body_unpin(world(), id, node)); }
-  void move_pin(std::uint32_t node, vec3 to) const { check(sinew_body_move_pin(world(), id, node, to.data())); }
+  void pin(std::uint32_t node) { check(sinew_body_pin(world(), id, node)); }
+  void pin_axes(std::uint32_t node, std::uint32_t axes) { check(sinew_body_pin_axes(world(), id, node, axes)); }
+  void unpin(std::uint32_t node) { check(sinew_body_unpin(world(), id, node)); }
+  void move_pin(std::uint32_t node, vec3 to) { check(sinew_body_move_pin(world(), id, node, to.data())); }
   vec3 pin_force(std::uint32_t node) const {
     vec3 out{};
     return check(sinew_body_get_pin_force(world(), id, node, out.data())), out;
   }
 
-  void add_spring(std::uint32_t a, std::uint32_t b, float stiffness, float rest_length) const {
+  void add_spring(std::uint32_t a, std::uint32_t b, float stiffness, float rest_length) {
     check(sinew_body_add_spring(world(), id, a, b, stiffness, rest_length));
   }
-  void remove_spring(std::uint32_t a, std::uint32_t b) const { check(sinew_body_remove_spring(world(), id, a, b)); }
-  void scale_region(nodes of, float stiffness_factor, float length_factor) const {
+  void remove_spring(std::uint32_t a, std::uint32_t b) { check(sinew_body_remove_spring(world(), id, a, b)); }
+  void scale_region(nodes of, float stiffness_factor, float length_factor) {
     check(sinew_body_scale_region(world(), id, of.data(), of.size(), stiffness_factor, length_factor));
   }
-  void set_pressure(float pressure) const { check(sinew_body_set_pressure(world(), id, pressure)); }
+  void set_pressure(float pressure) { check(sinew_body_set_pressure(world(), id, pressure)); }
 
-  sinew_cut_report cut(span<const float> start, span<const float> end) const { // the edge, two points each, before and after
+  sinew_cut_report cut(span<const float> start, span<const float> end) { // the edge, two points each, before and after
     expect(start.size() == 6 && end.size() == 6, "start, end: the 6 floats of an edge each");
     auto out = sized<sinew_cut_report>();
     return check(sinew_body_cut(world(), id, start.data(), end.data(), &out)), out;
@@ -301,8 +302,8 @@ public:
   }
 
   float awake_share() const { return viewed<float>(sinew_body_get_awake_share); }
-  void wake() const { check(sinew_body_wake(world(), id)); }
-  sinew_rest_state_report rest_state(const rest_state_def &def = {}) const {
+  void wake() { check(sinew_body_wake(world(), id)); }
+  sinew_rest_state_report rest_state(const rest_state_def &def = {}) {
     auto out = sized<sinew_rest_state_report>();
     return check(sinew_body_rest_state(world(), id, &def, &out)), out;
   }
@@ -312,21 +313,21 @@ public:
   sinew_enclosed_report enclosed_report() const { return reported<sinew_enclosed_report>(sinew_body_get_enclosed_report); }
   sinew_tear_report tear_report() const { return reported<sinew_tear_report>(sinew_body_get_tear_report); }
 
-  attachment attach(std::uint32_t node, const tool &to, float force_limit = no_limit) const {
+  attachment attach(std::uint32_t node, const tool &to, float force_limit = no_limit) {
     return attached([&](auto out) { return sinew_body_attach_node(world(), id, node, to.id, force_limit, out); });
   }
   // An attachment for each node, whose ids `out` has room for: sinew::attachment(world(), id).
-  void attach(nodes held, const tool &to, span<sinew_attachment_id> out, float force_limit = no_limit) const {
+  void attach(nodes held, const tool &to, span<sinew_attachment_id> out, float force_limit = no_limit) {
     expect(out.size() == held.size(), "out: as many as there are nodes");
     check(sinew_body_attach_nodes(world(), id, held.data(), held.size(), to.id, force_limit, out.data()));
   }
-  void attach(nodes held, const body &other, nodes others, span<sinew_attachment_id> out, float force_limit = no_limit) const {
+  void attach(nodes held, const body &other, nodes others, span<sinew_attachment_id> out, float force_limit = no_limit) {
     expect(held.size() == others.size(), "others: as many as there are nodes");
     expect(out.size() == held.size(), "out: as many as there are nodes");
     check(sinew_body_attach_nodes_to_nodes(world(), id, held.data(), held.size(), other.id, others.data(), force_limit, out.data()));
   }
   attachment suture(std::uint32_t triangle, vec3 weights, const body &other, std::uint32_t other_triangle, vec3 other_weights,
-                    const suture_def &def = {}) const {
+                    const suture_def &def = {}) {
     return attached([&](auto out) {
       return sinew_body_suture_points(world(), id, triangle, weights.data(), other.id, other_triangle, other_weights.data(), &def, out);
     });
@@ -345,7 +346,7 @@ private:
     auto out = sized<Out>();
     return check(get(world(), id, &out)), out;
   }
-  template <class Attach> attachment attached(Attach attach) const {
+  template <class Attach> attachment attached(Attach attach) {
     sinew_attachment_id made{};
     return check(attach(&made)), attachment(world(), made);
   }

@@ -27,8 +27,9 @@ endif
 ifeq ($(INCLUDE_FROM_LIB),)
 	$(error LIBDIR and INCLUDEDIR must lie within PREFIX: the package finds its parts from one another)
 endif
-	$(INSTALL) -d '$(DESTDIR)$(INCLUDEDIR)' '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(LIBDIR)/cmake/sinew'
+	$(INSTALL) -d '$(DESTDIR)$(INCLUDEDIR)/sinew' '$(DESTDIR)$(LIBDIR)/pkgconfig' '$(DESTDIR)$(LIBDIR)/cmake/sinew'
 	$(INSTALL) -m 644 $(wildcard ../include/sinew.h*) '$(DESTDIR)$(INCLUDEDIR)'
+	$(INSTALL) -m 644 $(wildcard ../include/sinew/*.h) '$(DESTDIR)$(INCLUDEDIR)/sinew'
 	$(INSTALL) -m 644 $(TARGET)/release/libsinew.a '$(DESTDIR)$(LIBDIR)'
 	$(INSTALL) -m 755 $(TARGET)/release/$(SHARED) '$(DESTDIR)$(LIBDIR)/$(FULL_NAME)'
 	ln -sf $(FULL_NAME) '$(DESTDIR)$(LIBDIR)/$(SONAME)'
@@ -37,7 +38,8 @@ endif
 	for file in $(CMAKE_FILES); do $(FILL) ../packaging/$$file.in > '$(DESTDIR)$(LIBDIR)'/cmake/sinew/$$file || exit 1; done
 
 uninstall:
-	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f sinew.h sinew.hpp
+	cd '$(DESTDIR)$(INCLUDEDIR)' && rm -f sinew.h sinew.hpp $(patsubst ../include/%,%,$(wildcard ../include/sinew/*.h))
+	rmdir '$(DESTDIR)$(INCLUDEDIR)/sinew' 2>/dev/null || true
 	cd '$(DESTDIR)$(LIBDIR)' && rm -f libsinew.a $(SHARED) $(SONAME) $(FULL_NAME) \
 	  $(PKGCONFIG_FILES:%=pkgconfig/%) $(CMAKE_FILES:%=cmake/sinew/%)
 	rmdir '$(DESTDIR)$(LIBDIR)/cmake/sinew' 2>/dev/null || true

@@ -1,61 +1,132 @@
-//! `include/sinew.h` is what cbindgen makes of `src/capi`, and says the version of the crate.
+//! The headers of `include/` are what cbindgen makes of `src/capi`, arranged by subject, and say the version of the crate.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+
+#[path = "header/layout.rs"]
+mod layout;
+
+use layout::{Header, WIDTH};
+
+/// Headers that most programs need, and the most lines that they may have together.
+const CORE: [&str; 5] = [
+    "sinew/base.h",
+    "sinew/world.h",
+    "sinew/mesh.h",
+    "sinew/body.h",
+    "sinew/tool.h",
+];
+const CORE_LINES: usize = 900;
+const ALL_LINES: usize = 2300;
+const IN_ONE: &str = "sinew/sinew_all.h";
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The header as it lies there; written first where SINEW_WRITE_HEADER asks for it.
-fn committed() -> &'static str {
-    static HEADER: OnceLock<String> = OnceLock::new();
-    HEADER.get_or_init(|| {
-        let place = root().join("include/sinew.h");
-        if std::env::var_os("SINEW_WRITE_HEADER").is_some() {
-            fs::create_dir_all(root().join("include")).expect("include/ can be made");
-            fs::write(&place, generated()).expect("include/sinew.h can be written");
-        }
-        fs::read_to_string(&place).unwrap_or_default()
+/// The declarations of cbindgen. Only `src/capi` is read, so no constant of another module is declared.
+fn declared() -> &'static str {
+    static DECLARED: OnceLock<String> = OnceLock::new();
+    DECLARED.get_or_init(|| {
+        let config = cbindgen::Config::from_file(root().join("cbindgen.toml")).expect("cbindgen.toml");
+        let bindings = cbindgen::Builder::new()
+            .with_config(config)
+            .with_src(root().join("src/capi/mod.rs"))
+            .generate()
+            .expect("cbindgen reads src/capi");
+        let mut declared = Vec::new();
+        bindings.write(&mut declared);
+        String::from_utf8(declared).expect("declarations are UTF-8")
     })
 }
 
-/// The header made anew, in memory. Only `src/capi` is read, so no constant of another room slips in.
-fn generated() -> String {
-    let config = cbindgen::Config::from_file(root().join("cbindgen.toml")).expect("cbindgen.toml");
-    let bindings = cbindgen::Builder::new()
-        .with_config(config)
-        .with_src(root().join("src/capi/mod.rs"))
-        .generate()
-        .expect("cbindgen reads src/capi");
-    let mut header = Vec::new();
-    bindings.write(&mut header);
-    String::from_utf8(header).expect("the header is UTF-8")
+/// The headers as generated now; written to `include/` if SINEW_WRITE_HEADER is set.
+fn generated() -> &'static [Header] {
+    static HEADERS: OnceLock<Vec<Header>> = OnceLock::new();
+    HEADERS.get_or_init(|| {
+        let headers = layout::arrange(declared());
+        if std::env::var_os("SINEW_WRITE_HEADER").is_some() {
+            let _ = fs::remove_dir_all(root().join("include/sinew"));
+            fs::create_dir_all(root().join("include/sinew")).expect("include/sinew can be made");
+            for header in &headers {
+                fs::write(root().join("include").join(&header.path), &header.text).expect("a header can be written");
+            }
+        }
+        headers
+    })
 }
 
-/// What follows each `#define`, but for the include guard.
+/// All declarations in one text.
+fn committed() -> &'static str {
+    static HEADER: OnceLock<String> = OnceLock::new();
+    HEADER.get_or_init(|| {
+        generated();
+        fs::read_to_string(root().join("include").join(IN_ONE)).unwrap_or_default()
+    })
+}
+
+/// What follows each `#define`, but for the include guards.
 fn defines(header: &str) -> impl Iterator<Item = (&str, &str)> {
     header
         .lines()
         .filter_map(|line| line.strip_prefix("#define "))
-        .filter(|rest| *rest != "SINEW_H")
-        .map(|rest| rest.split_once(' ').unwrap_or((rest, "")))
+        .filter_map(|rest| rest.split_once(' '))
+        .map(|(name, value)| (name, value.split("//").next().unwrap_or_default().trim()))
 }
 
 #[test]
-fn the_committed_header_is_the_generated_one() {
-    let header = generated();
-    if committed() == header {
-        return;
+fn the_committed_headers_are_the_generated_ones() {
+    let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join("include");
+    for header in generated() {
+        let committed = fs::read_to_string(root().join("include").join(&header.path)).unwrap_or_default();
+        if committed != header.text {
+            let path = fresh.join(&header.path);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("the target directory can be written");
+            fs::write(&path, &header.text).expect("the target directory can be written");
+            panic!(
+                "include/{} is not what src/capi declares. The new one is {}; to take it over:\n\
+                 SINEW_WRITE_HEADER=1 cargo test --test header",
+                header.path,
+                path.display()
+            );
+        }
     }
-    let fresh = Path::new(env!("CARGO_TARGET_TMPDIR")).join("sinew.h");
-    fs::write(&fresh, &header).expect("the target directory can be written");
-    panic!(
-        "include/sinew.h is not what src/capi declares. The new one is {}; to take it over:\n\
-         SINEW_WRITE_HEADER=1 cargo test --test header",
-        fresh.display()
-    );
+    let there = fs::read_dir(root().join("include/sinew")).expect("include/sinew");
+    let there: BTreeSet<String> = there
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
+        .collect();
+    let made = generated()
+        .iter()
+        .filter_map(|header| header.path.strip_prefix("sinew/"));
+    assert_eq!(there, made.map(str::to_owned).collect());
+}
+
+#[test]
+fn the_headers_are_short() {
+    let lines_of = |path: &str| {
+        let mut headers = generated().iter().filter(|header| header.path == path);
+        headers
+            .next()
+            .unwrap_or_else(|| panic!("no {path}"))
+            .text
+            .lines()
+            .count()
+    };
+    let core: usize = CORE.into_iter().map(lines_of).sum();
+    let all = generated().iter().filter(|header| header.path != IN_ONE);
+    let all: usize = all.map(|header| header.text.lines().count()).sum();
+    assert!(core <= CORE_LINES, "the core has {core} lines");
+    assert!(all <= ALL_LINES, "the headers have {all} lines");
+    for header in generated() {
+        for line in header.text.lines() {
+            // A macro stays in one line, for tools that drop lines of the preprocessor.
+            let is_macro = line.starts_with("#define ") && !line.contains("//");
+            assert!(is_macro || line.chars().count() <= WIDTH, "{}: {line}", header.path);
+            assert!(!line.contains("Safety"), "{}: {line}", header.path);
+        }
+    }
 }
 
 #[test]
@@ -65,7 +136,7 @@ fn the_version_macros_are_the_crates_version() {
         let mut values = defines(header).filter(|(define, _)| *define == name);
         let (_, value) = values.next().unwrap_or_else(|| panic!("no {name}"));
         assert_eq!(values.next(), None, "{name} is defined twice");
-        value.trim().to_owned()
+        value.to_owned()
     };
     for (name, expected) in [
         ("SINEW_VERSION_MAJOR", env!("CARGO_PKG_VERSION_MAJOR")),
@@ -77,45 +148,83 @@ fn the_version_macros_are_the_crates_version() {
 }
 
 #[test]
-fn every_macro_carries_the_prefix() {
-    let header = committed();
-    assert!(defines(header).count() > 20, "the constants are there");
-    for (name, _) in defines(header) {
-        assert!(name.starts_with("SINEW_"), "{name} is not ours to define");
+fn every_constant_carries_the_prefix() {
+    for header in generated() {
+        for line in header.text.lines().filter(|line| line.starts_with("#define ")) {
+            assert!(line.starts_with("#define SINEW_"), "{line} is not ours to define");
+        }
+    }
+    let enumerators = committed().lines().filter(|line| line.contains(" = "));
+    let enumerators: Vec<&str> = enumerators.filter(|line| !line.trim_start().starts_with('/')).collect();
+    assert!(enumerators.len() > 40, "the constants are there");
+    for line in enumerators {
+        assert!(line.starts_with("  SINEW_"), "{line} is not ours to define");
     }
 }
 
-/// The comment and the first line of every function that the header declares.
-fn functions(header: &str) -> Vec<(String, String)> {
-    let mut comment = String::new();
+/// The lines of the comment, and the declaration, of every function in a header.
+fn functions(header: &str) -> Vec<(Vec<&str>, &str)> {
     let mut functions = Vec::new();
-    for line in header.lines() {
-        match line {
-            "/**" => comment.clear(),
-            _ if line.starts_with(" *") => comment.push_str(line),
-            _ if line.contains(" sinew_") || line.contains("*sinew_") => {
-                if line.contains('(') {
-                    functions.push((std::mem::take(&mut comment), line.to_owned()));
-                }
-            }
-            _ => comment.clear(),
+    for block in header.split("\n\n") {
+        let count = block.lines().take_while(|line| line.starts_with("///")).count();
+        let comment: Vec<&str> = block.lines().take(count).collect();
+        let start = comment.iter().map(|line| line.len() + 1).sum::<usize>();
+        let declaration = block.get(start..).unwrap_or_default();
+        if declaration.trim_end().ends_with(");") && !declaration.starts_with("typedef") {
+            functions.push((comment, declaration));
         }
     }
     functions
 }
 
 #[test]
-fn every_function_says_what_it_does_and_how_it_fails() {
+fn every_function_says_first_what_it_does() {
     let functions = functions(committed());
+    let mut bad = Vec::new();
     assert!(functions.len() >= 31, "the functions of the contract are there");
     for (comment, declaration) in functions {
-        assert!(!comment.is_empty(), "undocumented: {declaration}");
-        assert_eq!(
-            comment.contains("Errors: "),
-            declaration.starts_with("sinew_status "),
-            "{declaration}"
-        );
+        // An editor shows the first line alone.
+        let first = comment.first().unwrap_or(&"").trim_start_matches("/// ");
+        let words = comment
+            .iter()
+            .map(|line| line.split_whitespace().count() - 1)
+            .sum::<usize>();
+        if !first.ends_with('.') || first.split_whitespace().count() < 4 || words > 95 {
+            bad.push(format!("{words} words: {first}"));
+        }
+        let can_fail = declaration.starts_with("sinew_status ");
+        let errors = comment.iter().any(|line| line.contains("Errors: "));
+        assert!(can_fail || !errors, "{declaration}");
     }
+    assert!(bad.is_empty(), "no short sentence of its own, or too long: {bad:#?}");
+    // Which errors every function may return stands in one place.
+    for status in ["INVALID_ARGUMENT", "STALE_ID", "OUT_OF_MEMORY", "INTERNAL"] {
+        let line = format!("//   SINEW_STATUS_{status} ");
+        assert_eq!(committed().matches(&line).count(), 1, "{line}");
+    }
+}
+
+#[test]
+fn every_field_and_constant_has_a_comment() {
+    let header = committed();
+    let mut above = Vec::new();
+    let mut count = 0;
+    for line in header.lines() {
+        if let Some(text) = line.strip_prefix("  /// ") {
+            above.push(text);
+            continue;
+        }
+        let behind = line.split_once("///< ").map(|(_, text)| text);
+        let text = above.join(" ") + behind.unwrap_or_default();
+        above.clear();
+        let ends = line.split("///<").next().unwrap_or_default().trim_end();
+        // Arguments of a function are further in.
+        if ends.starts_with("  ") && !ends.starts_with("   ") && ends.ends_with([';', ',']) {
+            count += 1;
+            assert!(text.split_whitespace().count() >= 2, "{line}");
+        }
+    }
+    assert!(count > 300, "{count} members are found");
 }
 
 /// Those that have a `struct_size`, by a program that tries each with sizes that no header gave them.
@@ -126,7 +235,7 @@ fn every_function_that_takes_a_struct_is_tried_with_a_wrong_struct_size() {
         .split("typedef struct ")
         .filter(|declaration| {
             declaration
-                .split("} ")
+                .split("\n} ")
                 .next()
                 .unwrap_or_default()
                 .contains(" struct_size;")
@@ -145,10 +254,7 @@ fn every_function_that_takes_a_struct_is_tried_with_a_wrong_struct_size() {
     for declaration in header.split("\nsinew_status ").skip(1) {
         let declaration = declaration.split(';').next().unwrap_or_default();
         let name = declaration.split('(').next().unwrap_or_default();
-        if sized
-            .iter()
-            .any(|sized| declaration.contains(&format!("struct {sized} *")))
-        {
+        if sized.iter().any(|sized| declaration.contains(&format!("{sized} *"))) {
             let fills = kinds.iter().find(|kind| name == format!("{kind}_def_init"));
             let call = fills.map_or(format!("{name}("), |kind| {
                 format!("DEFINITION({}, ", &kind["sinew_".len()..])
@@ -176,10 +282,11 @@ fn the_documents_list_every_function_beside_its_counterpart_in_rust() {
             format!("sinew_{name}")
         })
         .collect();
-    let declared: Vec<String> = functions(committed())
+    let in_modules: Vec<&str> = declared().lines().filter(|line| line.ends_with(");")).collect();
+    let in_modules: Vec<String> = in_modules
         .into_iter()
-        .filter(|(_, line)| !line.starts_with("typedef"))
-        .filter_map(|(_, line)| Some(line.split_once('(')?.0.rsplit([' ', '*']).next()?.to_owned()))
+        .filter(|line| !line.starts_with("typedef"))
+        .filter_map(|line| Some(line.split_once('(')?.0.rsplit([' ', '*']).next()?.to_owned()))
         .collect();
-    assert_eq!(listed, declared, "in the order of the header");
+    assert_eq!(listed, in_modules, "in the order of the modules");
 }

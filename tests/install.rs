@@ -205,6 +205,12 @@ fn uninstall_takes_away_what_install_brought_and_no_more() {
     }
     make("install", &settings);
     make("install", &settings);
+    let of_prefix = |file: PathBuf| file.strip_prefix(prefix.join("include")).map(Path::to_owned).ok();
+    let brought: BTreeSet<PathBuf> = files(&prefix).into_iter().filter_map(of_prefix).collect();
+    for header in files(&root().join("include")) {
+        let name = header.strip_prefix(root().join("include")).unwrap();
+        assert!(brought.contains(name), "{} is not installed", name.display());
+    }
     let library = prefix.join("lib").join(format!("libsinew.so.{VERSION}"));
     assert!(library.is_file() && !library.is_symlink());
     for name in ["libsinew.so".to_owned(), format!("libsinew.so.{}", abi())] {
@@ -224,6 +230,7 @@ fn uninstall_takes_away_what_install_brought_and_no_more() {
     }
     make("uninstall", &settings);
     assert_eq!(files(&prefix), BTreeSet::from(others));
+    assert!(!prefix.join("include/sinew").exists());
 }
 
 #[test]
@@ -234,8 +241,12 @@ fn the_makefile_and_the_manifest_name_the_library_alike() {
     assert!(manifest.contains(&format!("version_suffix_components = {components}")));
     let headers = std::fs::read_dir(root().join("include")).unwrap();
     for header in headers {
-        let name = header.unwrap().file_name().into_string().unwrap();
-        let asset = format!("{{ from = \"include/{name}\", to = \"\" }}");
+        let header = header.unwrap();
+        let name = header.file_name().into_string().unwrap();
+        let asset = match header.path().is_dir() {
+            true => format!("{{ from = \"include/{name}/*.h\", to = \"{name}\" }}"),
+            false => format!("{{ from = \"include/{name}\", to = \"\" }}"),
+        };
         assert!(manifest.contains(&asset), "cargo capi install brings {name}");
     }
     let output = succeed(Command::new("readelf").arg("-d").arg(Library::get().shared()));

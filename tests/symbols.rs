@@ -8,18 +8,12 @@ use std::process::Command;
 
 use support::{Library, installed, root, skip, succeed};
 
-/// The functions that the header declares: every `sinew_...(` outside a comment.
+/// The functions that the headers declare: every `sinew_...(` that begins a line.
 fn declared() -> BTreeSet<String> {
-    let header = std::fs::read_to_string(root().join("include/sinew.h")).expect("include/sinew.h");
-    let mut code = String::new();
-    let mut rest = header.as_str();
-    while let Some((before, after)) = rest.split_once("/*") {
-        code.push_str(before);
-        rest = after.split_once("*/").expect("comments end").1;
-    }
-    code.push_str(rest);
-    code.lines()
-        .filter(|line| !line.starts_with('#') && !line.starts_with("typedef"))
+    let header = std::fs::read_to_string(root().join("include/sinew/sinew_all.h")).expect("sinew_all.h");
+    header
+        .lines()
+        .filter(|line| !line.starts_with(['#', '/', ' ']) && !line.starts_with("typedef"))
         .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
         .map(str::to_owned)
         .collect()

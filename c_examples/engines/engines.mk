@@ -19,7 +19,7 @@ engines: engine_folders
 # love, xvfb, xauth
 love: engine_folders
 	$(DISPLAYED) env XDG_DATA_HOME=$(abspath $(ENGINE_BUILD)/home) \
-	  love engines/love $(abspath ../include/sinew.h $(LIBRARY)) $(abspath $(PICTURES))/love.png 100
+	  love engines/love $(abspath ../include/sinew/sinew_all.h $(LIBRARY)) $(abspath $(PICTURES))/love.png 100
 
 # libsdl2-dev, libgl-dev, pkg-config, libgl1-mesa-dri, xvfb, xauth
 viewer: engine_folders

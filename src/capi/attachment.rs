@@ -11,13 +11,13 @@ use crate::error::Result;
 use crate::slots::SlotId;
 use crate::world::{Anchor, AttachmentId, SurfacePoint};
 
-/// What a tool holds of a body, or a body of another: a plain value, all zero is "none".
+/// Id of an attachment or a suture; all zero means none.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_attachment_id {
-    /// Which place, from 1.
+    /// Slot of the attachment, counted from 1.
     pub index1: u32,
-    /// Which of the attachments that lived there.
+    /// Number of the use of that slot.
     pub generation: u32,
 }
 
@@ -39,9 +39,7 @@ impl From<AttachmentId> for sinew_attachment_id {
     }
 }
 
-/// Attaches a node of a body to a tool, as sinew_body_attach_nodes does.
-///
-/// Errors: as there.
+/// Attaches one node of a body to a tool, like sinew_body_attach_nodes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `out` is NULL or writable.
@@ -64,20 +62,14 @@ pub unsafe extern "C" fn sinew_body_attach_node(
     }
 }
 
-/// Attaches `count` nodes of a body to a tool, each by an attachment of its own, whose ids are written to `out`: where they lie
-/// they become part of the tool, which carries them along and turns them, exactly and whatever the solver, until
-/// sinew_attachment_release. Their velocities become the tool's in the next step.
+/// Attaches nodes of a body rigidly to a tool, each by its own attachment.
 ///
-/// What it takes to hold them, with their mass and what damps them, is part of the tool's wrench. The tool does not touch
-/// them any more, nor edges and faces that have one of them. `force_limit`, N: an attachment ends with the step in which its
-/// mean force was larger, and the node goes on as it was led (sinew_world_get_slipped); 0 or infinity: it holds whatever
-/// comes.
+/// The nodes move with the tool until sinew_attachment_release; the tool does not collide with them. The holding
+/// force is part of the tool's wrench. `out` receives `count` ids. `force_limit` [N]: the attachment breaks after a
+/// step with a larger mean force; 0 or infinity: unlimited. Attachments end with the body or tool. On failure
+/// nothing is attached.
 ///
-/// An attached node cannot be pinned. Its position can be set: then it is attached where it was put. One tool may hold a node
-/// more than once; then each attachment has its share of the force. An attachment ends with its body and with its tool.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a node is pinned, without mass or held by another tool),
-/// SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then nothing is attached.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a node is pinned, massless or held by another tool.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -102,16 +94,13 @@ pub unsafe extern "C" fn sinew_body_attach_nodes(
     }
 }
 
-/// Attaches `count` points of a body's surface to a tool, each by an attachment of its own, whose ids are written to `out`.
-/// `triangles` are their triangles' numbers: of those that the body was created with, or of the boundary of its tetrahedra or
-/// cells; `weights` are 3 `count` parts of corners, at least 0 and 1 in sum.
+/// Attaches surface points of a body rigidly to a tool, each by its own attachment.
 ///
-/// It is sinew_body_attach_nodes for the corners of each point's triangle, but those whose weight is 0. So the patch about the
-/// point is bonded to the tool, and does not turn against it; a point on an edge holds the edge, one in a corner the node. An
-/// attachment's force is that on all its corners. Points whose triangles share corners share what holds those, by their
-/// weights.
+/// `triangles` holds `count` indices into the body's surface, `weights` 3 * count corner weights, at least 0 with
+/// sum 1. Every corner with a weight is attached, so that the patch cannot rotate; its forces add up. Corners
+/// shared by points split their force by weight. Otherwise like sinew_body_attach_nodes.
 ///
-/// Errors: as there; SINEW_STATUS_INVALID_ARGUMENT also where there is no such triangle or weights are not as above.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a corner is pinned, massless or held by another tool.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -139,21 +128,14 @@ pub unsafe extern "C" fn sinew_body_attach_points(
     }
 }
 
-/// Attaches `count` nodes of a body to as many nodes of another, or of the same, each pair by an attachment of its own, whose ids
-/// are written to `out`. From the next step on the two are one point, whatever the solvers of the bodies; what is apart comes
-/// together within some hundredths of a second, and no faster than at 0.25 m/s, however far that is. Each body may turn about the
-/// point as it likes: what shall not turn takes three.
+/// Attaches nodes of a body to nodes of another or the same body, pair by pair.
 ///
-/// The bodies take their substeps together, those of IMPLICIT and NEWTON of 0.25 ms at most. No momentum is made; nor is any angular
-/// momentum, once the points have come together. Where both points are held by pins or tools along an axis nothing is done
-/// along it. Nodes, edges and faces that share such a pair of points do not touch each other.
+/// Each pair becomes one point, about which both may rotate; a gap closes at no more than 0.25 m/s. Momentum is
+/// conserved. Paired nodes and their features do not collide. `out` receives `count` ids. `force_limit` [N]: breaks
+/// after a step with a larger mean force; 0 or infinity: unlimited. Attachments end with either body. On failure
+/// nothing is attached.
 ///
-/// `force_limit`, N: an attachment ends with the step in which its mean force was larger (sinew_world_get_slipped); 0 or infinity:
-/// it holds whatever comes. sinew_attachment_get_force has the force on `body`; sinew_attachment_release lets go. An attachment
-/// ends with either body.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the two are one node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY;
-/// then nothing is attached.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if both nodes of a pair are the same.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -181,10 +163,10 @@ pub unsafe extern "C" fn sinew_body_attach_nodes_to_nodes(
     }
 }
 
-/// Attaches `count` nodes of a body to as many points of the surface of another, or of the same, as sinew_body_attach_nodes_to_nodes
-/// does. Points are given as to sinew_body_attach_points, and no patch is bonded: the surface may turn about the point.
+/// Attaches nodes of a body to surface points of another or the same body, pair by pair.
 ///
-/// Errors: as there; SINEW_STATUS_INVALID_ARGUMENT also where there is no such triangle or weights are not at least 0 and 1 in sum.
+/// `other_triangles` and `other_weights` are as in sinew_body_attach_points, but the surface may rotate about each
+/// point. Otherwise like sinew_body_attach_nodes_to_nodes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -216,10 +198,9 @@ pub unsafe extern "C" fn sinew_body_attach_nodes_to_points(
     }
 }
 
-/// Attaches `count` points of the surface of a body to as many points of that of another, or of the same, as
-/// sinew_body_attach_nodes_to_points does.
+/// Attaches surface points of a body to surface points of another or the same body, pair by pair.
 ///
-/// Errors: as there.
+/// Points are as in sinew_body_attach_nodes_to_points, the rest as in sinew_body_attach_nodes_to_nodes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -302,9 +283,9 @@ fn write(out: &mut [sinew_attachment_id], ids: Vec<AttachmentId>) {
     }
 }
 
-/// Lets go of what is attached: it goes on as it was led in the last step.
+/// Releases an attachment or cuts a suture; its nodes keep their velocities.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID (also where it slipped, or a body or the tool is gone).
+/// Errors: SINEW_STATUS_STALE_ID also if it broke, or if a body or the tool was destroyed.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -317,10 +298,10 @@ pub unsafe extern "C" fn sinew_attachment_release(
     unsafe { with_world_mut(world, |world| world.release(attachment.id())) }
 }
 
-/// Writes the force by which what it is attached to, a tool or a body, holds a body, on the tissue, 3 floats, N: world axes, mean
-/// over the last step; 0 before the first. After sinew_body_rest_state it is that by which a tool holds the body at rest.
+/// Writes the force of an attachment on its body, averaged over the last step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// `force` [N] receives 3 floats in world axes, 0 before the first step. After sinew_body_rest_state it is the
+/// force of the tool in equilibrium.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
@@ -340,11 +321,10 @@ pub unsafe extern "C" fn sinew_attachment_get_force(
     }
 }
 
-/// Writes to `count` how many attachments ended with the last step because it took more to hold them than their limit, and to
-/// `out`, which has room for `capacity` and may be NULL where that is 0, the first of their ids. They are stale: to be
-/// compared with those that were kept.
+/// Writes the attachments that broke in the last step because of their force_limit.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `out` receives at most `capacity` ids, `count` the number that broke. The ids are stale: compare them with those
+/// you stored.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or as long as stated; `count` is NULL or writable.
@@ -370,10 +350,10 @@ pub unsafe extern "C" fn sinew_world_get_slipped(
     }
 }
 
-/// Writes the force, 3 floats, N, on `count` tools together, and the torque about `point`, 3 floats, m, 3 floats, N m: world
-/// axes, mean over the last step. Of the two jaws of a forceps, say.
+/// Writes the total force and torque on several tools, averaged over the last step, in world axes.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool is named more than once), SINEW_STATUS_STALE_ID.
+/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m], about `point`,
+/// receive 3 floats each.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `tools` is NULL or as long as stated, `point` NULL or 3 floats; `force` and

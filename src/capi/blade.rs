@@ -9,61 +9,65 @@ use crate::contact::{CollisionFilter, Pose};
 use crate::slots::SlotId;
 use crate::world::{BladeDefinition, BladeId};
 
-/// A blade: a plain value, all zero is "none".
+/// Id of a blade; all zero means none.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_blade_id {
-    /// Which place, from 1.
+    /// Slot of the blade, counted from 1.
     pub index1: u32,
-    /// Which of the blades that lived there.
+    /// Number of the use of that slot.
     pub generation: u32,
 }
 
-/// What a blade is. Filled by sinew_blade_def_init; used only during sinew_blade_create.
+/// Edge and settings of a blade.
+///
+/// Filled by sinew_blade_def_init; read only during sinew_blade_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_blade_def {
-    /// Set by sinew_blade_def_init.
+    /// Size of this struct; sinew_blade_def_init sets it.
     pub struct_size: usize,
-    /// Both ends of the cutting edge about the blade's own origin, m, each coordinate within 1e9 of 0; not at one place; no default.
+    /// [m] Two different end points of the edge about the blade's origin, within 1e9; no default.
     pub edge: [f32; 6],
-    /// N/m, above 0 and finite; default 1000: the force for each metre by which it is ahead of where tissue is cut, in each body. How blunt it is:
-    /// tissue of toughness T resists with some T, and gives way by T / stiffness first.
+    /// [N/m] Coupling stiffness between the blade and its proxy in each body, above 0; default 1000.
+    ///
+    /// Before cutting, tissue of toughness T deforms by about T / stiffness.
     pub stiffness: f32,
-    /// The categories that it belongs to, a bit for each; default 1. It meets bodies where each has a category that the other's
-    /// mask has.
+    /// Bits of the categories that this blade belongs to; default 1.
+    ///
+    /// It cuts a body if each has a category in the mask of the other.
     pub collision_category: u32,
-    /// The categories that it meets, a bit for each; default 0xffffffff.
+    /// Bits of the categories that this blade cuts; default 0xffffffff.
     pub collision_mask: u32,
-    /// Where it is at first, m, each within 1e9 of 0; default 0 0 0.
+    /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
     pub position: [f32; 3],
-    /// x y z w; default 0 0 0 1; normalised, zero is refused.
+    /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
     pub orientation: [f32; 4],
 }
 
-/// What a blade did in the last step, and what was done to it.
+/// Report of the cuts of a blade and the load on it in the last step.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_blade_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_blade_report) before the call.
     pub struct_size: usize,
-    /// The force on it, world axes, mean over the step, N.
+    /// [N] Mean force on the blade, in world axes.
     pub force: [f32; 3],
-    /// The torque on it about its position, world axes, mean over the step, N m.
+    /// [N m] Mean torque on the blade about its position, in world axes.
     pub torque: [f32; 3],
-    /// What whoever moves it has spent on tissue in the step, J.
+    /// [J] Work that moving the blade did on tissue in the step.
     pub work: f64,
-    /// How long the cuts are that it made at the end of the step, at rest, m; of solids on their skin.
+    /// [m] Length of the cuts in the rest shape; for solids on their surface.
     pub length: f64,
-    /// How far it is ahead of where tissue is cut, m: 0 where nothing is in its way.
+    /// [m] Distance of the blade ahead of its cut; 0 without tissue in its path.
     pub lag: f64,
-    /// SINEW_STATUS_OK, or why what it went through was not cut: SINEW_STATUS_CAPACITY or SINEW_STATUS_OUT_OF_MEMORY. It is tried again with the
-    /// next step.
+    /// SINEW_STATUS_OK, or CAPACITY or OUT_OF_MEMORY if a cut failed; the next step retries.
     pub status: sinew_status,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved0: u32,
-    /// Of solids: how large the faces are that have opened, at rest, m^2.
-    /// A cell in which a stroke ends holds: this can be less than what was swept and resisted.
+    /// [m^2] Area of the opened faces of solids in the rest shape.
+    ///
+    /// A cell in which the cut ends stays whole, so the area can be less than the blade swept.
     pub area: f64,
 }
 
@@ -119,9 +123,7 @@ impl sinew_blade_def {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_blade_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a blade definition with its defaults; `struct_size` is sizeof(sinew_blade_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -131,25 +133,12 @@ pub unsafe extern "C" fn sinew_blade_def_init(def: *mut sinew_blade_def, struct_
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_blade_def::defaults()) })
 }
 
-/// Creates a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it (their definition's spare_nodes) as
-/// sinew_body_cut does, and feels their toughness. It is an edge alone: what has a body needs a tool beside it.
+/// Creates a blade: an edge that cuts bodies with spare_nodes as its pose moves.
 ///
-/// Tissue that the edge meets gives way until the edge is so far ahead, on the spring of the definition's stiffness, that this pulls as hard as the
-/// tissue resists: by its toughness for each metre that is cut, at rest. From then on its proxy follows, at the end of each step, as far as
-/// keeps both equal; so the work of the blade is the toughness times the length that is cut, or the area in solids, and what the spring stores (Mahvash,
-/// Hayward 2001).
-/// What pulls at the tissue through a step is what the blade feels: momentum is kept. An edge that goes along itself meets nothing, nor
-/// does one that goes back through its cut.
-///
-/// The cut is made where the proxy went, by a fifth of a triangle's shortest edge at a time and to its end where it leaves the tissue; so a triangle that
-/// is passed through takes some ten spare_nodes. Tissue of toughness 0 is cut with each step, just where the edge went. Where a cut fails the
-/// proxy stays and pulls on, as hard as the tissue resisted: the report's status tells; the step itself succeeds.
-///
-/// Tissue that moves onto an edge is cut as if that had moved; a turn is followed in parts of half a radian.
-///
-/// A body that a blade stands in takes its substeps as one that is attached does. A step in which a blade goes through tissue may allocate.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// It has no volume; add a tool for the flat of a scalpel. Tissue resists with its toughness; a failed cut is
+/// reported in sinew_blade_report and leaves the step successful. Tissue that moves onto the edge is cut too.
+/// Moving along the edge or back through the cut meets no resistance. A triangle needs about 10 spare_nodes. A step
+/// that cuts may allocate.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
@@ -174,9 +163,7 @@ pub unsafe extern "C" fn sinew_blade_create(
     }
 }
 
-/// Destroys a blade. What it has cut stays.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Destroys a blade; its cuts remain.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -186,11 +173,10 @@ pub unsafe extern "C" fn sinew_blade_destroy(world: *mut sinew_world, blade: sin
     unsafe { with_world_mut(world, |world| world.destroy_blade(blade.id())) }
 }
 
-/// Moves a blade to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be NULL: as it is. It goes
-/// straight and evenly.
+/// Moves a blade to a new pose during the next step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0 or the orientation is zero),
-/// SINEW_STATUS_STALE_ID.
+/// The blade moves along a straight line at constant speed. `position` [m] is 3 floats, each within 1e9;
+/// `orientation` is x y z w, not zero, nullable: unchanged.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
@@ -212,9 +198,7 @@ pub unsafe extern "C" fn sinew_blade_set_pose(
     }
 }
 
-/// Writes what a blade did and felt in the last step. `out->struct_size` is set by the caller.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes the cuts of a blade and the load on it in the last step.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.

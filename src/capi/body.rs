@@ -12,34 +12,34 @@ use crate::error::{Error, Result};
 use crate::slots::SlotId;
 use crate::world::BodyId;
 
-/// The axis x among those that a node is held along.
+/// Bit of the x axis.
 pub const SINEW_AXIS_X: u32 = 1;
-/// The axis y.
+/// Bit of the y axis.
 pub const SINEW_AXIS_Y: u32 = 2;
-/// The axis z.
+/// Bit of the z axis.
 pub const SINEW_AXIS_Z: u32 = 4;
 
-/// A body: a plain value, all zero is "none".
+/// Id of a body; all zero means none.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_body_id {
-    /// Which place, from 1.
+    /// Slot of the body, counted from 1.
     pub index1: u32,
-    /// Which of the bodies that lived there.
+    /// Number of the use of that slot.
     pub generation: u32,
 }
 
-/// Node i is at (const char *)data + i * stride, in the caller's order; valid until the next step, the next
-/// set_positions, set_velocities or rest_state, the next change of topology of that body, or its end; in a sinew_frame as long
-/// as that says.
+/// Borrowed array of vectors of 3 floats; vector i starts at (const char *)data + i * stride.
+///
+/// Nodes are in the caller's order. The function that writes the view states its lifetime.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_vec3_view {
-    /// The first.
+    /// First vector.
     pub data: *const f32,
-    /// How many.
+    /// Number of vectors.
     pub count: usize,
-    /// Bytes from one to the next.
+    /// [bytes] Distance from one vector to the next.
     pub stride: usize,
 }
 
@@ -97,10 +97,9 @@ pub(super) unsafe fn with_body_mut(
     unsafe { with_world_mut(world, |world| call(world.body_mut(body.id())?)) }
 }
 
-/// Creates a body; copies what `def` points to.
+/// Creates a body in a world, and copies everything that `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_CAPACITY
-/// (FAST_LINK: a node has more springs than springs_per_node), SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_CAPACITY if a node has more than springs_per_node springs (FAST_LINK).
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
@@ -126,9 +125,7 @@ pub unsafe extern "C" fn sinew_body_create(
     }
 }
 
-/// Destroys a body. Views of its positions and velocities end.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Destroys a body and ends the views of it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -138,10 +135,10 @@ pub unsafe extern "C" fn sinew_body_destroy(world: *mut sinew_world, body: sinew
     unsafe { with_world_mut(world, |world| world.destroy_body(body.id())) }
 }
 
-/// Adds `force`, 3 floats, N, to what acts on a node: constant over the whole next step, cleared when that is
-/// SINEW_STATUS_OK; nothing on a pinned node or one that a tool holds, nor along an axis along which a node is held.
+/// Adds a force to a node for the whole next step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// `force` [N] points to 3 floats. Forces are constant during the step and cleared when it succeeds. They have no
+/// effect on a pinned or attached node, nor along a pinned axis.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `force` is NULL or 3 floats.
@@ -160,10 +157,10 @@ pub unsafe extern "C" fn sinew_body_apply_force(
     }
 }
 
-/// Adds a force to what acts on each of `count` nodes, as sinew_body_apply_force does: `nodes` are `count` indices, of
-/// which some may be equal, `forces` 3 `count` floats, N. Both may be NULL where `count` is 0.
+/// Adds a force to each of many nodes for the whole next step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then no force is added.
+/// `nodes` holds `count` indices, which may repeat; `forces` [N] holds 3 * count floats. See
+/// sinew_body_apply_force. On failure no force is added.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -184,9 +181,10 @@ pub unsafe extern "C" fn sinew_body_apply_forces(
     }
 }
 
-/// Writes a view of where each node is, m. Nothing is copied; see sinew_vec3_view for how long it lives.
+/// Writes a view of the node positions [m] without copying.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Lifetime: until the next step, sinew_body_set_positions, sinew_body_set_velocities, sinew_body_rest_state or
+/// topology change of the body, or its destruction.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -205,11 +203,10 @@ pub unsafe extern "C" fn sinew_body_get_positions(
     }
 }
 
-/// Writes a view of how fast each node moves at the time of the positions, m/s; a pinned node as it was led in the last
-/// step. The first call after a step works them out, which takes about as long as a substep; see sinew_vec3_view for how
-/// long the view lives.
+/// Writes a view of the node velocities [m/s] at the time of the positions.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// A pinned node has the velocity of its pin in the last step. The first call after a step computes the velocities,
+/// at the cost of about one substep. Lifetime: as for sinew_body_get_positions.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -228,10 +225,9 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
     }
 }
 
-/// Writes 1 where a body's surface encloses something, so that others can be found within it and are led out, else 0: where it is not closed,
-/// and from then on that sinew_body_remove_spring has taken away an edge of it.
+/// Writes 1 if the surface of a body is closed, else 0.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Only a closed body pushes out what is inside it. Removing a spring on a surface edge opens the surface.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -250,10 +246,9 @@ pub unsafe extern "C" fn sinew_body_is_closed(
     }
 }
 
-/// Has a body be of these categories and meet those of `mask`, a bit for each, from the next step on: see sinew_body_def. What of tools and
-/// other bodies lies within it when they meet again is pushed out.
+/// Sets the collision category and mask of a body from the next step on.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// See sinew_body_def. Tools and bodies inside it are pushed out once they collide with it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -273,10 +268,10 @@ pub unsafe extern "C" fn sinew_body_set_collision(
     }
 }
 
-/// Puts all nodes at `positions`, 3 `node_count` floats, m. Velocities stay; pinned nodes move too; nothing is
-/// swept. What tools hold they hold there.
+/// Moves all nodes to new positions without a sweep.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+/// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and attached nodes stay
+/// attached at their new positions. `node_count` must be the body's number of nodes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `positions` is NULL or as long as stated.
@@ -297,10 +292,10 @@ pub unsafe extern "C" fn sinew_body_set_positions(
     }
 }
 
-/// Gives all nodes `velocities`, 3 `node_count` floats, m/s; pinned nodes keep theirs, as all do along axes along which they
-/// are held.
+/// Sets the velocities of all nodes.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+/// `velocities` [m/s] holds 3 * node_count floats. Pinned nodes and pinned axes keep theirs. `node_count` must be
+/// the body's number of nodes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `velocities` is NULL or as long as stated.
@@ -321,9 +316,9 @@ pub unsafe extern "C" fn sinew_body_set_velocities(
     }
 }
 
-/// Holds a node where it is, from now on; nothing where it is held already.
+/// Pins a node at its current position; no effect on a pinned node.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -333,18 +328,12 @@ pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_bod
     unsafe { with_body_mut(world, body, |body| body.pin(node)) }
 }
 
-/// Holds a node where it is along some axes, from now on, and along no others: a symmetry plane, a rail, a sliding support.
-/// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; all three are sinew_body_pin, 0 is sinew_body_unpin.
-/// Along the others the node moves as a free one does, with its mass; velocities and forces that are given to it count
-/// there alone.
+/// Pins a node along some axes and frees it along the others.
 ///
-/// An axis along which it was held already stays as it is, and one that it is let go of goes on as it was led in the last
-/// step. Where the axes change, what sinew_body_move_pin has asked of the node since the last step is forgotten, and so
-/// are forces that act on it along an axis which is held now. A tool acts on it along its free axes alone; what it does
-/// along the others the pin takes.
+/// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis keeps the
+/// velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `axes` has other bits, a tool holds the node, or it has no mass and is
-/// pinned for good), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or a node of mass 0 would be free.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -369,10 +358,11 @@ pub unsafe extern "C" fn sinew_body_pin_axes(
     }
 }
 
-/// Lets go of a node along all axes: it goes on as it was led in the last step; nothing where it is not held.
+/// Unpins a node along all axes; no effect on a free node.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a tool holds the node, or it has no mass and is pinned for good),
-/// SINEW_STATUS_STALE_ID.
+/// The node keeps the velocity of its pin in the last step.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or its mass is 0.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -382,10 +372,11 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
     unsafe { with_body_mut(world, body, |body| body.unpin(node)) }
 }
 
-/// Leads a pinned node on a straight line to `position`, 3 floats, m: there at the end of the next step; one that is held
-/// along some axes alone along those.
+/// Moves a pinned node to a new position during the next step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
+/// The node moves along a straight line, and only along its pinned axes. `position` [m] points to 3 floats.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats.
@@ -404,10 +395,11 @@ pub unsafe extern "C" fn sinew_body_move_pin(
     }
 }
 
-/// Writes what holds a pinned node against its springs and its weight, 3 floats, N, mean over the last step; 0 along axes
-/// along which it is not held.
+/// Writes the reaction force on a pinned node, averaged over the last step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the node is not pinned, or a tool holds it), SINEW_STATUS_STALE_ID.
+/// `force` [N] receives 3 floats, 0 along free axes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `force` is NULL or writable for 3 floats.
@@ -427,11 +419,12 @@ pub unsafe extern "C" fn sinew_body_get_pin_force(
     }
 }
 
-/// Joins two nodes by a spring without damping: `stiffness` in N/m, `rest_length` in m, below 0: the current distance.
-/// One spring per pair.
+/// Connects two nodes by a spring without damping.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the pair has a spring), SINEW_STATUS_STALE_ID,
-/// SINEW_STATUS_CAPACITY (FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY.
+/// `stiffness` is in [N/m], `rest_length` in [m]; a negative rest length means the current distance.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the pair has a spring; SINEW_STATUS_CAPACITY if a node has no free slot
+/// (FAST_LINK).
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -451,11 +444,11 @@ pub unsafe extern "C" fn sinew_body_add_spring(
     unsafe { with_body_mut(world, body, |body| body.add_spring(a, b, stiffness, rest_length)) }
 }
 
-/// Makes the pressure of a body's cavities this, Pa, where they have their volumes at rest, from the next step on: see `pressure` of
-/// sinew_body_def. A cavity that was cut open stays without. A body that is to be inflated later is created with a pressure or an
-/// enclosed_stiffness.
+/// Sets the overpressure of the cavities at rest volume from the next step on.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body was created with neither), SINEW_STATUS_STALE_ID.
+/// `pressure` is in [Pa]; see sinew_body_def. Open cavities stay without pressure.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body was created with neither pressure nor enclosed_stiffness.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -469,9 +462,11 @@ pub unsafe extern "C" fn sinew_body_set_pressure(
     unsafe { with_body_mut(world, body, |body| body.set_pressure(pressure)) }
 }
 
-/// Removes the spring between two nodes.
+/// Removes the spring between two nodes, with the elements and the bending of that edge.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where there is none), SINEW_STATUS_STALE_ID.
+/// Elements are those of SINEW_MATERIAL_TETRAHEDRA. It opens a cavity whose surface has the edge.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if there is nothing between the nodes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.

@@ -7,35 +7,35 @@ use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::contact::{Contact, ContactChange};
 
-/// Where a tool pressed a body when the last step ended.
+/// Contact between a tool and a body at the end of the last step.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_contact {
-    /// The body.
+    /// Body that the tool touches.
     pub body: sinew_body_id,
-    /// The node, the two of an edge or the three of a face that it pressed; the last is repeated.
+    /// Nodes of the touched node, edge or face; the last is repeated if there are fewer than 3.
     pub nodes: [u32; 3],
-    /// The point of them, as weights; 0 where a node is repeated.
+    /// Weights of the nodes at the contact point; 0 for a repeated node.
     pub weights: [f32; 3],
-    /// The point, m.
+    /// [m] Contact point on the body.
     pub point: [f32; 3],
-    /// Away from the tool, 1 long.
+    /// Unit normal that points away from the tool.
     pub normal: [f32; 3],
-    /// On the tool, friction with it, N, in the last substep: where a step has several, the wrench is their mean.
+    /// [N] Force on the tool with friction, in the last substep; the wrench is the mean of all substeps.
     pub force: [f32; 3],
 }
 
-/// A tool and a body that began or ceased to touch in the last step.
+/// Contact between a tool and a body that began or ended in the last step.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_contact_change {
-    /// The tool.
+    /// Tool of the contact.
     pub tool: sinew_tool_id,
-    /// The body.
+    /// Body of the contact.
     pub body: sinew_body_id,
-    /// 1: they touch now; 0: they do no longer.
+    /// 1: the contact began; 0: it ended.
     pub begun: u32,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
 }
 
@@ -63,10 +63,9 @@ impl From<ContactChange> for sinew_contact_change {
     }
 }
 
-/// Writes where the tool pressed bodies when the last step ended, `capacity` of them at most, to `contacts`, which may be NULL where
-/// that is 0, and how many there are to `count`.
+/// Writes the contacts of a tool at the end of the last step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// `contacts` receives at most `capacity` entries, `count` the number that exist.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `contacts` is NULL or writable for `capacity` of them; `count` is NULL or writable.
@@ -90,10 +89,10 @@ pub unsafe extern "C" fn sinew_tool_get_contacts(
     }
 }
 
-/// Writes which tools and bodies began or ceased to touch in the last step, `capacity` of them at most, to `changes`, which may be NULL
-/// where that is 0, and how many there are to `count`. With a tool or body that was destroyed nothing ceases.
+/// Writes the contacts that began or ended in the last step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool or body does not
+/// report an end.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `changes` is NULL or writable for `capacity` of them; `count` is NULL or writable.

@@ -9,83 +9,85 @@ use super::status::sinew_status;
 use crate::body::{NewNodeSource, NewRimEdge, expect_count};
 use crate::cutting::Sweep;
 
-/// What a cut did.
+/// Report of a cut.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_cut_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_cut_report) before the call.
     pub struct_size: usize,
-    /// Nodes that are new: copies of others, and points of the surface that are bound to nodes.
+    /// Number of new nodes: copies, and surface points bound to nodes.
     pub new_nodes: u32,
-    /// Triangles of the surface that are new.
+    /// Number of new surface triangles.
     pub new_triangles: u32,
-    /// Springs that are gone: taken away by the blade, or replaced by springs of copies.
+    /// Number of springs removed by the blade or replaced by springs of copies.
     pub springs_removed: u32,
-    /// How many more pieces the surface has.
+    /// Increase of the number of connected surface components.
     pub pieces_parted: u32,
-    /// How long the cut is, in the rest shape, m; of tetrahedra on their skin.
+    /// [m] Length of the cut in the rest shape; for a solid on its surface.
     pub length: f64,
-    /// Of tetrahedra: how large the faces are that have opened, in the rest shape, each on one of its sides, m².
-    /// A cell in which the cut ends holds: this can be less than what the blade swept.
+    /// [m^2] Area of the opened faces of a solid in the rest shape, counted on one side.
+    ///
+    /// A cell in which the cut ends stays whole, so the area can be less than the blade swept.
     pub area: f64,
 }
 
-/// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
+/// Origin of a node that a cut added; vertex attributes interpolate by its weights.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_new_node {
-    /// The new node: one more than that of the entry before.
+    /// Index of the new node; indices increase by 1 per entry.
     pub node: u32,
-    /// Those that it lies between, each of a lower number than its own; those beyond the first may repeat it with weight 0. A copy has the
-    /// node that it was copied from alone.
+    /// Source nodes, each with a lower index than the new node; an unused entry has weight 0.
     pub sources: [u32; 3],
-    /// How much of each, at least 0, 1 in all.
+    /// Weights of the sources, at least 0, with sum 1; a copy has a single source.
     pub weights: [f32; 3],
 }
 
-/// An edge of the rim of a cut. Each edge that was cut is two of them, one on either side.
+/// Cut-boundary edge; each cut edge has one on either side.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_rim_edge {
-    /// Its ends, in the order in which its triangle has them.
+    /// End nodes in the order of the triangle.
     pub nodes: [u32; 2],
-    /// The triangle of the surface that it is a side of.
+    /// Surface triangle that has this edge.
     pub triangle: u32,
 }
 
-/// What has come, changed or gone. The lists are valid until the next change of topology of the body, or its end.
+/// Changes of the topology of a body since a version.
+///
+/// Lifetime of the lists: until the next topology change of the body, or its destruction.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_topology_changes {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_topology_changes) before the call.
     pub struct_size: usize,
-    /// What the body's topology has now; to be asked with next time.
+    /// Current topology version; pass it to the next call.
     pub version: u64,
-    /// All new nodes, in the order of their numbers.
+    /// New nodes in ascending order of index.
     pub nodes: *const sinew_new_node,
-    /// How many.
+    /// Number of new nodes.
     pub node_count: usize,
-    /// Triangles, by their places in sinew_body_get_triangles, whose corners changed or that are new; one may be named several times.
+    /// Indices of changed and new triangles in sinew_body_get_triangles; may repeat.
     pub triangles: *const u32,
-    /// How many.
+    /// Number of triangle indices.
     pub triangle_count: usize,
-    /// Springs that are gone, 2 removed_spring_count nodes: taken away by a blade or by hand, or replaced by springs of copies.
+    /// 2 * removed_spring_count nodes of removed springs.
     pub removed_springs: *const u32,
-    /// How many.
+    /// Number of removed springs.
     pub removed_spring_count: usize,
-    /// New edges of the rim, as they were when they came: later cuts may have split or renumbered them.
+    /// New cut-boundary edges as they were when they were made; later cuts may change them.
     pub rim: *const sinew_rim_edge,
-    /// How many.
+    /// Number of cut-boundary edges.
     pub rim_count: usize,
 }
 
-/// Triangles of three nodes each, outward by the right-hand rule; valid until the next change of topology of the body, or its end.
+/// Borrowed array of triangles of 3 node indices each, outward by the right-hand rule.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_triangle_view {
-    /// 3 `count` nodes.
+    /// 3 * count node indices.
     pub data: *const u32,
-    /// How many triangles.
+    /// Number of triangles.
     pub count: usize,
 }
 
@@ -105,34 +107,14 @@ unsafe impl Versioned for sinew_topology_changes {
 const _: () = assert!(size_of::<sinew_new_node>() == size_of::<NewNodeSource>());
 const _: () = assert!(size_of::<sinew_rim_edge>() == size_of::<NewRimEdge>());
 
-/// Cuts a body where a blade's edge passed from one place to another, while its nodes are where they are: `start` and `end` are the two
-/// ends of the edge, 6 floats each, m. Between them it swept two triangles, which share the way from the first end at the start to the second at
-/// the end. `report` is nullable; its struct_size is set by the caller.
+/// Cuts a body along the surface that a blade's edge swept, at the current positions.
 ///
-/// Where the blade crosses an edge of the surface, or ends within a triangle, there is a point of the surface from then on: one that is there, or on
-/// an edge that is there, if it lies within 5 % of the shortest edge of the triangle that is simulated there, at rest. Between them the
-/// surface is open; a cut that goes on where the last ended joins it. What is simulated stays as well shaped as it was: a triangle whose material
-/// fell apart is copied for each piece, with nodes that are not drawn where its material is beyond the cut, and with its part of masses and
-/// stiffnesses; copies share nodes where their material hangs together (Molino, Bao, Fedkiw 2004). Springs along no edge of a triangle are taken
-/// away where the blade passed through them.
+/// `start` and `end` [m] hold the 2 end points of the edge, 6 floats each. `report` is nullable. A sweep that
+/// starts where the body's last one ended continues it. New nodes are appended; mass, momentum and energy are
+/// conserved. The call ends views of positions and triangles; see sinew_body_get_topology_changes. On failure
+/// nothing changes.
 ///
-/// Of tetrahedra the edges that the blade crosses are divided in the same way, and faces between points on its way open once one of their corners
-/// parts: at the latest when a tetrahedron's last edge is crossed. What was inside is drawn from then on. A body of springs alone loses those
-/// that the blade passed through.
-///
-/// A sweep that begins just where the last of the body ended goes on with it: it begins where the tissue that the blade stood in has gone
-/// meanwhile. A blade that stays in tissue that moves so leaves no bridges.
-///
-/// Nodes keep their numbers, and new ones are numbered on: copies, which move as what they copied moved, and points of the surface between nodes,
-/// which have no mass and go where their nodes go. Mass, momentum and energy stay what they were. What holds a node holds it where it is
-/// drawn; copies of it beyond the cut are free, and have the mass of their material in the mean where it had none. It takes as long as the cut is
-/// large, but with NEWTON, which is made anew. Positions and triangles that were lent before are stale; sinew_body_get_topology_changes tells what has changed.
-///
-/// Terms beside springs go on in parts: home springs with those of the nodes' masses, what goes by springs with those, fibres with the tetrahedra, and hinges of
-/// bending by area, where pieces of both triangles still share the edge. A hinge whose edge is cut along is gone, with its energy, and so is what a cavity had that is cut open.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (spare_nodes was 0), SINEW_STATUS_CAPACITY (there are
-/// not as many spare nodes left, or FAST_LINK: a node has no free place), SINEW_STATUS_OUT_OF_MEMORY; then nothing has changed.
+/// Errors: SINEW_STATUS_UNSUPPORTED without spare_nodes; SINEW_STATUS_CAPACITY if too few are left.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated; `report` is NULL or writable for the size that it
@@ -172,12 +154,12 @@ pub unsafe extern "C" fn sinew_body_cut(
     }
 }
 
-/// Writes what has changed since a version of a body's topology: 0 when it was made, and what was told as `version` the last time.
-/// `out->struct_size` is set by the caller. Nothing is copied, but for bodies that were not cut the lists are empty.
+/// Writes the topology changes of a body since a version.
 ///
-/// A renderer that follows gives each new node what its sources carry, by their weights, and reads the triangles that are named again.
+/// Pass 0 for all changes since creation, then the `version` of the previous call. A renderer interpolates the
+/// attributes of new nodes from their sources and reads the listed triangles again.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the version is to come), SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the version is in the future.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
@@ -209,10 +191,9 @@ pub unsafe extern "C" fn sinew_body_get_topology_changes(
     }
 }
 
-/// Writes a view of the triangles that are drawn and touched: those of the definition, or the boundary of its tetrahedra or cells, as cuts have
-/// changed them. Nothing is copied.
+/// Writes a view of the render and contact surface: the triangles of a body after all cuts.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Lifetime: until the next topology change of the body, or its destruction.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -235,10 +216,10 @@ pub unsafe extern "C" fn sinew_body_get_triangles(
     }
 }
 
-/// Writes which piece each node belongs to, from 0 on, and how many there are: nodes hang together by springs, elements and the surface.
-/// `pieces` are `count` numbers, as many as the body has nodes; nullable, as `piece_count` is. All nodes are looked at.
+/// Writes the connected component of each node, and the number of components.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `count` is not the body's), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// Nodes are connected by springs, elements and the surface. `pieces` receives `count` numbers from 0, where
+/// `count` is the number of nodes. `pieces` and `piece_count` are nullable.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `pieces` is NULL or as long as stated, `piece_count` NULL or writable.
@@ -270,9 +251,7 @@ pub unsafe extern "C" fn sinew_body_get_pieces(
     }
 }
 
-/// Writes the mass of a node, kg: 0 of one that is pinned for good, or bound to others.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.

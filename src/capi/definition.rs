@@ -12,250 +12,270 @@ use crate::error::{Error, Result};
 use crate::material::{Material, Model, Viscosity, Yielding};
 use crate::terms::SpringLaw;
 
-/// The default: laid out for the processor.
+/// Layout optimized for the processor; default.
 pub const SINEW_STORAGE_PACKED: u32 = 0;
-/// A linked list per node, every link allocated on its own.
+/// Linked list per node, one allocation per link; for comparison.
 pub const SINEW_STORAGE_EFFICIENT: u32 = 1;
-/// One array, springs_per_node places per node.
+/// One array with springs_per_node slots per node; for comparison.
 pub const SINEW_STORAGE_FAST_LINK: u32 = 2;
-/// Per node, a chain of arrays of springs_per_node places.
+/// Chain of arrays of springs_per_node slots per node; for comparison.
 pub const SINEW_STORAGE_DYNAMIC_BULK: u32 = 3;
 
-/// Explicit, as many substeps as it needs to be stable.
+/// Explicit; takes as many substeps as stability needs. Default.
 pub const SINEW_SOLVER_VERLET: u32 = 0;
-/// Stable at any step.
+/// Implicit; stable at any step size.
 pub const SINEW_SOLVER_IMPLICIT: u32 = 1;
-/// The accurate reference: the equations of IMPLICIT, solved to the last digits that count; slow.
+/// Reference solver: the equations of IMPLICIT solved to double precision; slow.
 pub const SINEW_SOLVER_NEWTON: u32 = 2;
 
-/// Springs as they are given, or all of one stiffness.
+/// Springs as given, or one stiffness for all. Default.
 pub const SINEW_MATERIAL_NONE: u32 = 0;
-/// Springs along the edges of the elements, as stiff as young_modulus asks for. Poisson's ratio is what they imply: 1/4 for
-/// tetrahedra and cells, 1/3 in the plane for triangles.
+/// Springs along the element edges, with stiffnesses computed from young_modulus.
+///
+/// They imply a Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
 pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
-/// Tetrahedra as finite elements, St Venant and Kirchhoff's law with a signed volume term: of any Poisson's ratio from 0 to 0.49, right
-/// up to compressions of some 20 % and stable beyond. There are no springs but those that are given. sinew_body_remove_spring takes
-/// away the tetrahedra that have the edge, whether or not there is a spring along it.
+/// Finite elements: St Venant-Kirchhoff with a signed volume term.
+///
+/// Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a compression of about 20 %, stable beyond. The body
+/// has no springs but those given. sinew_body_remove_spring removes the tetrahedra that have the edge.
 pub const SINEW_MATERIAL_TETRAHEDRA: u32 = 2;
 
-/// The pull of a spring is stiffness times rest length times its strain e, the part by which it is longer than at rest.
+/// Force = stiffness * rest length * strain e. Default.
 pub const SINEW_SPRING_LAW_LINEAR: u32 = 0;
-/// Shaped like a J: instead of e, (exp(spring_steepness e) - 1) / spring_steepness for strains from 0 to spring_limit; linear beyond, as
-/// stiff as there.
+/// J-shaped: e becomes (exp(spring_steepness e) - 1) / spring_steepness for e from 0 to spring_limit; linear
+/// beyond.
 pub const SINEW_SPRING_LAW_EXPONENTIAL: u32 = 1;
-/// Instead of e, e + spring_quadratic e^2 + spring_cubic e^3 up to a strain of spring_limit; linear beyond, as stiff as there.
+/// Polynomial: e becomes e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit; linear beyond.
 pub const SINEW_SPRING_LAW_CUBIC: u32 = 2;
 
-/// What a body is made of. Filled by sinew_body_def_init; used only during sinew_body_create.
+/// Geometry, material and settings of a body.
+///
+/// Filled by sinew_body_def_init; read only during sinew_body_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_body_def {
-    /// Set by sinew_body_def_init.
+    /// Size of this struct; sinew_body_def_init sets it.
     pub struct_size: usize,
-    /// 3 node_count floats, m.
+    /// [m] 3 * node_count floats.
     pub positions: *const f32,
-    /// Nullable: positions.
+    /// [m] 3 * node_count floats; nullable: positions.
     pub rest_positions: *const f32,
-    /// At least 1.
+    /// Number of nodes, at least 1.
     pub node_count: usize,
-    /// node_count floats, kg, at least 1e-37, or 0: pinned for good; nullable: node_mass for all. With IMPLICIT a body whose masses
-    /// over the square of a step's length are no finite floats is put back.
+    /// [kg] node_count floats, each at least 1e-37, or 0 for a permanent pin; nullable: node_mass.
+    ///
+    /// IMPLICIT rolls a body back if mass / dt^2 is not a finite float.
     pub masses: *const f32,
-    /// node_count floats, N s/m: the gamma_i of m a = ... - gamma_i v; nullable: node_damping.
+    /// [N s/m] node_count floats, the drag per node; nullable: node_damping.
     pub node_dampings: *const f32,
-    /// kg, at least 1e-37; no default. 0 where density gives each node its mass.
+    /// [kg] Mass of each node, at least 1e-37; no default. Must be 0 if density is set.
     pub node_mass: f32,
-    /// N s/m; default 0.
+    /// [N s/m] Drag on each node: force = -node_damping * velocity; default 0.
     pub node_damping: f32,
-    /// 2 spring_count node indices, each pair once; NULL: the edges of triangles, tetrahedra and cells, each once (then no
-    /// per-spring arrays); not NULL with spring_count 0: no springs.
+    /// 2 * spring_count node indices, each pair once; nullable: the element edges, each once.
+    ///
+    /// NULL excludes the arrays with one value per spring. A pointer with spring_count 0 means no springs.
     pub springs: *const u32,
-    /// Springs given.
+    /// Number of springs given.
     pub spring_count: usize,
-    /// spring_count floats, N/m; nullable: stiffness for all.
+    /// [N/m] spring_count floats; nullable: stiffness.
     pub stiffnesses: *const f32,
-    /// spring_count floats, m; nullable: from the rest positions.
+    /// [m] spring_count floats; nullable: from the rest positions.
     pub rest_lengths: *const f32,
-    /// spring_count floats, N s/m along the spring; nullable: spring_damping.
+    /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
     pub spring_dampings: *const f32,
-    /// N/m; default 0; 0 with SINEW_MATERIAL_TETRAHEDRA where no springs are given.
+    /// [N/m] Stiffness of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without springs.
     pub stiffness: f32,
-    /// N s/m; default 0; 0 with SINEW_MATERIAL_TETRAHEDRA where no springs are given.
+    /// [N s/m] Damping of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without springs.
     pub spring_damping: f32,
-    /// 3 triangle_count node indices, outward by the right-hand rule; nullable: the boundary of the tetrahedra or cells is what
-    /// is drawn and touched.
+    /// 3 * triangle_count node indices, outward: the render and contact surface; nullable.
+    ///
+    /// NULL takes the boundary of the tetrahedra or cells.
     pub triangles: *const u32,
-    /// Triangles given.
+    /// Number of triangles given.
     pub triangle_count: usize,
-    /// 4 tetrahedron_count node indices; nullable.
+    /// 4 * tetrahedron_count node indices; nullable: no tetrahedra.
     pub tetrahedra: *const u32,
-    /// Tetrahedra given.
+    /// Number of tetrahedra given.
     pub tetrahedron_count: usize,
-    /// SINEW_STORAGE_...
+    /// Spring storage, a sinew_storage value.
     pub storage: u32,
-    /// FAST_LINK: places of each node, SINEW_STATUS_CAPACITY where a node has more springs; DYNAMIC_BULK: places of each
-    /// array. 0, the default: chosen from the springs given, as many as the node with the most has, or what takes the
-    /// least memory. Other storages do not use it.
+    /// Slots per node (FAST_LINK) or per array (DYNAMIC_BULK); 0 (default) derives them from the springs.
+    ///
+    /// A node with more springs than slots is SINEW_STATUS_CAPACITY with FAST_LINK. Other storages ignore it.
     pub springs_per_node: u32,
-    /// SINEW_SOLVER_...
+    /// Time integrator, a sinew_solver value.
     pub solver: u32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved: u32,
-    /// IMPLICIT, NEWTON: 1, implicit Euler; 2, the second backward difference formula, which follows motion far better; 0, the
-    /// default: 2.
+    /// IMPLICIT, NEWTON: 1 is implicit Euler, 2 is BDF2, which is far more accurate; 0 (default): 2.
     pub order: u32,
-    /// IMPLICIT, NEWTON: how often the equation of a step may be multiplied out while it is solved. IMPLICIT: each takes about as
-    /// long as a substep of VERLET; 0, the default: 1000. NEWTON: far longer; 0, the default: 100 000.
-    /// Where a tool or a tolerance cuts the step, a thirty-second of it for each part at least. At most 1 000 000.
+    /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000.
+    ///
+    /// 0 (default) is 1000 for IMPLICIT, where a product costs about one VERLET substep, and 100,000 for NEWTON.
+    /// Each part of a subdivided step gets at least 1/32 of it.
     pub iterations: u32,
-    /// IMPLICIT, NEWTON: what may be missing of the solution of a step's equation, as a part of what forces change in the step;
-    /// from 1e-6 to 1; 0, the default: 0.01, or 1e-6 with NEWTON.
+    /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1.
+    ///
+    /// It bounds the error relative to the displacement that forces cause in the step. 0 (default) is 0.01 for
+    /// IMPLICIT and 1e-6 for NEWTON.
     pub accuracy: f32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved1: u32,
-    /// VERLET: what part of the body's mass may be added, in all, to the nodes whose springs or elements would make substeps short,
-    /// as those of slivers are; from 0 to 1; 0: none; default 0.001. Mass is added where that saves a quarter of the substeps or
-    /// more, and no more than they need; never where the world's substeps are fixed or a tolerance is asked for. It is
-    /// inertia alone: weight, and the force on a pin, stay as they are. See sinew_solver_report.
+    /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to 1.
+    ///
+    /// Default 0.001; 0 turns it off. Mass is added only if it saves at least 1/4 of the substeps, and never with
+    /// fixed substeps or a tolerance. It adds inertia but no weight. See sinew_solver_report.
     pub mass_scaling: f32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved2: u32,
-    /// 8 cell_count node indices: cubes of a lattice, corners numbered by bits, x 1, y 2, z 4; nullable. Their springs are their
-    /// edges and the diagonals of their faces.
+    /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells.
+    ///
+    /// Corner bits: x 1, y 2, z 4. Their springs are the edges and the face diagonals.
     pub cells: *const u32,
-    /// Cells given.
+    /// Number of cells given.
     pub cell_count: usize,
-    /// SINEW_MATERIAL_...; NONE, the default: the four below are 0. Else it fills the tetrahedra or the cells, or where there are
-    /// none the triangles, as they are at rest, and gives each spring its stiffness: springs is NULL and stiffness 0 then, and
-    /// triangles beside tetrahedra or cells have no edges but theirs. Cells must be cubes of one size, within 0.001 and the
-    /// rounding of their corners' coordinates.
+    /// How elements make forces, a sinew_material value; default NONE.
+    ///
+    /// Other values fill the tetrahedra or cells, or else the triangles, and need springs NULL and stiffness 0,
+    /// except for TETRAHEDRA with springs of its own. Cells must be cubes of one size within 0.1 %.
     pub material: u32,
-    /// Young's modulus at small strains, Pa, above 0. Exact for cells and equilateral triangles; an irregular mesh is some 4 to 8 %
-    /// softer, one that is one or two tetrahedra thick far more.
+    /// [Pa] Young's modulus at small strain, above 0 with a material, else 0.
+    ///
+    /// Exact for cells and equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or
+    /// two layers of tetrahedra much softer.
     pub young_modulus: f32,
-    /// SINEW_MATERIAL_SPRINGS: 0, the default, or what it implies within 0.001; SINEW_MATERIAL_TETRAHEDRA: from 0 to 0.49.
+    /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value within 0.001.
     pub poisson_ratio: f32,
-    /// kg/m3, above 0: each node has its share of the mass of the elements about it (masses is NULL and node_mass 0 then, and
-    /// every node belongs to an element); 0, the default: masses or node_mass.
+    /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
+    ///
+    /// Every node must then belong to an element, masses must be NULL and node_mass 0.
     pub density: f32,
-    /// m: above 0 where the material fills triangles, else 0.
+    /// [m] Thickness of a material that fills triangles, above 0; else 0.
     pub thickness: f32,
-    /// Pa: how tetrahedra resist a change of their volume, each by itself, and turn back where they are inside out; at least 0; 0, the
-    /// default: they do not. With 0.3 to 0.6 of Young's modulus a body of springs comes back to rest from anywhere. 0 with SINEW_MATERIAL_TETRAHEDRA, which keeps volume by itself.
+    /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0.
+    ///
+    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from any inversion. Must be 0 with
+    /// SINEW_MATERIAL_TETRAHEDRA.
     pub volume_stiffness: f32,
-    /// node_count floats, N/m, at least 0: what draws each node back to its rest position, wherever the body is; nullable:
-    /// home_stiffness for all.
+    /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness.
+    ///
+    /// An anchor spring pulls a node to its rest position in the world.
     pub home_stiffnesses: *const f32,
-    /// N/m; default 0: nothing does.
+    /// [N/m] Stiffness of each anchor spring; default 0: no anchor springs.
     pub home_stiffness: f32,
-    /// N m, at least 0: the flexural rigidity of the surface that triangles make; default 0: it bends freely. Of a sheet of Young's
-    /// modulus E, Poisson's ratio nu and thickness t it is E t^3 / (12 (1 - nu^2)). Each edge of two triangles turns back to its angle
-    /// at rest, whether the surface is flat or curved there; an edge of more triangles is refused. Exact where triangles are equilateral;
-    /// 5/6 of it along a side where they are squares that are cut alternately. sinew_body_remove_spring takes away the bending of
-    /// triangles that have the edge, whether or not there is a spring along it.
+    /// [N m] Flexural rigidity of the triangles, at least 0; default 0.
+    ///
+    /// A sheet of thickness t has E t^3 / (12 (1 - nu^2)). The rest angle of each edge may be any. An edge of more
+    /// than two triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the bending
+    /// of the triangles that have the edge.
     pub bending_stiffness: f32,
-    /// SINEW_SPRING_LAW_...; LINEAR, the default: the four below are 0. Springs that are added later are linear.
+    /// Force law of springs, a sinew_spring_law value; default LINEAR. Springs added later are linear.
     pub spring_law: u32,
     /// EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
     pub spring_steepness: f32,
-    /// CUBIC: any number whose square is at most 3 spring_cubic, so that longer springs pull more; else 0.
+    /// CUBIC: its square is at most 3 * spring_cubic; else 0.
     pub spring_quadratic: f32,
-    /// CUBIC: at least 0; else 0.
+    /// CUBIC: cubic coefficient, at least 0; else 0.
     pub spring_cubic: f32,
-    /// EXPONENTIAL, CUBIC: above 0; else 0.
+    /// EXPONENTIAL, CUBIC: strain beyond which the law is linear, above 0; else 0.
     pub spring_limit: f32,
-    /// Pa, at least 0; default 0.
+    /// [Pa] Fiber stiffness of each tetrahedron, at least 0; default 0.
     pub fibre_stiffness: f32,
-    /// 3 tetrahedron_count floats: the direction of each tetrahedron's fibres at rest, 1 long within 0.001, or 0: it has none;
-    /// nullable: there are none. Fibres pull where they are longer than at rest, by their stiffness times the part by which they are
-    /// longer, over the area across them at rest; they never push.
+    /// 3 * tetrahedron_count floats: unit fiber directions at rest, or 0 for no fibers; nullable.
+    ///
+    /// Fibers pull in proportion to their extension, over the cross section at rest. They never push.
     pub fibre_directions: *const f32,
-    /// tetrahedron_count floats, Pa, at least 0; nullable: fibre_stiffness for all.
+    /// [Pa] tetrahedron_count floats, at least 0; nullable: fibre_stiffness.
     pub fibre_stiffnesses: *const f32,
-    /// s, at least 0, at most 1e6: the viscosity of a dashpot beside each spring and each tetrahedron that is an element, over its stiffness;
-    /// default 0: there is none. Springs that are added later have none. VERLET takes substeps as short as a dashpot alone asks for: from
-    /// some hundredths of a second on IMPLICIT is the solver for it.
+    /// [s] Viscosity of springs and elements divided by their stiffness, 0 to 1e6; default 0: none.
+    ///
+    /// It acts in parallel with the stiffness. Springs added later have none. VERLET needs short substeps from
+    /// about 0.01 s on; use IMPLICIT there.
     pub retardation_time: f32,
-    /// s, from 1e-9 to 1e6: that of a spring in a row with the dashpot, so that after a step of strain the stress relaxes as
-    /// E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)): the standard linear solid. 0, the default: the dashpot acts
-    /// alone, which is Kelvin and Voigt's solid, and on tetrahedra of order 1 in the step. A body begins relaxed, and is
-    /// so where sinew_body_set_positions puts it.
+    /// [s] Relaxation time of the Maxwell branch (spring in series with the dashpot), 1e-9 to 1e6.
+    ///
+    /// After a strain step the stress is E (1 + retardation_time / relaxation_time exp(-t / relaxation_time)). 0
+    /// (default) leaves a Kelvin-Voigt solid. Bodies start relaxed; sinew_body_set_positions relaxes them.
     pub relaxation_time: f32,
-    /// The strain from which springs, and rods of tetrahedra that are elements, yield, stretched or pressed, at least 0; default 0: they do
-    /// not. What is beyond it stays for good. Springs that yield have SINEW_SPRING_LAW_LINEAR; those that are added later do not yield.
-    /// Springs yield within a step; tetrahedra do where a substep of VERLET or a step of the other solvers ends: with those, a load that
-    /// deforms them further and further does so the more slowly the longer steps are.
+    /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
+    ///
+    /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not yield.
+    /// Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so longer steps slow their flow.
     pub yield_strain: f32,
-    /// By what part of its rest length it may become longer or shorter for good, above 0 and below 1 where yield_strain is given; default
-    /// 0.5. Beyond that it is elastic again.
+    /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
     pub largest_set: f32,
-    /// The strain of springs from which they are stiffer, at least 0; default 0: there is none. Springs that are added later have none.
+    /// Strain above which springs stiffen, at least 0; default 0: none. Springs added later do not.
     pub strain_limit: f32,
-    /// How many times their stiffness is added beyond it, above 0, at most 1e6 where strain_limit is given; default 100.
+    /// Added stiffness beyond strain_limit as a multiple, above 0, at most 1e6; default 100.
     pub limit_stiffening: f32,
-    /// Pa, at least 0: how the volume inside of a closed surface resists a change; default 0: it does not. The energy of each cavity of
-    /// volume V, V0 at rest, is enclosed_stiffness / 2 V0 (V/V0 - 1)^2 - pressure (V - V0). The surface is triangles, or where there are
-    /// none the boundary of the tetrahedra or cells; each of its parts that hang together by edges must be closed and have a volume. Each is a
-    /// cavity of its own, unless some are inside out, as the inner wall of a hollow organ is: then those alone are cavities.
-    /// sinew_body_remove_spring opens the cavities whose triangles have the edge, for good, and a cut those of which it divides or parts
-    /// triangles, however little: what is open is neither kept nor pressed. A cut beside a cavity leaves it.
+    /// [Pa] Stiffness of the volume inside closed surfaces, at least 0; default 0.
+    ///
+    /// Energy of a cavity: enclosed_stiffness / 2 * V0 (V / V0 - 1)^2 - pressure (V - V0). Each connected surface
+    /// component must be closed and is a cavity; if some are inverted, like the inner wall of a hollow organ, only
+    /// those are. Cutting or removing a surface edge opens its cavity permanently.
     pub enclosed_stiffness: f32,
-    /// Pa: by how much the pressure inside of a cavity that has its volume at rest is above that outside; below 0 it sucks; default 0. Without an
-    /// enclosed_stiffness it stays the same however large the cavity becomes. See sinew_body_set_pressure.
+    /// [Pa] Overpressure in each cavity at rest volume; may be negative; default 0.
+    ///
+    /// It is constant without an enclosed_stiffness. See sinew_body_set_pressure.
     pub pressure: f32,
-    /// m, 0 to 1e9: what tools and other tissue keep off the surface; default 0.
+    /// [m] Distance that tools and other tissue keep from the surface, 0 to 1e9; default 0.
     pub contact_thickness: f32,
-    /// Coulomb coefficient with other tissue and with itself, at least 0; of two bodies that meet, the larger holds; default 0. With tools
-    /// the tool's own holds.
+    /// Coulomb coefficient for tissue contact, at least 0; default 0. The larger of two bodies applies.
+    ///
+    /// Contact with a tool uses the friction of the tool.
     pub contact_friction: f32,
-    /// 1: it meets other bodies that have 1 here; 0, the default: it does not.
+    /// 1: collides with other bodies that also have 1; 0 (default): does not.
     pub meets_bodies: u32,
-    /// 1: it meets itself; 0, the default: it does not. The two sides of a cut meet from then on, at no distance: they part freely, and rest against
-    /// each other where they are pressed together again; the rims of a sheet may slide over each other until they have parted.
+    /// 1: collides with itself; 0 (default): does not.
+    ///
+    /// The two sides of a cut then rest against each other with no gap. The cut-boundary edges of a sheet may slide
+    /// over each other until they have separated.
     pub meets_itself: u32,
-    /// How it and other bodies find each other: SINEW_DETECTION_EXACT, the default, or SINEW_DETECTION_IMAGE_SPACE, which one of two has to ask
-    /// for: then both are drawn in each substep along three axes where their boxes overlap, and what is seen near each other is compared
-    /// exactly. Itself it always meets exactly. SINEW_DETECTION_DISTANCE_FIELD is for rigid tools: SINEW_STATUS_UNSUPPORTED.
+    /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE.
+    ///
+    /// IMAGE_SPACE applies if either of two bodies asks for it. Self-collision is always exact.
+    /// SINEW_DETECTION_DISTANCE_FIELD is SINEW_STATUS_UNSUPPORTED.
     pub contact_detection: u32,
-    /// IMAGE_SPACE: m, the side of a pixel; 0, the default: half of the surface's mean edge. An image of a body of more than 2^24 pixels is
-    /// refused.
+    /// [m] IMAGE_SPACE: pixel size; 0 (default): half of the mean surface edge. At most 2^24 pixels.
     pub contact_resolution: f32,
-    /// The categories that it belongs to, a bit for each; default 1. It meets tools and bodies where each has a category that the other's
-    /// mask has.
+    /// Bits of the categories that this body belongs to; default 1.
+    ///
+    /// Two objects collide if each has a category in the mask of the other.
     pub collision_category: u32,
-    /// The categories that it meets, a bit for each; default 0xffffffff.
+    /// Bits of the categories that this body collides with; default 0xffffffff.
     pub collision_mask: u32,
-    /// How many nodes cuts may add, of which room is made: some five for each triangle or tetrahedron that a blade passes through. 0, the default:
-    /// the body cannot be cut, and pays nothing for it. A surface that is to be cut is one of triangles turned one way all over, of which two at most
-    /// have an edge and those about a node hang together; a solid is one of tetrahedra of which those about a node hang together by faces at it,
-    /// and triangles are its boundary, if there are any. A body of springs alone loses those that a blade passes through, and needs no room: 1
-    /// will do. See sinew_body_cut.
+    /// Number of nodes that cuts may add, about 5 per cut element; 0 (default): cannot be cut.
+    ///
+    /// Needs a consistently oriented 2-manifold surface, or tetrahedra connected through faces around each node,
+    /// with triangles that are their boundary, if given. For a body of springs alone 1 is enough. See
+    /// sinew_body_cut.
     pub spare_nodes: u32,
-    /// J/m, at least 0: what a blade (sinew_blade_create) spends for each metre of a cut, at rest: the fracture toughness of the material, J/m^2,
-    /// times the thickness of the surface. Of tetrahedra the toughness itself, J/m^2. Springs alone have none (SINEW_STATUS_UNSUPPORTED); default 0: it is cut for nothing.
+    /// Fracture energy of a blade's cut, at least 0: [J/m] for a surface, [J/m^2] for a solid.
+    ///
+    /// For a surface it is the toughness times the thickness. Default 0: no resistance. SINEW_STATUS_UNSUPPORTED
+    /// for a body of springs alone.
     pub toughness: f32,
-    /// The part of its rest length by which a spring may become longer, at least 0; 0, the default: any. A spring that a step has left beyond its
-    /// limits tears the surface, as sinew_body_cut cuts it, through that of its nodes which is pulled apart with the larger force, across that
-    /// force and as far as the next triangle (O'Brien, Hodgins 1999); where a cut ends in a triangle next to the spring, that goes on
-    /// instead. A solid tears at that of them about which the material is stretched more, across that and along faces of its tetrahedra; of
-    /// tetrahedra that are elements each edge has the limit of a spring. See sinew_body_set_tear_limits for single springs, and sinew_body_get_tear_report. A step in which something is
-    /// beyond its limits may allocate.
+    /// Strain above which a spring or an element edge tears, at least 0; 0 (default): never.
+    ///
+    /// A surface tears at the end node with the larger separating force, across that force, to the next triangle. A
+    /// solid tears along faces of its tetrahedra. A step that tears may allocate. See sinew_body_set_tear_limits.
     pub tear_strain: f32,
-    /// N, at least 0: how much a spring may pull; 0, the default: any amount. What a cut leaves of a spring bears its part. Edges of elements
-    /// have no such limit: SINEW_STATUS_UNSUPPORTED where a body has elements and no springs.
+    /// [N] Force above which a spring tears, at least 0; 0 (default): never.
+    ///
+    /// SINEW_STATUS_UNSUPPORTED for a body of elements without springs.
     pub tear_force: f32,
-    /// The most tears in a step, those of the most loaded springs; 0, the default: the body does not tear, and pays nothing for it. Else
-    /// spare_nodes is above 0.
+    /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes above 0.
     pub most_tears: u32,
-    /// m2, of solids m3, at least 0: a tear that would part a piece with less area or volume at rest is not made; default 0.
+    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. Tears never make a smaller one.
     pub smallest_piece: f32,
-    /// m/s, at least 0: what is slower is at rest; 0, the default: the body never sleeps, and pays nothing for it. Else parts of it that have
-    /// been at rest for sleep_time, and on which no force acts that would make them as fast in that time, stand still and are not stepped
-    /// until a neighbour, a force, a pin, a tool, a cut or a changed property reaches them. Speed by time is about how far off their places
-    /// may be. Parts of the body sleep by themselves with SINEW_SOLVER_VERLET, where it is made of springs and elements alone and was not cut; else
-    /// all of it does or nothing. What meets other tissue or is sewn to it does not sleep. See sinew_body_get_awake_share.
+    /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps.
+    ///
+    /// Parts that stay slower for sleep_time, and that no force would accelerate to that speed in that time, are
+    /// not stepped until something affects them. Only VERLET bodies without cuts sleep in parts. Bodies in contact
+    /// with or sutured to other tissue stay awake. See sinew_body_get_awake_share.
     pub sleep_speed: f32,
-    /// s, above 0: some times what the tissue takes to settle; default 0.5.
+    /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,
 }
 
@@ -551,9 +571,7 @@ unsafe fn values<'a>(name: &str, pointer: *const f32, count: usize, uniform: f32
     Ok(array.map_or(Values::Uniform(uniform), Values::Each))
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_body_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.

@@ -16,112 +16,121 @@ use crate::memory::reserved;
 use crate::mesh::{self, ClosedSurface};
 use crate::world::World;
 
-/// By the intervals in which the ray of each pixel is inside a body: no edge is lost, and no point that is deeper than 0.71 pixels.
+/// Intervals of each pixel's ray inside a body; finds every edge, and points deeper than 0.71 pixels.
 pub const SINEW_IMAGE_FORM_INTERVALS: u32 = 0;
-/// As its authors describe it (CInDeR; Halic et al., section 2.1): edges are drawn into a depth buffer, faces in front of them counted.
-/// Of edges that share a pixel only the nearest is seen, edges shorter than a pixel or along the view are not drawn; no points, no
-/// volume. For comparison.
+/// CInDeR (Halic et al., section 2.1): edges in a depth buffer, faces in front counted; for comparison.
+///
+/// Of edges that share a pixel only the nearest is found. No points and no volume.
 pub const SINEW_IMAGE_FORM_COUNTED: u32 = 1;
 
-/// In `triangle`: none is named.
+/// Value of `triangle` if there is none.
 pub const SINEW_NO_TRIANGLE: u32 = u32::MAX;
 
-/// Which two bodies are compared, and how. Filled by sinew_detector_def_init; used only during sinew_detector_create.
+/// Bodies and method of a detector.
+///
+/// Filled by sinew_detector_def_init; read only during sinew_detector_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_detector_def {
-    /// Set by sinew_detector_def_init.
+    /// Size of this struct; sinew_detector_def_init sets it.
     pub struct_size: usize,
-    /// The first and the second; no default. Both have triangles, tetrahedra or cells, and one at least has a closed surface.
+    /// First and second body with surfaces, at least one of them closed; no default.
     pub bodies: [sinew_body_id; 2],
-    /// SINEW_DETECTION_EXACT, the default: trees of triangles, refitted (the rest, but `bodies`, is not used then, and `thickness` 0); or
-    /// SINEW_DETECTION_IMAGE_SPACE: rays through the pixels of a parallel view. SINEW_DETECTION_DISTANCE_FIELD is for rigid
-    /// tools: SINEW_STATUS_UNSUPPORTED.
+    /// SINEW_DETECTION_EXACT (default) or IMAGE_SPACE.
+    ///
+    /// EXACT ignores the other settings, but thickness must be 0. SINEW_DETECTION_DISTANCE_FIELD is
+    /// SINEW_STATUS_UNSUPPORTED.
     pub detection: u32,
-    /// SINEW_IMAGE_FORM_...; default SINEW_IMAGE_FORM_INTERVALS.
+    /// IMAGE_SPACE: a sinew_image_form value; default SINEW_IMAGE_FORM_INTERVALS.
     pub form: u32,
-    /// IMAGE_SPACE: m, the side of a pixel, above 0; no default. A 256th of a body's size finds all but a thousandth of its edges.
+    /// [m] IMAGE_SPACE: pixel size, above 0; no default. 1/256 of the body finds 99.9 % of edges.
     pub pixel: f32,
-    /// IMAGE_SPACE: along which to look, of any length; 0 0 0, the default: along the three axes, one after the other, and what any of them
-    /// sees counts. Depths are along the view: along three axes some 2 % of the size more than the shortest way out, along one 6 %.
+    /// IMAGE_SPACE: view direction of any length; 0 0 0 (default): the three axes in turn.
+    ///
+    /// Depths are measured along the view. They exceed the shortest distance by about 2 % of the size with three
+    /// axes and by about 6 % with one.
     pub direction: [f32; 3],
-    /// IMAGE_SPACE: room for so many pixels in an image, 1 to 2^24; default 2^18. A pair whose boxes overlap so far that it is not enough is
-    /// drawn with pixels of twice the size, and so on.
+    /// IMAGE_SPACE: capacity of an image in pixels, 1 to 2^24; default 2^18.
+    ///
+    /// If it is too small, the pixel size doubles until the image fits.
     pub pixels: u32,
-    /// INTERVALS: room for so many crossings of rays with faces in an image of one body, at least 1; likewise; default 2^20. Both
-    /// defaults take some 18 MB.
+    /// INTERVALS: capacity of ray-face crossings per body and image, at least 1; default 2^20.
+    ///
+    /// If it is too small, the pixel size doubles. The default capacities take about 18 MB.
     pub crossings: u32,
-    /// IMAGE_SPACE: m, at least 0; default 0 0: how much further along the view than its faces each of the two counts as there, so that
-    /// thin parts are not missed; depths, and the volume that a view sees, are those of bodies that are so much thicker.
+    /// [m] IMAGE_SPACE: added thickness of each body along the view, at least 0; default 0 0.
+    ///
+    /// It keeps thin parts from being missed, and adds to depths and volume.
     pub thickness: [f32; 2],
 }
 
-/// What a detector found, but for lists. Index 0 is of the first body, 1 of the second.
+/// Overlap that a detector found; index 0 is the first body, 1 the second.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_detector_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_detector_report) before the call.
     pub struct_size: usize,
-    /// INTERVALS: what both enclose, m^3, the mean over the views (Faure et al. 2008); 0 where one of them is open, and with COUNTED and
-    /// EXACT.
+    /// [m^3] INTERVALS: overlap volume, mean over the views; 0 with an open body, COUNTED or EXACT.
     pub volume: f64,
-    /// The direction of unit length in which the first has to be moved so that the volume shrinks fastest; 0 where there is no volume.
+    /// Unit direction that moves the first body out of the second fastest; 0 without volume.
     pub normal: [f32; 3],
-    /// How far it has to be moved, were the volume to shrink so all the way, m.
+    /// [m] Linear estimate of the distance to move it.
     pub depth: f32,
-    /// The largest pixel used, m: that asked for, or twice that and so on where there was not enough room; EXACT: 0.
+    /// [m] Largest pixel size used; 0 with EXACT.
     pub pixel: f32,
-    /// Entries of sinew_detector_get_points.
+    /// Number of entries of sinew_detector_get_points.
     pub point_counts: [u32; 2],
-    /// Entries of sinew_detector_get_edges.
+    /// Number of entries of sinew_detector_get_edges.
     pub edge_counts: [u32; 2],
-    /// Parts of edges inside that there was no room for: more than four an edge, on average.
+    /// Number of edge parts beyond the capacity of four per edge on average.
     pub unlisted: [u32; 2],
-    /// 1: the body is closed, so that the other can be inside of it; 0: it is open, or was cut open: nothing is found within it, and in image
-    /// space of itself edges alone. As sinew_body_is_closed, but that a detector made for an open body does not ask again.
+    /// 1: the body is closed; 0: it is open, and nothing is found inside it.
+    ///
+    /// A detector made for an open body does not check again.
     pub closed: [u32; 2],
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
 }
 
-/// A node of a body that lies within the other.
+/// Node of a body that lies inside the other body.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_point_inside {
-    /// The node.
+    /// Index of the node.
     pub node: u32,
-    /// IMAGE_SPACE: the triangle of the other's surface at the end of the way out; EXACT: SINEW_NO_TRIANGLE.
+    /// IMAGE_SPACE: triangle of the other surface where the node would leave; EXACT: SINEW_NO_TRIANGLE.
     pub triangle: u32,
-    /// m: IMAGE_SPACE: the way out along the view, the shortest of those of several views; EXACT: how far the other's surface is.
+    /// [m] IMAGE_SPACE: shortest distance out along the views; EXACT: distance to the surface.
     pub depth: f32,
-    /// EXACT: the shortest way out, of unit length; IMAGE_SPACE: 0.
+    /// EXACT: unit direction of the shortest distance out; IMAGE_SPACE: 0.
     pub normal: [f32; 3],
 }
 
-/// A part of an edge of a body that lies within the other.
+/// Part of an edge of a body that lies inside the other body.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_edge_inside {
-    /// From the first to the second.
+    /// First and second node of the edge.
     pub nodes: [u32; 2],
-    /// Where it goes in, as a fraction of the edge; 0 where it begins inside.
+    /// Fraction of the edge where it enters; 0 if it starts inside.
     pub entry: f32,
-    /// Where it comes out; 1 where it ends inside.
+    /// Fraction of the edge where it leaves; 1 if it ends inside.
     pub exit: f32,
-    /// IMAGE_SPACE: the longest of the ways out along the view, m, of several views the one that sees the least; COUNTED: from the edge to
-    /// the next face; EXACT: 0.
+    /// [m] IMAGE_SPACE: largest distance out along the view, the least over the views; EXACT: 0.
+    ///
+    /// COUNTED: the distance from the edge to the next face.
     pub depth: f32,
 }
 
-/// Vector i is at (const char *)data + i * stride; valid as long as what gave it says.
+/// Borrowed array of vectors of 3 doubles; vector i starts at (const char *)data + i * stride.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_dvec3_view {
-    /// The first.
+    /// First vector.
     pub data: *const f64,
-    /// How many.
+    /// Number of vectors.
     pub count: usize,
-    /// Bytes from one to the next.
+    /// [bytes] Distance from one vector to the next.
     pub stride: usize,
 }
 
@@ -137,9 +146,10 @@ unsafe impl Versioned for sinew_detector_report {
     const NAME: &'static str = "sinew_detector_report";
 }
 
-/// Finds what two bodies have in common, in memory of its own. It belongs to the caller; it changes no world, and may outlive it.
+/// Detector of the overlap of two bodies; it applies no forces.
 ///
-/// As `const sinew_detector *` it may be used by any number of threads at once; as `sinew_detector *` by one, with nobody else inside.
+/// The caller owns it; it may outlive its world. Any number of threads may use a `const sinew_detector *` at the
+/// same time; a `sinew_detector *` needs exclusive access.
 pub struct sinew_detector {
     sides: [Side; 2],
     method: Method,
@@ -474,9 +484,7 @@ impl Found {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_detector_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -486,15 +494,13 @@ pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, s
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_detector_def::defaults()) })
 }
 
-/// Makes a detector for two bodies of a world, whether or not they meet each other there, and reserves its memory; nothing is looked for
-/// yet. The caller destroys it with sinew_detector_destroy.
+/// Creates a detector for two bodies and allocates its memory, without a first search.
 ///
-/// The methods: Halic, Kockara, Bayrak, Rowe, Chen, section 2.1 (CInDeR), and Faure, Barbier, Allard, Falipou 2008 for volumes; EXACT: signed
-/// distances by pseudonormals (Baerentzen, Aanaes 2005), from the closest of a tree of triangles.
+/// Destroy it with sinew_detector_destroy.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also for one and the same body twice, a body without triangles, and two that are open or were cut
-/// open; with EXACT for a closed one that is inside out, passes through itself, or has two nodes at the same place or a triangle along a line
-/// where it is now), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (SINEW_DETECTION_DISTANCE_FIELD), SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both are open; with
+/// EXACT also if a closed surface is inverted, self-intersecting or degenerate. SINEW_STATUS_UNSUPPORTED for
+/// SINEW_DETECTION_DISTANCE_FIELD.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
@@ -515,20 +521,14 @@ pub unsafe extern "C" fn sinew_detector_create(
     }
 }
 
-/// Compares the two bodies where they are now: each is looked for in the other, where that is closed. Writes what was found to `report`,
-/// whose struct_size is set by the caller; the lists are read with sinew_detector_get_points, sinew_detector_get_edges and
-/// sinew_detector_get_gradient. In image space it allocates nothing, and takes a time linear in polygons and in the pixels covered.
+/// Finds the overlap of the two bodies at their current positions.
 ///
-/// An open body gives edges alone in image space (and points with EXACT), and nothing is found within it. So it is with one that was cut open
-/// since (sinew_body_is_closed): `report->closed` says so; where both were, nothing is found. Bodies are compared where they are: what passes
-/// through a thin part between two calls is not seen. Whether a surface has come to pass through itself is not asked: EXACT is then not sure of
-/// sides; in images a part that is inside out counts as outside.
+/// You may pass another world, such as a loaded snapshot, if both ids refer there to bodies with identical
+/// surfaces. An open body reports only edges (EXACT: also points). Image space does not allocate. On failure the
+/// previous result stays.
 ///
-/// A world in which the two ids are of bodies with the same surfaces is as good as the one that the detector was made with.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where one of the bodies was destroyed, or has another surface, as in another world),
-/// SINEW_STATUS_CAPACITY (a single ray passes more faces than `crossings`), SINEW_STATUS_OUT_OF_MEMORY (EXACT, which may allocate); then what
-/// was found before stays.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface; SINEW_STATUS_CAPACITY if
+/// one ray has more than `crossings`.
 ///
 /// # Safety
 /// `detector` is NULL or a detector nobody else uses; `world` is NULL or a world nobody changes; `report` is NULL or writable for the size
@@ -551,11 +551,11 @@ pub unsafe extern "C" fn sinew_detector_find(
     }
 }
 
-/// Writes where the nodes of a body that lie within the other are listed, in ascending order, those within a tetrahedral body and those on
-/// no triangle among them, and how many there are: of the first body with `side` 0, of the second with 1. Empty before the first
-/// sinew_detector_find, and with COUNTED; valid until the next, or the detector's end.
+/// Writes the list of nodes of one body that lie inside the other, in ascending order.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `side` 0 is the first body, 1 the second. The list is empty before the first search and with COUNTED.
+///
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 ///
 /// # Safety
 /// `detector` is NULL or a detector nobody changes; `points` and `count` are NULL or writable.
@@ -577,11 +577,12 @@ pub unsafe extern "C" fn sinew_detector_get_points(
     })
 }
 
-/// Writes where the parts of a body's edges that lie within the other are listed, by edge and along it, and how many there are: of the first
-/// body with `side` 0, of the second with 1. Edges are those of the surface's triangles. Empty before the first sinew_detector_find; valid
-/// until the next, or the detector's end.
+/// Writes the list of surface edge parts of one body that lie inside the other.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `side` 0 is the first body, 1 the second. The list is ordered by edge and along it, and empty before the first
+/// search.
+///
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 ///
 /// # Safety
 /// `detector` is NULL or a detector nobody changes; `edges` and `count` are NULL or writable.
@@ -603,11 +604,12 @@ pub unsafe extern "C" fn sinew_detector_get_edges(
     })
 }
 
-/// Writes a view of how the volume changes with each node of a body, m^2, in the caller's order (Faure et al. 2008): of the first body with
-/// `side` 0, of the second with 1. Moving nodes against it parts the bodies. Empty before the first sinew_detector_find, with COUNTED and EXACT,
-/// and where one of the bodies is open: there is no volume then. Valid until the next sinew_detector_find, or the detector's end.
+/// Writes a view of the gradient [m^2] of the overlap volume at each node of one body.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `side` 0 is the first body, 1 the second. Moving the nodes against it separates the bodies. It is empty before
+/// the first search, with COUNTED or EXACT, and if a body is open.
+///
+/// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 ///
 /// # Safety
 /// `detector` is NULL or a detector nobody changes; `out` is NULL or writable.
@@ -630,7 +632,7 @@ pub unsafe extern "C" fn sinew_detector_get_gradient(
     })
 }
 
-/// Destroys a detector; what its lists and views show ends. NULL: nothing.
+/// Destroys a detector and ends its lists and views; NULL has no effect.
 ///
 /// # Safety
 /// `detector` is NULL or a detector that is not destroyed and that nobody uses any more.

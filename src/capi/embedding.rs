@@ -10,31 +10,35 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::embedding::{Embedding, EmbeddingDefinition};
 
-/// A fine surface, drawn, bound to a coarse body, simulated. It belongs to the caller, who uses it on one thread at a time; the body knows nothing of it
-/// and pays nothing.
+/// Embedding: a fine render surface that follows a coarse body.
+///
+/// The caller owns it. Use it on one thread at a time. The body has no cost from it.
 pub struct sinew_embedding {
     embedding: Embedding,
 }
 
-/// A surface that is drawn, and what of a body it goes with.
+/// Render surface of an embedding and the elements that it follows.
+///
+/// Filled by sinew_embedding_def_init; read only during sinew_embedding_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_embedding_def {
-    /// Set by sinew_embedding_def_init.
+    /// Size of this struct; sinew_embedding_def_init sets it.
     pub struct_size: usize,
-    /// 3 vertex_count floats: where each vertex is while the body is where it is, m, within 1e9 m of the origin; no default.
+    /// [m] 3 * vertex_count floats for the body's current positions, within 1e9; no default.
     pub vertices: *const f32,
-    /// At least 1.
+    /// Number of vertices, at least 1.
     pub vertex_count: usize,
-    /// 3 triangle_count vertices, outward by the right-hand rule: what normals come from; nullable: there are none.
+    /// 3 * triangle_count vertex indices, outward, for the normals; nullable: no normals.
     pub triangles: *const u32,
-    /// Triangles.
+    /// Number of triangles.
     pub triangle_count: usize,
-    /// 4 tetrahedron_count nodes: the tetrahedra of the body, as it was created with. Each vertex keeps its barycentric weights in the one that it
-    /// is in, or nearest to. Where the body has been cut or torn, those that it has now are taken instead. Nullable: each goes with the nearest
-    /// triangle that is drawn of the body, and keeps its distance from that.
+    /// 4 * tetrahedron_count nodes: the body's tetrahedra at its creation; nullable.
+    ///
+    /// Each vertex keeps its barycentric weights in the nearest one; a cut body uses its current tetrahedra. NULL
+    /// binds each vertex to the nearest surface triangle, at a constant distance.
     pub tetrahedra: *const u32,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tetrahedron_count: usize,
 }
 
@@ -71,9 +75,7 @@ impl sinew_embedding_def {
     }
 }
 
-/// Writes the defaults of the `struct_size` bytes that the caller compiled.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills an embedding definition with its defaults; `struct_size` is sizeof(sinew_embedding_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -83,12 +85,12 @@ pub unsafe extern "C" fn sinew_embedding_def_init(def: *mut sinew_embedding_def,
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_embedding_def::defaults()) })
 }
 
-/// Binds a fine surface to a body, where both are now, in a time as long as some hundred updates; copies what `def` points to. The caller destroys it
-/// with sinew_embedding_destroy, before or after the body and its world. Of an affine motion of the body the surface takes part to within rounding,
-/// where it is bound to tetrahedra.
+/// Creates an embedding: binds a render surface to a body at its current positions.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where no tetrahedron has a volume, or nothing is drawn of the body), SINEW_STATUS_STALE_ID,
-/// SINEW_STATUS_OUT_OF_MEMORY.
+/// It copies everything that `def` points to, and costs about as much as 100 updates. Destroy it with
+/// sinew_embedding_destroy, before or after the body and its world.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if no tetrahedron has a volume, or the body has no surface.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;
@@ -112,7 +114,7 @@ pub unsafe extern "C" fn sinew_embedding_create(
     }
 }
 
-/// Destroys an embedding; its views end. NULL: nothing.
+/// Destroys an embedding and ends its views; NULL has no effect.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding that is not destroyed and that nobody uses any more.
@@ -127,13 +129,13 @@ pub unsafe extern "C" fn sinew_embedding_destroy(embedding: *mut sinew_embedding
     }
 }
 
-/// Puts the vertices where the body is now, in the place where they are read. Nothing is allocated, but when the body has been cut or torn since:
-/// then each vertex is bound to the copy on its side, and triangles that would reach across are left out of
-/// sinew_embedding_get_triangles.
+/// Moves the vertices of an embedding to the body's current positions.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body has not the nodes that the vertices are bound to, as in a world that was saved before it was
-/// cut), SINEW_STATUS_STALE_ID (the body is gone), SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (it has been cut or torn, and the vertices are
-/// bound to the triangles of a body of tetrahedra, or not to all of the tetrahedra of which it was made). The vertices stay where they were then.
+/// It allocates only after a cut or tear; then vertices follow their side, and triangles across the cut are dropped
+/// from sinew_embedding_get_triangles. On failure the vertices stay.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the nodes are not those it is bound to; SINEW_STATUS_UNSUPPORTED if the
+/// body was cut, and it is bound to triangles or to part of the tetrahedra.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody else uses; `world` is NULL or the body's world, which nobody changes.
@@ -151,11 +153,12 @@ pub unsafe extern "C" fn sinew_embedding_update(
     }
 }
 
-/// The same with the body's nodes at `positions`, m, 3 node_count packed floats, such as a reader's frame has them: on any thread, whatever the world
-/// does meanwhile.
+/// Moves the vertices of an embedding to given node positions, such as those of a reader's frame.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the body had another number of nodes at the last sinew_embedding_update, which alone follows
-/// cuts).
+/// `positions` [m] holds 3 * node_count packed floats. It does not use the world, so it may run beside a step.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the body had another number of nodes at the last
+/// sinew_embedding_update.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody else uses; `positions` is NULL or 3 `node_count` floats.
@@ -175,9 +178,9 @@ pub unsafe extern "C" fn sinew_embedding_update_from(
     })
 }
 
-/// Writes a view of where each vertex is, m, in the order given. It stays the same until the embedding's end; updates change what it shows.
+/// Writes a view of the vertex positions [m], in the given order.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Lifetime: until the embedding is destroyed; updates change its contents.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
@@ -196,9 +199,9 @@ pub unsafe extern "C" fn sinew_embedding_get_positions(
     })
 }
 
-/// Writes a view of the triangles, in the order given, less those that reach across a cut. It changes with updates after cuts alone, and lives until then.
+/// Writes a view of the triangles, in the given order, without those across a cut.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Lifetime: until the first update after the next cut, or the embedding's destruction.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody changes; `out` is NULL or writable.
@@ -220,10 +223,10 @@ pub unsafe extern "C" fn sinew_embedding_get_triangles(
     })
 }
 
-/// Works out the normals, where that was not done since the last update, and writes a view of them: of unit length, outward, the mean of a
-/// vertex's triangles by area, 0 where that is 0; an empty view without triangles. The view lives like that of the positions.
+/// Computes the unit vertex normals if needed, and writes a view of them.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// They are area-weighted and point outward; 0 without area. The view is empty without triangles. It needs
+/// exclusive access. Lifetime: until the embedding is destroyed; the next call after an update changes them.
 ///
 /// # Safety
 /// `embedding` is NULL or an embedding nobody else uses; `out` is NULL or writable.
@@ -243,15 +246,14 @@ pub unsafe extern "C" fn sinew_embedding_get_normals(
     })
 }
 
-/// Makes a body of a closed surface, and binds the surface to it: tissue from what is drawn, in one call. `positions` and `triangles` of `def` are the
-/// surface, outward, with vertices that may be repeated as in STL files; it is filled with tetrahedra whose edges are `spacing` metres long in the
-/// mean (isosurface stuffing, Labelle and Shewchuk 2007), which are the nodes and elements of the body: its own surface follows the one given where that is
-/// not finer than the spacing, and what is thinner than about half of it is lost. All else in `def` is as for sinew_body_create, with one value for
-/// all nodes and springs. `out_embedding` is nullable; the caller destroys what it is given there.
+/// Creates a body of tetrahedra that fills a closed surface, and binds the surface to it.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (the surface is open or inside out; spacing is not above 0, too fine to count the nodes, or so coarse that
-/// nothing is filled; tetrahedra, cells, springs, rest positions or lists of values are given), SINEW_STATUS_UNSUPPORTED as sinew_body_create,
-/// SINEW_STATUS_CAPACITY, SINEW_STATUS_OUT_OF_MEMORY.
+/// positions and triangles of `def` are the surface, outward; vertices may repeat. `spacing` [m] is the mean edge
+/// length. Features thinner than about half of it are lost. The rest of `def` is as for sinew_body_create, with one
+/// value for all nodes. `out_embedding` is nullable; the caller destroys it.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, `spacing` is too fine or too coarse,
+/// or elements, springs, rest positions or lists of values are given.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of the lengths that it states;

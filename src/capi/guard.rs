@@ -7,10 +7,7 @@ use super::status::{SINEW_STATUS_OK, fail, sinew_status};
 use crate::error::{Error, Result};
 use crate::world::World;
 
-/// A world: bodies and tools that are stepped together.
-///
-/// As `const sinew_world *` it may be used by any number of threads at once; as `sinew_world *` by one, with nobody else
-/// inside.
+/// World: a set of bodies and tools that are stepped together.
 pub struct sinew_world {
     world: World,
     /// Set by a fault inside the library; what the world holds is not to be trusted then.

@@ -12,87 +12,94 @@ use crate::error::Error;
 use crate::haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
 use crate::world::ToolId;
 
-/// The device's side of a tool of a world, for one thread, the device's own: it may tick while another thread steps the world, or uses it otherwise.
+/// Haptic handle: couples a device to a tool, used by the device's thread.
+///
+/// One thread at a time may use it, while other threads step or use the world.
 pub struct sinew_haptic {
     handle: HapticHandle,
     /// As the device was turned last.
     orientation: Quat,
 }
 
-/// How a device is coupled to a tool. Filled by sinew_haptic_def_init; used only during sinew_haptic_create.
+/// Coupling of a haptic device to a tool.
+///
+/// Filled by sinew_haptic_def_init; read only during sinew_haptic_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_haptic_def {
-    /// Set by sinew_haptic_def_init.
+    /// Size of this struct; sinew_haptic_def_init sets it.
     pub struct_size: usize,
-    /// The tool that the device leads; no default.
+    /// Tool that the device drives; no default.
     pub tool: sinew_tool_id,
-    /// Of the spring between device and tool, N/m, above 0; default 1000. A device should stand it with its own sampling: about half of its damping,
-    /// N s/m, by the time between ticks, or less.
+    /// [N/m] Coupling stiffness between device and tool, above 0; default 1000.
+    ///
+    /// A device is stable up to about half of its damping [N s/m] divided by the tick time.
     pub stiffness: f32,
-    /// The same for turning, N m/rad, at least a millionth of the stiffness at the lever, which is half of the tool's length; default 0: that stiffness.
+    /// [N m/rad] Angular coupling stiffness; 0 (default): stiffness at half of the tool's length.
+    ///
+    /// It is at least 1e-6 of that value.
     pub angular_stiffness: f32,
-    /// Of the damper beside that spring, which acts where tissue resists; default 1: it damps device_mass on the spring critically. 0: what the loop
-    /// makes of energy is still damped away, but less surely.
+    /// Damping of the coupling while tissue resists, at least 0; 1 (default) is critical for device_mass.
     pub damping_ratio: f32,
-    /// What the hand moves of the device, kg, above 0; default 0.05.
+    /// [kg] Effective mass of the device, above 0; default 0.05.
     pub device_mass: f32,
-    /// The largest force, N, above 0; default infinity.
+    /// [N] Largest force on the device, above 0 (0 is refused); infinity (default): unlimited.
     pub force_limit: f32,
-    /// The largest torque, N m, above 0; default infinity.
+    /// [N m] Largest torque on the device, above 0 (0 is refused); infinity (default): unlimited.
     pub torque_limit: f32,
-    /// How fast the force may change, N/s, above 0; default infinity. A force that such a limit makes late gives a hand more than it took: the loop is
-    /// kept passive where it is not reached.
+    /// [N/s] Largest rate of change of the force, above 0; infinity (default): unlimited.
+    ///
+    /// The coupling is passive only while this limit is not reached.
     pub force_rate_limit: f32,
-    /// How fast the torque may change, N m/s, above 0; default infinity.
+    /// [N m/s] Largest rate of change of the torque, above 0; infinity (default): unlimited.
     pub torque_rate_limit: f32,
-    /// A model that is older, s, above 0, is stale: force and torque go to 0 until there is a newer one; default 0.1.
+    /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
     pub stale_after: f32,
-    /// The time in which they do, or come back, s, above 0; default 0.1.
+    /// [s] Duration of that fade, and of the return, above 0; default 0.1.
     pub ramp: f32,
 }
 
-/// What a tick comes to.
+/// Result of a haptic tick.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_haptic_result {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_haptic_result) before the call.
     pub struct_size: usize,
-    /// On the device, world axes, N, until the next tick.
+    /// [N] Force on the device until the next tick, in world axes.
     pub force: [f32; 3],
-    /// On the device, about its position, world axes, N m.
+    /// [N m] Torque on the device about its position, in world axes.
     pub torque: [f32; 3],
-    /// Where the tool is to go, m: the device, but for what the spring between them is drawn out.
+    /// [m] Position that the tool is driven to: the device minus the coupling extension.
     pub proxy_position: [f32; 3],
-    /// x y z w.
+    /// Orientation that the tool is driven to, x y z w.
     pub proxy_orientation: [f32; 4],
-    /// Contacts of the tool as the model was made: sinew_haptic_get_contacts.
+    /// Number of contacts of the model; see sinew_haptic_get_contacts.
     pub contact_count: u32,
-    /// How long ago the device was where the model was made, s, by the ticks; infinity as long as there was none.
+    /// [s] Age of the model by tick time; infinity before the first model.
     pub age: f32,
-    /// The steps of the world that were published for it.
+    /// Number of world steps published to this handle.
     pub version: u64,
-    /// What part of the model's forces is given: less than 1 where that was stale.
+    /// Fraction of the model's force that is applied; below 1 if the model is stale.
     pub gain: f32,
-    /// 1: the tool, or its world, is gone.
+    /// 1: the tool or its world was destroyed.
     pub is_over: u32,
-    /// What the coupling has lost of the energy that went through it, J: kept at 0 or above as far as damping can.
+    /// [J] Energy that the coupling dissipated; kept at least 0 as far as damping can.
     pub lost: f64,
 }
 
-/// Where a tool pressed a body as the model of its handle was made.
+/// Contact of the tool in the model of a haptic handle.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_haptic_contact {
-    /// The body.
+    /// Body that the tool touches.
     pub body: sinew_body_id,
-    /// The point, m.
+    /// [m] Contact point on the body.
     pub point: [f32; 3],
-    /// Away from the tool, of unit length.
+    /// Unit normal that points away from the tool.
     pub normal: [f32; 3],
-    /// How fast the tissue moves there, m/s.
+    /// [m/s] Velocity of the tissue at the point.
     pub velocity: [f32; 3],
-    /// On the tool, N.
+    /// [N] Force on the tool at the point.
     pub force: [f32; 3],
 }
 
@@ -177,9 +184,7 @@ impl From<&HapticContact> for sinew_haptic_contact {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_haptic_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a haptic definition with its defaults; `struct_size` is sizeof(sinew_haptic_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -189,11 +194,12 @@ pub unsafe extern "C" fn sinew_haptic_def_init(def: *mut sinew_haptic_def, struc
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_haptic_def::defaults()) })
 }
 
-/// Lets a device lead a tool through a handle, which the caller destroys with sinew_haptic_destroy. The tool should be where the device is: the
-/// first step leads it there. As long as there is the handle, sinew_tool_set_pose of the tool is refused: each step leads it to where the handle's
-/// proxy was last, as sinew_tool_get_target tells. Each step costs the handle some microseconds.
+/// Creates a haptic handle that drives a tool.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where another handle leads the tool), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// Destroy it with sinew_haptic_destroy. Until then sinew_tool_set_pose refuses the tool, and each step moves it to
+/// the latest proxy pose. The tool should start at the device's pose.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if another handle drives the tool.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
@@ -216,7 +222,9 @@ pub unsafe extern "C" fn sinew_haptic_create(
     }
 }
 
-/// Destroys a handle, before its world or after. The tool is the world's again. NULL: nothing.
+/// Destroys a haptic handle, before or after its world; NULL has no effect.
+///
+/// The tool is then moved by sinew_tool_set_pose again.
 ///
 /// # Safety
 /// `haptic` is NULL or a handle that is not destroyed and that nobody uses any more.
@@ -231,13 +239,11 @@ pub unsafe extern "C" fn sinew_haptic_destroy(haptic: *mut sinew_haptic) {
     }
 }
 
-/// Takes where the device is, 3 floats, m, and how it is turned, x y z w, `dt` seconds after the last tick, above 0 and at most 1, and writes what it
-/// is to feel until the next. `orientation` may be NULL: as it was, at first as the tool. `velocity`, m/s, and `angular_velocity`, rad/s, 3 floats each,
-/// world axes, may be NULL: as its way since the last tick says. `out->struct_size` is set by the caller.
+/// Computes the force on the device from its current pose, without waiting, locking or allocating.
 ///
-/// It waits for nothing, takes no lock and allocates nothing, whatever other threads do with the world. It takes some microseconds.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT: `out` is as it was, and the device should be given no force.
+/// `position` [m] is 3 floats; `orientation` is x y z w, nullable: unchanged. `velocity` [m/s] and
+/// `angular_velocity` [rad/s] are 3 floats each in world axes, nullable: estimated. `dt` [s] is the time since the
+/// last tick, above 0, at most 1. After an error apply no force to the device.
 ///
 /// # Safety
 /// `haptic` is NULL or a handle nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4, `velocity` and `angular_velocity` NULL or
@@ -278,10 +284,10 @@ pub unsafe extern "C" fn sinew_haptic_tick(
     })
 }
 
-/// Writes the contacts of the tool as the model was made that the last tick used, up to `capacity`, and how many there are in all to `count`: at most
-/// 32, of more the most pressed. `contacts` may be NULL with a capacity of 0. As sinew_haptic_tick it waits for nothing.
+/// Writes the contacts of the model that the last tick used, without waiting.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `contacts` receives at most `capacity` entries, `count` the number that exist, at most 32; with more, those with
+/// the largest force.
 ///
 /// # Safety
 /// `haptic` is NULL or a handle nobody else uses; `contacts` is NULL or writable for `capacity` contacts; `count` is NULL or writable.

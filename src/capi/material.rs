@@ -8,39 +8,40 @@ use super::status::sinew_status;
 use crate::error::Error;
 use crate::material::presets::PRESETS;
 
-/// Healthy liver, E 5.4 kPa.
+/// Healthy liver, E = 5.4 kPa.
 pub const SINEW_PRESET_LIVER: u32 = 0;
-/// Diseased liver, E 59.4 kPa.
+/// Fibrotic liver, E = 59.4 kPa.
 pub const SINEW_PRESET_FIBROTIC_LIVER: u32 = 1;
-/// Hepatocellular carcinoma, E 70.2 kPa.
+/// Hepatocellular carcinoma, E = 70.2 kPa.
 pub const SINEW_PRESET_LIVER_TUMOUR: u32 = 2;
-/// Stomach, E 1.9 kPa.
+/// Stomach, E = 1.9 kPa.
 pub const SINEW_PRESET_STOMACH: u32 = 3;
-/// Gallbladder, E 255 kPa.
+/// Gallbladder, E = 255 kPa.
 pub const SINEW_PRESET_GALLBLADDER: u32 = 4;
-/// Bile duct, E 498 kPa.
+/// Bile duct, E = 498 kPa.
 pub const SINEW_PRESET_BILE_DUCT: u32 = 5;
-/// Hepatic artery, E 630 kPa.
+/// Hepatic artery, E = 630 kPa.
 pub const SINEW_PRESET_HEPATIC_ARTERY: u32 = 6;
 
-/// A tissue's figures, from the literature, for young_modulus and density of a body. Single organs differ by more than the
-/// digits suggest.
+/// Material values of a tissue from the literature, for young_modulus and density of a body.
+///
+/// Organs of individual patients vary more than the digits suggest.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_material_preset {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_material_preset) before the call.
     pub struct_size: usize,
-    /// What tissue it is, in English; static.
+    /// English name of the tissue; static string.
     pub name: *const c_char,
-    /// Where the figures are from; static.
+    /// Source of the values; static string.
     pub source: *const c_char,
-    /// Pa, as the source gives it.
+    /// [Pa] Shear modulus as the source gives it.
     pub shear_modulus: f32,
-    /// Pa: three times the shear modulus, since tissue hardly changes its volume.
+    /// [Pa] Young's modulus: 3 times the shear modulus (incompressible).
     pub young_modulus: f32,
-    /// kg/m3.
+    /// [kg/m^3] Mass density.
     pub density: f32,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
 }
 
@@ -50,10 +51,9 @@ unsafe impl Versioned for sinew_material_preset {
     const NAME: &'static str = "sinew_material_preset";
 }
 
-/// Writes the figures of a tissue, `preset` being a SINEW_PRESET_...; they are numbered from 0 without a gap. Its texts are
-/// static. `out->struct_size` is set by the caller.
+/// Writes the material values of a tissue.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `preset` is a sinew_preset value; presets are numbered from 0 without a gap.
 ///
 /// # Safety
 /// `out` is NULL or writable for the size that it states.

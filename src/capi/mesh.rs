@@ -10,74 +10,78 @@ use super::status::sinew_status;
 use crate::error::{Error, Result};
 use crate::mesh::{self, LoadedMesh, Mesh, MeshFormat, is_closed};
 
-/// A mesh: positions, triangles, tetrahedra and cells. It belongs to the caller, never changes, and may be read by any number of
-/// threads at once.
+/// Immutable mesh of nodes, triangles, tetrahedra and cells, readable by any number of threads.
+///
+/// The caller owns it.
 pub struct sinew_mesh {
     loaded: LoadedMesh,
     surface: Vec<[u32; 3]>,
     closed: bool,
 }
 
-/// By the file's name: .obj .stl .vtk .msh .node .ele.
+/// By file name: .obj .stl .vtk .msh .node .ele.
 pub const SINEW_MESH_FORMAT_AUTO: u32 = 0;
 /// Wavefront OBJ.
 pub const SINEW_MESH_FORMAT_OBJ: u32 = 1;
 /// STL, binary or ASCII.
 pub const SINEW_MESH_FORMAT_STL: u32 = 2;
-/// VTK legacy: unstructured grids and polygonal data, ASCII or binary.
+/// VTK legacy: unstructured grid or polygonal data, ASCII or binary.
 pub const SINEW_MESH_FORMAT_VTK: u32 = 3;
-/// Gmsh, versions 1, 2 and 4.1, ASCII.
+/// Gmsh 1, 2 and 4.1, ASCII.
 pub const SINEW_MESH_FORMAT_GMSH: u32 = 4;
-/// TetGen: .node and .ele side by side, whichever is named.
+/// TetGen .node and .ele with the same base name; name either.
 pub const SINEW_MESH_FORMAT_TETGEN: u32 = 5;
 
-/// In node_of_vertex: the vertex was dropped.
+/// Value of node_of_vertex for a dropped vertex.
 pub const SINEW_NO_NODE: u32 = u32::MAX;
 
-/// What a mesh holds, and what was tidied; all borrowed from the mesh, valid until its end.
+/// Borrowed contents of a mesh, and a report of its cleaning.
+///
+/// Lifetime: until the mesh is destroyed.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_mesh_view {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_mesh_view) before the call.
     pub struct_size: usize,
-    /// 3 node_count floats, m.
+    /// [m] 3 * node_count floats.
     pub positions: *const f32,
-    /// Nodes; each is used.
+    /// Number of nodes; every node is used.
     pub node_count: usize,
-    /// 3 triangle_count node indices: what the file or the shape gives as triangles.
+    /// 3 * triangle_count node indices: the triangles of the file or shape.
     pub triangles: *const u32,
-    /// Triangles.
+    /// Number of triangles.
     pub triangle_count: usize,
-    /// 4 tetrahedron_count node indices, of positive volume.
+    /// 4 * tetrahedron_count node indices, of positive volume.
     pub tetrahedra: *const u32,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tetrahedron_count: usize,
-    /// 3 surface_triangle_count node indices, outward: the boundary of the tetrahedra or cells; without either the
-    /// triangles.
+    /// 3 * surface_triangle_count node indices, outward.
+    ///
+    /// The boundary of the tetrahedra or cells; without them the triangles.
     pub surface: *const u32,
-    /// Triangles of the surface.
+    /// Number of surface triangles.
     pub surface_triangle_count: usize,
-    /// vertex_count node indices: for each vertex of the file its node, or SINEW_NO_NODE where it was dropped.
+    /// vertex_count node indices: the node of each vertex of the file, or SINEW_NO_NODE.
     pub node_of_vertex: *const u32,
-    /// Vertices of the file; of a shape, its nodes.
+    /// Number of vertices in the file; for a shape its nodes.
     pub vertex_count: usize,
-    /// Vertices that became one node with an earlier one.
+    /// Number of vertices merged into an earlier one.
     pub welded_vertices: usize,
-    /// Points that nothing uses.
+    /// Number of unused vertices dropped.
     pub dropped_vertices: usize,
-    /// Collapsed or doubled.
+    /// Number of degenerate or duplicate triangles dropped.
     pub dropped_triangles: usize,
-    /// Collapsed or doubled.
+    /// Number of degenerate or duplicate tetrahedra dropped.
     pub dropped_tetrahedra: usize,
-    /// Were inside out; two of their nodes were swapped.
+    /// Number of inverted tetrahedra corrected by swapping two nodes.
     pub flipped_tetrahedra: usize,
-    /// 1: every edge of the surface is used equally often in both directions; 0: it is open.
+    /// 1: every surface edge is used equally often in both directions; 0: open.
     pub closed: u32,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
-    /// 8 cell_count node indices: the cubes of a lattice, corners numbered by bits, x 1, y 2, z 4.
+    /// 8 * cell_count node indices of lattice cubes; corner bits: x 1, y 2, z 4.
     pub cells: *const u32,
-    /// Cells.
+    /// Number of cells.
     pub cell_count: usize,
 }
 
@@ -140,13 +144,13 @@ unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Result<Loaded
     })
 }
 
-/// Reads a mesh from a file and makes it tidy: corners that lie together become one node, collapsed and doubled elements
-/// and points that nothing uses are dropped, tetrahedra that are inside out are turned; the view counts it all. `path` is
-/// UTF-8, `format` a SINEW_MESH_FORMAT_..., `scale` what one unit of the file is in m, above 0. The caller destroys the mesh
-/// with sinew_mesh_destroy.
+/// Loads a mesh from a file and cleans it.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT; SINEW_STATUS_IO (missing, cut short, malformed, of another format, with indices
-/// out of range or numbers that are not finite: the message names the line or byte); SINEW_STATUS_OUT_OF_MEMORY.
+/// It welds coincident vertices, drops degenerate and duplicate elements and unused vertices, and corrects inverted
+/// tetrahedra. `path` is UTF-8, `format` a sinew_mesh_format value, `scale` [m] the length of one file unit, above
+/// 0.
+///
+/// Errors: SINEW_STATUS_IO if the file is missing or malformed; the message names the line or byte.
 ///
 /// # Safety
 /// `path` is NULL or ends with NUL; `out` is NULL or writable.
@@ -174,10 +178,10 @@ pub unsafe extern "C" fn sinew_mesh_load(
     }
 }
 
-/// Makes a cloth in the plane y = 0 about the origin, up outward: `size` are its 2 extents along x and z, m, above 0,
-/// `cells` its 2 numbers of cells, at least 1, of two triangles each. The caller destroys it with sinew_mesh_destroy.
+/// Creates a cloth of triangles in the plane y = 0, centered at the origin, with normals along +y.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// `size` [m] holds the 2 extents along x and z, above 0; `cells` the 2 cell counts, at least 1, of two triangles
+/// each.
 ///
 /// # Safety
 /// `size` is NULL or 2 floats, `cells` NULL or 2 numbers; `out` is NULL or writable.
@@ -197,10 +201,9 @@ pub unsafe extern "C" fn sinew_mesh_create_cloth(
     }
 }
 
-/// Makes a block of tetrahedra about the origin: `size` are its 3 extents, m, above 0, `cells` its 3 numbers of cells, at
-/// least 1. The caller destroys it with sinew_mesh_destroy.
+/// Creates a box of tetrahedra, centered at the origin.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// `size` [m] holds the 3 extents, above 0; `cells` the 3 cell counts, at least 1.
 ///
 /// # Safety
 /// `size` is NULL or 3 floats, `cells` NULL or 3 numbers; `out` is NULL or writable.
@@ -220,10 +223,9 @@ pub unsafe extern "C" fn sinew_mesh_create_block(
     }
 }
 
-/// Makes a lattice of cubes about the origin: `edge` is the length of theirs, m, above 0, `cells` their 3 numbers along the axes,
-/// at least 1. The caller destroys it with sinew_mesh_destroy.
+/// Creates a lattice of cubes, centered at the origin.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// `edge` [m] is the edge length of a cube, above 0; `cells` holds the 3 cell counts, at least 1.
 ///
 /// # Safety
 /// `cells` is NULL or 3 numbers; `out` is NULL or writable.
@@ -242,10 +244,9 @@ pub unsafe extern "C" fn sinew_mesh_create_lattice(
     }
 }
 
-/// Makes an organ, liver-like, of tetrahedra about the origin: `length` is its longest extent, along x, and `spacing` that
-/// of its nodes, both m, above 0. Thin in y. The caller destroys it with sinew_mesh_destroy.
+/// Creates a liver-like organ of tetrahedra, centered at the origin and thin in y.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// `length` [m] is its extent along x and `spacing` [m] the node spacing, both above 0.
 ///
 /// # Safety
 /// `out` is NULL or writable.
@@ -255,10 +256,9 @@ pub unsafe extern "C" fn sinew_mesh_create_organ(length: f32, spacing: f32, out:
     unsafe { create(out, || LoadedMesh::unchanged(Mesh::organ(length, spacing)?)) }
 }
 
-/// Writes a view of what a mesh holds; nothing is copied, all is valid until the mesh's end. `out->struct_size` is set by
-/// the caller.
+/// Writes a view of the contents of a mesh without copying.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Lifetime: until the mesh is destroyed.
 ///
 /// # Safety
 /// `mesh` is NULL or a mesh that is not destroyed; `out` is NULL or writable for the size that it states.
@@ -272,7 +272,7 @@ pub unsafe extern "C" fn sinew_mesh_get_view(mesh: *const sinew_mesh, out: *mut 
     })
 }
 
-/// Destroys a mesh. NULL: nothing.
+/// Destroys a mesh and ends its views; NULL has no effect.
 ///
 /// # Safety
 /// `mesh` is NULL or a mesh that is not destroyed and that nobody uses any more.

@@ -1,6 +1,6 @@
 //! The C interface: a thin room in front of the Rust one, where a caller's pointers are checked.
 //!
-//! `include/sinew.h` is generated from here. Every function checks its pointers, catches what might panic, and writes
+//! The headers of `include/` are generated from here. Every function checks its pointers, catches what might panic, and writes
 //! its outputs only when it answers [`SINEW_STATUS_OK`](status::SINEW_STATUS_OK).
 //!
 #![doc = include_str!("functions.md")]
@@ -9,55 +9,81 @@
 
 mod memory;
 
-// The order of the header.
+// The order of functions.md. Units in brackets are no links.
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod status;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 mod guard;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod world;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod definition;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod body;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod springs;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod cut;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod tear;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod strain;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod sleep;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod report;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod material;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod rest_state;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod tool;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod contact;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod attachment;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod suture;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod blade;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod haptic;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod mesh;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod picture;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod query;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod reader;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod detector;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod embedding;
 
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod snapshot;

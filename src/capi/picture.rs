@@ -11,27 +11,29 @@ use crate::error::{Error, Result};
 use crate::picture::{BodyValues, PictureDefinition};
 use crate::raster::{ColourScale, Colours};
 
-/// How a world is drawn. Filled by sinew_picture_def_init.
+/// Camera and size of an image of a world, filled by sinew_picture_def_init.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_picture_def {
-    /// Set by sinew_picture_def_init.
+    /// Size of this struct; sinew_picture_def_init sets it.
     pub struct_size: usize,
-    /// Pixels, 1 to 16384; default 1280.
+    /// [pixels] Width of the image, 1 to 16384; default 1280.
     pub width: u32,
-    /// Pixels, 1 to 16384; default 960.
+    /// [pixels] Height of the image, 1 to 16384; default 960.
     pub height: u32,
-    /// Where the camera is, m.
+    /// [m] Position of the camera.
     pub eye: [f32; 3],
-    /// What it looks at, m; eye equal to target, the default: a view fitted to the bodies, from `direction`.
+    /// [m] Point at the center of the view.
+    ///
+    /// eye equal to target (default): the view is fitted to the bodies along `direction`.
     pub target: [f32; 3],
-    /// What is up in the picture; default 0 1 0.
+    /// Up direction of the image; default 0 1 0.
     pub up: [f32; 3],
-    /// For a fitted view: from the scene towards the camera; default 1 0.6 1.4.
+    /// Fitted view: direction from the scene to the camera; default 1 0.6 1.4.
     pub direction: [f32; 3],
-    /// rad, vertical, above 0 and below pi; default 0.6.
+    /// [rad] Vertical field of view, above 0 and below pi; default 0.6.
     pub field_of_view: f32,
-    /// 1: with the points where tools press bodies and the forces on the tools there; 0, the default: without.
+    /// 1: draws contact points and forces on tools; 0 (default): does not.
     pub show_contacts: u32,
 }
 
@@ -75,9 +77,7 @@ impl sinew_picture_def {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_picture_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills an image definition with its defaults; `struct_size` is sizeof(sinew_picture_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -87,28 +87,30 @@ pub unsafe extern "C" fn sinew_picture_def_init(def: *mut sinew_picture_def, str
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_picture_def::defaults()) })
 }
 
-/// From blue by a light grey, in the middle, to red: for values with a sign.
+/// Blue over light gray to red, for signed values.
 pub const SINEW_COLOURS_DIVERGING: u32 = 0;
-/// From a dark violet by green to a light yellow.
+/// Dark violet over green to light yellow.
 pub const SINEW_COLOURS_SEQUENTIAL: u32 = 1;
 
-/// A body that is coloured by a number for each of its nodes, such as strain or a force. Equal steps of a number look equally far apart.
+/// Values per node that color a body, such as strain or force.
+///
+/// The color maps are perceptually uniform.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_body_values {
-    /// Which.
+    /// Body that is colored.
     pub body: sinew_body_id,
-    /// `node_count` floats, finite, in the caller's order.
+    /// node_count finite floats in the caller's order.
     pub values: *const f32,
-    /// The body's.
+    /// Number of nodes of the body.
     pub node_count: usize,
-    /// What has the first colour, as has what is below.
+    /// Value of the first color; also used below it.
     pub low: f32,
-    /// What has the last colour, as has what is above; above `low`.
+    /// Value of the last color, above low; also used above it.
     pub high: f32,
-    /// SINEW_COLOURS_...
+    /// Color map, a sinew_colours value.
     pub colours: u32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved: u32,
 }
 
@@ -134,11 +136,12 @@ impl sinew_body_values {
     }
 }
 
-/// Draws all bodies and tools into a PNG file: the surface of a body, or its springs where it has none. `def` may be NULL:
-/// the defaults. `path` is UTF-8; a file that exists is replaced, once the whole picture is written.
+/// Draws all bodies and tools into a PNG file.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_IO, SINEW_STATUS_OUT_OF_MEMORY, SINEW_STATUS_UNSUPPORTED (a library
-/// built without pictures).
+/// A body without surface shows its springs. `def` is nullable: the defaults. `path` is UTF-8; an existing file is
+/// replaced once the image is complete.
+///
+/// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `path` is NULL or
@@ -158,9 +161,12 @@ pub unsafe extern "C" fn sinew_world_save_picture(
     }
 }
 
-/// The same with `count` bodies coloured by numbers, each body once; which numbers have which colours is in their `low` and `high`.
+/// Draws all bodies and tools into a PNG file, with some bodies colored by values.
 ///
-/// Errors: those of sinew_world_save_picture, SINEW_STATUS_STALE_ID.
+/// `coloured` holds `count` entries, each for another body. `def` is nullable: the defaults. `path` is as in
+/// sinew_world_save_picture.
+///
+/// Errors: SINEW_STATUS_IO; SINEW_STATUS_UNSUPPORTED if the library was built without pictures.
 ///
 /// # Safety
 /// As for sinew_world_save_picture; `coloured` is NULL or as long as stated, with arrays of the lengths that they state.

@@ -6,25 +6,25 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::query::SurfaceHit;
 
-/// A point of a body's surface.
+/// Point on the surface of a body.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_surface_point {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_surface_point) before the call.
     pub struct_size: usize,
-    /// The body it belongs to; all zero: nothing was found, and the rest is 0.
+    /// Body of the point; all zero if nothing was found, and the rest is 0.
     pub body: sinew_body_id,
-    /// The triangle, in the order of the body's surface.
+    /// Index of the triangle in the body's surface.
     pub triangle: u32,
-    /// Of the triangle's corners, 1 in sum.
+    /// Weights of the triangle's corners, with sum 1.
     pub weights: [f32; 3],
-    /// m
+    /// [m] Position of the point.
     pub position: [f32; 3],
-    /// The triangle's, outward, of unit length; 0 where it has no area.
+    /// Outward unit normal of the triangle; 0 if it has no area.
     pub normal: [f32; 3],
-    /// m: from where it was asked for.
+    /// [m] Distance from the query point.
     pub distance: f32,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
 }
 
@@ -53,12 +53,11 @@ impl From<Option<SurfaceHit>> for sinew_surface_point {
     }
 }
 
-/// Writes the first point that a ray from `origin`, 3 floats, m, along `direction`, 3 floats of any length, meets on the surface of a
-/// body within `max_distance`, m, at least 0, at the nodes' current places. `out->struct_size` is set by the caller; where nothing is
-/// met out->body is all zero. What lies along a triangle does not meet it. Of equal distances the first body's lowest triangle is taken.
-/// The first query near a body builds a tree over its surface, and the first after its nodes have moved refits it; others take a few us.
+/// Finds the first body surface point that a ray hits.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the direction is zero), SINEW_STATUS_OUT_OF_MEMORY.
+/// `origin` [m] and `direction` are 3 floats each; the direction may have any length but 0. `max_distance` [m] is
+/// at least 0. Without a hit out->body is all zero. A triangle parallel to the ray is not hit. The first query near
+/// a body builds a tree, which may allocate; nodes that moved refit it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `origin` and `direction` are NULL or 3 floats; `out` is NULL or writable for
@@ -83,11 +82,10 @@ pub unsafe extern "C" fn sinew_world_cast_ray(
     }
 }
 
-/// Writes the point of the bodies' surfaces that is nearest to `point`, 3 floats, m, at the nodes' current places, no further than
-/// `max_distance`, m, at least 0. `out->struct_size` is set by the caller; where there is none out->body is all zero. Of equal
-/// distances the first body's lowest triangle is taken. It uses the same trees as sinew_world_cast_ray.
+/// Finds the body surface point that is nearest to a point.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// `point` [m] is 3 floats; `max_distance` [m] is at least 0. If no surface is within it out->body is all zero. It
+/// uses the trees of sinew_world_cast_ray.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `point` is NULL or 3 floats; `out` is NULL or writable for `out->struct_size` bytes.

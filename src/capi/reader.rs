@@ -7,36 +7,37 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::readers::BodyReader;
 
-/// A reader of a body: the latest complete positions for one thread, without a lock, while another thread steps the world.
+/// Reader of a body: its latest complete positions for one thread, without locks.
 ///
-/// It is the exception to the rule of threads: made by who has the world, it is then used by one thread at a time, any, whatever others do to the
-/// world meanwhile, until its end; it outlives body and world. A thread more needs a reader more.
+/// One thread at a time may use it, while other threads step or use the world. It may outlive the body and the
+/// world. Create one reader per reading thread.
 pub struct sinew_reader {
     reader: BodyReader,
 }
 
-/// What a reader sees of a body: all of one moment. What it points to is valid, and stays as it is, until the next sinew_reader_read of the same
-/// reader, or the reader's end.
+/// State of a body that a reader read, all from the same moment.
+///
+/// Lifetime of its views: until the next sinew_reader_read of this reader, or its destruction.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_frame {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_frame) before the call.
     pub struct_size: usize,
-    /// Where each node is, m, in the caller's order, with those that cuts have added.
+    /// [m] Node positions, with the nodes added by cuts.
     pub positions: sinew_vec3_view,
-    /// The triangles that were drawn then, as sinew_body_get_triangles gives them; they change with topology_version alone.
+    /// Triangles of sinew_body_get_triangles; they change only with topology_version.
     pub triangles: sinew_triangle_view,
-    /// Above that of earlier frames; the same as long as nothing has moved the body.
+    /// Number of the frame; larger than before if the body was moved.
     pub version: u64,
-    /// What sinew_body_get_topology_changes told as `version` then.
+    /// Version of sinew_body_get_topology_changes at that moment.
     pub topology_version: u64,
-    /// How many steps the world had taken.
+    /// Number of steps that the world had taken.
     pub step: u64,
-    /// The sum of their lengths, s.
+    /// [s] Sum of the lengths of these steps.
     pub time: f64,
     /// 1: this reader did not read this frame before.
     pub is_new: u32,
-    /// 1: the body, or its world, is no more: this is its last frame.
+    /// 1: the body or its world was destroyed, and this is its last frame.
     pub is_over: u32,
 }
 
@@ -46,13 +47,12 @@ unsafe impl Versioned for sinew_frame {
     const NAME: &'static str = "sinew_frame";
 }
 
-/// Creates a reader of a body, which the caller destroys with sinew_reader_destroy. No more than 126 of one body live at a time.
+/// Creates a reader of a body.
 ///
-/// Each step that moves the body shows it to its readers when it has been taken, and so does what moves or cuts it between steps, at once. A step
-/// that is refused is never seen, nor one that is not complete. A body without readers takes no time or memory for them; one that has keeps two
-/// copies of its positions more than it has readers, writes one of them each step, and copies its triangles when cuts or tears have changed them.
+/// Destroy it with sinew_reader_destroy. Each successful step and each change between steps is published to it; an
+/// incomplete step never is. A body with readers keeps two copies of its positions more than it has readers.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID, SINEW_STATUS_CAPACITY (126 readers), SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_CAPACITY if the body has 126 readers.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `out` is NULL or writable.
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn sinew_reader_create(
     }
 }
 
-/// Destroys a reader, on any thread, before or after its body and its world. NULL: nothing.
+/// Destroys a reader on any thread, before or after its body and world; NULL has no effect.
 ///
 /// # Safety
 /// `reader` is NULL or a reader that is not destroyed and that nobody uses any more.
@@ -88,10 +88,9 @@ pub unsafe extern "C" fn sinew_reader_destroy(reader: *mut sinew_reader) {
     }
 }
 
-/// Writes the latest frame; `out->struct_size` is set by the caller. What the frame before pointed to ends. Nothing is copied, allocated or locked,
-/// and nobody waits: it is the same frame again where there is none later.
+/// Writes the latest frame of the body without copying, allocating, locking or waiting.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// It returns the same frame again if there is no newer one. It ends the views of the previous frame.
 ///
 /// # Safety
 /// `reader` is NULL or a reader nobody else uses, whatever happens to the world; `out` is NULL or writable for the size that it states.

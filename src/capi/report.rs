@@ -7,70 +7,70 @@ use super::guard::{sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 
-/// J, at the time of the positions.
+/// Energy of a body [J] at the time of the positions.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_energy {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_energy) before the call.
     pub struct_size: usize,
-    /// Of the nodes that are free to move, with what mass_scaling adds to them.
+    /// [J] Kinetic energy of the free nodes, with the mass that mass_scaling adds.
     pub kinetic: f64,
-    /// Springs and every other inner term, less the work that a constant pressure has done.
+    /// [J] Energy of springs, elements and other internal terms, minus the work of a constant pressure.
     pub elastic: f64,
-    /// Zero at the origin.
+    /// [J] Gravitational energy, 0 at the origin.
     pub gravitational: f64,
 }
 
-/// How much memory the springs of a body take.
+/// Memory use of the springs of a body.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_storage_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_storage_report) before the call.
     pub struct_size: usize,
-    /// Nodes of the body.
+    /// Number of nodes, with those added by cuts.
     pub node_count: usize,
-    /// Each counted once.
+    /// Number of springs, each counted once.
     pub spring_count: usize,
-    /// By springs that exist.
+    /// [bytes] Memory used by existing springs.
     pub bytes_used: usize,
-    /// From the allocator, with what is spare.
+    /// [bytes] Memory allocated, including spare room.
     pub bytes_reserved: usize,
 }
 
-/// How a body's solver took the last step: not one that was refused, or for which the body was put back.
+/// Report of the solver of a body for its last successful step.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_solver_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_solver_report) before the call.
     pub struct_size: usize,
-    /// IMPLICIT, NEWTON: how often the equations of the step were multiplied out; 0 for VERLET.
+    /// IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
     pub iterations: u32,
-    /// How far nodes may be from where the step's equation has them, m. IMPLICIT: root mean square by mass; above what rounding
-    /// allows only where `iterations` of the definition were not enough. NEWTON: the longest way of the last correction, of which
-    /// about a hundredth is left. What a shorter step would change is not in it. 0 for VERLET.
+    /// [m] Remaining error of the solved equations; 0 for VERLET.
+    ///
+    /// IMPLICIT: mass-weighted root mean square. NEWTON: largest displacement of the last correction; about 1/100
+    /// of it remains. It does not include the time discretization error.
     pub error: f32,
-    /// VERLET: by how much mass_scaling makes nodes heavier in all, kg.
+    /// [kg] VERLET: total mass that mass_scaling adds.
     pub added_mass: f64,
-    /// IMPLICIT, NEWTON: linearised equations that were solved; 0 for VERLET.
+    /// IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
     pub solves: u32,
-    /// IMPLICIT, NEWTON: 1 where every equation was solved as far as the definition asks or rounding allows, else 0; 0 for VERLET.
+    /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
     pub converged: u32,
 }
 
-/// What a body encloses: sums over the cavities that are closed; all 0 where its definition asks for neither enclosed_stiffness nor
-/// pressure.
+/// Sums over the closed cavities of a body; all 0 without enclosed_stiffness and pressure.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_enclosed_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_enclosed_report) before the call.
     pub struct_size: usize,
-    /// Cavities that have not been cut open.
+    /// Number of cavities that are not cut open.
     pub cavity_count: usize,
-    /// m3, at the time of the positions; negative where they are inside out.
+    /// [m^3] Volume at the time of the positions; negative if inverted.
     pub volume: f64,
-    /// The same at rest.
+    /// [m^3] Volume in the rest shape.
     pub rest_volume: f64,
-    /// Pa: by how much the pressure inside is above that outside; the mean by volume at rest.
+    /// [Pa] Mean overpressure, weighted by rest volume.
     pub pressure: f64,
 }
 
@@ -98,9 +98,7 @@ unsafe impl Versioned for sinew_solver_report {
     const NAME: &'static str = "sinew_solver_report";
 }
 
-/// Writes the energy of a body. `out->struct_size` is set by the caller.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes the energy of a body.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
@@ -125,9 +123,7 @@ pub unsafe extern "C" fn sinew_body_get_energy(
     }
 }
 
-/// Writes how much memory the springs of a body take. `out->struct_size` is set by the caller.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes the memory use of the springs of a body.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
@@ -153,9 +149,7 @@ pub unsafe extern "C" fn sinew_body_get_storage_report(
     }
 }
 
-/// Writes how a body's solver took the last step. `out->struct_size` is set by the caller.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes how the solver of a body took the last step.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
@@ -182,9 +176,7 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
     }
 }
 
-/// Writes what a body encloses. `out->struct_size` is set by the caller.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes the volume and the pressure of the cavities of a body.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.

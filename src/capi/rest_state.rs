@@ -6,36 +6,35 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::solver::RestStateDefinition;
 
-/// How a state of rest is looked for. Filled by sinew_rest_state_def_init.
+/// Settings of the search for static equilibrium, filled by sinew_rest_state_def_init.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_rest_state_def {
-    /// Set by sinew_rest_state_def_init.
+    /// Size of this struct; sinew_rest_state_def_init sets it.
     pub struct_size: usize,
-    /// How far a node may be from where it is at rest, as far as that can be told, m; 0, the default: a millionth of the body's
-    /// extent.
+    /// [m] Estimated position error allowed; 0 (default): 1e-6 of the body's extent.
     pub tolerance: f32,
-    /// The most products with the matrix of second derivatives; 0, the default: a million.
+    /// Largest number of matrix-vector products; 0 (default): 1,000,000.
     pub iterations: u32,
 }
 
-/// How a state of rest was found.
+/// Report of the search for static equilibrium.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_rest_state_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_rest_state_report) before the call.
     pub struct_size: usize,
-    /// Linearised equations that were solved.
+    /// Number of linear systems solved.
     pub iterations: u32,
-    /// Products with their matrices.
+    /// Number of matrix-vector products.
     pub products: u32,
-    /// The largest force left on a node that is not pinned, before positions were rounded to float, N.
+    /// [N] Largest force left on a free node, before positions are rounded to float.
     pub residual: f64,
-    /// How far a node may be from where it is at rest, before positions were rounded to float, m.
+    /// [m] Estimated position error, before positions are rounded to float.
     pub error: f64,
-    /// Of springs, gravity and forces, J, zero at the origin: before.
+    /// [J] Energy of springs, gravity and forces before the search, 0 at the origin.
     pub energy_before: f64,
-    /// After.
+    /// [J] Energy of springs, gravity and forces after the search.
     pub energy_after: f64,
 }
 
@@ -61,9 +60,7 @@ impl sinew_rest_state_def {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_rest_state_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a definition with its defaults; `struct_size` is sizeof(sinew_rest_state_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -73,15 +70,14 @@ pub unsafe extern "C" fn sinew_rest_state_def_init(def: *mut sinew_rest_state_de
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_rest_state_def::defaults()) })
 }
 
-/// Moves the free nodes of a body, whatever its solver, to the nearest place downhill where it is at rest under gravity, its
-/// pins where they are, and the forces applied since the last step, which stay pending. Velocities become zero, and
-/// sinew_body_get_pin_force tells what holds the pins there. Views of the body's positions and velocities end. It is no step: it takes memory and may take seconds. Tools are not
-/// taken into account. How a part that no pin holds lies and is turned as a whole is as it happens to be. `def` is nullable: the
-/// defaults; `report` is nullable; `report->struct_size` is set by the caller.
+/// Moves the free nodes of a body to static equilibrium under gravity, pins and pending forces.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a part is pulled by a net force along an axis along which no pin holds it, and
-/// so has no state of rest), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSTABLE (not found in the iterations allowed), SINEW_STATUS_OUT_OF_MEMORY; nothing
-/// has changed then.
+/// It is not a step: it allocates and may take seconds. It ignores tools. Velocities become 0, pending forces stay.
+/// The rigid position of unpinned parts is unspecified. `def` (defaults) and `report` are nullable. It ends the
+/// views of the body's positions and velocities. On failure nothing changes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a net force acts on an unpinned part; SINEW_STATUS_UNSTABLE if not
+/// found.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states; `report` is NULL or

@@ -5,10 +5,9 @@ use super::memory;
 use super::status::sinew_status;
 use super::world::sinew_world;
 
-/// Writes what part of a body's nodes is awake, 0 to 1: stepped. 1 for a body that never sleeps, 0 where all of it is at rest, and a step
-/// costs next to nothing.
+/// Writes the fraction of the nodes that are awake, from 0 to 1.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// It is 1 for a body that never sleeps.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -27,9 +26,9 @@ pub unsafe extern "C" fn sinew_body_get_awake_share(
     }
 }
 
-/// Has all of a body be stepped again, until it has been at rest for as long as it takes: whatever reaches it does so by itself.
+/// Wakes all nodes of a body until they come to rest again.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Forces, contacts, cuts and property changes wake a body automatically.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.

@@ -9,10 +9,9 @@ use super::world::sinew_run_tasks;
 use crate::threads::RunTasks;
 use crate::world::World;
 
-/// How many bytes sinew_world_save_snapshot writes of the world as it is now.
+/// Writes the number of bytes that sinew_world_save_snapshot needs now.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a haptic handle leads a tool; or more room is kept for what may come
-/// than bytes can ask for).
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool, or the size exceeds what memory can address.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -28,14 +27,13 @@ pub unsafe extern "C" fn sinew_world_get_snapshot_size(world: *const sinew_world
     }
 }
 
-/// Writes the world as bytes, of which sinew_world_load_snapshot makes one that goes on just as this one does, to the bit: with bodies as
-/// they were cut and torn, contacts, what is held and sewn, blades in mid stroke, forces applied for the next step, and ids, which name the
-/// same things there. `size` is what sinew_world_get_snapshot_size tells. The bytes are the same for any number of threads.
+/// Saves a world as bytes, from which sinew_world_load_snapshot continues bitwise identically.
 ///
-/// What is not of the world is not in them: threads, readers, detectors and embeddings, which are made again. They are for this version of
-/// the library alone. A checksum tells whether they are as they were written, not who wrote them.
+/// `size` must be that of sinew_world_get_snapshot_size. The snapshot holds bodies with cuts, contacts,
+/// attachments, blades, pending forces and ids. It does not hold threads, readers, detectors and embeddings. Only
+/// this library version can read it. A checksum detects damage, not tampering.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also another size), SINEW_STATUS_UNSUPPORTED as above.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a haptic handle drives a tool.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `bytes` is NULL or as long as stated.
@@ -54,14 +52,13 @@ pub unsafe extern "C" fn sinew_world_save_snapshot(
     }
 }
 
-/// Creates a world of the bytes that sinew_world_save_snapshot wrote, which the caller destroys with sinew_world_destroy. `thread_count`,
-/// `run_tasks`, nullable, and `tasks_context` are as in sinew_world_def.
+/// Creates a world from the bytes of a snapshot.
 ///
-/// It goes on to the bit where the processor offers the kernel that the world was stepped with; else SINEW_KERNEL_BEST is the best of this
-/// one. What was cut short, has changed or never was a world is refused as a whole.
+/// `thread_count`, `run_tasks` (nullable) and `tasks_context` (nullable) are as in sinew_world_def. Destroy the
+/// world with sinew_world_destroy. Results are bitwise identical only with the kernel of the saved world.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (bytes of another version of the library; a thread could not be started,
-/// or the processor does not offer the kernel that the world was created with), SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bytes are damaged; SINEW_STATUS_UNSUPPORTED for another library
+/// version or kernel, or if a thread could not be started.
 ///
 /// # Safety
 /// `bytes` is NULL or as long as stated; `run_tasks` is NULL or keeps its word, as long as the world lives; `out` is NULL or writable.

@@ -6,10 +6,10 @@ use super::memory;
 use super::status::sinew_status;
 use crate::body::{Values, expect_count};
 
-/// Writes the two nodes of each spring, each spring once, the lower node first: `pairs` are 2 `count` indices, `count` how many springs
-/// the body has (`spring_count` of sinew_body_get_storage_report). The order is the same until springs are added or removed.
+/// Writes the two nodes of each spring, each spring once, the lower node first.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `count` is not the body's), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY.
+/// `pairs` receives 2 * count indices; `count` must be spring_count of sinew_body_get_storage_report. The order
+/// stays until springs are added or removed.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `pairs` is NULL or as long as stated.
@@ -32,11 +32,12 @@ pub unsafe extern "C" fn sinew_body_get_spring_pairs(
     }
 }
 
-/// Writes what the springs of `count` pairs of nodes are like now: `pairs` are 2 `count` indices; `stiffnesses`, N/m, and
-/// `rest_lengths`, m, are `count` floats each, nullable. PACKED keeps rest lengths that come from positions merged where these are
-/// rounded to the same.
+/// Writes the stiffnesses and rest lengths of the springs between pairs of nodes.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID.
+/// `pairs` holds 2 * count indices. `stiffnesses` [N/m] and `rest_lengths` [m] receive `count` floats each and are
+/// nullable. PACKED merges rest lengths that differ only by rounding.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
@@ -69,13 +70,13 @@ pub unsafe extern "C" fn sinew_body_get_springs(
     }
 }
 
-/// Gives the springs of `count` pairs of nodes other stiffnesses, N/m, or rest lengths, m, or both: `pairs` are 2 `count` indices,
-/// `stiffnesses` and `rest_lengths` `count` floats each, NULL: they stay. Damping stays, and the law by which springs stiffen. Of a
-/// pair that is named more than once the last counts. Positions and velocities stay, so the energy changes by what the springs then
-/// hold. It takes as long as the springs are many, however large the body.
+/// Sets stiffnesses, rest lengths or both of the springs between pairs of nodes.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then no
-/// spring is changed.
+/// `pairs` holds 2 * count indices, the arrays `count` floats each: `stiffnesses` [N/m], `rest_lengths` [m], both
+/// nullable: unchanged. If a pair repeats, its last entry counts. Damping, force law, positions and velocities
+/// stay. On failure no spring changes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.
@@ -99,17 +100,11 @@ pub unsafe extern "C" fn sinew_body_set_springs(
     }
 }
 
-/// Makes what lies between `node_count` nodes alone `stiffness_factor` times as stiff and `length_factor` times as long at rest, as
-/// cautery stiffens and shrinks, and as tissue swells: springs of two of them, tetrahedra of SINEW_MATERIAL_TETRAHEDRA or with a
-/// volume_stiffness with all corners among them, bending and fibres alike. Home springs become stiffer, and draw where they did. What
-/// reaches beyond the region stays as it is, and so do masses, damping, positions and velocities: the body moves to its new shape by
-/// itself.
+/// Multiplies the stiffness and the rest length of the material between given nodes.
 ///
-/// `stiffness_factor` is at least 0, `length_factor` above 0. Factors multiply those of calls before; a stiffness of 0 is for good, and
-/// takes tetrahedra away. `nodes` may name a node more than once. It takes as long as the region is large.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where something would become so stiff, long or small that it is no number),
-/// SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY; then nothing is changed.
+/// It changes springs, tetrahedra, bending and fibers whose nodes are all among `nodes`, which may repeat; anchor
+/// springs change only their stiffness. `stiffness_factor` is at least 0, where 0 is permanent; `length_factor` is
+/// above 0. Repeated calls multiply. Masses, damping, positions and velocities stay. On failure nothing changes.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `nodes` is NULL or as long as stated.

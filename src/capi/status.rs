@@ -7,35 +7,35 @@ use libc::c_char;
 
 use crate::error::Error;
 
-/// The answer of every function that can fail: one of the `SINEW_STATUS_...`.
+/// Result of every function that can fail: a sinew_status_code value.
 pub type sinew_status = i32;
 
-/// Done.
+/// The call succeeded.
 pub const SINEW_STATUS_OK: sinew_status = 0;
-/// An argument is out of its range; nothing changed.
+/// An argument is outside its range; nothing changed.
 pub const SINEW_STATUS_INVALID_ARGUMENT: sinew_status = 1;
-/// The id is of something destroyed, or of nothing.
+/// The id refers to a destroyed object, or to none.
 pub const SINEW_STATUS_STALE_ID: sinew_status = 2;
-/// A fixed-capacity storage is full.
+/// A storage of fixed capacity is full.
 pub const SINEW_STATUS_CAPACITY: sinew_status = 3;
-/// Memory could not be reserved; nothing changed.
+/// Memory could not be allocated; nothing changed.
 pub const SINEW_STATUS_OUT_OF_MEMORY: sinew_status = 4;
-/// The step could not be taken, or the state of rest was not found: nothing moved, pending forces and poses stay pending.
+/// The step or the equilibrium failed: nothing moved, forces and poses stay pending.
 pub const SINEW_STATUS_UNSTABLE: sinew_status = 5;
-/// Valid, but this build or this combination does not offer it.
+/// The request is valid, but this build or combination does not offer it.
 pub const SINEW_STATUS_UNSUPPORTED: sinew_status = 6;
 /// A file could not be read or written.
 pub const SINEW_STATUS_IO: sinew_status = 7;
-/// A fault inside the library; the world refuses further calls but destroy.
+/// Fault inside the library; the world then accepts only sinew_world_destroy.
 pub const SINEW_STATUS_INTERNAL: sinew_status = 8;
 
-/// The first number of the version that this header is of.
+/// Major version of this header.
 pub const SINEW_VERSION_MAJOR: u32 = 0;
-/// The second.
+/// Minor version of this header.
 pub const SINEW_VERSION_MINOR: u32 = 1;
-/// The third.
+/// Patch version of this header.
 pub const SINEW_VERSION_PATCH: u32 = 0;
-/// All three: major << 16 | minor << 8 | patch.
+/// Version of this header as one number: major << 16 | minor << 8 | patch.
 pub const SINEW_VERSION: u32 = SINEW_VERSION_MAJOR << 16 | SINEW_VERSION_MINOR << 8 | SINEW_VERSION_PATCH;
 
 thread_local! {
@@ -94,13 +94,15 @@ pub(super) fn status_of(error: &Error) -> sinew_status {
     }
 }
 
-/// The version of the library that is linked: major << 16 | minor << 8 | patch; compare with SINEW_VERSION.
+/// Returns the version of the linked library; compare it with SINEW_VERSION.
 #[unsafe(no_mangle)]
 pub extern "C" fn sinew_version() -> u32 {
     SINEW_VERSION
 }
 
-/// The name of a status, such as "SINEW_STATUS_OK"; never NULL, valid for ever.
+/// Returns the name of a status, such as "SINEW_STATUS_OK".
+///
+/// The string is static and never NULL, also for an unknown status.
 #[unsafe(no_mangle)]
 pub extern "C" fn sinew_status_name(status: sinew_status) -> *const c_char {
     let name = match status {
@@ -118,10 +120,10 @@ pub extern "C" fn sinew_status_name(status: sinew_status) -> *const c_char {
     name.as_ptr()
 }
 
-/// Writes the message of this thread's last failed call to `buffer`, cut where `capacity` bytes do not hold it, and ended
-/// by NUL. `buffer` may be NULL where `capacity` is 0.
+/// Copies the message of this thread's last failed call into a buffer.
 ///
-/// Returns the bytes that the whole message needs, NUL included; 1, an empty message, where no call has failed.
+/// The text is cut to `capacity` bytes and always ends with NUL. `buffer` is nullable. Returns the number of bytes
+/// that the whole message needs, NUL included; 1 if no call has failed.
 ///
 /// # Safety
 /// `buffer` must be writable for `capacity` bytes.

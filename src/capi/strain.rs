@@ -9,16 +9,15 @@ use super::status::sinew_status;
 use crate::error::{Error, Result};
 use crate::strain::{self, Strain};
 
-/// How a triangle or tetrahedron is strained, as a part of its lengths at rest: 0 wherever it is moved and turned, 0.1 where it is a
-/// tenth longer. What has no area or volume at rest has no strain: 0.
+/// Strain of a triangle or tetrahedron; 0 for a rigid motion, or if it has no size at rest.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_strain {
-    /// Along the direction in which it is longest: the largest principal stretch, less 1.
+    /// Largest principal stretch minus 1.
     pub largest: f32,
-    /// Along the direction in which it is shortest: the smallest principal stretch, less 1; from -1 on.
+    /// Smallest principal stretch minus 1, at least -1.
     pub smallest: f32,
-    /// Of its area or volume: J - 1; below -1 for a tetrahedron that is inside out.
+    /// Volumetric (or areal) strain J - 1; below -1 for an inverted tetrahedron.
     pub growth: f32,
 }
 
@@ -32,11 +31,12 @@ unsafe fn strains_of<'a>(strains: *mut sinew_strain, count: usize) -> Result<&'a
     unsafe { memory::output_array("strains", strains.cast::<Strain>(), count) }
 }
 
-/// Writes the strain L/L0 - 1 of `count` pairs of nodes, 0 where L0 is 0: `pairs` are 2 `count` indices, `rest_lengths` `count` floats,
-/// m, NULL: those of the springs that the pairs have (which takes longer), `strains` `count` floats.
+/// Writes the strain L / L0 - 1 between pairs of nodes; 0 where L0 is 0.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has no spring and `rest_lengths` is NULL), SINEW_STATUS_STALE_ID,
-/// SINEW_STATUS_OUT_OF_MEMORY.
+/// `pairs` holds 2 * count indices. `rest_lengths` [m] holds `count` floats; it is nullable: the rest lengths of
+/// the springs, which takes longer. `strains` receives `count` floats.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a pair has no spring and `rest_lengths` is NULL.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
@@ -64,11 +64,10 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
     }
 }
 
-/// Writes the strain of `triangle_count` triangles of a body's nodes, any, such as those of its surface: `rest_positions` are 3
-/// `node_count` floats, m, where its nodes are at rest, or were when strain is to be counted from; `triangles` 3 `triangle_count`
-/// indices.
+/// Writes the strains of any triangles between nodes of a body.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `triangles` holds 3 * triangle_count
+/// indices; `strains` receives one entry per triangle. `node_count` must be the body's.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
@@ -93,10 +92,10 @@ pub unsafe extern "C" fn sinew_body_get_triangle_strains(
     }
 }
 
-/// Writes the strain of `tetrahedron_count` tetrahedra of a body's nodes, any: `rest_positions` as for sinew_body_get_triangle_strains,
-/// `tetrahedra` 4 `tetrahedron_count` indices.
+/// Writes the strains of any tetrahedra between nodes of a body.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where `node_count` is not the body's), SINEW_STATUS_STALE_ID.
+/// `rest_positions` [m] holds 3 * node_count floats, the reference shape; `tetrahedra` holds 4 * tetrahedron_count
+/// indices; `strains` receives one entry per tetrahedron. `node_count` must be the body's.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; the arrays are NULL or as long as stated, and do not overlap.
@@ -121,11 +120,10 @@ pub unsafe extern "C" fn sinew_body_get_tetrahedron_strains(
     }
 }
 
-/// Writes for each of `node_count` nodes the mean of the values of its elements, 0 where it has none, as to draw strain with
-/// sinew_world_save_picture_of_values: `elements` are `corners` `element_count` node indices, `corners` 2, 3 or 4, `values`
-/// `element_count` floats, finite, `means` `node_count` floats.
+/// Averages values of elements at their nodes; 0 at a node without elements.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_OUT_OF_MEMORY.
+/// `elements` holds corners * element_count node indices, `corners` is 2, 3 or 4, `values` holds element_count
+/// finite floats, and `means` receives node_count floats. Use it to color an image by strain.
 ///
 /// # Safety
 /// The arrays are NULL or as long as stated, and do not overlap.

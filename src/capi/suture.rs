@@ -8,33 +8,33 @@ use super::status::sinew_status;
 use crate::error::Result;
 use crate::world::{Anchor, SurfacePoint, SutureDefinition};
 
-/// What a suture is like. Filled by sinew_suture_def_init.
+/// Settings of a suture, filled by sinew_suture_def_init.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_suture_def {
-    /// Set by sinew_suture_def_init.
+    /// Size of this struct; sinew_suture_def_init sets it.
     pub struct_size: usize,
-    /// How long the thread is between its points while nothing pulls, m, at least 0; -1, the default: as long as they are apart.
+    /// [m] Unloaded length of the thread, at least 0; -1 (default): the current distance.
     pub length: f32,
-    /// By what force it is longer, N/m, above 0; infinity, the default: it does not stretch.
+    /// [N/m] Stiffness of the thread, above 0; infinity (default): inextensible.
     pub stiffness: f32,
-    /// The force at which it is pulled through the tissue, N, at least 0; 0, the default, or infinity: it holds whatever comes.
+    /// [N] Mean force above which it tears out, at least 0; 0 (default) or infinity: unlimited.
     pub force_limit: f32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved0: u32,
 }
 
-/// How a suture is now.
+/// Current state of a suture.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_suture_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_suture_report) before the call.
     pub struct_size: usize,
-    /// How long its thread is while nothing pulls, m.
+    /// [m] Unloaded length of the thread.
     pub length: f32,
-    /// How far apart its points are, m: further than that where it pulls.
+    /// [m] Distance of its points; larger than the length under load.
     pub distance: f32,
-    /// What the thread stores, J; 0 where it does not stretch. That of bodies is without it.
+    /// [J] Energy stored in the thread, not part of the bodies' energy; 0 if inextensible.
     pub energy: f64,
 }
 
@@ -62,9 +62,7 @@ impl sinew_suture_def {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_suture_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a suture definition with its defaults; `struct_size` is sizeof(sinew_suture_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -74,21 +72,13 @@ pub unsafe extern "C" fn sinew_suture_def_init(def: *mut sinew_suture_def, struc
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_suture_def::defaults()) })
 }
 
-/// Sutures a point of the surface of a body to one of another, or of the same: a thread between them, which pulls them together where
-/// they are further apart than it is long, and never pushes. Each may turn about its point as it likes. What the thread joins still
-/// touches. A point is a triangle's number, as to sinew_body_attach_points, and 3 parts of its corners, at least 0 and 1 in sum.
+/// Joins two surface points of bodies by a thread, which pulls and never pushes.
 ///
-/// It is one of the attachments, with the id written to `out`: sinew_attachment_release cuts it, sinew_attachment_get_force has
-/// the force on `body`, and one that is pulled through the tissue is among those of sinew_world_get_slipped: with the step in which
-/// its mean force was larger than the definition's force_limit. It ends with either body. The bodies take their substeps together,
-/// as with sinew_body_attach_points_to_points; no stiffness makes them shorter.
+/// A point is a surface triangle with 3 corner weights, at least 0 with sum 1. The bodies may be the same and still
+/// collide. `def` is nullable: the defaults. A thread shorter than the distance is drawn in at no more than 0.25
+/// m/s. Release and force are those of an attachment; a torn suture is in sinew_world_get_slipped.
 ///
-/// A thread that is to be shorter than its points are apart is drawn in as with sinew_suture_set_length. No momentum is made; nor is
-/// any angular momentum, unless points of a thread of next to no length pass each other. Nor is energy, but by drawing it in; what takes up
-/// a thread that becomes taut within a substep is lost, as is some of what sways along a stiff one. `def` is nullable: the defaults.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the two are one point), SINEW_STATUS_STALE_ID, SINEW_STATUS_OUT_OF_MEMORY;
-/// then nothing is sutured.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if both points are the same.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `weights` and `other_weights` are NULL or 3 floats; `def` is NULL or a definition of the
@@ -138,10 +128,11 @@ unsafe fn anchor(name: &str, triangle: u32, weights: *const f32) -> Result<Ancho
     Ok(Anchor::Point(SurfacePoint { triangle, weights }))
 }
 
-/// Tightens a suture, or gives it slack: its thread becomes so long, m, at least 0, evenly over the next step; where it is to become
-/// shorter no faster than by 0.25 m/s, over as many steps as that takes.
+/// Changes the length [m] of a suture's thread evenly over the next step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the attachment is no suture), SINEW_STATUS_STALE_ID.
+/// The length is at least 0. It shortens by at most 0.25 m/s, over as many steps as that takes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -155,9 +146,9 @@ pub unsafe extern "C" fn sinew_suture_set_length(
     unsafe { with_world_mut(world, |world| world.set_suture_length(suture.id(), length)) }
 }
 
-/// Writes how a suture is now; `report->struct_size` is set by the caller.
+/// Writes the current state of a suture.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where the attachment is no suture), SINEW_STATUS_STALE_ID.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the attachment is not a suture.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `report` is NULL or writable for the size that it states.

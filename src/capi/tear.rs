@@ -6,24 +6,23 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::body::Values;
 
-/// What tore in the last step, and what did not; all 0 of a body that does not tear.
+/// Report of the tears in the last step; all 0 for a body that does not tear.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_tear_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_tear_report) before the call.
     pub struct_size: usize,
-    /// Tears that were made.
+    /// Number of tears made.
     pub tears: u32,
-    /// How many more pieces the surface has.
+    /// Increase of the number of connected surface components.
     pub pieces_parted: u32,
-    /// Springs beyond their limits whose turn is to come: there were most_tears, one beside them, or nothing pulls their nodes apart.
+    /// Overloaded springs that wait: most_tears was reached, a neighbor tore, or no force separates their nodes.
     pub waiting: u32,
-    /// Springs beyond their limits that would part a piece smaller than smallest_piece. They are tried again when the topology has changed.
+    /// Overloaded springs that would make a fragment below smallest_piece; retried after a topology change.
     pub small_pieces: u32,
-    /// Springs beyond their limits for whose tears there is no room: not as many spare nodes, FAST_LINK: no free place of a node, or no memory.
-    /// They are tried again when the topology has changed.
+    /// Overloaded springs without spare nodes, FAST_LINK slots or memory; retried after a topology change.
     pub no_room: u32,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
 }
 
@@ -33,9 +32,7 @@ unsafe impl Versioned for sinew_tear_report {
     const NAME: &'static str = "sinew_tear_report";
 }
 
-/// Writes what tore in the last step of a body, and what did not. `out->struct_size` is set by the caller.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Writes which tears the last step of a body made or refused.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
@@ -63,12 +60,14 @@ pub unsafe extern "C" fn sinew_body_get_tear_report(
     }
 }
 
-/// Gives the springs of `count` pairs of nodes, or edges of elements, other limits than tear_strain and tear_force of the definition: `pairs` are 2 `count` indices,
-/// `strains` and `forces`, N, `count` floats each, at least 0, 0: any; NULL: they stay. Springs that are added later have none until they are given
-/// some. Of a pair that is named more than once the last counts.
+/// Sets tear limits of single springs or element edges, in place of the body's.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a pair has neither), SINEW_STATUS_STALE_ID, SINEW_STATUS_UNSUPPORTED (most_tears was 0),
-/// SINEW_STATUS_OUT_OF_MEMORY; then no limit is changed.
+/// `pairs` holds 2 * count indices; `strains` and `forces` [N] hold `count` floats each, at least 0, where 0 means
+/// no limit; both are nullable: unchanged. If a pair repeats, its last entry counts. On failure no limit changes.
+/// Springs added later have no limits.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a pair without spring and edge; SINEW_STATUS_UNSUPPORTED if most_tears
+/// is 0.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; the arrays are NULL or as long as stated.

@@ -12,78 +12,83 @@ use crate::error::{Error, Result};
 use crate::slots::SlotId;
 use crate::world::ToolId;
 
-/// A tool: a plain value, all zero is "none".
+/// Id of a tool; all zero means none.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_tool_id {
-    /// Which place, from 1.
+    /// Slot of the tool, counted from 1.
     pub index1: u32,
-    /// Which of the tools that lived there.
+    /// Number of the use of that slot.
     pub generation: u32,
 }
 
-/// A ball about the origin.
+/// Sphere about the origin.
 pub const SINEW_SHAPE_SPHERE: u32 = 0;
-/// A cylinder along y about the origin, with round caps.
+/// Cylinder along y about the origin, with round caps.
 pub const SINEW_SHAPE_CAPSULE: u32 = 1;
-/// The plane y = 0 with free space above.
+/// Plane y = 0 with free space above.
 pub const SINEW_SHAPE_PLANE: u32 = 2;
-/// A closed mesh.
+/// Closed triangle mesh.
 pub const SINEW_SHAPE_MESH: u32 = 3;
 
 /// Exact distances, swept over the step.
 pub const SINEW_DETECTION_EXACT: u32 = 0;
-/// Virtual rays cast through a depth buffer.
+/// Rays cast through depth images.
 pub const SINEW_DETECTION_IMAGE_SPACE: u32 = 1;
-/// A sampled signed distance; for meshes alone.
+/// Sampled signed distance; only for mesh tools.
 pub const SINEW_DETECTION_DISTANCE_FIELD: u32 = 2;
 
-/// What a tool is. Filled by sinew_tool_def_init; used only during sinew_tool_create.
+/// Shape and settings of a rigid tool.
+///
+/// Filled by sinew_tool_def_init; read only during sinew_tool_create.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_tool_def {
-    /// Set by sinew_tool_def_init.
+    /// Size of this struct; sinew_tool_def_init sets it.
     pub struct_size: usize,
-    /// SINEW_SHAPE_...: sphere about the origin, capsule along y, plane y = 0 with free space above.
+    /// Shape of the tool, a sinew_shape value.
     pub shape: u32,
-    /// m, above 0, at most 1e9, as is the sum with `half_length`: sphere, capsule; no default.
+    /// [m] Sphere, capsule: above 0, at most 1e9 with half_length added; no default.
     pub radius: f32,
-    /// m, at least 0: capsule, between the centre and a cap's centre; with SINEW_DETECTION_IMAGE_SPACE at most 10 000 times `radius`.
-    /// What is touched is known to a ten millionth of it.
+    /// [m] Capsule: distance from the center to the center of a cap, at least 0.
+    ///
+    /// IMAGE_SPACE allows at most 10,000 times the radius. Contact points are accurate to 1e-7 of it.
     pub half_length: f32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved0: u32,
-    /// Mesh: 3 node_count floats, closed, triangles outward.
+    /// [m] Mesh: 3 * node_count floats; nullable for other shapes.
     pub positions: *const f32,
-    /// Nodes of the mesh.
+    /// Number of nodes of the mesh.
     pub node_count: usize,
-    /// 3 triangle_count node indices.
+    /// 3 * triangle_count node indices of a closed surface, outward; nullable for other shapes.
     pub triangles: *const u32,
-    /// Triangles of the mesh.
+    /// Number of triangles of the mesh.
     pub triangle_count: usize,
-    /// SINEW_DETECTION_...
+    /// Contact detection, a sinew_detection value; default SINEW_DETECTION_EXACT.
     pub detection: u32,
-    /// Coulomb coefficient; default 0.
+    /// Coulomb coefficient, at least 0; default 0.
     pub friction: f32,
-    /// Where it is at first, m, each within 1e9 of 0; default 0 0 0.
+    /// [m] Initial position, each coordinate within 1e9; default 0 0 0.
     pub position: [f32; 3],
-    /// x y z w; default 0 0 0 1; normalised, zero is refused.
+    /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
     pub orientation: [f32; 4],
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved: u32,
-    /// How fine an image or a distance field is, m: the side of a pixel or a cell; 0, the default: a 256th or a 96th of the mesh's longest
-    /// extent, or a fourth of the least where that is less. Refused where no ray or sample would lie within the mesh, by default where
-    /// fewer than two would along its least extent; and where an image would have more than 2^24 pixels or a field as many samples.
-    /// Memory: some 24 bytes for each pixel of 3 images, or 4 for each sample. Time: to draw the mesh 3 times, or as many exact distances
-    /// as there are samples, which takes minutes for 2^24 of a large mesh.
+    /// [m] Mesh: pixel size of the images or cell size of the distance field; 0 (default): automatic.
+    ///
+    /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if less. Refused
+    /// above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory: about 24 bytes per pixel of 3
+    /// images, 4 bytes per sample.
     pub resolution: f32,
-    /// N, at least 0: the largest force that moves it; default infinity: it goes wherever it is sent. Where tissue resists with more it stops
-    /// short of its pose: see sinew_tool_get_pose.
+    /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue stops it.
+    ///
+    /// Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
     pub force_limit: f32,
-    /// The categories that it belongs to, a bit for each; default 1. It meets bodies where each has a category that the other's
-    /// mask has.
+    /// Bits of the categories that this tool belongs to; default 1.
+    ///
+    /// Two objects collide if each has a category in the mask of the other.
     pub collision_category: u32,
-    /// The categories that it meets, a bit for each; default 0xffffffff.
+    /// Bits of the categories that this tool collides with; default 0xffffffff.
     pub collision_mask: u32,
 }
 
@@ -186,9 +191,7 @@ impl sinew_tool_def {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_tool_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -198,10 +201,9 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_tool_def::defaults()) })
 }
 
-/// Creates a tool; copies what `def` points to.
+/// Creates a tool in a world, and copies everything that `def` points to.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (DISTANCE_FIELD of a shape that is no mesh, IMAGE_SPACE of a plane),
-/// SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD without a mesh, or IMAGE_SPACE with a plane.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
@@ -223,9 +225,7 @@ pub unsafe extern "C" fn sinew_tool_create(
     }
 }
 
-/// Destroys a tool. What is attached to it is let go.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Destroys a tool and releases everything attached to it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -235,12 +235,13 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
     unsafe { with_world_mut(world, |world| world.destroy_tool(tool.id())) }
 }
 
-/// Moves a tool to `position`, 3 floats, m, over the next step, and turns it to `orientation`, x y z w, which may be
-/// NULL: as it is. It goes straight and turns the shorter way, both evenly; tissue gives way. What of its way a tool of limited force has
-/// not gone in that step is forgotten: it is sent again.
+/// Moves a tool to a new pose during the next step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT (also where a coordinate is further than 1e9 m from 0, the orientation is zero, or a haptic handle leads the
-/// tool), SINEW_STATUS_STALE_ID.
+/// The tool moves along a straight line and rotates through the shorter arc, at constant speed. `position` [m] is 3
+/// floats, each within 1e9; `orientation` is x y z w, not zero, nullable: unchanged. If force_limit stops the tool
+/// early, the remaining motion is discarded: call again for every step.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `position` is NULL or 3 floats, `orientation` NULL or 4.
@@ -262,9 +263,7 @@ pub unsafe extern "C" fn sinew_tool_set_pose(
     }
 }
 
-/// Gives a tool this Coulomb coefficient of friction, at least 0, from the next step on.
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// Sets the friction coefficient of a tool, at least 0, from the next step on.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -278,9 +277,9 @@ pub unsafe extern "C" fn sinew_tool_set_friction(
     unsafe { with_world_mut(world, |world| world.set_friction(tool.id(), friction)) }
 }
 
-/// Has `force_limit`, N, at least 0 or infinity, be the largest force that moves a tool, from the next step on: see sinew_tool_def.
+/// Sets the largest force [N] that moves a tool, from the next step on.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// It is at least 0; infinity: unlimited; 0: tissue stops the tool. See sinew_tool_def.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -294,10 +293,9 @@ pub unsafe extern "C" fn sinew_tool_set_force_limit(
     unsafe { with_world_mut(world, |world| world.set_force_limit(tool.id(), force_limit)) }
 }
 
-/// Has a tool be of these categories and meet those of `mask`, a bit for each, from the next step on: see sinew_tool_def. With mask 0 it
-/// meets nothing; tissue that lies within it when it meets it again is pushed out.
+/// Sets the collision category and mask of a tool from the next step on.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// With mask 0 the tool collides with nothing. Tissue inside it is pushed out once it collides again.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -316,10 +314,10 @@ pub unsafe extern "C" fn sinew_tool_set_collision(
     }
 }
 
-/// Writes where a tool is: its position, 3 floats, m, and its orientation, 4 floats, x y z w; either may be NULL. Where its force is
-/// limited it may have stopped short of where it was sent.
+/// Writes the current pose of a tool.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. A tool with a
+/// force_limit can be short of its commanded pose.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
@@ -347,10 +345,10 @@ pub unsafe extern "C" fn sinew_tool_get_pose(
     }
 }
 
-/// Writes where the last step led a tool: where it is, but for one of limited force. Either may be NULL, as for sinew_tool_get_pose. Sent there by
-/// sinew_tool_set_pose step by step, it does the same in another world: so what a haptic handle did can be taken down and done again.
+/// Writes the pose that the last step moved a tool to, before the force_limit.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable. Replaying these poses
+/// with sinew_tool_set_pose reproduces the steps, also those that a haptic handle drove.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `position` is NULL or writable for 3 floats, `orientation` for 4.
@@ -378,10 +376,9 @@ pub unsafe extern "C" fn sinew_tool_get_target(
     }
 }
 
-/// Writes the force, 3 floats, N, and the torque about its position, 3 floats, N m, on a tool: world axes, mean over the
-/// last step.
+/// Writes the force and torque on a tool, averaged over the last step, in world axes.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_STALE_ID.
+/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `force` and `torque` are NULL or writable for 3 floats.

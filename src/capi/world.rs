@@ -15,84 +15,90 @@ use crate::world::{StepReport, World, WorldDefinition};
 
 pub use super::guard::sinew_world;
 
-/// uint32_t: the instructions that springs and nodes are worked on with. The widest that the processor offers.
+/// Widest level that the processor supports.
 pub const SINEW_KERNEL_BEST: u32 = 0;
-/// The same bits on every processor.
+/// Bitwise identical results on every processor.
 pub const SINEW_KERNEL_PORTABLE: u32 = 1;
-/// x86-64: AVX2 and FMA.
+/// x86-64 with AVX2 and FMA.
 pub const SINEW_KERNEL_AVX2: u32 = 2;
-/// x86-64: AVX-512 F, BW, DQ and VL.
+/// x86-64 with AVX-512 F, BW, DQ and VL.
 pub const SINEW_KERNEL_AVX512: u32 = 3;
-/// AArch64.
+/// AArch64 with NEON.
 pub const SINEW_KERNEL_NEON: u32 = 4;
 
-/// A part of a step, to be called once for every index that sinew_run_tasks was told, with the task_data it was given.
+/// One task of a step; call it with the task_data and the indices that sinew_run_tasks received.
 pub type sinew_task = Option<unsafe extern "C" fn(task_data: *mut c_void, index: u32)>;
 
-/// Runs a step's tasks on the threads of a job system: calls task(task_data, index) once for every index from 0 to
-/// count - 1, on any threads, in any order, even one after another, and returns when all of these calls have. Calling it
-/// later than that is an error that is not found out.
+/// Callback that runs the tasks of a step on a job system.
 ///
-/// Calls that overlap share the work; each lasts until the step is taken, so that no more tasks should run at once than
-/// there are cores free for them. The first to begin takes the step, wherever it runs; with none, the step is taken by
-/// the caller's thread. Runs within sinew_world_step, and must not use the world.
+/// Call task(task_data, index) once for every index from 0 to count - 1, on any threads and in any order. Return
+/// when all these calls have returned; returning earlier is not detected. Start no more tasks at once than there
+/// are free cores. The callback runs inside sinew_world_step and must not use the world.
 pub type sinew_run_tasks =
     Option<unsafe extern "C" fn(context: *mut c_void, task: sinew_task, task_data: *mut c_void, count: u32)>;
 
-/// How a world steps. Filled by sinew_world_def_init.
+/// Settings of a world, filled by sinew_world_def_init.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_world_def {
-    /// Set by sinew_world_def_init.
+    /// Size of this struct; sinew_world_def_init sets it.
     pub struct_size: usize,
-    /// m/s^2; default 0 -9.81 0.
+    /// [m/s^2] Acceleration of all nodes; default 0 -9.81 0.
     pub gravity: [f32; 3],
-    /// 1, the default: the caller's thread alone; 0: one per core; at most 256. Results are the same for every number. A
-    /// world's threads end with it, and sleep while it is not stepped or too small to share.
+    /// Threads of a step, at most 256: 1 (default) uses the calling thread, 0 one thread per core.
+    ///
+    /// The results do not depend on it. The world owns its threads; they sleep between steps.
     pub thread_count: u32,
-    /// 0, the default: as many as stability needs; n: exactly n per step, but for bodies of IMPLICIT and NEWTON near a tool,
-    /// whose substeps are of 1 ms at most there, or attached to a body, of 0.25 ms, and where a substep of theirs gains energy: then
-    /// they are cut again, to 4096 in all.
+    /// Substeps per step: 0 (default) takes as many as stability needs; n takes exactly n.
+    ///
+    /// IMPLICIT and NEWTON take at most 1 ms near a tool and at most 0.25 ms while attached to another body, and
+    /// subdivide a substep that gains energy; at most 4096 substeps in total.
     pub substeps: u32,
-    /// Default 1000; at least 1; a step that needs more is SINEW_STATUS_UNSTABLE. What IMPLICIT and NEWTON cut, as above, may be 4096
-    /// parts whatever this is; one that would take more of them, 4 s near a tool or 1 s attached to a body, is
-    /// SINEW_STATUS_UNSTABLE too.
+    /// Largest number of substeps per step, at least 1; default 1000.
+    ///
+    /// A step that needs more returns SINEW_STATUS_UNSTABLE. The subdivisions of IMPLICIT and NEWTON have their own
+    /// limit of 4096: a step beyond it (4 s near a tool, 1 s while attached) is unstable too.
     pub max_substeps: u32,
-    /// m; 0, the default: off, as it is with fixed substeps; above 0, with substeps 0: a step's own position error stays below it.
+    /// [m] Bound on the position error of a step; 0 (default) turns it off.
+    ///
+    /// It has no effect with fixed substeps.
     pub tolerance: f32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved: u32,
-    /// Nullable, the default: the world has threads of its own. Else these are used instead, thread_count tasks a step, 1:
-    /// never called; it is called by steps that are worth sharing, as long as the world lives.
+    /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
+    ///
+    /// It must stay valid while the world lives. It is not called if thread_count is 1, or in steps too small to
+    /// share.
     pub run_tasks: sinew_run_tasks,
-    /// What run_tasks is given; nullable.
+    /// First argument of run_tasks; nullable.
     pub tasks_context: *mut c_void,
-    /// SINEW_KERNEL_...; default SINEW_KERNEL_BEST.
+    /// SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
     pub kernel: u32,
-    /// 0.
+    /// Reserved; must be 0.
     pub reserved2: u32,
 }
 
-/// What a step did; filled on SINEW_STATUS_OK and SINEW_STATUS_UNSTABLE.
+/// Report of a step; written on SINEW_STATUS_OK and on SINEW_STATUS_UNSTABLE.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct sinew_step_report {
-    /// Set by the caller.
+    /// Set to sizeof(sinew_step_report) before the call.
     pub struct_size: usize,
-    /// The most that any body took.
+    /// Largest number of substeps that a body took.
     pub substeps: u32,
-    /// s: the longest explicit substep that is stable now, over all bodies; infinity: no limit, as for bodies of IMPLICIT and
-    /// NEWTON.
+    /// [s] Longest stable explicit substep over all bodies; infinity: no limit, as with IMPLICIT and NEWTON.
     pub stable_substep: f32,
-    /// Bodies that would have become non-finite: put back as they were, the others stepped.
+    /// Number of bodies that became non-finite and were rolled back; the others were stepped.
     pub bodies_restored: u32,
-    /// m: how far a position of this step may be off; 0 where tolerance is off, infinity where the step is refused before there is
-    /// anything to compare.
+    /// [m] Position error of this step; 0 without a tolerance, infinity if the step was refused before it could be
+    /// estimated.
     pub error_estimate: f32,
-    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those of another body in one that is closed come out again by themselves.
+    /// Number of interpenetrating surface edges that contact could not separate.
+    ///
+    /// It counts edges inside other tissue, and inside their own body where that collides with itself. Contact
+    /// pushes edges of another body out of a closed one in later steps.
     pub crossings: u32,
-    /// 0.
+    /// Reserved; set to 0 by the library.
     pub reserved: u32,
 }
 
@@ -166,9 +172,7 @@ impl From<StepReport> for sinew_step_report {
     }
 }
 
-/// Fills `def` with the defaults. `struct_size` is sizeof(sinew_world_def).
-///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Fills a world definition with its defaults; `struct_size` is sizeof(sinew_world_def).
 ///
 /// # Safety
 /// `def` is NULL or writable for `struct_size` bytes.
@@ -178,11 +182,9 @@ pub unsafe extern "C" fn sinew_world_def_init(def: *mut sinew_world_def, struct_
     guard(|| unsafe { memory::initialise(def, struct_size, sinew_world_def::defaults()) })
 }
 
-/// Creates an empty world, which the caller destroys with sinew_world_destroy.
+/// Creates an empty world; destroy it with sinew_world_destroy.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT, SINEW_STATUS_UNSUPPORTED (a thread could not be started, or the
-/// processor does not offer the kernel),
-/// SINEW_STATUS_OUT_OF_MEMORY.
+/// Errors: SINEW_STATUS_UNSUPPORTED if a thread could not be started or the processor lacks the kernel.
 ///
 /// # Safety
 /// `def` is NULL or a definition of the size that it states, with a `run_tasks` that keeps its word; `out` is NULL or
@@ -201,7 +203,7 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
     })
 }
 
-/// Destroys a world with all that is in it. NULL: nothing.
+/// Destroys a world with all its bodies, tools and blades; NULL has no effect.
 ///
 /// # Safety
 /// `world` is NULL or a world that is not destroyed and that nobody uses any more.
@@ -216,10 +218,12 @@ pub unsafe extern "C" fn sinew_world_destroy(world: *mut sinew_world) {
     }
 }
 
-/// Steps everything in the world by `dt` seconds, above 0. `report` may be NULL. Views of positions and velocities end.
+/// Advances everything in the world by one time step.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT; SINEW_STATUS_UNSTABLE, where the step needs more substeps than max_substeps, or
-/// than the world's fixed substeps: nothing has moved, pending forces and poses stay pending.
+/// `dt` [s] is above 0. `report` is nullable. The call ends the views of positions and velocities.
+///
+/// Errors: SINEW_STATUS_UNSTABLE if the step needs more than max_substeps, or more than the fixed number of
+/// substeps.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
@@ -247,9 +251,9 @@ pub unsafe extern "C" fn sinew_world_step(
     unsafe { with_world_mut(world, step) }
 }
 
-/// Gives everything this acceleration, 3 floats, m/s^2, from the next step on.
+/// Sets the gravitational acceleration from the next step on.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// `gravity` [m/s^2] points to 3 floats.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `gravity` is NULL or 3 floats.
@@ -259,9 +263,9 @@ pub unsafe extern "C" fn sinew_world_set_gravity(world: *mut sinew_world, gravit
     unsafe { with_world_mut(world, |world| world.set_gravity(memory::vector("gravity", gravity)?)) }
 }
 
-/// Writes a hash over everything that the next step depends on; to be compared within one version of the library.
+/// Computes a hash over everything that the next step depends on.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT.
+/// Compare hashes only between worlds of the same library version.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.

@@ -56,7 +56,7 @@ static void owners() {
   const auto shape = mesh.view();
   sinew::world world;
   const sinew_world *raw = world.get();
-  const auto first = world.create_body(solid(shape)), second = world.create_body(solid(shape));
+  auto first = world.create_body(solid(shape)), second = world.create_body(solid(shape));
 
   sinew::world moved = std::move(world); // what belongs to it still does
   EXPECT(moved.get() == raw && world.get() == nullptr);
@@ -66,7 +66,7 @@ static void owners() {
 
   sinew::tool_def ball;
   ball.shape = SINEW_SHAPE_SPHERE, ball.radius = 0.01f, ball.position[1] = 0.5f;
-  const auto tool = moved.create_tool(ball);
+  auto tool = moved.create_tool(ball);
   sinew::haptic haptic(tool);
   sinew::reader reader(first);
   sinew::detector detector(first, second);
@@ -103,7 +103,7 @@ static void owners() {
 static void spans() {
   sinew::world world;
   const auto mesh = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {2, 2, 2});
-  const auto body = world.create_body(solid(mesh.view()));
+  auto body = world.create_body(solid(mesh.view()));
   const std::vector<std::uint32_t> nodes = {1, 2};
   const float forces[] = {0, 1, 0, 0, 1, 0};
   body.apply_forces(nodes, forces);
@@ -136,10 +136,10 @@ static void spans() {
 static void attachments() {
   sinew::world world;
   const auto mesh = sinew::mesh::block({0.1f, 0.1f, 0.1f}, {2, 2, 2});
-  const auto first = world.create_body(solid(mesh.view())), second = world.create_body(solid(mesh.view()));
+  auto first = world.create_body(solid(mesh.view())), second = world.create_body(solid(mesh.view()));
   sinew::tool_def ball;
   ball.shape = SINEW_SHAPE_SPHERE, ball.radius = 0.01f, ball.position[1] = 1;
-  const auto tool = world.create_tool(ball);
+  auto tool = world.create_tool(ball);
   const std::array<std::uint32_t, 3> nodes = {0, 4, 8}, others = {1, 5, 7};
   std::array<sinew_attachment_id, 5> ids{};
   const sinew::span<sinew_attachment_id> out(&ids[1], nodes.size());
@@ -148,7 +148,7 @@ static void attachments() {
   world.step(0.001f);
   float weight = 0;
   for (const auto &id : out) {
-    const sinew::attachment held(world.get(), id);
+    sinew::attachment held(world.get(), id);
     weight += held.force()[1];
     held.release();
     EXPECT(refused([&] { held.release(); }, "attachment") == SINEW_STATUS_STALE_ID);
@@ -169,7 +169,7 @@ static void no_allocation_of_its_own() {
   def.positions = shape.positions, def.node_count = shape.node_count;
   def.triangles = shape.triangles, def.triangle_count = shape.triangle_count;
   def.node_mass = 1e-3f, def.stiffness = 10;
-  const auto body = world.create_body(def);
+  auto body = world.create_body(def);
   sinew::reader reader(body);
   for (int i = 0; i < 10; i++) world.step(0.01f), reader.read(), body.energy();
 }

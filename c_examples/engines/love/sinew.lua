@@ -1,12 +1,13 @@
--- The C header as LuaJIT reads it: without comments, and with its `#define`s as fields of a table beside the functions.
+-- sinew/sinew_all.h as LuaJIT reads it, with its constants as fields of a table beside the functions.
 local ffi = require "ffi"
 
 return function(header_path, library_path)
   local file = assert(io.open(header_path))
-  local header = file:read "*a":gsub("/%*.-%*/", "")
+  local header = file:read "*a":gsub("//[^\n]*", "")
   file:close()
   local constants = {}
   for name, value in header:gmatch "#define (SINEW_%w[%w_]*) (%d+)%s" do constants[name] = tonumber(value) end
+  for name, value in header:gmatch "(SINEW_%w[%w_]*) = (%d+)" do constants[name] = tonumber(value) end
   header = header:gsub("#ifdef __cplusplus.-#endif[^\n]*", ""):gsub("#[^\n]*", "")
   ffi.cdef(header)
 
