@@ -4,9 +4,8 @@ use glam::{BVec3, DVec3, Vec3};
 
 use super::cuttable::Cuttable;
 use super::{Body, SMALLEST_MASS};
+use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
-use crate::error::Result;
-use crate::memory;
 use crate::solver::{Candidate, Masses, make_up_for};
 use crate::springs::{Rewiring, pull};
 

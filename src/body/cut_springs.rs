@@ -2,9 +2,8 @@
 
 use super::cuttable::passes;
 use super::{Body, Spring};
+use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial, PieceOfSpring, Sweep};
-use crate::error::Result;
-use crate::memory;
 use crate::springs::{Change, Link, Rewiring};
 
 impl Body {

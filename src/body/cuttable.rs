@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use super::{Body, BodyDefinition, Bounds, NodeOrder, Spring};
+use super::{Body, BodyDefinition, NodeOrder, Spring};
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
 use crate::cutting::{CutMaterial, CutSolid, CutSurface, Sweep};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{TILE, tile_count};
+use crate::geometry::Bounds;
+use crate::soa::{TILE, tile_count};
 
 use super::change_log::ChangeLog;
 use super::stroke::Stroke;

@@ -4,10 +4,9 @@ use glam::Vec3;
 
 use super::sleep::Sleep;
 use super::tearing::Tearing;
+use crate::base::{Error, Result, memory};
 use crate::contact::BodyContact;
-use crate::error::{Error, Result};
 use crate::material::{Material, Viscosity, Yielding};
-use crate::memory;
 use crate::springs::Rounding;
 use crate::terms::SpringLaw;
 

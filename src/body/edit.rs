@@ -2,10 +2,10 @@
 
 use glam::{BVec3, Vec3};
 
+use super::Body;
 use super::definition::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
-use super::{Body, Bounds};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
+use crate::geometry::Bounds;
 use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 

@@ -18,7 +18,6 @@ mod grasp;
 mod grow;
 mod hash;
 mod material_point;
-mod nodes;
 mod order;
 mod origin;
 mod past;
@@ -26,7 +25,6 @@ mod pieces;
 mod pins;
 mod published;
 mod query_tree;
-mod records;
 mod region;
 mod shown;
 mod sleep;
@@ -41,10 +39,12 @@ mod tearing;
 mod tears;
 mod tissue;
 mod tune;
-mod vectors;
 
 use glam::{BVec3, DVec3, Vec3};
 
+use crate::geometry::Bounds;
+use crate::simd::ChosenKernel;
+use crate::soa::{Records, Vectors, tile_count, tile_nodes};
 pub(crate) use bindings::{Bindings, Bound};
 pub(crate) use blade::HoldAt;
 pub use change_log::{NewNodeSource, NewRimEdge, TopologyChanges};
@@ -59,29 +59,24 @@ pub(crate) use definition::{
 };
 pub(crate) use grasp::{Grasps, Grip, Lapse};
 pub(crate) use grow::NewNode;
-pub(crate) use nodes::{Region, Scale};
-pub(crate) use origin::Bounds;
-pub(crate) use records::{Record, Records, WriteRecords};
 pub(crate) use tear::Torn;
 pub(crate) use tearing::Withheld;
 pub use tearing::{TearReport, Tearing};
 pub use tune::SpringState;
-pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
 use crate::contact::{BodyContact, Contact, Contacts, ToolPath};
 use crate::diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 use crate::elements::{Elements, Law};
 use crate::enclosed::Enclosed;
-use crate::error::{Error, Result};
 use crate::material::Made;
-use crate::memory;
 use crate::readers::Shown;
-use crate::snapshot::saved;
 use crate::solver::{
     Carried, Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums,
     Survey, Watched, close, write_records,
 };
-use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
+use crate::springs::{Springs, store};
 use crate::terms::Terms;
 use crate::threads::Team;
 use crate::world::BodyId;

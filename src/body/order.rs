@@ -5,9 +5,8 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::definition::Spring;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::springs::{Rounding, costs};
 
 /// Where each node is kept, for bodies that do not keep them in the caller's order.

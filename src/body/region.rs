@@ -1,9 +1,9 @@
 //! Regions of a body made stiffer or softer, larger or smaller, between steps.
 
+use super::Body;
 use super::definition::not_negative;
-use super::{Body, Region, Scale};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
+use crate::soa::{Region, Scale};
 use crate::springs::{Change, Link};
 
 impl Body {

@@ -6,14 +6,14 @@
 
 use glam::Vec3;
 
+use super::Body;
 use super::definition::not_negative;
-use super::{Body, Bounds, WriteRecords};
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::contact::ToolPath;
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Motion, TILE, TileForces, tile_count, tile_nodes};
+use crate::geometry::Bounds;
+use crate::soa::{TILE, TileForces, WriteRecords, tile_count, tile_nodes};
+use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
 /// When tissue at rest is left alone.

@@ -6,10 +6,9 @@ use super::cuttable::Cuttable;
 use super::definition::check_values;
 use super::tearing::{TearReport, Withheld};
 use super::{Body, CutReport, Values};
+use crate::base::{Error, Result, memory};
 use crate::contact::Skin;
 use crate::cutting::{CutSurface, Limits, Load};
-use crate::error::{Error, Result};
-use crate::memory;
 use crate::springs::{Link, pull};
 use crate::threads::Team;
 

@@ -2,9 +2,9 @@
 
 use super::BodyDefinition;
 use super::definition::not_negative;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
+use crate::codec::{saved, saved_enum};
 use crate::material::Model;
-use crate::snapshot::{saved, saved_enum};
 
 /// When a body tears.
 ///

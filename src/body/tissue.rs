@@ -4,9 +4,9 @@ use glam::Vec3;
 
 use super::Body;
 use super::bindings::parts;
+use crate::base::Result;
 use crate::contact::{CollisionFilter, Moment};
 use crate::cutting::CutMaterial;
-use crate::error::Result;
 use crate::solver::close;
 
 impl Body {

@@ -2,8 +2,7 @@
 
 use super::definition::check_values;
 use super::{Body, Values};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 use crate::solver::{Stability, make_up_for};
 use crate::springs::{Change, Link, not_joined, pull};
 

@@ -6,7 +6,7 @@ use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::{SINEW_STATUS_OK, sinew_status, status_of};
 use crate::contact::{CollisionFilter, Pose};
-use crate::slots::SlotId;
+use crate::ids::SlotId;
 use crate::world::{BladeDefinition, BladeId};
 
 /// A blade: a plain value, all zero is "none".

@@ -6,9 +6,9 @@ use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
+use crate::base::{Error, Result};
 use crate::body::{BodyDefinition, Sleep, Solver, Storage, Tearing, Values};
 use crate::contact::{BodyContact, CollisionFilter};
-use crate::error::{Error, Result};
 use crate::material::{Material, Model, Viscosity, Yielding};
 use crate::terms::SpringLaw;
 

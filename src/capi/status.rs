@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 
 use libc::c_char;
 
-use crate::error::Error;
+use crate::base::Error;
 
 /// The answer of every function that can fail: one of the `SINEW_STATUS_...`.
 pub type sinew_status = i32;

@@ -7,9 +7,9 @@ use glam::{Quat, Vec3};
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
+use crate::base::{Error, Result};
 use crate::contact::{CollisionFilter, Detection, Pose, Shape, ToolDefinition};
-use crate::error::{Error, Result};
-use crate::slots::SlotId;
+use crate::ids::SlotId;
 use crate::world::ToolId;
 
 /// A tool: a plain value, all zero is "none".

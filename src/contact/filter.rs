@@ -1,10 +1,9 @@
 //! What meets what, and what a body asks of contact.
 
 use super::tool::{Detection, check_reach};
+use crate::base::{Error, Result, StateHasher};
 use crate::body::not_negative;
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 /// Which tools and bodies meet: two do where each has a category that the other's mask has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,11 +8,10 @@ use super::filter::CollisionFilter;
 use super::limit::Reach;
 use super::mesh_solid::MeshSolid;
 use super::rounded;
+use crate::base::{Error, Result, StateHasher};
 use crate::body::{finite_vector, not_negative};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
+use crate::codec::{saved, saved_enum};
 use crate::mesh::FURTHEST;
-use crate::snapshot::{saved, saved_enum};
 
 /// The shape of a tool, about its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]

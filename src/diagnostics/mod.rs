@@ -1,12 +1,10 @@
 //! What a world says about itself: energy, memory, a hash of its state.
 
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 mod energy;
-mod hash;
 
 pub use energy::Energy;
-pub(crate) use hash::StateHasher;
 
 /// How much memory the springs of a body take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,13 +6,13 @@
 use glam::{DMat3, DVec3};
 
 use super::parts::{Copy, Part, in_group};
+use super::tetrahedra::{GROUP, Group, Groups};
 use super::{Deformed, Elements, Load, Rest, Sums};
-use crate::body::Vectors;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::{TILE, Vectors, tile_count};
 use crate::solver::{Masses, Rates};
-use crate::springs::{GROUP, Group, Groups, Springs, TILE, tile_count};
+use crate::springs::Springs;
 
 /// The groups of a part that comes later.
 const GROUPS: usize = 32;

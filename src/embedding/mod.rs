@@ -6,10 +6,9 @@ mod read;
 
 use glam::Vec3;
 
+use crate::base::{Error, Result, memory};
 use crate::body::{Body, BodyDefinition, Values};
 use crate::cutting::CutMaterial;
-use crate::error::{Error, Result};
-use crate::memory;
 use crate::mesh::Mesh;
 use crate::world::{BodyId, World};
 

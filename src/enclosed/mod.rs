@@ -11,13 +11,11 @@ mod surface;
 
 use glam::{DVec3, Vec3};
 
-use crate::body::{BodyDefinition, NodeOrder, Vectors};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, StateHasher, memory};
+use crate::body::{BodyDefinition, NodeOrder};
+use crate::codec::saved;
+use crate::soa::{TileForces, Vectors};
 use crate::solver::Rates;
-use crate::springs::TileForces;
 use crate::threads::{Items, Ragged, Team};
 use surface::{Block, Surface};
 

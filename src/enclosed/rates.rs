@@ -9,11 +9,10 @@
 use glam::DVec3;
 
 use super::Enclosed;
-use crate::body::Vectors;
-use crate::error::Result;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::material::Viscosity;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::soa::Vectors;
 use crate::solver::{Carried, Masses, Rates};
 use crate::springs::Springs;
 

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::base::{Error, Result};
 use crate::body::BodyDefinition;
-use crate::error::{Error, Result};
 use crate::mesh::{CELL_DIAGONALS, CELL_EDGES, cell_volume, tetrahedron_volume};
 use crate::springs::Rounding;
 

@@ -10,9 +10,9 @@ mod springs;
 mod viscosity;
 mod yielding;
 
+use crate::base::{Error, Result};
 use crate::body::{BodyDefinition, Values, not_negative};
 use crate::elements::Law;
-use crate::error::{Error, Result};
 use filled::Filled;
 pub(crate) use viscosity::Course;
 pub use viscosity::Viscosity;

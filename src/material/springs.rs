@@ -3,9 +3,8 @@
 use glam::DVec3;
 
 use super::filled::{Filled, corners, triangle_area};
+use crate::base::{Error, Result, memory};
 use crate::body::BodyDefinition;
-use crate::error::{Error, Result};
-use crate::memory;
 use crate::mesh::{
     CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, element_edges, pack, tetrahedron_volume, unpack,
 };

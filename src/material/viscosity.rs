@@ -1,9 +1,9 @@
 //! Viscosity: an arm beside what is elastic, a spring and a dashpot in a row (the standard linear solid; Zener 1948), or the dashpot
 //! alone (Kelvin and Voigt).
 
+use crate::base::{Error, Result};
 use crate::body::not_negative;
-use crate::error::{Error, Result};
-use crate::snapshot::saved;
+use crate::codec::saved;
 use crate::solver::Rates;
 
 /// How tissue resists the speed at which it is deformed. With E the stiffness at rest, of a spring or an element, a dashpot of

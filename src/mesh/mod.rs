@@ -15,7 +15,7 @@ mod topology;
 
 use glam::{DVec3, Vec3};
 
-use crate::memory;
+use crate::base::memory;
 use crate::{Error, Result};
 
 pub use closed::ClosedSurface;

@@ -9,11 +9,10 @@
 //! masses is found as it is with any others.
 
 use super::attempt::RESERVE as RESERVE_AT_REST;
+use crate::base::{Result, memory};
 use crate::body::NodeDamping;
-use crate::error::Result;
+use crate::codec::saved;
 use crate::material::Viscosity;
-use crate::memory;
-use crate::snapshot::saved;
 use crate::springs::Springs;
 
 /// What is left of the substeps where mass is added, at most: for less the motion is not changed.

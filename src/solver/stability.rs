@@ -10,8 +10,8 @@
 use glam::Vec3;
 
 use super::watched::{Candidate, Watched};
-use crate::body::Vectors;
-use crate::snapshot::saved;
+use crate::codec::saved;
+use crate::soa::Vectors;
 use crate::springs::{Springs, separation};
 
 /// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over

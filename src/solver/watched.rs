@@ -4,9 +4,8 @@
 //! stiffest are found once, and an estimate looks at them from the stiffest on until no other can matter.
 
 use super::stability::{Masses, Rates};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::springs::Springs;
 
 /// One node in so many is watched.

@@ -10,25 +10,22 @@ mod kept;
 mod kernels;
 mod law;
 mod packed;
-mod tile;
 
 use std::fmt::Debug;
 use std::ops;
 
 use glam::Vec3;
 
-pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, GROUP, Group, Groups, Loops, Range, Stresses, prefetch};
+use crate::simd::ChosenKernel;
+use crate::soa::{TileForces, Vectors, View, tile_nodes};
 use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
 pub(crate) use packed::{Costs, Rounding, Row, Split, cheapest, costs};
-pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
 
-use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
+use crate::base::{Error, Result, memory};
+use crate::body::{BodyDefinition, Spring, Storage};
+use crate::codec::{Reader, Saved, Writer, saved, shape_with};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
 use fast_link::FastLink;

@@ -20,10 +20,9 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils};
+use crate::base::{Error, Result, memory};
 use crate::body::{BodyDefinition, NodeOrder, not_negative};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 /// Hinges: the two nodes of the edge, then those opposite.
 #[derive(Debug)]

@@ -23,14 +23,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DMat3, DVec3};
 
-use crate::body::{BodyDefinition, NodeOrder, Region, Scale, Spring, Vectors, View};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
+use crate::base::{Result, StateHasher, memory};
+use crate::body::{BodyDefinition, NodeOrder, Spring};
+use crate::codec::{Reader, Saved, Writer, saved, shape_with};
 use crate::material::{Course, Viscosity};
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
+use crate::simd::ChosenKernel;
+use crate::soa::{Region, Scale, TileForces, Vectors, View, tile_count};
 use crate::solver::{Carried, Masses, Rates};
-use crate::springs::{Change, ChosenKernel, Springs, TileForces, tile_count};
+use crate::springs::{Change, Springs};
 use crate::threads::Team;
 use arms::Arms;
 use bending::Hinges;

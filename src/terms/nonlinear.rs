@@ -9,10 +9,9 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
+use crate::base::{Error, Result, memory};
 use crate::body::{BodyDefinition, NodeOrder, Spring};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::{saved, saved_enum};
+use crate::codec::{saved, saved_enum};
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
 /// the stiffness they are given. Springs that are added later are linear.

@@ -9,14 +9,14 @@ use glam::{DMat3, DVec3, Vec3};
 use super::parting::Parting;
 use super::strings::{Aging, OfTile, Tension};
 use super::{Blocks, Moment, Term};
-use crate::body::{NodeOrder, Region, Scale, Spring, Vectors, View};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::body::{NodeOrder, Spring};
+use crate::codec::{Saved, Writer, saved};
 use crate::material::Course;
-use crate::memory;
-use crate::snapshot::{Saved, Writer, saved};
+use crate::simd::ChosenKernel;
+use crate::soa::{Region, Scale, TILE, TileForces, Vectors, View, tile_count};
 use crate::solver::Masses;
-use crate::springs::{Change, ChosenKernel, TILE, TileForces, tile_count};
+use crate::springs::Change;
 use crate::threads::{Ragged, Team};
 
 /// What a term does whose stiffness is 1.

@@ -3,12 +3,11 @@
 use glam::{DVec3, Vec3};
 
 use super::{BodyId, ToolId, World, make_walks};
+use crate::base::{Error, Result, memory};
 use crate::body::Grip;
+use crate::codec::{saved, saved_enum};
 use crate::contact::{Bonds, Bound, Thread};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::slots::SlotId;
-use crate::snapshot::{saved, saved_enum};
+use crate::ids::SlotId;
 use crate::solver::Outcome;
 
 /// What a tool holds of a body, or a body of another.

@@ -1,8 +1,7 @@
 //! Which bodies take their substeps together.
 
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// The groups of the bodies of a world.
 #[derive(Debug, Default)]

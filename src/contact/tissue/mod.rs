@@ -25,12 +25,12 @@ use self::search::{Party, Search};
 pub(crate) use self::skin::Skin;
 use glam::Vec3;
 
-use crate::body::{Body, Bounds};
+use crate::base::{Result, memory};
+use crate::body::Body;
+use crate::codec::saved;
 use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
-use crate::error::Result;
-use crate::memory;
-use crate::slots::Slots;
-use crate::snapshot::saved;
+use crate::geometry::Bounds;
+use crate::ids::Slots;
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;

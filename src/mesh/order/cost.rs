@@ -3,7 +3,7 @@
 use super::inverse;
 use super::links::Links;
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 use crate::springs::{Row, Split, cheapest};
 
 /// Nodes side by side whose links share columns.

@@ -3,7 +3,7 @@
 
 use super::links::Links;
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// Walks to the far end of a part before the one that makes the order: the further apart its ends, the narrower it is.
 const SEARCHES: u32 = 2;

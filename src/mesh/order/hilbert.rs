@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// The curve visits 2^16 places along each axis: as many as a key of 64 bits has room for three times over, and more than
 /// meshes have nodes along an axis.

@@ -1,7 +1,7 @@
 //! The springs of each node.
 
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 use crate::springs::Costs;
 
 /// As many as the processor writes to side by side.

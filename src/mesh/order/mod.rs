@@ -19,7 +19,7 @@ use std::cmp::Reverse;
 use glam::Vec3;
 
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 use crate::springs::Costs;
 use cost::{cost, least_cost};
 use cuthill_mckee::reverse_cuthill_mckee;

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use super::axes::{Axes, NEAR, Steps, whole};
 use super::links::Links;
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// Springs of a node that are looked at to find axes there. Lattices have up to 26, or twice that with second neighbours.
 const MOST_LINKS: usize = 64;

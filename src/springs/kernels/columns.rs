@@ -9,11 +9,10 @@
 use std::ops::Range;
 
 use super::strays::Strays;
-use crate::body::MARGIN;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Link, TILE};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::{MARGIN, TILE};
+use crate::springs::Link;
 
 /// Lanes of a column.
 pub(crate) const LANES: usize = 16;

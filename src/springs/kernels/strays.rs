@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::columns::{LANES, Line};
-use crate::error::Result;
-use crate::snapshot::saved;
+use crate::base::Result;
+use crate::codec::saved;
 use crate::springs::Link;
 
 /// Links beside the columns of a tile.

@@ -1,9 +1,8 @@
 //! The few kinds of spring that most of a body's springs are.
 
+use crate::base::{Result, memory};
 use crate::body::Spring;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::codec::saved;
 use crate::springs::kernels::Material;
 
 /// How many springs are looked at to find the kinds.

@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use super::split::{Costs, GATHER, Row, Split, cheapest};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 use crate::springs::Link;
 use crate::springs::kernels::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
 

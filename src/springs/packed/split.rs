@@ -1,7 +1,6 @@
 //! Which links of a block of nodes go into runs, which into gathers, and which are left beside the columns.
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 use crate::springs::kernels::LANES;
 
 /// The fewest links that are worth a gather: alone they cost a third as much as a gather of sixteen.

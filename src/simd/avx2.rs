@@ -5,9 +5,9 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
-use super::eights::{EightLinks, Sight};
-use super::lanes::Lanes;
-use crate::body::Record;
+use super::Lanes;
+use super::Record;
+use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx2Lanes(__m256);

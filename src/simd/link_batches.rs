@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use glam::Vec3;
 
-use super::lanes::Lanes;
+use super::Lanes;
 use super::{ChosenKernel, WithLanes};
 
 /// Links: the neighbour, and the bits of the stiffness and the rest length.

@@ -1,9 +1,9 @@
 //! Trees over the triangles of a surface that may be cut: that of the surface as it was made, and trees of those that cuts have added.
 
-use crate::body::Bounds;
-use crate::contact::tree::{Placed, Tree};
-use crate::error::Result;
-use crate::snapshot::saved;
+use super::Bounds;
+use super::tree::{Placed, Tree};
+use crate::base::Result;
+use crate::codec::saved;
 use glam::Vec3;
 
 /// Trees, each over the triangles that follow those of the one before. Of the later ones each has twice as many as the next or more (Bentley,

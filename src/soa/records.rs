@@ -1,15 +1,10 @@
 //! Vectors of nodes a second time, as records: three numbers that lie together are one load, not three.
 
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Loops, TILE};
+use super::TILE;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::simd::{Loops, Record};
 use crate::threads::Tiles;
-
-/// A vector, and a number to spare, so that it never lies across two cache lines.
-#[repr(C, align(16))]
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Record(pub [f32; 4]);
 
 saved!(Record { 0 });
 

@@ -4,18 +4,17 @@
 //! energy is `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)` and the forces are those of `P = F S + kappa (J - 1) cof F`,
 //! `S = lambda tr E + 2 mu E`. The law is the same in every direction, so each tetrahedron may have its own frame at rest: one in
 //! which that inverse is upper triangular, six numbers instead of nine.
+#![allow(unsafe_code)]
 
 use std::ops::Range;
 
-use super::algebra::{
+use crate::codec::saved;
+use crate::elements::{LEAST_SHEAR, Law};
+use crate::simd::algebra::{
     Matrix, Six, add_times, cross, difference, dot, largest, scaled_matrix, scaled_six, sum, sum_six, times_lower,
     times_upper,
 };
-use super::lanes::Lanes;
-use super::{ChosenKernel, WithLanes};
-use crate::body::Record;
-use crate::elements::{LEAST_SHEAR, Law};
-use crate::snapshot::saved;
+use crate::simd::{ChosenKernel, Lanes, Record, WithLanes};
 
 /// Tetrahedra side by side.
 pub(crate) const GROUP: usize = 16;

@@ -5,8 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use glam::{BVec3, DMat3, DQuat, DVec3, Quat, Vec3, Vec3A};
 
 use super::bytes::{Reader, Writer};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 
 /// What is written and read bit by bit.
 pub(crate) trait Saved: Sized {
@@ -66,37 +65,37 @@ pub(crate) const fn least_of_field<T, F: Saved>(_: fn(&T) -> &F) -> usize {
 /// `where check` what is read must pass a check. `saved!(Name)` is of one without fields.
 macro_rules! saved {
     ($name:ident) => {
-        impl $crate::snapshot::Saved for $name {
-            const SHAPE: u64 = $crate::snapshot::shape_of_name(stringify!($name));
+        impl $crate::codec::Saved for $name {
+            const SHAPE: u64 = $crate::codec::shape_of_name(stringify!($name));
             const LEAST: usize = 0;
 
-            fn save(&self, _to: &mut $crate::snapshot::Writer) {}
+            fn save(&self, _to: &mut $crate::codec::Writer) {}
 
-            fn load(_from: &mut $crate::snapshot::Reader) -> $crate::error::Result<Self> {
+            fn load(_from: &mut $crate::codec::Reader) -> $crate::base::Result<Self> {
                 Ok(Self)
             }
         }
     };
     ([$($generics:tt)*] $name:ty { $($field:tt),* $(,)? } $(leaves { $($left:ident: $value:expr),* $(,)? })? $(where $check:path)?) => {
-        impl<$($generics)*> $crate::snapshot::Saved for $name {
+        impl<$($generics)*> $crate::codec::Saved for $name {
             const SHAPE: u64 = {
-                let shape = $crate::snapshot::shape_of_name(stringify!($name));
-                $(let shape = $crate::snapshot::shape_with(
-                    $crate::snapshot::shape_with(shape, $crate::snapshot::shape_of_name(stringify!($field))),
-                    $crate::snapshot::shape_of_field(|it: &Self| &it.$field),
+                let shape = $crate::codec::shape_of_name(stringify!($name));
+                $(let shape = $crate::codec::shape_with(
+                    $crate::codec::shape_with(shape, $crate::codec::shape_of_name(stringify!($field))),
+                    $crate::codec::shape_of_field(|it: &Self| &it.$field),
                 );)*
                 shape
             };
 
-            const LEAST: usize = 0 $(+ $crate::snapshot::least_of_field(|it: &Self| &it.$field))*;
+            const LEAST: usize = 0 $(+ $crate::codec::least_of_field(|it: &Self| &it.$field))*;
 
-            fn save(&self, to: &mut $crate::snapshot::Writer) {
+            fn save(&self, to: &mut $crate::codec::Writer) {
                 let Self { $($field: _,)* $($($left: _),*)? } = self;
-                $($crate::snapshot::Saved::save(&self.$field, to);)*
+                $($crate::codec::Saved::save(&self.$field, to);)*
             }
 
-            fn load(from: &mut $crate::snapshot::Reader) -> $crate::error::Result<Self> {
-                let it = Self { $($field: $crate::snapshot::Saved::load(from)?,)* $($($left: $value),*)? };
+            fn load(from: &mut $crate::codec::Reader) -> $crate::base::Result<Self> {
+                let it = Self { $($field: $crate::codec::Saved::load(from)?,)* $($($left: $value),*)? };
                 $(if !$check(&it) {
                     return Err(from.refusal(concat!("no ", stringify!($name), " is like this")));
                 })?
@@ -105,36 +104,36 @@ macro_rules! saved {
         }
     };
     ($name:ty { $($rest:tt)* } $($more:tt)*) => {
-        $crate::snapshot::saved!([] $name { $($rest)* } $($more)*);
+        $crate::codec::saved!([] $name { $($rest)* } $($more)*);
     };
 }
 
 /// The same for what is one of several: `saved_enum!(Name { 0 => First, 1 => Second { field }, 2 => Third(value) })`.
 macro_rules! saved_enum {
     ($name:ty { $($tag:literal => $variant:ident $({ $($field:ident),* $(,)? })? $(( $($value:ident),* ))?),* $(,)? }) => {
-        impl $crate::snapshot::Saved for $name {
-            const SHAPE: u64 = $crate::snapshot::shape_of_name(stringify!(
+        impl $crate::codec::Saved for $name {
+            const SHAPE: u64 = $crate::codec::shape_of_name(stringify!(
                 $name { $($tag => $variant $({ $($field),* })? $(( $($value),* ))?),* }
             ));
 
             const LEAST: usize = 1;
 
-            fn save(&self, to: &mut $crate::snapshot::Writer) {
+            fn save(&self, to: &mut $crate::codec::Writer) {
                 match self {
                     $(Self::$variant $({ $($field),* })? $(( $($value),* ))? => {
                         to.put(&[$tag]);
-                        $($($crate::snapshot::Saved::save($field, to);)*)?
-                        $($($crate::snapshot::Saved::save($value, to);)*)?
+                        $($($crate::codec::Saved::save($field, to);)*)?
+                        $($($crate::codec::Saved::save($value, to);)*)?
                     })*
                 }
             }
 
-            fn load(from: &mut $crate::snapshot::Reader) -> $crate::error::Result<Self> {
+            fn load(from: &mut $crate::codec::Reader) -> $crate::base::Result<Self> {
                 let [tag] = from.take_array()?;
                 Ok(match tag {
                     $($tag => {
-                        $($(let $field = $crate::snapshot::Saved::load(from)?;)*)?
-                        $($(let $value = $crate::snapshot::Saved::load(from)?;)*)?
+                        $($(let $field = $crate::codec::Saved::load(from)?;)*)?
+                        $($(let $value = $crate::codec::Saved::load(from)?;)*)?
                         Self::$variant $({ $($field),* })? $(( $($value),* ))?
                     })*
                     _ => return Err(from.refusal(concat!("no ", stringify!($name)))),

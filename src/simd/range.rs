@@ -1,7 +1,7 @@
 //! The least and the greatest of many numbers.
 
+use super::Lanes;
 use super::WithLanes;
-use super::lanes::Lanes;
 
 /// The least and the greatest of some numbers; of what is NaN nothing is said.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Some nodes of a body, and what is to be done with what lies between them.
 
-use crate::springs::TILE;
+use super::TILE;
 
 /// Some nodes, in the body's own numbers.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 #![allow(clippy::undocumented_unsafe_blocks)]
 // No closures: one may be compiled on its own, without the kernel's instructions.
 
-use super::lanes::Lanes;
+use super::Lanes;
 
 /// A vector per lane.
 pub type Vector<L> = [L; 3];

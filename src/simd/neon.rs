@@ -2,8 +2,8 @@
 
 use std::arch::aarch64::*;
 
-use super::lanes::Lanes;
-use crate::body::Record;
+use super::Lanes;
+use super::Record;
 
 #[derive(Clone, Copy)]
 pub(super) struct NeonLanes(float32x4_t);

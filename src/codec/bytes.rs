@@ -1,7 +1,7 @@
 //! Bytes that values are written to, and read from as if somebody had made them up.
 
-use crate::error::{Error, Result};
-use crate::springs::ChosenKernel;
+use crate::base::{Error, Result};
+use crate::simd::ChosenKernel;
 
 /// What a world may take beside its bytes: rooms that are kept for what may come.
 const ROOM: usize = 1 << 30;
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
     /// An empty list with room for so many values.
     pub fn reserved<T>(&mut self, count: usize) -> Result<Vec<T>> {
         self.will_take(count.checked_mul(size_of::<T>()))?;
-        crate::memory::reserved(count)
+        crate::base::memory::reserved(count)
     }
 
     /// Why the bytes are refused.

@@ -2,8 +2,8 @@
 
 use std::array::from_fn;
 
-use super::lanes::Lanes;
-use crate::body::Record;
+use super::Lanes;
+use super::Record;
 
 #[derive(Clone, Copy)]
 pub(super) struct PortableLanes([f32; 4]);

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::records::{Record, Records};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer, floats_into};
-use crate::springs::TILE;
+use super::Records;
+use super::TILE;
+use crate::base::{Result, memory};
+use crate::codec::{Reader, Saved, Writer, floats_into};
+use crate::simd::Record;
 use crate::threads::{Ragged, Tiles};
 
 /// How many numbers there are to spare on either side: a kernel that takes the neighbours of sixteen nodes in one load may

@@ -2,10 +2,9 @@
 
 use glam::{DVec3, Vec3, Vec3A};
 
-use crate::body::Bounds;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use super::Bounds;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// Triangles of a leaf at most.
 const LEAF: usize = 4;

@@ -12,6 +12,7 @@
 //! All numbers are little-endian.
 
 mod bytes;
+mod kernel;
 mod saved;
 
 use xxhash_rust::xxh3::Xxh3Default;
@@ -21,8 +22,8 @@ pub(crate) use saved::{
     Saved, floats_into, least_of_field, saved, saved_enum, shape_of_field, shape_of_name, shape_with,
 };
 
-use crate::error::{Error, Result};
-use crate::springs::ChosenKernel;
+use crate::base::{Error, Result};
+use crate::simd::ChosenKernel;
 
 /// No text begins so, and none comes through a transfer of text as it was.
 const MAGIC: [u8; 8] = *b"\x93sinew\r\n";
@@ -131,7 +132,7 @@ pub(crate) fn at_end(from: &Reader) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::springs::Kernel;
+    use crate::simd::Kernel;
 
     #[test]
     fn what_is_saved_can_be_loaded_or_is_refused_by_both() {

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::signs::{is_above, triple};
+use crate::base::symbolic_perturbation::{is_above, triple};
 
 /// Whether the segment from `p` to `q` passes through a triangle from one side to the other, further than `depth` on both and from its
 /// border; what only touches, or lies in its plane, does not.

@@ -1,6 +1,6 @@
 //! Memory that grows with the caller's data, reserved so that running out of it is an answer, not an abort.
 
-use crate::error::Result;
+use super::Result;
 
 /// A vector of `count` equal values.
 pub(crate) fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>> {

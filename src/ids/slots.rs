@@ -1,7 +1,7 @@
 //! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
 
-use crate::error::{Error, Result};
-use crate::snapshot::{Reader, Saved, Writer, saved};
+use crate::base::{Error, Result};
+use crate::codec::{Reader, Saved, Writer, saved};
 
 /// Things in places that are used again.
 #[derive(Debug)]

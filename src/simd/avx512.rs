@@ -5,10 +5,10 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
+use super::Lanes;
+use super::Record;
 use super::avx2::{Avx2Lanes, add_record, four_at, four_near, record, twice};
-use super::eights::{EightLinks, Sight};
-use super::lanes::Lanes;
-use crate::body::Record;
+use super::link_batches::{EightLinks, Sight};
 
 #[derive(Clone, Copy)]
 pub(super) struct Avx512Lanes(__m512);

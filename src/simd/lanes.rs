@@ -2,16 +2,16 @@
 
 use glam::Vec3;
 
-use crate::body::Record;
+use super::Record;
 
-use super::eights::{EightLinks, Sight, pull_one_by_one};
+use super::link_batches::{EightLinks, Sight, pull_one_by_one};
 
 /// A few `f32` side by side, and what the spring kernel does with them.
 ///
 /// # Safety
 /// Every function is called only where the processor has the implementation's instructions; functions that take a pointer
 /// also ask for what they say.
-pub(super) trait Lanes: Copy {
+pub(crate) trait Lanes: Copy {
     /// How many; divides 16.
     const COUNT: usize;
 
