@@ -6,8 +6,8 @@ pub mod capi;
 mod codec;
 mod contact;
 pub mod cutting;
+mod def;
 pub mod detection;
-mod diagnostics;
 mod elements;
 mod embedding;
 mod enclosed;
@@ -17,6 +17,7 @@ mod haptics;
 mod ids;
 pub mod material;
 pub mod mesh;
+mod order;
 mod picture;
 mod query;
 #[cfg(test)]
@@ -33,21 +34,19 @@ mod threads;
 mod world;
 
 pub use base::{Error, Result};
-pub use body::{
-    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Sleep, Solver, SpringState, Storage,
-    TearReport, Tearing, TopologyChanges, Values,
+pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
+pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
+pub use def::{
+    BodyContact, BodyDefinition, CollisionFilter, Detection, EnclosedReport, Energy, Material, Model, Sleep, Solver,
+    SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
 };
-pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
-pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
-pub use material::{Material, Model, Viscosity, Yielding};
 pub use picture::{BodyValues, PictureDefinition};
 pub use query::SurfaceHit;
 pub use readers::{BodyReader, Frame};
 pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
-pub use terms::SpringLaw;
 pub use threads::RunTasks;
 pub use world::{
     Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepReport, SurfacePoint, SutureDefinition,

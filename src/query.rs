@@ -3,7 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use crate::base::{Error, Result};
-use crate::body::{Body, finite_vector};
+use crate::body::Body;
+use crate::def::finite_vector;
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
 use crate::geometry::predicates::pierce;

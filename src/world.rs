@@ -17,10 +17,11 @@ mod tear;
 use glam::{Quat, Vec3};
 
 use crate::base::{Error, Result, StateHasher, memory};
-use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, Stroke, finite_vector, not_negative};
+use crate::body::{Body, CutReport, MaterialPoint, Needs, Stroke};
 use crate::codec::saved;
-use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
+use crate::def::{BodyDefinition, CollisionFilter, finite_vector, not_negative};
 use crate::ids::{SlotId, Slots};
 use crate::readers::Clock;
 use crate::simd::{ChosenKernel, Kernel};

@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
-use super::{Body, BodyDefinition, NodeOrder, Spring};
+use super::Body;
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
 use crate::cutting::{CutMaterial, CutSolid, CutSurface, Sweep};
+use crate::def::{BodyDefinition, Spring};
 use crate::geometry::Bounds;
-use crate::soa::{TILE, tile_count};
+use crate::soa::{NodeOrder, TILE, tile_count};
 
 use super::change_log::ChangeLog;
 use super::stroke::Stroke;

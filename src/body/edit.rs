@@ -3,10 +3,11 @@
 use glam::{BVec3, Vec3};
 
 use super::Body;
-use super::definition::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
 use crate::base::{Error, Result, memory};
+use crate::def::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
 use crate::geometry::Bounds;
-use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
+use crate::soa::Masses;
+use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {

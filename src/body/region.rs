@@ -1,8 +1,8 @@
 //! Regions of a body made stiffer or softer, larger or smaller, between steps.
 
 use super::Body;
-use super::definition::not_negative;
 use crate::base::{Error, Result, memory};
+use crate::def::not_negative;
 use crate::soa::{Region, Scale};
 use crate::springs::{Change, Link};
 

@@ -2,13 +2,12 @@
 
 use super::bearing::{Bearing, sorted};
 use super::stretch::Stretch;
-use super::tearing::{TearReport, Tearing, Withheld};
-use super::{BodyDefinition, NodeOrder, Spring};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::cutting::Changes;
+use crate::def::{BodyDefinition, Spring, TearReport, Tearing, Withheld};
 use crate::simd::ChosenKernel;
-use crate::soa::Vectors;
+use crate::soa::{NodeOrder, Vectors};
 use crate::springs::{Change, Link, Rewiring};
 use crate::threads::Team;
 

@@ -5,8 +5,9 @@ use glam::Vec3;
 use super::Body;
 use super::bindings::parts;
 use crate::base::Result;
-use crate::contact::{CollisionFilter, Moment};
+use crate::contact::Moment;
 use crate::cutting::CutMaterial;
+use crate::def::CollisionFilter;
 use crate::solver::close;
 
 impl Body {

@@ -8,7 +8,7 @@ use super::memory;
 use super::status::sinew_status;
 use crate::base::{Error, Result};
 use crate::body::Body;
-use crate::contact::CollisionFilter;
+use crate::def::CollisionFilter;
 use crate::ids::SlotId;
 use crate::world::BodyId;
 

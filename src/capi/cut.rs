@@ -6,8 +6,9 @@ use super::body::{sinew_body_id, with_body};
 use super::guard::{sinew_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::body::{NewNodeSource, NewRimEdge, expect_count};
+use crate::body::{NewNodeSource, NewRimEdge};
 use crate::cutting::Sweep;
+use crate::def::expect_count;
 
 /// What a cut did.
 #[repr(C)]

@@ -7,10 +7,10 @@ use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::{Error, Result};
-use crate::body::{BodyDefinition, Sleep, Solver, Storage, Tearing, Values};
-use crate::contact::{BodyContact, CollisionFilter};
-use crate::material::{Material, Model, Viscosity, Yielding};
-use crate::terms::SpringLaw;
+use crate::def::{
+    BodyContact, BodyDefinition, CollisionFilter, Material, Model, Sleep, Solver, SpringLaw, Storage, Tearing, Values,
+    Viscosity, Yielding,
+};
 
 /// The default: laid out for the processor.
 pub const SINEW_STORAGE_PACKED: u32 = 0;

@@ -8,7 +8,8 @@ use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result};
-use crate::contact::{CollisionFilter, Detection, Pose, Shape, ToolDefinition};
+use crate::contact::{Pose, Shape, ToolDefinition};
+use crate::def::{CollisionFilter, Detection};
 use crate::ids::SlotId;
 use crate::world::ToolId;
 

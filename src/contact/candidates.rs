@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 
 use super::features::{Feature, Features};
-use super::filter::CollisionFilter;
 use super::mesh_solid::MeshSolid;
 use super::path::{Placement, Solid, ToolPath};
 use super::room::{Room, sides_of};
@@ -11,6 +10,7 @@ use super::sweep::Corners;
 use crate::base::{Result, memory};
 use crate::body::Bindings;
 use crate::codec::{saved, saved_enum};
+use crate::def::CollisionFilter;
 use crate::geometry::Bounds;
 use crate::soa::Vectors;
 

@@ -11,10 +11,9 @@ use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::ridges::Ridges;
 
-use super::tool::Detection;
 use crate::base::{Error, Result, StateHasher, memory};
-use crate::body::not_negative;
 use crate::codec::{Reader, Saved, Writer, shape_of_name};
+use crate::def::{Detection, not_negative};
 use crate::geometry::Bounds;
 use crate::mesh::ClosedSurface;
 

@@ -2,10 +2,10 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use super::filter::CollisionFilter;
 use super::mesh_solid::MeshSolid;
 use super::tool::{Form, Pose, Tool};
 use crate::codec::saved;
+use crate::def::CollisionFilter;
 use crate::geometry::Bounds;
 
 /// The way of a tool over a step: a straight line at constant speed, turning at a constant rate.

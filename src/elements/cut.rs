@@ -10,9 +10,8 @@ use super::tetrahedra::{GROUP, Group, Groups};
 use super::{Deformed, Elements, Load, Rest, Sums};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::soa::{TILE, Vectors, tile_count};
-use crate::solver::{Masses, Rates};
-use crate::springs::Springs;
+use crate::soa::{Masses, Rates, TILE, Vectors, tile_count};
+use crate::springs::{Springs, rates_anywhere};
 
 /// The groups of a part that comes later.
 const GROUPS: usize = 32;
@@ -225,7 +224,7 @@ impl Elements {
                 }
             }
             self.stiffnesses[node as usize] = stiffness as f32;
-            let of_springs = Rates::anywhere(node as usize, springs, masses).unwrap_or(Rates::ZERO);
+            let of_springs = rates_anywhere(node as usize, springs, masses).unwrap_or(Rates::ZERO);
             self.most_damped = self.most_damped.max(of_springs.most_damped);
             self.carried[node as usize] = carried as f32 * masses.inverse(node as usize) + of_springs.stiffest;
         }

@@ -19,7 +19,7 @@ use glam::{DMat3, DVec3};
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::material::{Course, Viscosity, Yielding};
+use crate::def::{Course, Viscosity, Yielding};
 use crate::simd::{ChosenKernel, Record};
 use crate::soa::{TILE, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};

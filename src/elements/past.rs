@@ -12,7 +12,7 @@ use super::set::{Bounds, Set};
 use super::tetrahedra::{GROUP, Group, Stresses};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Saved, saved};
-use crate::material::{Course, Viscosity, Yielding};
+use crate::def::{Course, Viscosity, Yielding};
 use crate::simd::ChosenKernel;
 
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use super::law::Law;
 use super::tetrahedra::{GROUP, Stresses};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::material::Yielding;
+use crate::def::Yielding;
 use crate::simd::{ChosenKernel, Loops};
 
 /// What is left of stresses in the tetrahedra of a part.

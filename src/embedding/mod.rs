@@ -7,8 +7,9 @@ mod read;
 use glam::Vec3;
 
 use crate::base::{Error, Result, memory};
-use crate::body::{Body, BodyDefinition, Values};
+use crate::body::Body;
 use crate::cutting::CutMaterial;
+use crate::def::{BodyDefinition, Values};
 use crate::mesh::Mesh;
 use crate::world::{BodyId, World};
 

@@ -12,10 +12,9 @@ mod surface;
 use glam::{DVec3, Vec3};
 
 use crate::base::{Result, StateHasher, memory};
-use crate::body::{BodyDefinition, NodeOrder};
 use crate::codec::saved;
-use crate::soa::{TileForces, Vectors};
-use crate::solver::Rates;
+use crate::def::BodyDefinition;
+use crate::soa::{NodeOrder, Rates, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
 use surface::{Block, Surface};
 

@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use super::Cavity;
 use crate::base::{Error, Result, memory};
-use crate::body::{BodyDefinition, NodeOrder};
 use crate::codec::saved;
-use crate::soa::{TILE, tile_count};
+use crate::def::BodyDefinition;
+use crate::soa::{NodeOrder, TILE, tile_count};
 
 /// Triangles that are worked on together, at most.
 const BLOCK: usize = 512;

@@ -1,7 +1,7 @@
 //! What a haptic handle is to be.
 
 use crate::base::{Error, Result};
-use crate::body::not_negative;
+use crate::def::not_negative;
 use crate::world::ToolId;
 
 use super::six::Six;

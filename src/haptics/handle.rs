@@ -7,8 +7,8 @@ use super::model::{HapticContact, Model};
 use super::observer::Observer;
 use super::six::{self, Six};
 use crate::base::{Error, Result};
-use crate::body::finite_vector;
 use crate::contact::Pose;
+use crate::def::finite_vector;
 use crate::handover::triple_buffer::{Reader, Writer};
 
 /// Beside what the motion of the device explains, a tick changes the force by no more than this, N, or this part of it.

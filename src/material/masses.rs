@@ -2,7 +2,7 @@
 
 use super::filled::{Filled, corners, triangle_area};
 use crate::base::{Error, Result, memory};
-use crate::body::{BodyDefinition, SMALLEST_MASS};
+use crate::def::{BodyDefinition, SMALLEST_MASS};
 use crate::mesh::tetrahedron_volume;
 
 /// The mass of each node, kg; `density` in kg/m³, above 0.

@@ -11,8 +11,8 @@ use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::{Change, Link, Motion, Springs, already_joined, not_joined};
 use crate::base::{Result, memory};
-use crate::body::Spring;
 use crate::codec::{Saved, Writer, saved};
+use crate::def::Spring;
 use crate::simd::{ChosenKernel, Eights, prefetch};
 use crate::soa::{TileForces, tile_nodes};
 

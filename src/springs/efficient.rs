@@ -10,8 +10,8 @@ use super::gather::Gather;
 use super::kept::{DampedLink, KeptLink};
 use super::{Change, Link, Motion, Springs, already_joined, not_joined};
 use crate::base::{Result, memory};
-use crate::body::Spring;
 use crate::codec::{Saved, Writer, saved};
+use crate::def::Spring;
 use crate::simd::prefetch;
 use crate::soa::{TileForces, tile_nodes};
 

@@ -2,7 +2,7 @@
 
 use super::Link;
 use crate::base::{Result, memory};
-use crate::body::Spring;
+use crate::def::Spring;
 
 /// Both ends of every spring, in the order of their nodes; those of a node in the order of its springs.
 pub(super) struct Ends<'a> {

@@ -8,8 +8,8 @@ use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
 use super::{Change, Link, Motion, Rewiring, Springs, already_joined, not_joined};
 use crate::base::{Error, Result, memory};
-use crate::body::Spring;
 use crate::codec::{Saved, Writer, saved};
+use crate::def::Spring;
 use crate::simd::{ChosenKernel, Eights};
 use crate::soa::{TileForces, tile_nodes};
 

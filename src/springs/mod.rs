@@ -16,15 +16,15 @@ use std::ops;
 
 use glam::Vec3;
 
+use crate::def::{BodyDefinition, Spring, Storage};
 use crate::simd::ChosenKernel;
-use crate::soa::{TileForces, Vectors, View, tile_nodes};
+use crate::soa::{Masses, Rates, TileForces, Vectors, View, tile_nodes};
 use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
-pub(crate) use packed::{Costs, Rounding, Row, Split, cheapest, costs};
+pub(crate) use packed::costs;
 
 use crate::base::{Error, Result, memory};
-use crate::body::{BodyDefinition, Spring, Storage};
 use crate::codec::{Reader, Saved, Writer, saved, shape_with};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
@@ -298,6 +298,23 @@ fn rewire_by<S: Springs + ?Sized>(
         return Err(error);
     }
     take_out(springs, removed)
+}
+
+/// Those of a node wherever it and its neighbours are; `None`: it is pinned.
+pub(crate) fn rates_anywhere(node: usize, springs: &dyn Springs, masses: &Masses) -> Option<Rates> {
+    let inverse_mass = masses.inverse(node);
+    let mut rates = Rates::ZERO;
+    springs.visit(node, &mut |link| {
+        // Masses that were added are what a node needs by itself, with half of each spring.
+        let inverse_mass = if masses.are_heavier {
+            2.0 * inverse_mass
+        } else {
+            inverse_mass + masses.inverse(link.neighbour as usize)
+        };
+        rates.stiffest += link.stiffness * inverse_mass;
+        rates.most_damped += link.damping * inverse_mass;
+    });
+    (inverse_mass > 0.0).then_some(rates)
 }
 
 /// Why a spring is not added.

@@ -10,10 +10,9 @@ use super::stencils::{Law, Stencils, directed, direction, lengthening, of_spring
 use super::strings::Tension;
 use super::{Moment, Term};
 use crate::base::{Result, StateHasher, memory};
-use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::codec::saved;
-use crate::material::{Course, Viscosity};
-use crate::terms::SpringLaw;
+use crate::def::{BodyDefinition, Course, Spring, SpringLaw, Viscosity};
+use crate::soa::NodeOrder;
 
 /// Beside springs of a law.
 #[derive(Debug)]

@@ -21,8 +21,9 @@ use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::base::{Error, Result, memory};
-use crate::body::{BodyDefinition, NodeOrder, not_negative};
 use crate::codec::saved;
+use crate::def::{BodyDefinition, not_negative};
+use crate::soa::NodeOrder;
 
 /// Hinges: the two nodes of the edge, then those opposite.
 #[derive(Debug)]

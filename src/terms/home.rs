@@ -6,8 +6,9 @@ use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils};
 use crate::base::{Result, memory};
-use crate::body::{BodyDefinition, NodeOrder, check_values};
 use crate::codec::saved;
+use crate::def::{BodyDefinition, check_values};
+use crate::soa::NodeOrder;
 
 /// Springs of no rest length to a point that stays.
 #[derive(Debug)]

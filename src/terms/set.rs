@@ -11,10 +11,9 @@ use super::stencils::{Law, Stencils, directed, direction, lengthening, of_spring
 use super::strings::Tension;
 use super::{Moment, Term};
 use crate::base::{Error, Result, StateHasher, memory};
-use crate::body::{BodyDefinition, NodeOrder, Spring};
 use crate::codec::saved;
-use crate::material::{Course, Yielding};
-use crate::terms::SpringLaw;
+use crate::def::{BodyDefinition, Course, Spring, SpringLaw, Yielding};
+use crate::soa::NodeOrder;
 
 /// What springs pull less than before they yielded, over their stiffness.
 #[derive(Debug)]

@@ -10,12 +10,10 @@ use super::parting::Parting;
 use super::strings::{Aging, OfTile, Tension};
 use super::{Blocks, Moment, Term};
 use crate::base::{Error, Result, StateHasher, memory};
-use crate::body::{NodeOrder, Spring};
 use crate::codec::{Saved, Writer, saved};
-use crate::material::Course;
+use crate::def::{Course, Spring};
 use crate::simd::ChosenKernel;
-use crate::soa::{Region, Scale, TILE, TileForces, Vectors, View, tile_count};
-use crate::solver::Masses;
+use crate::soa::{Masses, NodeOrder, Region, Scale, TILE, TileForces, Vectors, View, tile_count};
 use crate::springs::Change;
 use crate::threads::{Ragged, Team};
 

@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::Vec4;
 
 use super::stencils::{Law, Stencil};
-use crate::material::Course;
+use crate::def::Course;
 use crate::simd::Loops;
 use crate::soa::{TILE, TileForces, View};
 

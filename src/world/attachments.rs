@@ -246,7 +246,7 @@ impl World {
     ) -> Result<Vec<AttachmentId>> {
         self.bodies.get(body.0)?;
         self.bodies.get(other.0)?;
-        crate::body::expect_count("other_anchors", other_anchors.len(), anchors.len())?;
+        crate::def::expect_count("other_anchors", other_anchors.len(), anchors.len())?;
         check_limit(force_limit)?;
         let mut pairs = memory::reserved(anchors.len())?;
         for (index, (first, second)) in anchors.iter().zip(other_anchors).enumerate() {
@@ -391,7 +391,7 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a tool is named more than once, or the point is not finite.
     pub fn wrench_about(&self, tools: &[ToolId], point: Vec3) -> Result<(Vec3, Vec3)> {
-        crate::body::finite_vector("point", point)?;
+        crate::def::finite_vector("point", point)?;
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
         for (index, tool) in tools.iter().enumerate() {
             if tools[..index].contains(tool) {

@@ -5,10 +5,11 @@ use glam::{DVec3, Vec3};
 use super::BodyId;
 use super::resistance::Knot;
 use crate::base::{Error, Result, StateHasher, memory};
-use crate::body::{CutReport, Stroke, finite_vector};
+use crate::body::{CutReport, Stroke};
 use crate::codec::saved;
-use crate::contact::{CollisionFilter, Lead, Pose};
+use crate::contact::{Lead, Pose};
 use crate::cutting::Met;
+use crate::def::{CollisionFilter, finite_vector};
 use crate::ids::SlotId;
 use crate::mesh::FURTHEST;
 

@@ -24,9 +24,8 @@ pub(super) use step::{begin_parts, next_part, parts_near, run};
 use glam::Vec3;
 
 use crate::base::{Result, StateHasher, memory};
-use crate::body::MOST_ITERATIONS;
 use crate::codec::saved;
-use crate::diagnostics::SolverReport;
+use crate::def::{MOST_ITERATIONS, SolverReport};
 use crate::elements::{Elements, Sums};
 use crate::enclosed::{self, Enclosed};
 use crate::soa::{Records, Vectors, tile_count};

@@ -7,7 +7,7 @@ use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::body::{Body, Lapse};
 use crate::codec::saved;
-use crate::diagnostics::SolverReport;
+use crate::def::SolverReport;
 use crate::soa::{Records, Vectors, WriteRecords, tile_count, tile_nodes};
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};

@@ -11,11 +11,9 @@ use std::ops::Range;
 use super::strays::Strays;
 use crate::base::{Result, memory};
 use crate::codec::saved;
+use crate::order::LANES;
 use crate::soa::{MARGIN, TILE};
 use crate::springs::Link;
-
-/// Lanes of a column.
-pub(crate) const LANES: usize = 16;
 
 /// How far ahead a gather with small indices reaches.
 const WINDOW: usize = 1 << 16;

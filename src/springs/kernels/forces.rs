@@ -8,8 +8,9 @@ use std::marker::PhantomData;
 
 use glam::Vec3;
 
-use super::columns::{Columns, Ends, LANES, Material, Run};
+use super::columns::{Columns, Ends, Material, Run};
 use super::quantities::{Change, Force, HalfEnergy, Quantity, Spring, Ways, difference};
+use crate::order::LANES;
 use crate::simd::{ChosenKernel, Lanes, WithLanes, prefetch};
 use crate::soa::{Places, TileForces, Vectors, View};
 use crate::springs::{Course, Link, Motion, Tangent};

@@ -7,4 +7,4 @@ mod quantities;
 mod sound;
 mod strays;
 
-pub(super) use columns::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
+pub(super) use columns::{Column, Columns, Line, Material, Neighbours, Parameters};

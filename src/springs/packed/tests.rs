@@ -3,8 +3,8 @@ use std::collections::btree_map::Entry;
 
 use glam::{DVec3, Vec3};
 
-use super::{Packed, Rounding};
-use crate::body::Spring;
+use super::Packed;
+use crate::def::{Rounding, Spring};
 use crate::random::Random;
 use crate::simd::Kernel;
 use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};

@@ -1,7 +1,7 @@
 //! Yielding: what is deformed beyond a strain stays so.
 
+use super::not_negative;
 use crate::base::{Error, Result};
-use crate::body::not_negative;
 
 /// From which strain on springs, and tetrahedra that are elements, take a set: they are at rest elsewhere from then on (perfect
 /// plasticity).

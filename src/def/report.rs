@@ -1,10 +1,6 @@
-//! What a world says about itself: energy, memory, a hash of its state.
+//! What a body says about itself: energy, memory, cavities, how its solver took the last step.
 
 use crate::codec::saved;
-
-mod energy;
-
-pub use energy::Energy;
 
 /// How much memory the springs of a body take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,4 +64,15 @@ impl SolverReport {
         solves: 0,
         converged: true,
     };
+}
+
+/// Energy in joules, at the time of the positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of the nodes that are free to move, along the axes along which they are, with what mass scaling adds to them.
+    pub kinetic: f64,
+    /// Of the springs, of tetrahedra that are elements, and of every other term; less the work that a constant pressure has done.
+    pub elastic: f64,
+    /// Of all nodes, zero at the origin.
+    pub gravitational: f64,
 }

@@ -10,6 +10,7 @@ mod cuthill_mckee;
 mod hilbert;
 mod links;
 mod rows;
+mod split;
 
 #[cfg(test)]
 mod tests;
@@ -20,12 +21,15 @@ use glam::Vec3;
 
 use crate::Result;
 use crate::base::memory;
-use crate::springs::Costs;
 use cost::{cost, least_cost};
 use cuthill_mckee::reverse_cuthill_mckee;
 use hilbert::along_curve;
 use links::Links;
 use rows::along_rows;
+pub(crate) use split::{Costs, GATHER, Row, Split, cheapest};
+
+/// Nodes side by side whose links share columns.
+pub(crate) const LANES: usize = 16;
 
 /// What another order must save to be taken instead of the caller's, and what is too little to look further for.
 const WORTH: f64 = 0.03;

@@ -2,13 +2,12 @@
 
 use glam::Vec3;
 
-use super::sleep::Sleep;
-use super::tearing::Tearing;
+use super::BodyContact;
+use super::Sleep;
+use super::SpringLaw;
+use super::Tearing;
+use super::{Material, Viscosity, Yielding};
 use crate::base::{Error, Result, memory};
-use crate::contact::BodyContact;
-use crate::material::{Material, Viscosity, Yielding};
-use crate::springs::Rounding;
-use crate::terms::SpringLaw;
 
 /// One value for all, or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -255,6 +254,27 @@ pub(crate) struct Spring {
     pub stiffness: f32,
     pub rest_length: f32,
     pub damping: f32,
+}
+
+/// Rest lengths that come from positions are merged where they differ by no more than this part of themselves, however
+/// coarse the positions.
+const LARGEST_MERGER: f32 = 1e-3;
+
+/// What rest lengths may differ by, to be one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rounding {
+    /// The largest coordinate that they were computed from, m; 0 where they were given.
+    pub reach: f32,
+}
+
+impl Rounding {
+    /// The width within which rest lengths of about this length are one, m.
+    pub fn width(self, length: f32) -> f32 {
+        // Each end is rounded by up to half a unit in the last place along each axis, and so are the length and its ends'
+        // difference.
+        let rounded = 4.0 * f32::EPSILON * self.reach;
+        (4.0 * f32::EPSILON * length).max(rounded.min(LARGEST_MERGER * length))
+    }
 }
 
 impl BodyDefinition<'_> {

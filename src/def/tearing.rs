@@ -1,10 +1,10 @@
 //! When a body tears, and what it says of it.
 
 use super::BodyDefinition;
-use super::definition::not_negative;
+use super::Model;
+use super::not_negative;
 use crate::base::{Error, Result};
 use crate::codec::{saved, saved_enum};
-use crate::material::Model;
 
 /// When a body tears.
 ///
@@ -71,7 +71,7 @@ saved_enum!(Withheld { 0 => SmallPiece, 1 => NoRoom, 2 => NoWay });
 
 impl Tearing {
     /// Refuses what is out of its range, or not possible for such a body.
-    pub(super) fn check(&self, definition: &BodyDefinition) -> Result<()> {
+    pub(crate) fn check(&self, definition: &BodyDefinition) -> Result<()> {
         let of_springs = [("tear_strain", self.strain), ("tear_force", self.force)];
         for (name, value) in of_springs.into_iter().chain([("smallest_piece", self.smallest_piece)]) {
             not_negative(name, value)?;
@@ -114,7 +114,7 @@ impl Tearing {
 }
 
 impl TearReport {
-    pub(super) fn withhold(&mut self, why: Withheld) {
+    pub(crate) fn withhold(&mut self, why: Withheld) {
         *match why {
             Withheld::SmallPiece => &mut self.small_pieces,
             Withheld::NoRoom => &mut self.no_room,

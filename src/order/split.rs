@@ -1,7 +1,7 @@
 //! Which links of a block of nodes go into runs, which into gathers, and which are left beside the columns.
 
+use super::LANES;
 use crate::base::{Result, memory};
-use crate::springs::kernels::LANES;
 
 /// The fewest links that are worth a gather: alone they cost a third as much as a gather of sixteen.
 pub(crate) const GATHER: usize = 4;

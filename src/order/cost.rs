@@ -2,9 +2,9 @@
 
 use super::inverse;
 use super::links::Links;
+use super::{Row, Split, cheapest};
 use crate::Result;
 use crate::base::memory;
-use crate::springs::{Row, Split, cheapest};
 
 /// Nodes side by side whose links share columns.
 const LANES: usize = 1 << LANE_BITS;

@@ -1,8 +1,8 @@
 //! The springs of each node.
 
+use super::Costs;
 use crate::Result;
 use crate::base::memory;
-use crate::springs::Costs;
 
 /// As many as the processor writes to side by side.
 const GROUPS: usize = 256;

@@ -2,18 +2,8 @@
 
 use glam::Vec3;
 
-use crate::body::Body;
-
-/// Energy in joules, at the time of the positions.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Energy {
-    /// Of the nodes that are free to move, along the axes along which they are, with what mass scaling adds to them.
-    pub kinetic: f64,
-    /// Of the springs, of tetrahedra that are elements, and of every other term; less the work that a constant pressure has done.
-    pub elastic: f64,
-    /// Of all nodes, zero at the origin.
-    pub gravitational: f64,
-}
+use super::Body;
+use crate::def::Energy;
 
 impl Energy {
     pub(crate) fn of(body: &Body, gravity: Vec3) -> Self {

@@ -1,10 +1,10 @@
 //! Viscosity: an arm beside what is elastic, a spring and a dashpot in a row (the standard linear solid; Zener 1948), or the dashpot
 //! alone (Kelvin and Voigt).
 
+use super::not_negative;
 use crate::base::{Error, Result};
-use crate::body::not_negative;
 use crate::codec::saved;
-use crate::solver::Rates;
+use crate::soa::Rates;
 
 /// How tissue resists the speed at which it is deformed. With E the stiffness at rest, of a spring or an element, a dashpot of
 /// `E retardation_time` lies beside it, in a row with a spring of `E retardation_time / relaxation_time`.
@@ -131,6 +131,29 @@ impl Viscosity {
             as_dashpot
         } else {
             as_spring
+        }
+    }
+}
+
+/// What a node carries of forces that are not those of springs, at rest: twice the sum over all nodes bounds their form.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Carried {
+    /// N/m
+    pub stiffness: f32,
+    /// N s/m
+    pub damping: f32,
+}
+
+saved!(Carried { stiffness, damping });
+
+impl Carried {
+    /// Adds what forces give with this stiffness, N/m, that have such an arm beside them.
+    pub fn add(&mut self, stiffness: f32, viscosity: Viscosity) {
+        let stiffness = 0.5 * stiffness;
+        self.stiffness += stiffness;
+        match viscosity.stiffening() {
+            Some(stiffening) => self.stiffness += stiffness * stiffening as f32,
+            None => self.damping += stiffness * viscosity.retardation_time,
         }
     }
 }

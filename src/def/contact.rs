@@ -1,9 +1,23 @@
 //! What meets what, and what a body asks of contact.
 
-use super::tool::{Detection, check_reach};
+use super::not_negative;
 use crate::base::{Error, Result, StateHasher};
-use crate::body::not_negative;
-use crate::codec::saved;
+use crate::codec::{saved, saved_enum};
+use crate::mesh::FURTHEST;
+
+/// How a tool finds what it touches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Detection {
+    /// Exact distances, swept over the step.
+    #[default]
+    Exact,
+    /// Virtual rays cast through a depth buffer (CInDeR; Halic et al., section 2.1).
+    ImageSpace,
+    /// A sampled signed distance; for meshes alone.
+    DistanceField,
+}
+
+saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 
 /// Which tools and bodies meet: two do where each has a category that the other's mask has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,4 +135,14 @@ impl BodyContact {
         }
         Ok(())
     }
+}
+
+/// Refuses a length with which squares of distances would not stay finite.
+pub(crate) fn check_reach(name: &str, value: f32) -> Result<()> {
+    if value <= FURTHEST {
+        return Ok(());
+    }
+    Err(Error::invalid(format!(
+        "{name} is {value}: must be at most {FURTHEST:e} m"
+    )))
 }
