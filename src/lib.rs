@@ -1,29 +1,31 @@
 //! Soft tissue for programs that already have a loop.
 
+mod base;
 mod body;
 pub mod capi;
+mod codec;
 mod contact;
 pub mod cutting;
+mod def;
 pub mod detection;
-mod diagnostics;
 mod elements;
 mod embedding;
 mod enclosed;
-mod error;
+mod geometry;
 mod handover;
 mod haptics;
+mod ids;
 pub mod material;
-mod memory;
 pub mod mesh;
+mod order;
 mod picture;
 mod query;
 #[cfg(test)]
 mod random;
 pub mod raster;
 mod readers;
-mod signs;
-mod slots;
-mod snapshot;
+mod simd;
+mod soa;
 mod solver;
 mod springs;
 pub mod strain;
@@ -31,22 +33,20 @@ mod terms;
 mod threads;
 mod world;
 
-pub use body::{
-    Body, BodyDefinition, CutReport, NewNodeSource, NewRimEdge, Pieces, Sleep, Solver, SpringState, Storage,
-    TearReport, Tearing, TopologyChanges, Values,
+pub use base::{Error, Result};
+pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
+pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
+pub use def::{
+    BodyContact, BodyDefinition, CollisionFilter, Detection, EnclosedReport, Energy, Material, Model, Sleep, Solver,
+    SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
 };
-pub use contact::{BodyContact, CollisionFilter, Contact, ContactChange, Detection, Pose, Shape, ToolDefinition};
-pub use diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use embedding::{Embedding, EmbeddingDefinition};
-pub use error::{Error, Result};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
-pub use material::{Material, Model, Viscosity, Yielding};
 pub use picture::{BodyValues, PictureDefinition};
 pub use query::SurfaceHit;
 pub use readers::{BodyReader, Frame};
+pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
-pub use springs::Kernel;
-pub use terms::SpringLaw;
 pub use threads::RunTasks;
 pub use world::{
     Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepReport, SurfacePoint, SutureDefinition,

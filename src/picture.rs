@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use crate::body::{Body, finite_vector};
+use crate::base::{Error, Result, memory};
+use crate::body::Body;
 use crate::contact::{Contact, Form, Pose, Tool};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::def::finite_vector;
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
 use crate::world::{BodyId, World};

@@ -2,10 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::body::{Body, Bounds, finite_vector};
-use crate::contact::nearest::nearest_on_triangle;
-use crate::contact::predicates::pierce;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
+use crate::body::Body;
+use crate::def::finite_vector;
+use crate::geometry::Bounds;
+use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::predicates::pierce;
 use crate::world::{BodyId, World};
 
 /// A point of a body's surface.

@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use crate::error::{Error, Result};
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
 use crate::handover::pool::{Reader, Writer};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{TILE, tile_count, tile_nodes};
+use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::threads::{Team, Tiles};
 
 /// So many readers of one body at a time.

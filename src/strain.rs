@@ -9,9 +9,8 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::body::{Values, check_values, expect_count, finite_vectors, node_indices};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
+use crate::def::{Values, check_values, expect_count, finite_vectors, node_indices};
 
 /// How a triangle or tetrahedron is strained. What has no area or volume at rest has no strain: 0.
 #[repr(C)]

@@ -16,17 +16,16 @@ mod tear;
 
 use glam::{Quat, Vec3};
 
-use crate::body::{Body, BodyDefinition, CutReport, MaterialPoint, Needs, Stroke, finite_vector, not_negative};
-use crate::contact::{CollisionFilter, Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::body::{Body, CutReport, MaterialPoint, Needs, Stroke};
+use crate::codec::saved;
+use crate::contact::{Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::def::{BodyDefinition, CollisionFilter, finite_vector, not_negative};
+use crate::ids::{SlotId, Slots};
 use crate::readers::Clock;
-use crate::slots::{SlotId, Slots};
-use crate::snapshot::saved;
+use crate::simd::{ChosenKernel, Kernel};
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
-use crate::springs::{ChosenKernel, Kernel};
 use crate::threads::{RunTasks, Threads};
 pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 use attachments::{Attachment, Which};
@@ -268,7 +267,7 @@ impl World {
     ) -> Result<T> {
         let place = self.bodies.place(body.0)?;
         let carried = self.attached_points(body, place)?;
-        let mut moved = crate::memory::reserved(carried.len())?;
+        let mut moved = crate::base::memory::reserved(carried.len())?;
         let it = self.bodies.get_mut(body.0)?;
         let before = it.topology_version();
         let skin = self.tissue.as_mut().and_then(|tissue| tissue.skin_mut(place));
@@ -312,7 +311,7 @@ impl World {
                 Anchor::Point(point) => it.material_point(point),
                 Anchor::Node(_) => None,
             };
-            crate::memory::push(&mut points, (anchor, at))?;
+            crate::base::memory::push(&mut points, (anchor, at))?;
         }
         Ok(points)
     }

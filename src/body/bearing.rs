@@ -1,13 +1,11 @@
 //! What each spring of a body bears before it tears.
 
 use super::stretch::Watched;
-use super::tearing::Withheld;
-use super::{NodeOrder, Spring};
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::cutting::Changes;
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::def::{Spring, Withheld};
+use crate::soa::NodeOrder;
 use crate::springs::{Change, Link, Rewiring};
 
 /// No spring.

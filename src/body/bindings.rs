@@ -2,11 +2,9 @@
 
 use glam::Vec3;
 
-use super::vectors::Vectors;
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::soa::Vectors;
 
 /// A point that is bound to nodes, which are not bound themselves. It has a number among the body's nodes, without mass or springs.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::cuttable::passes;
-use super::{Body, Bounds, Stroke};
+use super::{Body, Stroke};
+use crate::base::Result;
 use crate::cutting::{CutEnd, CutMaterial, Met, Sweep};
-use crate::error::Result;
+use crate::geometry::Bounds;
 use crate::world::{Anchor, SurfacePoint};
 
 /// A point of the tissue in which a blade stands.

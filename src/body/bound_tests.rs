@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::{Body, BodyDefinition, Bound, NewNode, Solver, Storage, Values};
+use super::{Body, Bound, NewNode};
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
+use crate::def::{BodyDefinition, Solver, Storage, Values};
 use crate::springs::Rewiring;
 use crate::world::{BodyId, ToolId, World, WorldDefinition};
 

@@ -1,8 +1,8 @@
 //! What cuts have changed, in order, for renderers that follow.
 
+use crate::base::{Error, Result};
+use crate::codec::saved;
 use crate::cutting::Changes;
-use crate::error::{Error, Result};
-use crate::snapshot::saved;
 
 /// Where a node that a cut added comes from: what it carries (texture coordinates, weights of a skin) follows by these weights.
 #[repr(C)]

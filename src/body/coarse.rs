@@ -1,8 +1,8 @@
 //! A step taken with fewer substeps, kept to be compared with the same step taken with more.
 
-use super::vectors::Vectors;
-use crate::error::Result;
-use crate::snapshot::saved;
+use crate::base::Result;
+use crate::codec::saved;
+use crate::soa::Vectors;
 
 /// Positions within and at the end of a coarser step, and velocities at its end; kept only in worlds with a tolerance.
 ///

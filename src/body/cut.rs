@@ -2,12 +2,12 @@
 
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::Cuttable;
-use super::{Body, Bound, NewNode, NodeOrder};
+use super::{Body, Bound, NewNode};
+use crate::base::{Error, Result, memory};
 use crate::contact::{Skin, SkinChange, SurfaceChange, SurfaceToBe};
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::soa::NodeOrder;
 use crate::solver::close_beside;
 use crate::springs::{Change, Rewiring};
 use crate::terms::Parting;

@@ -2,12 +2,13 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
+use super::Body;
 use super::cuttable::Cuttable;
-use super::{Body, SMALLEST_MASS};
+use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
-use crate::error::Result;
-use crate::memory;
-use crate::solver::{Candidate, Masses, make_up_for};
+use crate::def::SMALLEST_MASS;
+use crate::soa::Masses;
+use crate::solver::{Candidate, make_up_for};
 use crate::springs::{Rewiring, pull};
 
 /// A node whose springs or mass a cut changes.

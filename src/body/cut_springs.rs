@@ -1,10 +1,10 @@
 //! Springs of a body that is cut: parts of those along edges of cells, and those along none that the blade passes through.
 
+use super::Body;
 use super::cuttable::passes;
-use super::{Body, Spring};
+use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial, PieceOfSpring, Sweep};
-use crate::error::Result;
-use crate::memory;
+use crate::def::Spring;
 use crate::springs::{Change, Link, Rewiring};
 
 impl Body {

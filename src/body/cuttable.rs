@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 
-use super::{Body, BodyDefinition, Bounds, NodeOrder, Spring};
+use super::Body;
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
 use crate::cutting::{CutMaterial, CutSolid, CutSurface, Sweep};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{TILE, tile_count};
+use crate::def::{BodyDefinition, Spring};
+use crate::geometry::Bounds;
+use crate::soa::{NodeOrder, TILE, tile_count};
 
 use super::change_log::ChangeLog;
 use super::stroke::Stroke;

@@ -4,11 +4,10 @@
 //! per step becomes the same decay and the same terminal velocity at every step.
 
 use super::Sleeper;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::TILE;
 use crate::solver::{MassScaling, Sliver};
-use crate::springs::TILE;
 
 /// What half a substep does to each node's velocity; kept only by bodies that have node damping.
 #[derive(Debug)]

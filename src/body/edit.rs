@@ -2,11 +2,12 @@
 
 use glam::{BVec3, Vec3};
 
-use super::definition::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
-use super::{Body, Bounds};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::solver::{GravityKicks, Masses, Stability, close, make_up_for, mean_force};
+use super::Body;
+use crate::base::{Error, Result, memory};
+use crate::def::{Spring, distance, expect_count, finite, finite_vector, finite_vectors, not_negative};
+use crate::geometry::Bounds;
+use crate::soa::Masses;
+use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {

@@ -8,13 +8,12 @@ use std::fmt::Display;
 
 use glam::{DVec3, Vec3};
 
-use super::{Body, Pin, Pins, Vectors};
+use super::{Body, Pin, Pins};
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::contact::{Frame, ToolPath};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::slots::SlotId;
-use crate::snapshot::saved;
+use crate::ids::SlotId;
+use crate::soa::Vectors;
 use crate::solver::close;
 
 /// A part of a body that a tool holds: a node, or the corners of a triangle about a point on it.

@@ -1,12 +1,11 @@
 //! Nodes that come after a body was made, as cuts make them: room for them is made at the door, so that adding one moves nothing.
 
-use super::{Body, Bound, Vectors};
-use crate::error::{Error, Result};
-use crate::memory;
+use super::{Body, Bound};
+use crate::base::{Error, Result, memory};
+use crate::soa::{TILE, Vectors, tile_count};
 use crate::solver::{Sums, Survey};
-use crate::springs::{TILE, tile_count};
 
-use super::origin::Bounds;
+use crate::geometry::Bounds;
 
 /// What a new node is.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! The bits of a body that its next step depends on.
 
 use super::Body;
-use crate::diagnostics::StateHasher;
+use crate::base::StateHasher;
 
 impl Body {
     pub(crate) fn hash_state(&self, hasher: &mut StateHasher) {

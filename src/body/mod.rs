@@ -12,13 +12,12 @@ mod cut_masses;
 mod cut_springs;
 mod cuttable;
 mod damping;
-mod definition;
 mod edit;
+mod energy;
 mod grasp;
 mod grow;
 mod hash;
 mod material_point;
-mod nodes;
 mod order;
 mod origin;
 mod past;
@@ -26,7 +25,6 @@ mod pieces;
 mod pins;
 mod published;
 mod query_tree;
-mod records;
 mod region;
 mod shown;
 mod sleep;
@@ -37,14 +35,18 @@ mod stroke;
 mod surface;
 mod tear;
 mod tear_solid;
-mod tearing;
 mod tears;
 mod tissue;
 mod tune;
-mod vectors;
 
 use glam::{BVec3, DVec3, Vec3};
 
+use crate::def::{
+    BodyContact, BodyDefinition, Carried, EnclosedReport, Energy, Solver, SolverReport, Storage, StorageReport, Values,
+};
+use crate::geometry::Bounds;
+use crate::simd::ChosenKernel;
+use crate::soa::{Masses, NodeOrder, Rates, Records, Vectors, tile_count, tile_nodes};
 pub(crate) use bindings::{Bindings, Bound};
 pub(crate) use blade::HoldAt;
 pub use change_log::{NewNodeSource, NewRimEdge, TopologyChanges};
@@ -52,47 +54,33 @@ pub(crate) use coarse::CoarseStep;
 pub use cut::CutReport;
 use cuttable::Cuttable;
 pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
-pub use definition::{BodyDefinition, Solver, Storage, Values};
-pub(crate) use definition::{
-    MOST_ITERATIONS, SMALLEST_MASS, Spring, check_values, expect_count, finite_vector, finite_vectors, node_indices,
-    not_negative,
-};
 pub(crate) use grasp::{Grasps, Grip, Lapse};
 pub(crate) use grow::NewNode;
-pub(crate) use nodes::{Region, Scale};
-pub(crate) use origin::Bounds;
-pub(crate) use records::{Record, Records, WriteRecords};
 pub(crate) use tear::Torn;
-pub(crate) use tearing::Withheld;
-pub use tearing::{TearReport, Tearing};
 pub use tune::SpringState;
-pub(crate) use vectors::{MARGIN, Places, Vectors, View};
 
-use crate::contact::{BodyContact, Contact, Contacts, ToolPath};
-use crate::diagnostics::{EnclosedReport, Energy, SolverReport, StorageReport};
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::contact::{Contact, Contacts, ToolPath};
 use crate::elements::{Elements, Law};
 use crate::enclosed::Enclosed;
-use crate::error::{Error, Result};
 use crate::material::Made;
-use crate::memory;
 use crate::readers::Shown;
-use crate::snapshot::saved;
 use crate::solver::{
-    Carried, Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Masses, Rates, Stability, Sums,
-    Survey, Watched, close, write_records,
+    Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Stability, Sums, Survey, Watched, close,
+    write_records,
 };
-use crate::springs::{ChosenKernel, Springs, store, tile_count, tile_nodes};
+use crate::springs::{Springs, store};
 use crate::terms::Terms;
 use crate::threads::Team;
 use crate::world::BodyId;
 pub(crate) use material_point::MaterialPoint;
-pub(crate) use order::NodeOrder;
+use order::{order_for_springs, order_for_tetrahedra};
 use origin::shift_towards;
 pub use pieces::Pieces;
 pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use query_tree::QueryTree;
-pub use sleep::Sleep;
 pub(crate) use sleep::Sleeper;
 use state::State;
 pub(crate) use stroke::Stroke;
@@ -198,9 +186,9 @@ impl Body {
         let law = made.as_ref().and_then(|made| made.law);
         let order = match definition.storage {
             Storage::Packed if springs.is_empty() && law.is_some() => {
-                NodeOrder::for_tetrahedra(definition.positions, definition.tetrahedra)?
+                order_for_tetrahedra(definition.positions, definition.tetrahedra)?
             }
-            Storage::Packed => NodeOrder::for_springs(definition.positions, &springs, definition.rounding())?,
+            Storage::Packed => order_for_springs(definition.positions, &springs, definition.rounding())?,
             _ => NodeOrder::default(),
         };
         let of_volume = (definition.volume_stiffness > 0.0).then(|| Law::of_volume(definition.volume_stiffness));

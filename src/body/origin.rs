@@ -1,77 +1,11 @@
 //! Where a body's local coordinates begin: near the body, so that small motions survive in `f32` anywhere in the world.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use crate::snapshot::saved;
-use crate::springs::Range;
+use crate::geometry::Bounds;
 
 /// The smallest grid on which an origin is chosen, in metres; a body of one node has no extent of its own.
 const SMALLEST_GRID: f64 = 1.0 / 1024.0;
-
-/// The corners of an axis-aligned box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bounds {
-    pub min: Vec3,
-    pub max: Vec3,
-}
-
-saved!(Bounds { min, max });
-
-impl Bounds {
-    pub const EMPTY: Self = Self {
-        min: Vec3::INFINITY,
-        max: Vec3::NEG_INFINITY,
-    };
-
-    /// The box about `points`; a NaN among them is not seen.
-    pub fn of(points: impl Iterator<Item = Vec3>) -> Self {
-        points.fold(Self::EMPTY, Self::with)
-    }
-
-    pub fn with(self, point: Vec3) -> Self {
-        Self {
-            min: self.min.min(point),
-            max: self.max.max(point),
-        }
-    }
-
-    /// The box about both.
-    pub fn and(self, other: &Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
-    }
-
-    pub fn extended(self, margin: f32) -> Self {
-        Self {
-            min: self.min - margin,
-            max: self.max + margin,
-        }
-    }
-
-    pub fn moved(self, by: DVec3) -> Self {
-        let [min, max] = [self.min, self.max].map(|corner| (corner.as_dvec3() + by).as_vec3());
-        Self { min, max }
-    }
-
-    pub fn contains(&self, other: &Self) -> bool {
-        self.min.cmple(other.min).all() && other.max.cmple(self.max).all()
-    }
-
-    pub fn overlaps(&self, other: &Self) -> bool {
-        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
-    }
-}
-
-impl From<[Range; 3]> for Bounds {
-    fn from(ranges: [Range; 3]) -> Self {
-        Self {
-            min: ranges.map(|range| range.least).into(),
-            max: ranges.map(|range| range.greatest).into(),
-        }
-    }
-}
 
 /// The shift of the origin that brings what lies within `bounds` near it; zero while that is near enough.
 ///
@@ -98,6 +32,7 @@ fn power_of_two_from(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     #[test]
     fn local_coordinates_are_exact() {

@@ -1,8 +1,8 @@
 //! What a body remembers of how it was deformed: elements and terms that are viscous, or set.
 
 use super::Body;
+use crate::def::{Course, Viscosity};
 use crate::elements::Elements;
-use crate::material::{Course, Viscosity};
 use crate::solver::write_records;
 use crate::terms::Terms;
 use crate::threads::Team;

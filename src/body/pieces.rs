@@ -1,8 +1,7 @@
 //! Which pieces a body consists of.
 
 use super::Body;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// The pieces of a body.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,11 +2,9 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
-use super::vectors::Vectors;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::TILE;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::{TILE, Vectors};
 use crate::threads::Ragged;
 
 /// A node that is held, along all axes or along some. Along the others `force` and `travel` are 0, and what else is kept means

@@ -5,13 +5,13 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::{DVec3, Vec3};
 
-use super::origin::Bounds;
 use super::{Bindings, Body};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer};
+use crate::base::{Result, memory};
+use crate::codec::{Reader, Saved, Writer};
+use crate::geometry::Bounds;
+use crate::simd::{Loops, prefetch};
+use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::solver::show_closed;
-use crate::springs::{Loops, TILE, prefetch, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
 
 /// Positions in another order are fetched ahead in bodies of so many nodes.

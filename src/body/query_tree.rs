@@ -5,9 +5,8 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use glam::Vec3;
 
 use super::Body;
-use crate::contact::Forest;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::geometry::Forest;
 
 /// Nothing while nobody asks. A step only marks it as outdated: it neither waits, refits nor allocates.
 #[derive(Debug, Default)]

@@ -1,9 +1,9 @@
 //! Regions of a body made stiffer or softer, larger or smaller, between steps.
 
-use super::definition::not_negative;
-use super::{Body, Region, Scale};
-use crate::error::{Error, Result};
-use crate::memory;
+use super::Body;
+use crate::base::{Error, Result, memory};
+use crate::def::not_negative;
+use crate::soa::{Region, Scale};
 use crate::springs::{Change, Link};
 
 impl Body {

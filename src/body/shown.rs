@@ -1,8 +1,7 @@
 //! What readers on other threads see.
 
 use super::Body;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 use crate::readers::{BodyReader, Clock, Shown, View};
 use crate::threads::Team;
 

@@ -6,46 +6,15 @@
 
 use glam::Vec3;
 
-use super::definition::not_negative;
-use super::{Body, Bounds, WriteRecords};
+use super::Body;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::contact::ToolPath;
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Motion, TILE, TileForces, tile_count, tile_nodes};
+use crate::def::Sleep;
+use crate::geometry::Bounds;
+use crate::soa::{TILE, TileForces, WriteRecords, tile_count, tile_nodes};
+use crate::springs::Motion;
 use crate::threads::{Items, Team};
-
-/// When tissue at rest is left alone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sleep {
-    /// What is slower is at rest, m/s, at least 0; 0: the body never sleeps, and pays nothing for it.
-    pub speed: f32,
-    /// For how long it has to be at rest, s, above 0: some times what the tissue takes to settle.
-    pub time: f32,
-}
-
-saved!(Sleep { speed, time });
-
-impl Default for Sleep {
-    /// Never; after half a second.
-    fn default() -> Self {
-        Self { speed: 0.0, time: 0.5 }
-    }
-}
-
-impl Sleep {
-    pub(crate) fn check(&self) -> Result<()> {
-        not_negative("sleep_speed", self.speed)?;
-        if !(self.time > 0.0 && self.time.is_finite()) {
-            return Err(Error::invalid(format!(
-                "sleep_time is {}: must be above 0 and finite",
-                self.time
-            )));
-        }
-        Ok(())
-    }
-}
 
 /// Forces on what falls asleep are so much less than those that wake it: it does not wake at once.
 const SOUNDLY: f32 = 0.5;

@@ -1,7 +1,7 @@
 //! Whether a body that was read from bytes hangs together.
 
 use super::Body;
-use crate::springs::tile_count;
+use crate::soa::tile_count;
 
 impl Body {
     /// Whether what it has of each node and tile is there for all of them, and what leads to nodes leads to some; all is finite.

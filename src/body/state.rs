@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::vectors::Vectors;
-use crate::error::Result;
-use crate::snapshot::saved;
+use crate::base::Result;
+use crate::codec::saved;
+use crate::soa::Vectors;
 
 /// Positions, velocities and spring forces of all nodes, with room for a step in progress.
 ///

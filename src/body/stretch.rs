@@ -1,10 +1,10 @@
 //! Which springs have become too long: looked for where nodes have gone far enough for that alone.
 
-use super::{Bounds, Vectors};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{ChosenKernel, Loops};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::geometry::Bounds;
+use crate::simd::{ChosenKernel, Loops};
+use crate::soa::Vectors;
 use crate::threads::{Items, Team};
 
 /// Springs that are looked at together.

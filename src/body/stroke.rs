@@ -2,11 +2,9 @@
 
 use glam::Vec3;
 
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::cutting::{CutEnd, CutMaterial, SolidStroke, Sweep};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
 
 /// Points that reach along less than this part of an edge do not tell how it turns.
 const LITTLE: f32 = 0.02;

@@ -1,8 +1,8 @@
 //! A surface that changes: where it is drawn and touched it is not what it was made as.
 
 use super::Body;
+use crate::base::Result;
 use crate::contact::SurfaceChange;
-use crate::error::Result;
 
 impl Body {
     /// Makes room for a change of its surface with which so many nodes come, and so many triangles change and are added.

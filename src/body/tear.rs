@@ -3,13 +3,11 @@
 use glam::{DMat3, DVec3};
 
 use super::cuttable::Cuttable;
-use super::definition::check_values;
-use super::tearing::{TearReport, Withheld};
-use super::{Body, CutReport, Values};
+use super::{Body, CutReport};
+use crate::base::{Error, Result, memory};
 use crate::contact::Skin;
 use crate::cutting::{CutSurface, Limits, Load};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::def::{TearReport, Values, Withheld, check_values};
 use crate::springs::{Link, pull};
 use crate::threads::Team;
 

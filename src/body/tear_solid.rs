@@ -2,12 +2,11 @@
 
 use super::cuttable::Cuttable;
 use super::tear::Torn;
-use super::tearing::Withheld;
 use super::{Body, CutReport};
+use crate::base::{Result, memory};
 use crate::contact::Skin;
 use crate::cutting::{CutMaterial, Limits, Load};
-use crate::error::Result;
-use crate::memory;
+use crate::def::Withheld;
 
 impl Body {
     /// Tears a solid at a spring, or an edge of elements: through that of its nodes which is stretched more, else the other, or else one beside it.

@@ -2,13 +2,13 @@
 
 use super::bearing::{Bearing, sorted};
 use super::stretch::Stretch;
-use super::tearing::{TearReport, Tearing, Withheld};
-use super::{BodyDefinition, NodeOrder, Spring, Vectors};
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::cutting::Changes;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Change, ChosenKernel, Link, Rewiring};
+use crate::def::{BodyDefinition, Spring, TearReport, Tearing, Withheld};
+use crate::simd::ChosenKernel;
+use crate::soa::{NodeOrder, Vectors};
+use crate::springs::{Change, Link, Rewiring};
 use crate::threads::Team;
 
 /// A spring beyond its limits.

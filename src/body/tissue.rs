@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::Body;
 use super::bindings::parts;
-use crate::contact::{CollisionFilter, Moment};
+use crate::base::Result;
+use crate::contact::Moment;
 use crate::cutting::CutMaterial;
-use crate::error::Result;
+use crate::def::CollisionFilter;
 use crate::solver::close;
 
 impl Body {

@@ -1,9 +1,8 @@
 //! Springs read, and their stiffnesses and rest lengths changed, between steps.
 
-use super::definition::check_values;
-use super::{Body, Values};
-use crate::error::{Error, Result};
-use crate::memory;
+use super::Body;
+use crate::base::{Error, Result, memory};
+use crate::def::{Values, check_values};
 use crate::solver::{Stability, make_up_for};
 use crate::springs::{Change, Link, not_joined, pull};
 

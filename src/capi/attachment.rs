@@ -7,8 +7,8 @@ use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
 use super::tool::sinew_tool_id;
-use crate::error::Result;
-use crate::slots::SlotId;
+use crate::base::Result;
+use crate::ids::SlotId;
 use crate::world::{Anchor, AttachmentId, SurfacePoint};
 
 /// Id of an attachment or a suture; all zero means none.
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn sinew_body_attach_points(
     unsafe {
         with_world_mut(world, |world| {
             let given = surface_points(["triangles", "weights"], triangles, weights, count)?;
-            let mut points = crate::memory::reserved(count)?;
+            let mut points = crate::base::memory::reserved(count)?;
             points.extend(given);
             let out = memory::output_array("out", out, count)?;
             write(out, world.attach_points(body.id(), &points, tool.id(), force_limit)?);
@@ -238,7 +238,7 @@ pub unsafe extern "C" fn sinew_body_attach_points_to_points(
 unsafe fn anchors_of_nodes(name: &str, nodes: *const u32, count: usize) -> Result<Vec<Anchor>> {
     // SAFETY: the same contract.
     let nodes = unsafe { memory::array(name, nodes, count)? };
-    let mut anchors = crate::memory::reserved(count)?;
+    let mut anchors = crate::base::memory::reserved(count)?;
     anchors.extend(nodes.iter().map(|&node| Anchor::Node(node)));
     Ok(anchors)
 }
@@ -253,7 +253,7 @@ unsafe fn anchors_of_points(
 ) -> Result<Vec<Anchor>> {
     // SAFETY: the same contract.
     let points = unsafe { surface_points(names, triangles, weights, count)? };
-    let mut anchors = crate::memory::reserved(count)?;
+    let mut anchors = crate::base::memory::reserved(count)?;
     anchors.extend(points.map(Anchor::Point));
     Ok(anchors)
 }
@@ -372,7 +372,7 @@ pub unsafe extern "C" fn sinew_tools_get_wrench(
         with_world(world, |world| {
             let given = memory::array("tools", tools, count)?;
             let point = memory::vector("point", point)?;
-            let mut tools = crate::memory::reserved(count)?;
+            let mut tools = crate::base::memory::reserved(count)?;
             tools.extend(given.iter().map(|tool| tool.id()));
             let (of_force, of_torque) = world.wrench_about(&tools, point)?;
             write_pair([("force", force, of_force), ("torque", torque, of_torque)])

@@ -6,10 +6,10 @@ use super::definition::sinew_body_def;
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
+use crate::base::{Error, Result};
 use crate::body::Body;
-use crate::contact::CollisionFilter;
-use crate::error::{Error, Result};
-use crate::slots::SlotId;
+use crate::def::CollisionFilter;
+use crate::ids::SlotId;
 use crate::world::BodyId;
 
 /// Bit of the x axis.

@@ -6,8 +6,9 @@ use super::body::{sinew_body_id, with_body};
 use super::guard::{sinew_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::body::{NewNodeSource, NewRimEdge, expect_count};
+use crate::body::{NewNodeSource, NewRimEdge};
 use crate::cutting::Sweep;
+use crate::def::expect_count;
 
 /// Report of a cut.
 #[repr(C)]
@@ -275,7 +276,7 @@ pub unsafe extern "C" fn sinew_body_get_node_mass(
 ///
 /// # Safety
 /// As [`memory::array`] of 6 numbers.
-unsafe fn edge(name: &str, ends: *const f32) -> crate::error::Result<[Vec3; 2]> {
+unsafe fn edge(name: &str, ends: *const f32) -> crate::base::Result<[Vec3; 2]> {
     // SAFETY: the same contract.
     let ends: &[[f32; 3]] = unsafe { memory::array(name, ends.cast(), 2) }?;
     Ok([ends[0], ends[1]].map(Vec3::from))

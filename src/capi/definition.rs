@@ -6,11 +6,11 @@ use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
-use crate::body::{BodyDefinition, Sleep, Solver, Storage, Tearing, Values};
-use crate::contact::{BodyContact, CollisionFilter};
-use crate::error::{Error, Result};
-use crate::material::{Material, Model, Viscosity, Yielding};
-use crate::terms::SpringLaw;
+use crate::base::{Error, Result};
+use crate::def::{
+    BodyContact, BodyDefinition, CollisionFilter, Material, Model, Sleep, Solver, SpringLaw, Storage, Tearing, Values,
+    Viscosity, Yielding,
+};
 
 /// Layout optimized for the processor; default.
 pub const SINEW_STORAGE_PACKED: u32 = 0;

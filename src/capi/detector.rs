@@ -7,12 +7,12 @@ use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
-use crate::body::{Body, finite_vector};
-use crate::contact::Detection;
+use crate::base::memory::reserved;
+use crate::base::{Error, Result};
+use crate::body::Body;
+use crate::def::{Detection, finite_vector};
 use crate::detection::exact::{self, Exact};
 use crate::detection::image_space::{self, Form, ImageSpace, ImageSpaceDefinition, Placed, Surface, Views};
-use crate::error::{Error, Result};
-use crate::memory::reserved;
 use crate::mesh::{self, ClosedSurface};
 use crate::world::World;
 
@@ -259,7 +259,7 @@ impl sinew_detector_def {
             && sides.iter().all(|side| side.was_closed);
         let method = if method == Detection::ImageSpace {
             let surfaces = [&sides[0].surface, &sides[1].surface];
-            Method::ImageSpace(crate::memory::boxed(ImageSpace::new(&image, &surfaces)?)?)
+            Method::ImageSpace(crate::base::memory::boxed(ImageSpace::new(&image, &surfaces)?)?)
         } else {
             let solids = [
                 Self::solid(0, &sides[0], bodies[0])?,
@@ -315,7 +315,7 @@ impl sinew_detector_def {
                  as they move; SINEW_DETECTION_IMAGE_SPACE can"
             )));
         }
-        Ok(Some(crate::memory::boxed(Exact::changing(&surface)?)?))
+        Ok(Some(crate::base::memory::boxed(Exact::changing(&surface)?)?))
     }
 }
 
@@ -515,7 +515,7 @@ pub unsafe extern "C" fn sinew_detector_create(
         with_world(world, |world| {
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_detector_def::defaults())?;
-            *out = Box::into_raw(crate::memory::boxed(def.detector(world)?)?);
+            *out = Box::into_raw(crate::base::memory::boxed(def.detector(world)?)?);
             Ok(())
         })
     }

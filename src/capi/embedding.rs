@@ -108,7 +108,7 @@ pub unsafe extern "C" fn sinew_embedding_create(
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_embedding_def::defaults())?;
             let embedding = world.create_embedding(body.id(), &def.definition()?)?;
-            *out = Box::into_raw(crate::memory::boxed(sinew_embedding { embedding })?);
+            *out = Box::into_raw(crate::base::memory::boxed(sinew_embedding { embedding })?);
             Ok(())
         })
     }
@@ -276,7 +276,7 @@ pub unsafe extern "C" fn sinew_body_create_from_surface(
             };
             let def = memory::definition("def", def, sinew_body_def::defaults())?;
             // Nothing may fail once there is a body.
-            let place = crate::memory::boxed(MaybeUninit::uninit())?;
+            let place = crate::base::memory::boxed(MaybeUninit::uninit())?;
             let (body, embedding) = world.create_body_from_surface(&def.definition()?, spacing)?;
             *out_body = body.into();
             if let Some(out) = out_embedding {

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::status::{SINEW_STATUS_OK, fail, sinew_status};
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 use crate::world::World;
 
 /// World: a set of bodies and tools that are stepped together.

@@ -7,8 +7,8 @@ use super::guard::{guard, sinew_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::{fail, sinew_status};
 use super::tool::sinew_tool_id;
+use crate::base::Error;
 use crate::contact::Pose;
-use crate::error::Error;
 use crate::haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
 use crate::world::ToolId;
 
@@ -216,7 +216,7 @@ pub unsafe extern "C" fn sinew_haptic_create(
             let def = memory::definition("def", def, sinew_haptic_def::defaults())?;
             let orientation = world.pose(def.tool.id())?.orientation;
             let handle = world.create_haptic(&def.definition())?;
-            *out = Box::into_raw(crate::memory::boxed(sinew_haptic { handle, orientation })?);
+            *out = Box::into_raw(crate::base::memory::boxed(sinew_haptic { handle, orientation })?);
             Ok(())
         })
     }

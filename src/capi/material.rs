@@ -5,7 +5,7 @@ use libc::c_char;
 use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::error::Error;
+use crate::base::Error;
 use crate::material::presets::PRESETS;
 
 /// Healthy liver, E = 5.4 kPa.

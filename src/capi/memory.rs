@@ -8,8 +8,7 @@ use std::ops::Range;
 use glam::Vec3;
 use libc::c_char;
 
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 
 /// A struct that begins with `struct_size`, so that it can grow.
 ///

@@ -7,7 +7,7 @@ use libc::c_char;
 use super::guard::guard;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 use crate::mesh::{self, LoadedMesh, Mesh, MeshFormat, is_closed};
 
 /// Immutable mesh of nodes, triangles, tetrahedra and cells, readable by any number of threads.
@@ -135,7 +135,7 @@ unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Result<Loaded
         let loaded = make()?;
         let surface = loaded.mesh.surface()?;
         let closed = is_closed(&surface)?;
-        *out = Box::into_raw(crate::memory::boxed(sinew_mesh {
+        *out = Box::into_raw(crate::base::memory::boxed(sinew_mesh {
             loaded,
             surface,
             closed,

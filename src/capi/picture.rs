@@ -7,7 +7,7 @@ use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 use crate::picture::{BodyValues, PictureDefinition};
 use crate::raster::{ColourScale, Colours};
 
@@ -182,7 +182,7 @@ pub unsafe extern "C" fn sinew_world_save_picture_of_values(
     unsafe {
         with_world(world, |world| {
             let coloured = memory::array("coloured", coloured, count)?;
-            let mut values = crate::memory::reserved(count)?;
+            let mut values = crate::base::memory::reserved(count)?;
             for of in coloured {
                 values.push(of.values()?);
             }

@@ -67,7 +67,7 @@ pub unsafe extern "C" fn sinew_reader_create(
         with_world_mut(world, |world| {
             let out = memory::output("out", out)?;
             let reader = world.create_reader(body.id())?;
-            *out = Box::into_raw(crate::memory::boxed(sinew_reader { reader })?);
+            *out = Box::into_raw(crate::base::memory::boxed(sinew_reader { reader })?);
             Ok(())
         })
     }

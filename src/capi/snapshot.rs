@@ -77,7 +77,7 @@ pub unsafe extern "C" fn sinew_world_load_snapshot(
         // SAFETY: the same contract.
         let tasks = run_tasks.map(|run| unsafe { RunTasks::from_c(run, tasks_context) });
         let world = World::load(bytes, thread_count, tasks)?;
-        *out = Box::into_raw(crate::memory::boxed(sinew_world::new(world))?);
+        *out = Box::into_raw(crate::base::memory::boxed(sinew_world::new(world))?);
         Ok(())
     })
 }

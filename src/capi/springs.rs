@@ -4,7 +4,7 @@ use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::sinew_world;
 use super::memory;
 use super::status::sinew_status;
-use crate::body::{Values, expect_count};
+use crate::def::{Values, expect_count};
 
 /// Writes the two nodes of each spring, each spring once, the lower node first.
 ///

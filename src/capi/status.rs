@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 
 use libc::c_char;
 
-use crate::error::Error;
+use crate::base::Error;
 
 /// Result of every function that can fail: a sinew_status_code value.
 pub type sinew_status = i32;

@@ -6,7 +6,7 @@ use super::body::{sinew_body_id, with_body};
 use super::guard::{guard, sinew_world};
 use super::memory;
 use super::status::sinew_status;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 use crate::strain::{self, Strain};
 
 /// Strain of a triangle or tetrahedron; 0 for a rigid motion, or if it has no size at rest.
@@ -57,7 +57,7 @@ pub unsafe extern "C" fn sinew_body_get_spring_strains(
             if let Some(lengths) = memory::optional_array("rest_lengths", rest_lengths, count)? {
                 return strain::of_springs(body.positions(), pairs, lengths, strains);
             }
-            let mut lengths = crate::memory::reserved(count)?;
+            let mut lengths = crate::base::memory::reserved(count)?;
             lengths.extend(body.springs(pairs)?.iter().map(|spring| spring.rest_length));
             strain::of_springs(body.positions(), pairs, &lengths, strains)
         })

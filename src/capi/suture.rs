@@ -5,7 +5,7 @@ use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::error::Result;
+use crate::base::Result;
 use crate::world::{Anchor, SurfacePoint, SutureDefinition};
 
 /// Settings of a suture, filled by sinew_suture_def_init.

@@ -4,7 +4,7 @@ use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::guard::sinew_world;
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::body::Values;
+use crate::def::Values;
 
 /// Report of the tears in the last step; all 0 for a body that does not tear.
 #[repr(C)]

@@ -7,9 +7,10 @@ use glam::{Quat, Vec3};
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::contact::{CollisionFilter, Detection, Pose, Shape, ToolDefinition};
-use crate::error::{Error, Result};
-use crate::slots::SlotId;
+use crate::base::{Error, Result};
+use crate::contact::{Pose, Shape, ToolDefinition};
+use crate::def::{CollisionFilter, Detection};
+use crate::ids::SlotId;
 use crate::world::ToolId;
 
 /// Id of a tool; all zero means none.

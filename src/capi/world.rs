@@ -8,8 +8,8 @@ use libc::c_void;
 use super::guard::{guard, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::error::{Error, Result};
-use crate::springs::Kernel;
+use crate::base::{Error, Result};
+use crate::simd::Kernel;
 use crate::threads::RunTasks;
 use crate::world::{StepReport, World, WorldDefinition};
 
@@ -198,7 +198,7 @@ pub unsafe extern "C" fn sinew_world_create(def: *const sinew_world_def, out: *m
         let def = unsafe { memory::definition("def", def, sinew_world_def::defaults()) }?;
         // SAFETY: the same contract.
         let world = World::new(unsafe { def.definition() }?)?;
-        *out = Box::into_raw(crate::memory::boxed(sinew_world::new(world))?);
+        *out = Box::into_raw(crate::base::memory::boxed(sinew_world::new(world))?);
         Ok(())
     })
 }

@@ -3,15 +3,16 @@
 use glam::{DVec3, Vec3};
 
 use super::features::{Feature, Features};
-use super::filter::CollisionFilter;
 use super::mesh_solid::MeshSolid;
 use super::path::{Placement, Solid, ToolPath};
 use super::room::{Room, sides_of};
 use super::sweep::Corners;
-use crate::body::{Bindings, Bounds, Vectors};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{saved, saved_enum};
+use crate::base::{Result, memory};
+use crate::body::Bindings;
+use crate::codec::{saved, saved_enum};
+use crate::def::CollisionFilter;
+use crate::geometry::Bounds;
+use crate::soa::Vectors;
 
 /// A list that is good for so many substeps more is kept.
 const WORTH_KEEPING: f32 = 4.0;

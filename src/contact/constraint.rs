@@ -7,8 +7,9 @@ use super::gauge::{Gauge, Meets};
 use super::impulses::LEVERAGE;
 use super::press::Press;
 use super::supports::{MOST, Supports};
-use crate::body::{Mobility, Vectors};
-use crate::snapshot::saved;
+use crate::body::Mobility;
+use crate::codec::saved;
+use crate::soa::Vectors;
 
 /// A contact over one slice of a substep.
 ///

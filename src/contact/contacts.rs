@@ -9,7 +9,6 @@ use glam::{BVec3, DVec3, Vec3};
 use super::candidates::{Candidates, met, zone_bit};
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
-use super::filter::{BodyContact, CollisionFilter};
 use super::holds::Holds;
 use super::impulses::{PUSHED_OUT, SWEEPS};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded};
@@ -20,11 +19,13 @@ use super::press_nodes::{PressNodes, PressingSolid};
 use super::report::Touch;
 use super::supports::{MOST, Supports};
 use super::sweep::Corners;
-use crate::body::{Bindings, Bounds, Mobility, Pins, Vectors};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::ChosenKernel;
+use crate::base::{Result, memory};
+use crate::body::{Bindings, Mobility, Pins};
+use crate::codec::saved;
+use crate::def::{BodyContact, CollisionFilter};
+use crate::geometry::Bounds;
+use crate::simd::ChosenKernel;
+use crate::soa::Vectors;
 
 /// Contacts that are solved together: room for so many at least and at most. What is beyond is solved once each.
 const TOGETHER: std::ops::RangeInclusive<usize> = 256..=1 << 16;

@@ -8,9 +8,8 @@ use glam::{UVec3, Vec3};
 
 use super::closest::Closest;
 use super::exact::ExactSolid;
-use crate::body::Bounds;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
+use crate::geometry::Bounds;
 
 /// Cells along the longest side of a solid where nothing else is asked for.
 const CELLS: f32 = 64.0;

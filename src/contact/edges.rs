@@ -4,10 +4,9 @@ use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, DefaultHasher};
 
 use super::features::HOLE;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::codec::{Reader, Saved, Writer, shape_of_name};
 use crate::mesh::TRIANGLE_EDGES;
-use crate::snapshot::{Reader, Saved, Writer, shape_of_name};
 
 /// How many triangles have each edge of a surface.
 #[derive(Debug)]

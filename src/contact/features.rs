@@ -3,10 +3,9 @@
 use glam::Vec3;
 
 use super::edges::EdgeUses;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::mesh;
-use crate::snapshot::saved;
 
 /// What a tool can meet. The closest points of a tool and a triangle lie on one of these, so that each touch is found
 /// once, however many triangles share the node or edge.

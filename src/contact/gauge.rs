@@ -4,7 +4,7 @@
 //! from step to step: for a force f on an edge of length l, held by a sphere of radius r, as much as a spring of `f r / l²` that is
 //! always a step late.
 
-use crate::snapshot::{saved, saved_enum};
+use crate::codec::{saved, saved_enum};
 use glam::DVec3;
 
 /// The surface of a tool near a feature, at the end of a substep.

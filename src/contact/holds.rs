@@ -13,10 +13,9 @@ use super::constraint::Constraint;
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::supports::{MOST, Supports, Ties};
+use crate::base::{Result, StateHasher};
 use crate::body::Bindings;
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 /// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
 const STIFFER: f32 = 3.0;

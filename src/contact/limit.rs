@@ -1,6 +1,6 @@
 //! How far a tool of limited force gets.
 
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 /// How often a step is begun again for a tool that would press too hard, at most.
 pub(crate) const TRIES: u32 = 16;

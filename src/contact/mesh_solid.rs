@@ -11,13 +11,11 @@ use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::ridges::Ridges;
 
-use super::tool::Detection;
-use crate::body::{Bounds, not_negative};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::codec::{Reader, Saved, Writer, shape_of_name};
+use crate::def::{Detection, not_negative};
+use crate::geometry::Bounds;
 use crate::mesh::ClosedSurface;
-use crate::snapshot::{Reader, Saved, Writer, shape_of_name};
 
 /// What a mesh encloses.
 #[derive(Debug)]

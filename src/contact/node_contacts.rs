@@ -13,10 +13,9 @@ use super::impulses::{LEVERAGE, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
 use super::path::{Motion, Solid};
 use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
-use crate::body::Vectors;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::Vectors;
 
 /// What finds the contacts of nodes with a tool in a slice: what is the same for all of them.
 pub(super) struct NodeLook<'a> {

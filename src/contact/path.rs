@@ -2,11 +2,11 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use super::filter::CollisionFilter;
 use super::mesh_solid::MeshSolid;
 use super::tool::{Form, Pose, Tool};
-use crate::body::Bounds;
-use crate::snapshot::saved;
+use crate::codec::saved;
+use crate::def::CollisionFilter;
+use crate::geometry::Bounds;
 
 /// The way of a tool over a step: a straight line at constant speed, turning at a constant rate.
 #[derive(Clone, Debug)]

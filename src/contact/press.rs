@@ -7,10 +7,9 @@ use glam::{Vec3, Vec3A};
 use super::constraint::Constraint;
 use super::impulses::{Sweep, relax};
 use super::supports::MOST;
-use crate::body::Vectors;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::Vectors;
 
 /// One contact as its impulse is found.
 #[derive(Clone, Copy, Debug)]

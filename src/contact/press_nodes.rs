@@ -9,8 +9,9 @@ use super::candidates::NearestPlane;
 use super::impulses::PUSHED_OUT;
 use super::path::Placement;
 use super::sweep::{Segment, TOUCHING};
-use crate::body::{Bounds, NodeDamping};
-use crate::springs::Loops;
+use crate::body::NodeDamping;
+use crate::geometry::Bounds;
+use crate::simd::Loops;
 
 /// Nodes side by side.
 const LANES: usize = 16;

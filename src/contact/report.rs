@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::snapshot::saved;
+use crate::codec::saved;
 use crate::world::{BodyId, ToolId};
 
 /// Where a tool pressed a body when the last step ended.

@@ -2,10 +2,9 @@
 
 use glam::Vec3;
 
-use super::tree::Tree;
-use crate::body::Bounds;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::geometry::Bounds;
+use crate::geometry::tree::Tree;
 use crate::mesh::ClosedSurface;
 
 /// The turn of a surface at a convex edge from which that is a ridge, rad: less is how a smooth surface is divided into triangles.

@@ -6,7 +6,7 @@ use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
 use super::path::{Motion, Solid};
 use super::sweep::{Segment, TOUCHING};
-use crate::body::Bounds;
+use crate::geometry::Bounds;
 
 /// All that a tool may meet in a slice.
 #[derive(Clone, Copy, Debug)]

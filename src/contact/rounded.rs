@@ -4,8 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::Vec3;
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// Around the axis, and from one pole to the other: corners lie on the surface, and the middle of a triangle 0.2 % of the radius within.
 const SEGMENTS: u32 = 64;

@@ -1,8 +1,9 @@
 //! A surface that changes while tools are near, as where it is cut: what the change costs does not depend on the rest of it.
 
 use super::contacts::Contacts;
-use crate::body::{Bindings, Vectors};
-use crate::error::Result;
+use crate::base::Result;
+use crate::body::Bindings;
+use crate::soa::Vectors;
 
 /// How a surface changes.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,15 +4,13 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 
-use super::filter::CollisionFilter;
 use super::limit::Reach;
 use super::mesh_solid::MeshSolid;
 use super::rounded;
-use crate::body::{finite_vector, not_negative};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result, StateHasher};
+use crate::codec::{saved, saved_enum};
+use crate::def::{CollisionFilter, Detection, check_reach, finite_vector, not_negative};
 use crate::mesh::FURTHEST;
-use crate::snapshot::{saved, saved_enum};
 
 /// The shape of a tool, about its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,20 +37,6 @@ pub enum Shape<'a> {
         triangles: &'a [[u32; 3]],
     },
 }
-
-/// How a tool finds what it touches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Detection {
-    /// Exact distances, swept over the step.
-    #[default]
-    Exact,
-    /// Virtual rays cast through a depth buffer (CInDeR; Halic et al., section 2.1).
-    ImageSpace,
-    /// A sampled signed distance; for meshes alone.
-    DistanceField,
-}
-
-saved_enum!(Detection { 0 => Exact, 1 => ImageSpace, 2 => DistanceField });
 
 /// Where a tool is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,16 +186,6 @@ saved!(Tool {
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
 const SLENDEREST: f32 = 1e4;
-
-/// Refuses a length with which squares of distances would not stay finite.
-pub(super) fn check_reach(name: &str, value: f32) -> Result<()> {
-    if value <= FURTHEST {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
-        "{name} is {value}: must be at most {FURTHEST:e} m"
-    )))
-}
 
 impl Tool {
     pub fn new(definition: &ToolDefinition) -> Result<Self> {

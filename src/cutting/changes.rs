@@ -1,7 +1,6 @@
 //! What a cut has changed, for the solver and for a renderer.
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// A part of what a node was before the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]

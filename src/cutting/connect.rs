@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::cut::Cut;
 use super::surface::{NONE, SurfaceTriangle};
-use crate::error::Result;
+use crate::base::Result;
 
 /// A way that is longer was led astray by a surface that is folded in its rest shape; the cut ends there.
 const LONGEST_WAY: usize = 64;

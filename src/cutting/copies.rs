@@ -4,8 +4,7 @@ use super::changes::{PieceOfCell, PieceOfNode, PieceOfSpring};
 use super::cut::Cut;
 use super::surface::{NONE, Node};
 use super::union::Union;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl Cut<'_> {
     /// Copies each of the nodes for each set of cells about it that hangs together by what is drawn, but for that with the most material.

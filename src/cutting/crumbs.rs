@@ -2,8 +2,7 @@
 
 use super::cut::Cut;
 use super::surface::{NONE, SurfaceTriangle};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// A piece with less area than this many squares of the snapping distance stays with what it was cut from: the blade goes round it on one side.
 const CRUMB: f64 = 4.0;

@@ -4,8 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::changes::Changes;
 use super::surface::CutSurface;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 
 /// What a blade's edge, a segment, passes over in one step: two triangles, which meet from the start's first point to the end's second.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,10 +7,8 @@ use super::cut::{Limits, Sweep};
 use super::met::Met;
 use super::solid::{CutSolid, SolidStroke};
 use super::surface::CutSurface;
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{saved, saved_enum};
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::{saved, saved_enum};
 
 /// The material of a body. It is looked for by *items*: the triangles of a surface, the cells of a solid, springs.
 #[derive(Debug)]

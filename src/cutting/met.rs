@@ -5,9 +5,8 @@ use glam::{DVec3, Vec3};
 use super::crossing::{End, meet};
 use super::cut::Sweep;
 use super::surface::{CutSurface, SNAP, SurfaceTriangle};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// A part of a blade's way that lies in one triangle of a surface, or in one tetrahedron of a solid's material.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,6 @@
 //! Which vertex has the number of the node that it is at: one alone, or what is drawn would hang together there by numbers where it does not.
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// The nodes whose numbers may be taken in a cut: those that it has made, and those that a vertex has left.
 pub(crate) struct FreeNodes(Vec<(u32, bool)>);

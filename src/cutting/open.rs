@@ -3,8 +3,7 @@
 use super::changes::{NewVertex, RimEdge};
 use super::cut::Cut;
 use super::surface::NONE;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl Cut<'_> {
     /// Parts triangles along edges newly marked as cut, and copies vertices for each fan but the first. Returns the cells beside those edges.

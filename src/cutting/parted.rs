@@ -5,8 +5,7 @@ use std::collections::HashMap;
 use super::changes::RimEdge;
 use super::surface::{CutSurface, NONE};
 use super::union::Union;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl CutSurface {
     /// How many more pieces what is drawn has after the last cut, of which `rim` is the new rim.

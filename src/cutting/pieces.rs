@@ -4,8 +4,7 @@ use super::changes::PieceOfCell;
 use super::cut::Cut;
 use super::surface::{CutSurface, NONE, SurfaceCell};
 use super::union::Union;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl Cut<'_> {
     /// Copies each of the cells for each piece of its material but the largest. Returns the nodes of all of them.

@@ -4,8 +4,7 @@ use super::changes::{BoundPoint, Source};
 use super::cut::Cut;
 use super::numbers::FreeNodes;
 use super::surface::{NONE, Node, SurfaceVertex};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl Cut<'_> {
     /// Numbers what is drawn and new, and lists it.

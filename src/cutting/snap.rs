@@ -4,8 +4,7 @@ use glam::DVec3;
 
 use super::cut::Cut;
 use super::surface::{NONE, SurfaceTriangle, turn};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl Cut<'_> {
     /// The triangles about a vertex, with its number in each.

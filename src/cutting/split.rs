@@ -3,8 +3,7 @@
 use super::changes::NewVertex;
 use super::cut::Cut;
 use super::surface::{NONE, SurfaceTriangle, SurfaceVertex};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 impl Cut<'_> {
     /// Splits a triangle, and the one across, at a point of the side that starts at corner `side`, `along` of the way to the next corner.

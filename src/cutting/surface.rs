@@ -3,9 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use super::tracked::Tracked;
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
 
 /// No triangle, or no corner.
 pub(crate) const NONE: u32 = u32::MAX;

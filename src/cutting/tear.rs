@@ -4,8 +4,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::cut::Sweep;
 use super::surface::{CutSurface, NONE, SurfaceTriangle};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// How far beside a side of a triangle a way may go, as a part of how far it goes along it, to be taken for one along the side.
 const BESIDE: f64 = 0.05;

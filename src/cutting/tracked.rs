@@ -2,9 +2,8 @@
 
 use std::ops::Index;
 
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{Saved, saved};
+use crate::base::{Result, memory};
+use crate::codec::{Saved, saved};
 
 /// Values of which each change is kept, so that all changes since [`Tracked::begin`] can be undone without memory.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! Which of a few things hang together (union-find).
 
-use crate::error::Result;
+use crate::base::Result;
 
 /// Sets of the numbers from 0 on.
 #[derive(Default)]

@@ -6,13 +6,12 @@
 use glam::{DMat3, DVec3};
 
 use super::parts::{Copy, Part, in_group};
+use super::tetrahedra::{GROUP, Group, Groups};
 use super::{Deformed, Elements, Load, Rest, Sums};
-use crate::body::Vectors;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::solver::{Masses, Rates};
-use crate::springs::{GROUP, Group, Groups, Springs, TILE, tile_count};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::{Masses, Rates, TILE, Vectors, tile_count};
+use crate::springs::{Springs, rates_anywhere};
 
 /// The groups of a part that comes later.
 const GROUPS: usize = 32;
@@ -225,7 +224,7 @@ impl Elements {
                 }
             }
             self.stiffnesses[node as usize] = stiffness as f32;
-            let of_springs = Rates::anywhere(node as usize, springs, masses).unwrap_or(Rates::ZERO);
+            let of_springs = rates_anywhere(node as usize, springs, masses).unwrap_or(Rates::ZERO);
             self.most_damped = self.most_damped.max(of_springs.most_damped);
             self.carried[node as usize] = carried as f32 * masses.inverse(node as usize) + of_springs.stiffest;
         }

@@ -1,6 +1,6 @@
 //! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
 
-use crate::snapshot::saved;
+use crate::codec::saved;
 use glam::{DMat3, DVec3};
 
 /// St Venant and Kirchhoff's law with a signed volume term, Pa: the energy of a tetrahedron is

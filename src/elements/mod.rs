@@ -13,16 +13,15 @@ mod rates;
 mod rings;
 mod scale;
 mod set;
+mod tetrahedra;
 
 use glam::{DMat3, DVec3};
 
-use crate::body::{Record, Vectors};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::material::{Course, Viscosity, Yielding};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{ChosenKernel, Stresses, TILE, TileForces};
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::def::{Course, Viscosity, Yielding};
+use crate::simd::{ChosenKernel, Record};
+use crate::soa::{TILE, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
 pub(crate) use cut::PieceOfElement;
 pub(crate) use law::{Deformed, Law, Load, Rest};
@@ -31,6 +30,7 @@ use parts::{Copies, Part};
 use past::Memory;
 pub(crate) use rates::LEAST_SHEAR;
 use rings::{Pressures, Rings};
+use tetrahedra::Stresses;
 
 /// The tetrahedra of a body that are elements.
 #[derive(Debug)]

@@ -13,12 +13,10 @@
 use glam::DMat3;
 
 use super::{Deformed, Elements, Sums};
-use crate::body::{Record, Vectors};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::ChosenKernel;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::simd::{ChosenKernel, Record};
+use crate::soa::Vectors;
 use crate::threads::Team;
 
 /// How long they take to fade to 1/e, s: short for an eye, and longer than sound takes through what is cut.

@@ -4,11 +4,11 @@ use glam::{DMat3, DVec3};
 
 use super::cut::{PieceOfElement, Place};
 use super::law::Rest;
-use crate::body::Record;
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{GROUP, Group, Groups, TILE, tile_count};
+use super::tetrahedra::{GROUP, Group, Groups};
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::simd::Record;
+use crate::soa::{TILE, tile_count};
 
 /// Tetrahedra of a part: so few that its nodes stay in the nearest cache, and their numbers are small.
 pub(super) const PART: usize = 4096;

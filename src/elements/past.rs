@@ -9,12 +9,11 @@ use super::cut::Place;
 use super::law::{Law, Load};
 use super::parts::Part;
 use super::set::{Bounds, Set};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::material::{Course, Viscosity, Yielding};
-use crate::memory;
-use crate::snapshot::{Saved, saved};
-use crate::springs::{ChosenKernel, GROUP, Group, Stresses};
+use super::tetrahedra::{GROUP, Group, Stresses};
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::{Saved, saved};
+use crate::def::{Course, Viscosity, Yielding};
+use crate::simd::ChosenKernel;
 
 #[derive(Debug)]
 pub(super) struct Memory {

@@ -11,8 +11,9 @@
 use glam::DVec3;
 
 use super::{Elements, Law, Rest};
-use crate::solver::{Carried, Masses, Rates};
-use crate::springs::Springs;
+use crate::def::Carried;
+use crate::soa::{Masses, Rates};
+use crate::springs::{Springs, rates_anywhere};
 
 /// The least that shear counts for: a third of the sum of three eigenvalues, which is 1.
 pub(crate) const LEAST_SHEAR: f32 = 1.0 / 3.0;
@@ -66,7 +67,7 @@ impl Elements {
         self.add_carried(masses, |node, more| carried[node] += more as f32);
         self.most_damped = 0.0;
         for (node, carried) in carried.iter_mut().enumerate() {
-            let of_springs = Rates::anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
+            let of_springs = rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
             self.most_damped = self.most_damped.max(of_springs.most_damped);
             *carried = *carried * masses.inverse(node) + of_springs.stiffest;
         }

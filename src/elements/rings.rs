@@ -1,11 +1,10 @@
 //! Volume by rings: the tetrahedra about a node keep their volume together, and press with the mean of their nodes' pressures.
 
 use super::parts::{Copies, Part};
-use crate::body::Record;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{TILE, tile_count, tile_nodes};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::simd::Record;
+use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team, Tiles};
 
 /// What each node and the tetrahedra about it have of volume at rest: a quarter of theirs, m³.

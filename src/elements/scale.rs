@@ -8,9 +8,9 @@ use glam::DVec3;
 
 use super::Elements;
 use super::parts::{PART, Part};
-use crate::body::{Region, Scale};
-use crate::error::{Error, Result};
-use crate::springs::{GROUP, Group};
+use super::tetrahedra::{GROUP, Group};
+use crate::base::{Error, Result};
+use crate::soa::{Region, Scale};
 
 /// Which nodes of a part are in a region: a bit each, of which tetrahedra have four at most.
 struct Inside([u64; 4 * PART / 64]);

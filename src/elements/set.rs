@@ -7,11 +7,11 @@
 use glam::{DMat3, DVec3};
 
 use super::law::Law;
-use crate::error::Result;
-use crate::material::Yielding;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{ChosenKernel, GROUP, Loops, Stresses};
+use super::tetrahedra::{GROUP, Stresses};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::def::Yielding;
+use crate::simd::{ChosenKernel, Loops};
 
 /// What is left of stresses in the tetrahedra of a part.
 #[derive(Debug)]

@@ -2,12 +2,11 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::body::Bounds;
-use crate::contact::nearest::nearest_on_triangle;
-use crate::contact::tree::Tree;
+use crate::base::{Error, Result, memory};
 use crate::cutting::{CutSolid, CutSurface};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::geometry::Bounds;
+use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::tree::Tree;
 
 /// A vertex in a tetrahedron, or beside one.
 #[derive(Clone, Copy, Debug)]

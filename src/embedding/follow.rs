@@ -5,10 +5,9 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec3};
 
 use super::bind::{Binding, Solid, weighted};
-use crate::contact::nearest::nearest_on_triangle;
+use crate::base::{Error, Result, memory};
 use crate::cutting::{CutMaterial, CutSolid, CutSurface};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::geometry::nearest::nearest_on_triangle;
 
 /// What following cuts asks for: kept for bodies that may be cut.
 #[derive(Debug)]

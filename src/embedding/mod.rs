@@ -6,10 +6,10 @@ mod read;
 
 use glam::Vec3;
 
-use crate::body::{Body, BodyDefinition, Values};
+use crate::base::{Error, Result, memory};
+use crate::body::Body;
 use crate::cutting::CutMaterial;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::def::{BodyDefinition, Values};
 use crate::mesh::Mesh;
 use crate::world::{BodyId, World};
 

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{Cavity, Enclosed, pressure_of};
-use crate::diagnostics::EnclosedReport;
+use crate::def::EnclosedReport;
 
 /// Where each node is, or how far it goes.
 type At<'a> = &'a dyn Fn(usize) -> DVec3;

@@ -11,13 +11,10 @@ mod surface;
 
 use glam::{DVec3, Vec3};
 
-use crate::body::{BodyDefinition, NodeOrder, Vectors};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::solver::Rates;
-use crate::springs::TileForces;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::def::BodyDefinition;
+use crate::soa::{NodeOrder, Rates, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
 use surface::{Block, Surface};
 

@@ -9,13 +9,11 @@
 use glam::DVec3;
 
 use super::Enclosed;
-use crate::body::Vectors;
-use crate::error::Result;
-use crate::material::Viscosity;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::solver::{Carried, Masses, Rates};
-use crate::springs::Springs;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::def::{Carried, Viscosity};
+use crate::soa::{Masses, Rates, Vectors};
+use crate::springs::{Springs, rates_anywhere};
 
 /// What a triangle counts for: the factors of the square of its vector, and of its longest edge, 1/kg.
 #[derive(Clone, Copy, Debug, Default)]
@@ -103,7 +101,7 @@ impl Enclosed {
         self.of_springs = Rates::ZERO;
         if let Some(springs) = springs {
             for node in 0..masses.masses.len() {
-                let rates = Rates::anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
+                let rates = rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
                 self.of_springs.stiffest = self.of_springs.stiffest.max(rates.stiffest);
                 self.of_springs.most_damped = self.of_springs.most_damped.max(rates.most_damped);
             }

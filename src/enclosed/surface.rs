@@ -3,11 +3,10 @@
 use glam::DVec3;
 
 use super::Cavity;
-use crate::body::{BodyDefinition, NodeOrder};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{TILE, tile_count};
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::def::BodyDefinition;
+use crate::soa::{NodeOrder, TILE, tile_count};
 
 /// Triangles that are worked on together, at most.
 const BLOCK: usize = 512;

@@ -1,7 +1,7 @@
 //! What a haptic handle is to be.
 
-use crate::body::not_negative;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
+use crate::def::not_negative;
 use crate::world::ToolId;
 
 use super::six::Six;

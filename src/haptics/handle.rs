@@ -6,9 +6,9 @@ use super::definition::{Coupling, spread};
 use super::model::{HapticContact, Model};
 use super::observer::Observer;
 use super::six::{self, Six};
-use crate::body::finite_vector;
+use crate::base::{Error, Result};
 use crate::contact::Pose;
-use crate::error::{Error, Result};
+use crate::def::finite_vector;
 use crate::handover::triple_buffer::{Reader, Writer};
 
 /// Beside what the motion of the device explains, a tick changes the force by no more than this, N, or this part of it.

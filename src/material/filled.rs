@@ -2,10 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::body::BodyDefinition;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
+use crate::def::{BodyDefinition, Rounding};
 use crate::mesh::{CELL_DIAGONALS, CELL_EDGES, cell_volume, tetrahedron_volume};
-use crate::springs::Rounding;
 
 /// An element is flat where its height is no more than this part of its longest edge: what rounding makes of a plane.
 const FLAT: f64 = 1e-7;

@@ -1,9 +1,8 @@
 //! Masses of nodes from a density: each element's mass in equal parts to its nodes.
 
 use super::filled::{Filled, corners, triangle_area};
-use crate::body::{BodyDefinition, SMALLEST_MASS};
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
+use crate::def::{BodyDefinition, SMALLEST_MASS};
 use crate::mesh::tetrahedron_volume;
 
 /// The mass of each node, kg; `density` in kg/m³, above 0.

@@ -1,11 +1,10 @@
-//! Springs along the edges of elements, as stiff as Young's modulus asks for: see [`Model::Springs`](super::Model::Springs).
+//! Springs along the edges of elements, as stiff as Young's modulus asks for: see [`Model::Springs`](crate::def::Model::Springs).
 
 use glam::DVec3;
 
 use super::filled::{Filled, corners, triangle_area};
-use crate::body::BodyDefinition;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
+use crate::def::BodyDefinition;
 use crate::mesh::{
     CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, element_edges, pack, tetrahedron_volume, unpack,
 };

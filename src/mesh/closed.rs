@@ -3,10 +3,10 @@
 use glam::{DVec3, Vec3};
 
 use super::{check_indices, tetrahedron_volume};
-use crate::body::Bounds;
-use crate::contact::predicates::{crosses, solid_angle};
-use crate::contact::tree::Tree;
-use crate::memory;
+use crate::base::memory;
+use crate::geometry::Bounds;
+use crate::geometry::predicates::{crosses, solid_angle};
+use crate::geometry::tree::Tree;
 use crate::{Error, Result};
 
 /// A triangle lies along a line where it is lower than this part of its longest side: about what rounding makes of it.

@@ -4,10 +4,10 @@ use glam::{DVec3, IVec3};
 
 use super::stuffing::{Lattice, Site, Stuffing};
 use super::{ClosedSurface, Mesh, boundary, tetrahedron_volume, tidy};
-use crate::body::Bounds;
-use crate::contact::predicates::pierce;
-use crate::contact::tree::Tree;
-use crate::memory;
+use crate::base::memory;
+use crate::geometry::Bounds;
+use crate::geometry::predicates::pierce;
+use crate::geometry::tree::Tree;
 use crate::{Error, Result};
 
 impl Mesh {

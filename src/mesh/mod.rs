@@ -6,7 +6,6 @@
 mod closed;
 mod file;
 mod filled;
-pub(crate) mod order;
 mod organ;
 mod shapes;
 mod stuffing;
@@ -15,13 +14,12 @@ mod topology;
 
 use glam::{DVec3, Vec3};
 
-use crate::memory;
+use crate::base::memory;
 use crate::{Error, Result};
 
 pub use closed::ClosedSurface;
 pub(crate) use closed::FURTHEST;
 pub use file::{MeshFormat, load};
-pub(crate) use order::best_order;
 pub use tidy::{LoadedMesh, NO_NODE, TidyReport, tidy};
 pub(crate) use topology::{
     CELL_DIAGONALS, CELL_EDGES, TETRAHEDRON_EDGES, TRIANGLE_EDGES, cell_boundary, element_edges, pack, unpack,

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::stuffing::{Lattice, Stuffing};
 use super::{Mesh, boundary, is_closed, tetrahedron_volume};
-use crate::memory;
+use crate::base::memory;
 use crate::{Error, Result};
 
 /// The largest spacing, in lengths of the organ: coarser, its thin lobe is lost.

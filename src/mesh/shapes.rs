@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::tidy::NO_NODE;
 use super::{Mesh, boundary, cell_boundary};
-use crate::memory;
+use crate::base::memory;
 use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a

@@ -10,7 +10,7 @@ use glam::{DVec3, IVec3};
 
 use super::tetrahedron_volume;
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// A lattice edge whose end is nearer to the surface than this share of its length moves there: the shares for the long
 /// edges, along the axes, and the short ones, to the middle of a cube. Labelle and Shewchuk prove 10.7 degrees for 0.25 and

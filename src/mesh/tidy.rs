@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::topology::{boundary, sorted};
 use super::{Mesh, tetrahedron_volume};
-use crate::memory;
+use crate::base::memory;
 use crate::{Error, Result};
 
 /// In [`LoadedMesh::node_of_vertex`]: the vertex was dropped.

@@ -1,7 +1,7 @@
 //! Edges and surfaces, found by sorting: near-linear, and the same result on every run.
 
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// The corners of a tetrahedron's faces; outward if its volume is positive.
 const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];

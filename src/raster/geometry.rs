@@ -5,7 +5,8 @@ use super::scene::{Lines, Look, Scene, Shape, Surface};
 use super::shade::linear;
 use super::tessellate::{self, Tessellation};
 use super::view::View;
-use crate::{Error, Result, memory};
+use crate::base::memory;
+use crate::{Error, Result};
 use glam::Vec3;
 
 /// Everything in a scene as triangles.

@@ -4,7 +4,7 @@ use super::fragment::Window;
 use super::geometry::{Geometry, Kind};
 use super::view::View;
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 use glam::Vec3;
 
 /// Places looked at around each pixel, on a spiral.

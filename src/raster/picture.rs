@@ -8,7 +8,7 @@ use super::scene::Scene;
 use super::shade::{self, Encoder, Lights, Place};
 use super::shadow::ShadowMap;
 use super::view::{Homogeneous, View};
-use crate::memory;
+use crate::base::memory;
 use crate::{Error, Result};
 use glam::Vec3;
 

@@ -5,7 +5,7 @@
 
 use glam::{Mat3, Vec3};
 
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 
 /// Which colours numbers have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

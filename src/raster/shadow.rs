@@ -5,7 +5,7 @@ use super::geometry::{Geometry, Kind};
 use super::scene::bounds;
 use super::view::View;
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 use glam::Vec3;
 
 /// Texels along each side.

@@ -9,8 +9,8 @@ use super::implicit;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
+use crate::codec::saved;
 use crate::contact::{Contacts, ToolPath};
-use crate::snapshot::saved;
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.

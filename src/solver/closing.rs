@@ -10,13 +10,14 @@ use glam::{DVec3, Vec3};
 
 use super::gravity::GravityKicks;
 use super::kick::{Kick, Survey, TileKick, look};
-use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors};
+use crate::base::{Result, memory};
+use crate::body::{Body, Inertia, NodeDamping, Pin};
+use crate::codec::saved;
 use crate::elements::Shares;
 use crate::enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{ChosenKernel, Motion, Springs, TILE, TileForces, pull, tile_count, tile_nodes};
+use crate::simd::ChosenKernel;
+use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
+use crate::springs::{Motion, Springs, pull};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
 

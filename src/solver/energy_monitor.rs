@@ -23,12 +23,13 @@ use glam::{BVec3, DMat3, DVec3, Vec3};
 use super::attempt::{Carry, StepRequest};
 use super::closing::Closed;
 use super::substep::{Before, Part};
-use crate::body::{Body, Inertia, Vectors};
+use crate::base::StateHasher;
+use crate::body::{Body, Inertia};
+use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::diagnostics::StateHasher;
-use crate::snapshot::saved;
+use crate::simd::Loops;
+use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
 use crate::solver::write_records;
-use crate::springs::{Loops, TILE, tile_count, tile_nodes};
 use crate::threads::{Items, Team};
 
 /// Substeps between two comparisons, at least, and how many more there may be: at even intervals, comparisons might meet a mode in its

@@ -5,8 +5,8 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::body::Bounds;
-use crate::snapshot::saved;
+use crate::codec::saved;
+use crate::geometry::Bounds;
 
 /// Gravity's kicks over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,9 +8,11 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::subnormal::{on_grid, still_or};
-use crate::body::{Bounds, Inertia, InverseMasses, NodeDamping, Vectors};
-use crate::snapshot::saved;
-use crate::springs::{ChosenKernel, Loops, TileForces};
+use crate::body::{Inertia, InverseMasses, NodeDamping};
+use crate::codec::saved;
+use crate::geometry::Bounds;
+use crate::simd::{ChosenKernel, Loops};
+use crate::soa::{TileForces, Vectors};
 
 /// One kick of a body.
 #[derive(Clone, Copy)]

@@ -9,7 +9,7 @@ use super::substep::Part;
 use super::verlet::{Step, Taken, TooLong, begin, check, check_beside_springs, pass};
 use crate::body::Body;
 use crate::contact::{Moment, Tissue};
-use crate::slots::Slots;
+use crate::ids::Slots;
 use crate::threads::Team;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.

@@ -9,11 +9,10 @@
 //! masses is found as it is with any others.
 
 use super::attempt::RESERVE as RESERVE_AT_REST;
+use crate::base::{Result, memory};
 use crate::body::NodeDamping;
-use crate::error::Result;
-use crate::material::Viscosity;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::codec::saved;
+use crate::def::Carried;
 use crate::springs::Springs;
 
 /// What is left of the substeps where mass is added, at most: for less the motion is not changed.
@@ -28,29 +27,6 @@ const WORTH_KEEPING: f64 = 1.125;
 
 /// So many nodes are asked for what they need before the sum is looked at.
 const TOGETHER: usize = 256;
-
-/// What a node carries of forces that are not those of springs, at rest: twice the sum over all nodes bounds their form.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Carried {
-    /// N/m
-    pub stiffness: f32,
-    /// N s/m
-    damping: f32,
-}
-
-saved!(Carried { stiffness, damping });
-
-impl Carried {
-    /// Adds what forces give with this stiffness, N/m, that have such an arm beside them.
-    pub fn add(&mut self, stiffness: f32, viscosity: Viscosity) {
-        let stiffness = 0.5 * stiffness;
-        self.stiffness += stiffness;
-        match viscosity.stiffening() {
-            Some(stiffening) => self.stiffness += stiffness * stiffening as f32,
-            None => self.damping += stiffness * viscosity.retardation_time,
-        }
-    }
-}
 
 /// A node that may be made heavier.
 #[derive(Clone, Copy, Debug)]

@@ -10,8 +10,10 @@ use std::array::from_fn;
 use super::attempt::StepRequest;
 use super::kick::Survey;
 use super::substep::{Part, Pass, Written};
-use crate::body::{Body, Inertia, NodeDamping, Pin, Vectors, View};
-use crate::springs::{ChosenKernel, Springs, TILE, TileForces, tile_count, tile_nodes};
+use crate::body::{Body, Inertia, NodeDamping, Pin};
+use crate::simd::ChosenKernel;
+use crate::soa::{TILE, TileForces, Vectors, View, tile_count, tile_nodes};
+use crate::springs::Springs;
 use crate::threads::{Items, Ragged, Team};
 
 /// Substeps that are taken in one go, at most.

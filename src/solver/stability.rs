@@ -10,8 +10,8 @@
 use glam::Vec3;
 
 use super::watched::{Candidate, Watched};
-use crate::body::Vectors;
-use crate::snapshot::saved;
+use crate::codec::saved;
+use crate::soa::{Masses, Rates, Vectors};
 use crate::springs::{Springs, separation};
 
 /// How far neighbours may move against each other before the limit is estimated again, as a fraction of the length over
@@ -27,82 +27,6 @@ const WORTH_LENGTHENING: f32 = 2.0;
 
 /// So few nodes are sorted into those that are watched one by one.
 const FEW: usize = 8;
-
-/// What bounds the frequencies and the dampings of a node and its springs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rates {
-    /// The highest frequency squared, 1/s².
-    pub stiffest: f32,
-    /// The highest rate of damping, 1/s.
-    pub most_damped: f32,
-}
-
-saved!(Rates { stiffest, most_damped });
-
-impl Rates {
-    pub const ZERO: Self = Self {
-        stiffest: 0.0,
-        most_damped: 0.0,
-    };
-
-    /// The longest stable substep, s; infinity where there is no limit. Springs beyond the range of `f32` allow no substep
-    /// at all.
-    pub fn limit(self) -> f32 {
-        let damping = 0.5 * self.most_damped;
-        let limit = 2.0 / ((self.stiffest + damping * damping).sqrt() + damping);
-        if limit.is_nan() { 0.0 } else { limit }
-    }
-
-    /// Those of both together.
-    pub fn and(self, other: Self) -> Self {
-        Self {
-            stiffest: self.stiffest + other.stiffest,
-            most_damped: self.most_damped + other.most_damped,
-        }
-    }
-
-    /// Those of a node wherever it and its neighbours are; `None`: it is pinned.
-    pub fn anywhere(node: usize, springs: &dyn Springs, masses: &Masses) -> Option<Self> {
-        let inverse_mass = masses.inverse(node);
-        let mut rates = Self::ZERO;
-        springs.visit(node, &mut |link| {
-            // Masses that were added are what a node needs by itself, with half of each spring.
-            let inverse_mass = if masses.are_heavier {
-                2.0 * inverse_mass
-            } else {
-                inverse_mass + masses.inverse(link.neighbour as usize)
-            };
-            rates.stiffest += link.stiffness * inverse_mass;
-            rates.most_damped += link.damping * inverse_mass;
-        });
-        (inverse_mass > 0.0).then_some(rates)
-    }
-}
-
-/// The masses of a body as they are, or with what is added to them.
-#[derive(Clone, Copy)]
-pub(crate) struct Masses<'a> {
-    /// kg
-    pub masses: &'a [f32],
-    /// 0 for nodes that are pinned.
-    pub inverse_masses: &'a [f32],
-    /// Whether with what is added to them.
-    pub are_heavier: bool,
-}
-
-impl Masses<'_> {
-    /// 1/kg, 0 for a node that is pinned.
-    #[inline(always)]
-    pub fn inverse(&self, node: usize) -> f32 {
-        if self.are_heavier {
-            self.inverse_masses[node]
-        } else if self.inverse_masses[node] > 0.0 {
-            1.0 / self.masses[node]
-        } else {
-            0.0
-        }
-    }
-}
 
 /// What is known about the longest stable substep of a body, with its masses as they are.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,10 +7,12 @@ use glam::Vec3;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::{Body, Inertia, NodeDamping, Pin, Records, Vectors, View, WriteRecords};
+use crate::body::{Body, Inertia, NodeDamping, Pin};
 use crate::elements::{Elements, Shares};
 use crate::enclosed::{self, Enclosed};
-use crate::springs::{ChosenKernel, Motion, Springs, TileForces, tile_count, tile_nodes};
+use crate::simd::ChosenKernel;
+use crate::soa::{Records, TileForces, Vectors, View, WriteRecords, tile_count, tile_nodes};
+use crate::springs::{Motion, Springs};
 use crate::terms::Terms;
 use crate::threads::{Items, Team};
 

@@ -14,8 +14,9 @@ use super::energy_monitor::{Account, Sums};
 use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
-use crate::body::{Body, Bounds, Lapse, Mobility};
+use crate::body::{Body, Lapse, Mobility};
 use crate::contact::{Contacts, Meeting};
+use crate::geometry::Bounds;
 use crate::threads::Team;
 
 /// The substep asked for is longer than what is stable, or the motion made it so on the way.

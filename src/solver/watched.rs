@@ -3,11 +3,10 @@
 //! How stiff the springs of a node can be together wherever it goes does not change as it moves. So those that can be
 //! stiffest are found once, and an estimate looks at them from the stiffest on until no other can matter.
 
-use super::stability::{Masses, Rates};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::Springs;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::soa::Masses;
+use crate::springs::{Springs, rates_anywhere};
 
 /// One node in so many is watched.
 const SHARE: usize = 16;
@@ -76,7 +75,7 @@ impl Watched {
         self.candidates.clear();
         self.others = f32::INFINITY;
         for node in 0..masses.masses.len() {
-            if let Some(rates) = Rates::anywhere(node, springs, &masses) {
+            if let Some(rates) = rates_anywhere(node, springs, &masses) {
                 let limit = rates.limit();
                 if limit < self.others {
                     self.take(node as u32, limit);
@@ -101,7 +100,7 @@ impl Watched {
         self.candidates
             .retain(|candidate| nodes.binary_search(&candidate.node).is_err());
         for &node in nodes {
-            if let Some(rates) = Rates::anywhere(node as usize, springs, &masses) {
+            if let Some(rates) = rates_anywhere(node as usize, springs, &masses) {
                 let limit = rates.limit();
                 if limit <= self.others {
                     self.take(node, limit);

@@ -1,8 +1,7 @@
 //! A linked list whose elements are allocated one by one.
 
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer};
+use crate::base::{Error, Result, memory};
+use crate::codec::{Reader, Saved, Writer};
 
 /// An element on the heap: an array of one, because its memory can be asked for in a way that may be refused.
 type Owned<T> = Box<[Element<T>; 1]>;

@@ -9,12 +9,12 @@ use super::chain::{Chain, Element, Unlinked, unlinked};
 use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
-use super::kernels::{Eights, prefetch};
-use super::{Change, ChosenKernel, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
-use crate::body::Spring;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{Saved, Writer, saved};
+use super::{Change, Link, Motion, Springs, already_joined, not_joined};
+use crate::base::{Result, memory};
+use crate::codec::{Saved, Writer, saved};
+use crate::def::Spring;
+use crate::simd::{ChosenKernel, Eights, prefetch};
+use crate::soa::{TileForces, tile_nodes};
 
 /// How many nodes ahead arrays are fetched from memory.
 const AHEAD: usize = 16;

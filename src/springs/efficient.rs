@@ -8,12 +8,12 @@ use super::chain::{Chain, Element, unlinked};
 use super::ends::Ends;
 use super::gather::Gather;
 use super::kept::{DampedLink, KeptLink};
-use super::kernels::prefetch;
-use super::{Change, Link, Motion, Springs, TileForces, already_joined, not_joined, tile_nodes};
-use crate::body::Spring;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{Saved, Writer, saved};
+use super::{Change, Link, Motion, Springs, already_joined, not_joined};
+use crate::base::{Result, memory};
+use crate::codec::{Saved, Writer, saved};
+use crate::def::Spring;
+use crate::simd::prefetch;
+use crate::soa::{TileForces, tile_nodes};
 
 /// How many lists are followed side by side.
 const SIDE_BY_SIDE: usize = 16;

@@ -1,9 +1,8 @@
 //! The springs of a body, node by node.
 
 use super::Link;
-use crate::body::Spring;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::def::Spring;
 
 /// Both ends of every spring, in the order of their nodes; those of a node in the order of its springs.
 pub(super) struct Ends<'a> {

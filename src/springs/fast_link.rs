@@ -6,14 +6,12 @@
 use super::ends::Ends;
 use super::gather::{Gather, RowStorage, Rows, prefetch_row};
 use super::kept::{KeptLink, empty_place, links, place_of, vacate};
-use super::kernels::Eights;
-use super::{
-    Change, ChosenKernel, Link, Motion, Rewiring, Springs, TileForces, already_joined, not_joined, tile_nodes,
-};
-use crate::body::Spring;
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::{Saved, Writer, saved};
+use super::{Change, Link, Motion, Rewiring, Springs, already_joined, not_joined};
+use crate::base::{Error, Result, memory};
+use crate::codec::{Saved, Writer, saved};
+use crate::def::Spring;
+use crate::simd::{ChosenKernel, Eights};
+use crate::soa::{TileForces, tile_nodes};
 
 /// How many nodes ahead rows are fetched from memory.
 const AHEAD: usize = 16;

@@ -5,9 +5,10 @@
 use glam::Vec3;
 
 use super::kept::{KeptLink, NOBODY};
-use super::kernels::{Eights, Sight, WithEights, prefetch};
 use super::law::pull;
-use super::{Link, Motion, TileForces};
+use super::{Link, Motion};
+use crate::simd::{Eights, Sight, WithEights, prefetch};
+use crate::soa::TileForces;
 
 /// How many numbers a cache line holds.
 const LINE: usize = 16;

@@ -1,8 +1,8 @@
 //! What is kept of a link: bodies without damping along springs do not pay for it.
 
 use super::Link;
-use super::kernels::EightLinks;
-use crate::snapshot::{Saved, saved};
+use crate::codec::{Saved, saved};
+use crate::simd::EightLinks;
 
 /// No node: a body has fewer.
 pub(super) const NOBODY: u32 = u32::MAX;

@@ -10,25 +10,22 @@ mod kept;
 mod kernels;
 mod law;
 mod packed;
-mod tile;
 
 use std::fmt::Debug;
 use std::ops;
 
 use glam::Vec3;
 
-pub use kernels::Kernel;
-pub(crate) use kernels::{ChosenKernel, GROUP, Group, Groups, Loops, Range, Stresses, prefetch};
+use crate::def::{BodyDefinition, Spring, Storage};
+use crate::simd::ChosenKernel;
+use crate::soa::{Masses, Rates, TileForces, Vectors, View, tile_nodes};
 use law::half_energy;
 pub(crate) use law::{Tangent, pull, separation};
 use packed::Packed;
-pub(crate) use packed::{Costs, Rounding, Row, Split, cheapest, costs};
-pub(crate) use tile::{TILE, TileForces, tile_count, tile_nodes};
+pub(crate) use packed::costs;
 
-use crate::body::{BodyDefinition, Spring, Storage, Vectors, View};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
+use crate::base::{Error, Result, memory};
+use crate::codec::{Reader, Saved, Writer, saved, shape_with};
 use dynamic_bulk::DynamicBulk;
 use efficient::Efficient;
 use fast_link::FastLink;
@@ -301,6 +298,23 @@ fn rewire_by<S: Springs + ?Sized>(
         return Err(error);
     }
     take_out(springs, removed)
+}
+
+/// Those of a node wherever it and its neighbours are; `None`: it is pinned.
+pub(crate) fn rates_anywhere(node: usize, springs: &dyn Springs, masses: &Masses) -> Option<Rates> {
+    let inverse_mass = masses.inverse(node);
+    let mut rates = Rates::ZERO;
+    springs.visit(node, &mut |link| {
+        // Masses that were added are what a node needs by itself, with half of each spring.
+        let inverse_mass = if masses.are_heavier {
+            2.0 * inverse_mass
+        } else {
+            inverse_mass + masses.inverse(link.neighbour as usize)
+        };
+        rates.stiffest += link.stiffness * inverse_mass;
+        rates.most_damped += link.damping * inverse_mass;
+    });
+    (inverse_mass > 0.0).then_some(rates)
 }
 
 /// Why a spring is not added.

@@ -9,13 +9,10 @@ use super::nonlinear::Curve;
 use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Moment, Term};
-use crate::body::{BodyDefinition, NodeOrder, Spring};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::material::{Course, Viscosity};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::terms::SpringLaw;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, Course, Spring, SpringLaw, Viscosity};
+use crate::soa::NodeOrder;
 
 /// Beside springs of a law.
 #[derive(Debug)]

@@ -20,10 +20,10 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils};
-use crate::body::{BodyDefinition, NodeOrder, not_negative};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, not_negative};
+use crate::soa::NodeOrder;
 
 /// Hinges: the two nodes of the edge, then those opposite.
 #[derive(Debug)]

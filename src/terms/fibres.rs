@@ -11,10 +11,10 @@ use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils, directed, lengthening, shares, weighted};
 use super::strings::Tension;
-use crate::body::{BodyDefinition, NodeOrder, check_values, expect_count};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, check_values, expect_count};
+use crate::soa::NodeOrder;
 
 /// What the length of a direction may differ from 1 by.
 const UNIT: f32 = 1e-3;

@@ -5,10 +5,10 @@ use glam::{DMat3, DVec3, Vec3};
 use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils};
-use crate::body::{BodyDefinition, NodeOrder, check_values};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, check_values};
+use crate::soa::NodeOrder;
 
 /// Springs of no rest length to a point that stays.
 #[derive(Debug)]

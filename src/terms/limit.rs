@@ -8,10 +8,10 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
-use crate::body::{BodyDefinition, NodeOrder, Spring, not_negative};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, Spring, not_negative};
+use crate::soa::NodeOrder;
 
 /// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.
 #[derive(Debug)]

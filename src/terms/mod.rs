@@ -23,21 +23,18 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DMat3, DVec3};
 
-use crate::body::{BodyDefinition, NodeOrder, Region, Scale, Spring, Vectors, View};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::material::{Course, Viscosity};
-use crate::memory;
-use crate::snapshot::{Reader, Saved, Writer, saved, shape_with};
-use crate::solver::{Carried, Masses, Rates};
-use crate::springs::{Change, ChosenKernel, Springs, TileForces, tile_count};
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::{Reader, Saved, Writer, saved, shape_with};
+use crate::def::{BodyDefinition, Carried, Course, Spring, Viscosity};
+use crate::simd::ChosenKernel;
+use crate::soa::{Masses, NodeOrder, Rates, Region, Scale, TileForces, Vectors, View, tile_count};
+use crate::springs::{Change, Springs, rates_anywhere};
 use crate::threads::Team;
 use arms::Arms;
 use bending::Hinges;
 use fibres::Fibres;
 use home::Home;
 use limit::Limit;
-pub use nonlinear::SpringLaw;
 use nonlinear::Stiffening;
 pub(crate) use parting::Parting;
 use set::Sets;
@@ -389,7 +386,7 @@ impl Terms {
         }
         let mut most = Rates::ZERO;
         for (node, &sum) in self.sums.iter().enumerate() {
-            let of_springs = Rates::anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
+            let of_springs = rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
             most.stiffest = most.stiffest.max(sum + of_springs.stiffest);
             most.most_damped = most.most_damped.max(of_springs.most_damped);
         }

@@ -9,82 +9,12 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
-use crate::body::{BodyDefinition, NodeOrder, Spring};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::snapshot::{saved, saved_enum};
-
-/// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
-/// the stiffness they are given. Springs that are added later are linear.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum SpringLaw {
-    /// `e`.
-    #[default]
-    Linear,
-    /// Shaped like a J: `(exp(steepness e) - 1) / steepness` for strains from 0 to `limit`; linear beyond, as stiff as there; `e` below 0.
-    /// (Fung 1967 found such a law for soft tissue.)
-    Exponential {
-        /// Above 0; `steepness limit` is at most 13.8: a spring becomes at most a million times as stiff.
-        steepness: f32,
-        /// Above 0.
-        limit: f32,
-    },
-    /// `e + quadratic e² + cubic e³` up to a strain of `limit`, linear beyond, as stiff as there. `quadratic²` is at most `3 cubic`:
-    /// then a spring that is longer always pulls more.
-    Cubic {
-        /// Any number.
-        quadratic: f32,
-        /// At least 0.
-        cubic: f32,
-        /// Above 0.
-        limit: f32,
-    },
-}
-
-saved_enum!(SpringLaw { 0 => Linear, 1 => Exponential { steepness, limit }, 2 => Cubic { quadratic, cubic, limit } });
-
-/// A million times as stiff.
-const STEEPEST: f32 = 13.8;
+use crate::base::{Error, Result, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, Spring, SpringLaw};
+use crate::soa::NodeOrder;
 
 impl SpringLaw {
-    fn check(&self) -> Result<()> {
-        let above_zero = |name: &str, value: f32| {
-            if value > 0.0 && value.is_finite() {
-                return Ok(());
-            }
-            Err(Error::invalid(format!(
-                "{name} of spring_law is {value}: must be above 0 and finite"
-            )))
-        };
-        match *self {
-            SpringLaw::Linear => Ok(()),
-            SpringLaw::Exponential { steepness, limit } => {
-                above_zero("steepness", steepness)?;
-                above_zero("limit", limit)?;
-                if steepness * limit > STEEPEST {
-                    return Err(Error::invalid(format!(
-                        "steepness of spring_law is {steepness} and limit {limit}: their product must be at most {STEEPEST}"
-                    )));
-                }
-                Ok(())
-            }
-            SpringLaw::Cubic {
-                quadratic,
-                cubic,
-                limit,
-            } => {
-                above_zero("limit", limit)?;
-                if !(quadratic * quadratic <= 3.0 * cubic && cubic.is_finite()) {
-                    return Err(Error::invalid(format!(
-                        "quadratic of spring_law is {quadratic} and cubic {cubic}: quadratic² must be at most 3 cubic, and finite, \
-                         or longer springs would pull less"
-                    )));
-                }
-                Ok(())
-            }
-        }
-    }
-
     /// What the pull, its slope and the energy are beyond those of a linear spring, up to the limit.
     fn below_limit(&self, strain: f64) -> [f64; 3] {
         match *self {

@@ -3,8 +3,7 @@
 //! Each term goes on as parts of it, one for each copy of what it is of, as stiff as that copy's share of the material: together they
 //! have the energy that it had, or less where what it joined is severed.
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// No node.
 const NONE: u32 = u32::MAX;

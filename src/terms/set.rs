@@ -10,13 +10,10 @@ use glam::{DMat3, DVec3};
 use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
 use super::{Moment, Term};
-use crate::body::{BodyDefinition, NodeOrder, Spring};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::material::{Course, Yielding};
-use crate::memory;
-use crate::snapshot::saved;
-use crate::terms::SpringLaw;
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::def::{BodyDefinition, Course, Spring, SpringLaw, Yielding};
+use crate::soa::NodeOrder;
 
 /// What springs pull less than before they yielded, over their stiffness.
 #[derive(Debug)]

@@ -9,14 +9,12 @@ use glam::{DMat3, DVec3, Vec3};
 use super::parting::Parting;
 use super::strings::{Aging, OfTile, Tension};
 use super::{Blocks, Moment, Term};
-use crate::body::{NodeOrder, Region, Scale, Spring, Vectors, View};
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::material::Course;
-use crate::memory;
-use crate::snapshot::{Saved, Writer, saved};
-use crate::solver::Masses;
-use crate::springs::{Change, ChosenKernel, TILE, TileForces, tile_count};
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::codec::{Saved, Writer, saved};
+use crate::def::{Course, Spring};
+use crate::simd::ChosenKernel;
+use crate::soa::{Masses, NodeOrder, Region, Scale, TILE, TileForces, Vectors, View, tile_count};
+use crate::springs::Change;
 use crate::threads::{Ragged, Team};
 
 /// What a term does whose stiffness is 1.

@@ -8,9 +8,9 @@ use std::ops::Range;
 use glam::Vec4;
 
 use super::stencils::{Law, Stencil};
-use crate::body::View;
-use crate::material::Course;
-use crate::springs::{Loops, TILE, TileForces};
+use crate::def::Course;
+use crate::simd::Loops;
+use crate::soa::{TILE, TileForces, View};
 
 /// How many are worked out side by side.
 const BLOCK: usize = 64;

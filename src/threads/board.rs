@@ -16,8 +16,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// How long a thread looks for work before it lets others have its core.
 const HOT: Duration = Duration::from_micros(50);

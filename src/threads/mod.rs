@@ -22,8 +22,7 @@ pub(crate) use split::{Items, Ragged, Tiles};
 pub use tasks::RunTasks;
 pub(crate) use team::Team;
 
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 use tasks::Tasks;
 use workers::Workers;
 

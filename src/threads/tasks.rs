@@ -9,7 +9,7 @@ use std::thread;
 
 use super::board::{Board, Patience};
 use super::team::Team;
-use crate::error::Result;
+use crate::base::Result;
 
 /// Runs tasks on the threads of a job system: calls the task once for every index below the count, on any threads, in
 /// any order, even one after another; returns when all of them have.

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::split::Split;
 use super::*;
-use crate::error::Error;
+use crate::base::Error;
 
 /// Numbers that look random (SplitMix64).
 struct Random(u64);

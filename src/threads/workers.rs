@@ -6,8 +6,7 @@ use std::thread::{self, JoinHandle};
 
 use super::board::{Apart, Board, Patience};
 use super::team::Team;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 
 /// What the threads share.
 struct Shared {

@@ -3,12 +3,11 @@
 use glam::{DVec3, Vec3};
 
 use super::{BodyId, ToolId, World, make_walks};
+use crate::base::{Error, Result, memory};
 use crate::body::Grip;
+use crate::codec::{saved, saved_enum};
 use crate::contact::{Bonds, Bound, Thread};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::slots::SlotId;
-use crate::snapshot::{saved, saved_enum};
+use crate::ids::SlotId;
 use crate::solver::Outcome;
 
 /// What a tool holds of a body, or a body of another.
@@ -247,7 +246,7 @@ impl World {
     ) -> Result<Vec<AttachmentId>> {
         self.bodies.get(body.0)?;
         self.bodies.get(other.0)?;
-        crate::body::expect_count("other_anchors", other_anchors.len(), anchors.len())?;
+        crate::def::expect_count("other_anchors", other_anchors.len(), anchors.len())?;
         check_limit(force_limit)?;
         let mut pairs = memory::reserved(anchors.len())?;
         for (index, (first, second)) in anchors.iter().zip(other_anchors).enumerate() {
@@ -392,7 +391,7 @@ impl World {
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a tool is named more than once, or the point is not finite.
     pub fn wrench_about(&self, tools: &[ToolId], point: Vec3) -> Result<(Vec3, Vec3)> {
-        crate::body::finite_vector("point", point)?;
+        crate::def::finite_vector("point", point)?;
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
         for (index, tool) in tools.iter().enumerate() {
             if tools[..index].contains(tool) {

@@ -4,15 +4,14 @@ use glam::{DVec3, Vec3};
 
 use super::BodyId;
 use super::resistance::Knot;
-use crate::body::{CutReport, Stroke, finite_vector};
-use crate::contact::{CollisionFilter, Lead, Pose};
+use crate::base::{Error, Result, StateHasher, memory};
+use crate::body::{CutReport, Stroke};
+use crate::codec::saved;
+use crate::contact::{Lead, Pose};
 use crate::cutting::Met;
-use crate::diagnostics::StateHasher;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::def::{CollisionFilter, finite_vector};
+use crate::ids::SlotId;
 use crate::mesh::FURTHEST;
-use crate::slots::SlotId;
-use crate::snapshot::saved;
 
 /// A proxy is held at no more points: a blade through more layers of a body is held at some.
 pub(super) const MOST_HOLDS: usize = 8;

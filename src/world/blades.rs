@@ -9,9 +9,9 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
 use super::{BodyId, World};
+use crate::base::Result;
 use crate::contact::{Lead, Pose};
-use crate::error::Result;
-use crate::slots::{SlotId, Slots};
+use crate::ids::{SlotId, Slots};
 
 /// A blade of a world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3, Vec3};
 
 use super::{BodyId, ToolId, World};
+use crate::base::{Error, Result};
 use crate::contact::{Form, Pose};
-use crate::error::{Error, Result};
 use crate::handover::triple_buffer::{Reader, Writer, triple_buffer};
 use crate::haptics::{
     Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Model, Secant, Sent, Six, ZERO,

@@ -5,11 +5,10 @@ use glam::{DVec3, Vec3};
 use super::attachments::Which;
 use super::blade::{Hold, MOST_HOLDS, Proxy, Stand};
 use super::{World, make_walks};
+use crate::base::{Result, memory};
 use crate::body::{Body, HoldAt};
 use crate::contact::{Lead, Thread};
 use crate::cutting::Met;
-use crate::error::Result;
-use crate::memory;
 
 /// Where a proxy is to be held: a point of the tissue, and that of the proxy next to it.
 pub(super) type Held = (HoldAt, DVec3);

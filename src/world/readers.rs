@@ -1,7 +1,7 @@
 //! Readers of bodies.
 
 use super::{BodyId, World};
-use crate::error::Result;
+use crate::base::Result;
 use crate::readers::BodyReader;
 
 impl World {

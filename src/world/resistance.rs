@@ -1,9 +1,8 @@
 //! How far tissue is cut by an edge that is ahead of it on a spring (Mahvash, Hayward 2001).
 
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::cutting::Met;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
 
 /// What a cut snaps to within a part of a cell lies open before the proxy is there: a gap no longer than this part of a cell is gone through as
 /// the tissue before it.

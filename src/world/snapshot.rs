@@ -1,13 +1,13 @@
 //! A world to bytes and back.
 
 use super::{World, WorldDefinition};
+use crate::base::{Error, Result, memory};
 use crate::body::Body;
+use crate::codec::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
 use crate::contact::{Tissue, Tool};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::slots::Slots;
-use crate::snapshot::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
-use crate::springs::{Kernel, TILE};
+use crate::ids::Slots;
+use crate::simd::Kernel;
+use crate::soa::TILE;
 use crate::threads::RunTasks;
 
 use super::attachments::Attachment;

@@ -3,11 +3,11 @@
 use glam::{DVec3, Vec3};
 
 use super::World;
+use crate::base::{Error, Result};
 use crate::body::Body;
+use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
-use crate::error::{Error, Result};
-use crate::slots::Slots;
-use crate::snapshot::saved;
+use crate::ids::Slots;
 use crate::solver::{Outcome, StepRequest, Together, attempt};
 use crate::threads::{Items, Team};
 

@@ -2,8 +2,8 @@
 
 use super::attachments::{Anchor, AttachmentId, Which, check_limit, refuse_one_point};
 use super::{BodyId, World};
+use crate::base::{Error, Result};
 use crate::contact::{Thread, distance};
-use crate::error::{Error, Result};
 
 /// What a suture is like.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! What a step has stretched too far tears when it has ended.
 
 use super::{BodyId, World};
-use crate::body::{Body, Torn, Withheld};
-use crate::error::Result;
+use crate::base::Result;
+use crate::body::{Body, Torn};
+use crate::def::Withheld;
 
 impl World {
     /// Tears bodies, one after the other, at the springs that the step has left beyond what they bear. A tear for which there is no room is

@@ -2,9 +2,8 @@
 
 use glam::{UVec3, Vec3};
 
-use crate::body::Bounds;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::geometry::Bounds;
 
 /// Cells for each triangle, about, and in all.
 const CELLS_PER_TRIANGLE: usize = 4;

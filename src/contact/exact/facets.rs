@@ -2,10 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::contact::nearest::Part;
-use crate::contact::tree::Tree;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::geometry::nearest::Part;
+use crate::geometry::tree::Tree;
 use crate::mesh::{ClosedSurface, TRIANGLE_EDGES, pack, unpack};
 
 /// An edge is flat where its faces turn by less, in radians about.

@@ -5,11 +5,11 @@ use glam::{DVec3, Vec3};
 use super::coarse::Between;
 use super::deepest::{Deepest, deepest, lies_between};
 use super::{ExactSolid, ROUNDING, TOUCHING};
-use crate::body::Bounds;
 use crate::contact::closest::Closest;
-use crate::contact::nearest::{Part, nearest_of_segments, nearest_on_triangle};
-use crate::contact::predicates::pierce;
-use crate::contact::tree::Placed;
+use crate::geometry::Bounds;
+use crate::geometry::nearest::{Part, nearest_of_segments, nearest_on_triangle};
+use crate::geometry::predicates::pierce;
+use crate::geometry::tree::Placed;
 
 /// Where a way that begins on the surface is on it no more.
 const BEGUN: f64 = 1e-6;

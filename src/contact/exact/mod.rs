@@ -17,11 +17,11 @@ use glam::{DVec3, Vec3};
 use self::coarse::{Between, Coarse};
 use self::deepest::Signed;
 use self::facets::Facets;
-use super::nearest::{Part, nearest_on_triangle};
-use super::predicates::pierce;
-use super::tree::Tree;
-use crate::body::Bounds;
-use crate::error::Result;
+use crate::base::Result;
+use crate::geometry::Bounds;
+use crate::geometry::nearest::{Part, nearest_on_triangle};
+use crate::geometry::predicates::pierce;
+use crate::geometry::tree::Tree;
 use crate::mesh::ClosedSurface;
 
 /// What is closer than this part of the solid's size looks the way that its surface does.

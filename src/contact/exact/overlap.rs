@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::ExactSolid;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 use crate::mesh::ClosedSurface;
 
 /// A solid, rigid or changing its shape, that finds what lies within it.

@@ -9,10 +9,10 @@ use glam::{DVec3, Vec3};
 
 use super::ExactSolid;
 use super::facets::Facets;
-use crate::body::Bounds;
 use crate::contact::closest::Closest;
-use crate::contact::nearest::{Part, nearest_on_triangle};
-use crate::contact::tree::Placed;
+use crate::geometry::Bounds;
+use crate::geometry::nearest::{Part, nearest_on_triangle};
+use crate::geometry::tree::Placed;
 
 /// Edges of a solid that an edge has passed, at most.
 const PASSED: usize = 16;

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use super::ExactSolid;
-use crate::contact::predicates::solid_angle;
+use crate::geometry::predicates::solid_angle;
 use crate::mesh::{ClosedSurface, Mesh, MeshFormat, load};
 use crate::random::Random;
 

@@ -5,8 +5,7 @@ use super::draw::draw_triangles;
 use super::overlap::{EdgeInside, Inside};
 use super::projection::Projection;
 use super::surface::Placed;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 use crate::raster::rasterise_line;
 
 const NO_EDGE: u32 = u32::MAX;

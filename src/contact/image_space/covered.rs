@@ -1,7 +1,6 @@
 //! For each pixel the nearest one that shows anything (Danielsson 1980, "Euclidean distance mapping").
 
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 const NONE: u32 = u32::MAX;
 

@@ -9,7 +9,7 @@ use super::projection::{Frame, LARGEST_IMAGE, Projection};
 use super::surface::{Placed, Surface};
 use super::traced::{find_points, trace_edges};
 use super::volume::add_volume;
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
 
 /// From where bodies are looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,9 +4,9 @@ use glam::{DVec3, Vec3};
 
 use super::layers::{Crossing, Layers};
 use super::projection::{Frame, LARGEST_IMAGE, Projection};
-use crate::body::Bounds;
-use crate::error::{Error, Result};
-use crate::snapshot::saved;
+use crate::base::{Error, Result};
+use crate::codec::saved;
+use crate::geometry::Bounds;
 
 /// Room for how many times the pixels and the crossings that a surface has when it is made: it may be stretched.
 const STRETCHED: f64 = 1.5;

@@ -6,13 +6,12 @@ use super::covered::nearest_covered;
 use super::layers::{Crossing, Layers};
 use super::projection::{Frame, Projection};
 use super::surface;
-use crate::body::Bounds;
+use crate::base::{Error, Result, memory};
 use crate::contact::distance::closest_on_triangle;
 use crate::contact::exact::coarse::{Coarse, Sample};
-use crate::contact::nearest::nearest_on_triangle;
-use crate::contact::tree::Tree;
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::geometry::Bounds;
+use crate::geometry::nearest::nearest_on_triangle;
+use crate::geometry::tree::Tree;
 use crate::mesh;
 
 /// How often a search goes on from the foot of the perpendicular on the face that it has found.

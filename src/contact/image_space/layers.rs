@@ -4,9 +4,8 @@ use glam::Vec3;
 
 use super::draw::draw_triangles;
 use super::projection::Projection;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// Where the ray of a pixel passes a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,8 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::surface::Surface;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// What two surfaces have in common. Index 0 belongs to the first, 1 to the second.
 #[derive(Debug)]

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, Vec3};
 
-use crate::error::{Error, Result};
+use crate::base::{Error, Result};
+use crate::codec::saved;
 use crate::raster::{GUARD, PixelVertex, Window};
-use crate::snapshot::saved;
 
 /// The most pixels of one image.
 pub(super) const LARGEST_IMAGE: u64 = 1 << 24;

@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use crate::error::{Error, Result};
-use crate::memory;
+use crate::base::{Error, Result, memory};
 use crate::mesh;
 
 /// What is said of an occluder that is none.

@@ -4,12 +4,12 @@ use glam::Vec3;
 
 use super::skin::{NONE, Skin};
 use super::wound::Wound;
-use crate::body::{Body, Bound, NewNode, Vectors};
+use crate::base::{Result, memory};
+use crate::body::{Body, Bound, NewNode};
+use crate::codec::saved;
 use crate::contact::SurfaceChange;
-use crate::contact::forest::Later;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::geometry::forest::Later;
+use crate::soa::Vectors;
 
 /// An edge that is none.
 const HOLE: [u32; 2] = [NONE; 2];

@@ -3,9 +3,8 @@
 //! Bodies may be made closer to each other than their thicknesses allow. Parting them would take work, so there the thickness is reduced: a feature
 //! may stay as near as it was made. It gets its thickness back as it moves away, and loses none otherwise.
 
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// Of a corner or an edge.
 #[derive(Clone, Copy, Debug)]

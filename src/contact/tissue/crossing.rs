@@ -2,8 +2,8 @@
 
 use super::search::shift;
 use super::skin::{NONE, Skin};
-use crate::body::Bounds;
-use crate::contact::predicates::crosses;
+use crate::geometry::Bounds;
+use crate::geometry::predicates::crosses;
 
 /// Marks the edges of `first` that pass through triangles of `second`, as their trees have them, but for those that are joined with the
 /// edge: how many there are.

@@ -3,11 +3,10 @@
 use glam::Vec3;
 
 use super::skin::{NONE, Skin};
-use crate::body::Bounds;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::contact::image_space::Drawn;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::geometry::Bounds;
 
 /// A longer part of an edge, in pixels, is looked along piece by piece.
 const PIECE: f32 = 8.0;

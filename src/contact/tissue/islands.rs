@@ -7,10 +7,9 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::body::Bounds;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::geometry::Bounds;
 
 /// Near pairs that there is room for, for each body. Where there are more, all bodies of an island count as near each other.
 const ROOM: usize = 32;

@@ -4,9 +4,9 @@ use glam::{BVec3, Vec3};
 
 use super::skin::Skin;
 use crate::body::Body;
+use crate::codec::saved;
 use crate::contact::impulses::LEVERAGE;
 use crate::contact::supports::MOST;
-use crate::snapshot::saved;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

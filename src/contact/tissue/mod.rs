@@ -27,12 +27,12 @@ use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
 use glam::{DVec3, Vec3};
 
-use crate::body::{Body, Bounds};
+use crate::base::{Result, memory};
+use crate::body::Body;
+use crate::codec::saved;
 use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
-use crate::error::Result;
-use crate::memory;
-use crate::slots::Slots;
-use crate::snapshot::saved;
+use crate::geometry::Bounds;
+use crate::ids::Slots;
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
@@ -48,11 +48,14 @@ const TRAVEL: f32 = 0.5;
 
 /// How fast what began too close is moved apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so it
 /// bounds the energy that they gain.
-const PARTING_SPEED: f32 = 1.0;
+const PARTING_SPEED: f32 = 0.3;
+
+/// Or as a part of how fast the bodies are against each other: at most a thousandth of their energy.
+const PARTING_SHARE: f32 = 0.03;
 
 /// All contacts together part a body with a force that would take this long to make it as fast, s. So where bodies hold each other, or others press
 /// them together, nothing is wound up.
-const PARTING_TIME: f32 = 0.1;
+const PARTING_TIME: f32 = 0.02;
 
 /// Sweeps over what began too close.
 const PARTING_SWEEPS: u32 = 4;
@@ -430,7 +433,11 @@ impl Tissue {
             let (Some(first), Some(second)) = (skin(0), skin(1)) else {
                 continue;
             };
-            let speed = PARTING_SPEED * first.extent.min(second.extent);
+            let against = match link.sides.map(|side| bodies.at(side.body)) {
+                [Some(first), Some(second)] => relative_speed(first, second),
+                _ => 0.0,
+            };
+            let speed = (PARTING_SPEED * first.extent.min(second.extent)).max(PARTING_SHARE * against);
             // What presses harder than this would have work done to be parted.
             let most = first.mass.min(second.mass) * speed / (PARTING_TIME * count);
             let ease = (1.0 - link.impulse() / (most * duration)).max(0.0);

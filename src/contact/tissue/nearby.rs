@@ -6,12 +6,11 @@
 use glam::Vec3;
 
 use super::skin::{NONE, Skin};
-use crate::body::Bounds;
-use crate::contact::predicates::crosses;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::geometry::Bounds;
+use crate::geometry::predicates::crosses;
 
 /// It reaches this part of a short edge further than it has to, at most: it holds the longer, and there is the more of it.
 const MARGIN: f32 = 0.25;

@@ -6,8 +6,8 @@ use glam::Vec3;
 use super::clearances::{Clearances, Part};
 use super::link::Side;
 use super::skin::{Clearance, NONE, PARTED, Skin};
-use crate::body::Bounds;
 use crate::contact::sweep::{Corners, Segment, Separation};
+use crate::geometry::Bounds;
 
 /// A node that lies within another body is led out through a face that is no further than this part of a short edge.
 const LED_OUT: f32 = 0.5;

@@ -7,15 +7,14 @@ use super::change::Changing;
 use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
-use crate::body::{Bindings, Body, Bounds, Vectors};
-use crate::contact::BodyContact;
-use crate::contact::forest::Forest;
+use crate::base::{Result, memory};
+use crate::body::{Bindings, Body};
+use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment};
-use crate::contact::tool::Detection;
-use crate::error::Result;
-use crate::memory;
+use crate::def::{BodyContact, Detection};
+use crate::geometry::{Bounds, Forest};
 use crate::mesh;
-use crate::snapshot::saved;
+use crate::soa::Vectors;
 
 /// Where the nodes of a body may go in a step, and the tree of its triangles as the step begins.
 #[derive(Debug)]

@@ -9,11 +9,12 @@ use glam::Vec3;
 use super::link::Side;
 use super::search::{Search, Touch};
 use super::skin::{Clearance, NONE, Skin};
-use crate::body::{Body, Bounds, Vectors};
+use crate::base::{Result, memory};
+use crate::body::Body;
+use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment, Separation};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::geometry::Bounds;
+use crate::soa::Vectors;
 
 /// Edges meet that both look across the gap by this much at least, as the cosine of an angle.
 const SQUARELY: f32 = 0.5;

@@ -3,10 +3,9 @@
 use glam::{DVec3, Vec3};
 
 use super::sever::{Mark, Stroke};
+use crate::base::{Result, memory};
+use crate::codec::{saved, saved_enum};
 use crate::cutting::tracked::Tracked;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{saved, saved_enum};
 
 /// No tetrahedron, no triangle, or no corner.
 pub(crate) const NONE: u32 = u32::MAX;

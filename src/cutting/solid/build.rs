@@ -4,9 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::body::{CutSolid, FACES, Face, NONE, Node, SNAP, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
 use super::sever::{Mark, Stroke};
+use crate::base::{Error, Result, memory};
 use crate::cutting::tracked::Tracked;
-use crate::error::{Error, Result};
-use crate::memory;
 
 impl CutSolid {
     /// Of the rest positions of its nodes, m, of cells with four nodes each, in any order, and of the triangles that are drawn: the outer faces of

@@ -6,8 +6,7 @@ use super::body::NONE;
 use super::crossing::Swept;
 use super::cut::Cut;
 use super::sever::Plane;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// An edge that is crossed.
 struct Crossed {

@@ -2,10 +2,9 @@
 
 use super::body::{NONE, Node};
 use super::cut::Cut;
+use crate::base::{Result, memory};
 use crate::cutting::changes::{PieceOfCell, PieceOfNode, PieceOfSpring};
 use crate::cutting::union::Union;
-use crate::error::Result;
-use crate::memory;
 
 impl Cut<'_> {
     /// Copies each of the nodes for each set of cells about it that hangs together by what is drawn, but for that in

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use crate::signs::{is_above, triple};
+use crate::base::symbolic_perturbation::{is_above, triple};
 
 /// A triangle that the blade swept.
 #[derive(Clone, Copy, Debug)]

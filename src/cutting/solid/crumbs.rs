@@ -4,8 +4,7 @@ use std::collections::HashSet;
 
 use super::body::{Face, NONE};
 use super::cut::Cut;
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
 
 /// A piece between cuts that are nearer to each other, in snapping distances, is a crumb.
 const THIN: f64 = 3.0;

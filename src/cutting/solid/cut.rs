@@ -4,10 +4,9 @@ use glam::Vec3;
 
 use super::body::CutSolid;
 use super::crossing::Swept;
+use crate::base::{Error, Result, memory};
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep, bounds};
-use crate::error::{Error, Result};
-use crate::memory;
 
 /// A cut that is being made.
 pub(crate) struct Cut<'a> {

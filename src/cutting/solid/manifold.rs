@@ -5,9 +5,8 @@
 
 use super::body::{CutSolid, Face, NONE};
 use super::cut::Cut;
+use crate::base::{Result, memory};
 use crate::cutting::union::Union;
-use crate::error::Result;
-use crate::memory;
 
 /// A tetrahedron and which of its faces.
 type FaceOf = (u32, usize);

@@ -3,10 +3,9 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::body::{CutSolid, Face, NONE, SNAP};
+use crate::base::{Result, memory};
 use crate::cutting::cut::Sweep;
 use crate::cutting::met::Met;
-use crate::error::Result;
-use crate::memory;
 
 /// A triangle that is cut by the four sides of a tetrahedron has no more corners.
 const MOST_CORNERS: usize = 7;

@@ -2,10 +2,9 @@
 
 use super::body::{Face, NONE, SolidTriangle};
 use super::cut::Cut;
+use crate::base::{Result, memory};
 use crate::cutting::changes::{CutFace, NewVertex, RimEdge};
 use crate::cutting::union::Union;
-use crate::error::Result;
-use crate::memory;
 
 impl Cut<'_> {
     /// Parts tetrahedra at faces marked as opening, each given by one of its sides. Returns the cells beside them.

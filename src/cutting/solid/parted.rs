@@ -3,10 +3,9 @@
 use std::collections::HashMap;
 
 use super::body::{CutSolid, NONE};
+use crate::base::{Result, memory};
 use crate::cutting::changes::CutFace;
 use crate::cutting::union::Union;
-use crate::error::Result;
-use crate::memory;
 
 impl CutSolid {
     /// How many more pieces the material has after the last cut, which has opened `faces`.

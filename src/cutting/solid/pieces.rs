@@ -2,10 +2,9 @@
 
 use super::body::{CutSolid, NONE, SolidCell};
 use super::cut::Cut;
+use crate::base::{Result, memory};
 use crate::cutting::changes::PieceOfCell;
 use crate::cutting::union::Union;
-use crate::error::Result;
-use crate::memory;
 
 impl Cut<'_> {
     /// Copies each of the cells for each piece of its material but the largest. Returns the nodes of all of them.

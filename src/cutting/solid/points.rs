@@ -2,10 +2,9 @@
 
 use super::body::{NONE, Node, SolidVertex};
 use super::cut::Cut;
+use crate::base::{Result, memory};
 use crate::cutting::changes::{BoundPoint, Source};
 use crate::cutting::numbers::FreeNodes;
-use crate::error::Result;
-use crate::memory;
 
 impl Cut<'_> {
     /// Numbers what is new, and lists it.

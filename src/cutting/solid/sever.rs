@@ -4,11 +4,9 @@ use glam::{DVec3, Vec3};
 
 use super::body::{CutSolid, Face, NONE, SolidVertex};
 use super::cut::Cut;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::{saved, saved_enum};
 use crate::cutting::cut::Sweep;
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{saved, saved_enum};
 
 /// Steps of the blade that go on from each other.
 #[derive(Clone, Copy, Debug, PartialEq)]

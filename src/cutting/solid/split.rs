@@ -3,9 +3,8 @@
 use super::body::{Face, NONE, SolidTriangle, SolidVertex, Tetrahedron};
 use super::cut::Cut;
 use super::sever::Mark;
+use crate::base::{Result, memory};
 use crate::cutting::changes::NewVertex;
-use crate::error::Result;
-use crate::memory;
 
 impl Cut<'_> {
     /// Splits an edge of a tetrahedron `along` of the way from its first end to its second. Each tetrahedron about it keeps the half at the first.

@@ -5,11 +5,10 @@ use glam::{DMat3, DVec3, Vec3};
 use super::body::{CutSolid, Face, NONE};
 use super::cut::Cut;
 use super::sever::Stroke;
+use crate::base::{Result, memory};
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep};
 use crate::cutting::tear::Load;
-use crate::error::Result;
-use crate::memory;
 use crate::strain::eigenvalues;
 
 /// A tetrahedron of which the middle lies no higher above a plane than this part of how far it reaches off it is not above: rounding does not tell.

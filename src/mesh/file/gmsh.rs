@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::scanner::{Scanner, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// The layouts of the nodes and elements.
 #[derive(Clone, Copy, PartialEq)]

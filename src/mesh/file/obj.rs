@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::scanner::{Scanner, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 /// Statements that say nothing about points, triangles, lines: looks, groups, smooth surfaces.
 const IGNORED: [&str; 34] = [

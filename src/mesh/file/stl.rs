@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::scanner::{Scanner, is};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 const HEADER: usize = 80;
 /// A normal, three corners and two bytes of attributes.

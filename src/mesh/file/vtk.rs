@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::scanner::{Scanner, is, parse, shown};
 use super::{RawMesh, check_vertex_count};
 use crate::Result;
-use crate::memory;
+use crate::base::memory;
 
 pub fn read(scanner: &mut Scanner) -> Result<RawMesh> {
     let header = scanner.line();

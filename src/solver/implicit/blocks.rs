@@ -4,14 +4,12 @@ use std::ops::Range;
 
 use glam::{BVec3, DMat3, Vec3};
 
-use crate::body::Vectors;
-use crate::diagnostics::StateHasher;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Springs, TILE, Tangent, tile_count, tile_nodes};
+use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
+use crate::springs::{Springs, Tangent};
 use crate::terms::Terms;
 use crate::threads::{Team, Tiles};
 

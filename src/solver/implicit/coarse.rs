@@ -7,15 +7,15 @@
 use glam::{BVec3, DMat3, DVec3, Mat3, Vec3};
 
 use super::gradient::add_lanes;
-use crate::body::{Pins, Vectors};
-use crate::diagnostics::StateHasher;
+use crate::base::{Result, StateHasher, memory};
+use crate::body::Pins;
+use crate::codec::saved;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::simd::{ChosenKernel, Loops};
+use crate::soa::{TILE, Vectors};
 use crate::solver::held::without_held;
-use crate::springs::{ChosenKernel, Loops, Springs, TILE, Tangent};
+use crate::springs::{Springs, Tangent};
 use crate::terms::Terms;
 
 /// Nodes that always belong to one cluster together: as many as are worked on side by side.
@@ -502,7 +502,7 @@ fn split(centres: &[Vec3], order: &mut [u32], count: usize, next: &mut u16, clus
         *next += 1;
         return;
     }
-    let bounds = crate::body::Bounds::of(order.iter().map(|&block| centres[block as usize]));
+    let bounds = crate::geometry::Bounds::of(order.iter().map(|&block| centres[block as usize]));
     let extent = bounds.max - bounds.min;
     let axis = extent.max_position();
     order.sort_unstable_by(|&a, &b| {

@@ -7,10 +7,11 @@ use glam::Vec3;
 
 use super::step::Substep;
 use super::{End, Implicit};
-use crate::body::{Body, Bounds, Mobility, Vectors};
+use crate::body::{Body, Mobility};
 use crate::contact::{Contacts, Meeting};
+use crate::geometry::Bounds;
+use crate::soa::{Vectors, tile_count, tile_nodes};
 use crate::solver::kick::look;
-use crate::springs::{tile_count, tile_nodes};
 
 /// The longest step near a tool, s.
 pub(super) const LONGEST: f64 = 1e-3;

@@ -3,13 +3,15 @@
 use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, Implicit};
-use crate::body::{Body, Pins, Vectors};
+use crate::body::{Body, Pins};
+use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::snapshot::saved;
+use crate::simd::{ChosenKernel, Loops};
+use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
 use crate::solver::write_records;
-use crate::springs::{ChosenKernel, Loops, Motion, TileForces, tile_count, tile_nodes};
+use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
 /// What rounding may add, as a fraction of the energies involved.

@@ -9,7 +9,7 @@
 //! coefficients give a better one, by Gauss-Radau quadrature with a node at t (Meurant, Tichy 2013): its factor takes the place
 //! of 1/t, and comes down as soon as the stiff part has been dealt with.
 
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 /// How many iterations are kept; of longer solutions the bound is that of the first so many, and too high.
 const KEPT: usize = 1024;
@@ -38,11 +38,11 @@ saved!(Spectrum {
 
 impl Spectrum {
     /// With room for all it takes.
-    pub fn new() -> crate::error::Result<Self> {
+    pub fn new() -> crate::base::Result<Self> {
         Ok(Self {
-            diagonal: crate::memory::reserved(KEPT)?,
-            beside: crate::memory::reserved(KEPT)?,
-            steps: crate::memory::reserved(KEPT)?,
+            diagonal: crate::base::memory::reserved(KEPT)?,
+            beside: crate::base::memory::reserved(KEPT)?,
+            steps: crate::base::memory::reserved(KEPT)?,
             smallest: 1.0,
         })
     }

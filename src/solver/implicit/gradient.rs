@@ -7,10 +7,12 @@ use glam::Vec3;
 
 use super::Implicit;
 use super::coarse::Coarse;
-use crate::body::{Body, Pins, Records, Vectors, WriteRecords};
+use crate::body::{Body, Pins};
+use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::snapshot::saved;
-use crate::springs::{Course, Loops, Tangent, TileForces, tile_count, tile_nodes};
+use crate::simd::Loops;
+use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
+use crate::springs::{Course, Tangent};
 use crate::threads::{Items, Team, Tiles};
 
 /// Sums over the nodes of a tile.

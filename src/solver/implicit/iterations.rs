@@ -6,10 +6,12 @@ use super::Implicit;
 use super::gradient::Goal;
 use super::loops::{Add, Refine, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
-use crate::body::{Body, Pin, Vectors};
+use crate::body::{Body, Pin};
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::springs::{ChosenKernel, Motion, TILE, Tangent, TileForces, tile_count, tile_nodes};
+use crate::simd::ChosenKernel;
+use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
+use crate::springs::{Motion, Tangent};
 use crate::threads::{Items, Team};
 
 /// Linearised equations solved in a step at most.

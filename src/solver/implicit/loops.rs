@@ -3,8 +3,9 @@
 use glam::Vec3;
 
 use super::gradient::{add_products, total};
+use crate::simd::Loops;
+use crate::soa::TileForces;
 use crate::solver::subnormal::{or_zero, still_or};
-use crate::springs::{Loops, TileForces};
 
 /// `factor` times the one added to the other.
 pub(super) struct Add<'a> {

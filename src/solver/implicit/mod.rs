@@ -23,15 +23,14 @@ pub(super) use step::{begin_parts, next_part, parts_near, run};
 
 use glam::Vec3;
 
-use crate::body::{MOST_ITERATIONS, Records, Vectors};
-use crate::diagnostics::{SolverReport, StateHasher};
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
+use crate::def::{MOST_ITERATIONS, SolverReport};
 use crate::elements::{Elements, Sums};
 use crate::enclosed::{self, Enclosed};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::soa::{Records, Vectors, tile_count};
 use crate::solver::newton::Newton;
-use crate::springs::{Springs, tile_count};
+use crate::springs::Springs;
 use crate::terms::Terms;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;

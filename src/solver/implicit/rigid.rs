@@ -6,7 +6,8 @@ use glam::{BVec3, DMat3, DVec3};
 
 use super::Implicit;
 use super::step::Substep;
-use crate::body::{Body, Vectors};
+use crate::body::Body;
+use crate::soa::Vectors;
 
 impl Implicit {
     /// Adds to the pushes the shift and the turn that take the sum and the torque off the residual of nodes at `positions`, as far as

@@ -5,14 +5,15 @@ use glam::Vec3;
 use super::energy::Before;
 use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
-use crate::body::{Body, Lapse, Records, Vectors, WriteRecords};
-use crate::diagnostics::SolverReport;
-use crate::snapshot::saved;
+use crate::body::{Body, Lapse};
+use crate::codec::saved;
+use crate::def::SolverReport;
+use crate::soa::{Records, Vectors, WriteRecords, tile_count, tile_nodes};
 use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
 use crate::solver::verlet::{Taken, TooLong, begin};
-use crate::springs::{Tangent, tile_count, tile_nodes};
+use crate::springs::Tangent;
 use crate::threads::{Items, Team};
 
 /// The largest ratio of a step to the last with which the formula of order 2 is used: it is stable up to 2.41.

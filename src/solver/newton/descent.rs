@@ -8,11 +8,10 @@ use super::factor;
 use super::gradient::{Gradient, dot, longest};
 use super::matrix::Matrix;
 use super::network::Network;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
 use crate::springs::Springs;
 use crate::terms::Terms;
 

@@ -7,13 +7,12 @@ use glam::{DMat3, DVec3};
 
 use super::matrix::Matrix;
 use super::network::{Element, Network, PAIRS, Tetrahedron};
+use crate::base::{Result, memory};
 use crate::body::Pins;
+use crate::codec::saved;
 use crate::contact::Holds;
 use crate::elements::Deformed;
 use crate::enclosed::Enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
 use crate::solver::held::without_held;
 use crate::springs::Link;
 use crate::terms::Blocks;

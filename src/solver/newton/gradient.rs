@@ -6,9 +6,8 @@ use super::equation::Equation;
 use super::factor;
 use super::matrix::Matrix;
 use super::network::Network;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// So many iterations in a row must change little before the solution counts as found.
 const WINDOW: usize = 10;

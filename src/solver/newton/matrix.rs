@@ -3,9 +3,8 @@
 use glam::{DMat3, DVec3};
 
 use super::network::Network;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
 
 /// The blocks on the diagonal, and those below it.
 #[derive(Debug)]

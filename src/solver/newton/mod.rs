@@ -20,13 +20,11 @@ pub(crate) use rest::rest_state;
 pub use rest::{RestStateDefinition, RestStateReport};
 pub(super) use step::Aimed;
 
-use crate::body::Vectors;
-use crate::diagnostics::StateHasher;
+use crate::base::{Result, StateHasher, memory};
+use crate::codec::saved;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::soa::Vectors;
 use crate::springs::Springs;
 use crate::terms::Terms;
 use descent::Descent;

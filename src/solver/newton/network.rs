@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
+use crate::base::{Result, memory};
+use crate::codec::saved;
 use crate::elements::{Elements, Law, Load, Rest};
 use crate::enclosed::Enclosed;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
 use crate::springs::{Link, Springs};
 use crate::terms::Terms;
 

@@ -3,10 +3,9 @@
 use glam::{BVec3, DVec3, Vec3};
 
 use super::descent::{Descent, Found, Goal};
+use crate::base::{Error, Result, memory};
 use crate::body::Body;
 use crate::elements::Elements;
-use crate::error::{Error, Result};
-use crate::memory;
 
 /// Linearised equations solved at most.
 const ITERATIONS: u32 = 10_000;

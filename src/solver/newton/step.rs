@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::Newton;
 use super::descent::{Found, Goal};
-use crate::body::{Body, Vectors};
+use crate::body::Body;
+use crate::soa::Vectors;
 
 /// Linearised equations solved in a step at most.
 const ITERATIONS: u32 = 300;

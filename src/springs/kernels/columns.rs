@@ -9,14 +9,11 @@
 use std::ops::Range;
 
 use super::strays::Strays;
-use crate::body::MARGIN;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
-use crate::springs::{Link, TILE};
-
-/// Lanes of a column.
-pub(crate) const LANES: usize = 16;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::order::LANES;
+use crate::soa::{MARGIN, TILE};
+use crate::springs::Link;
 
 /// How far ahead a gather with small indices reaches.
 const WINDOW: usize = 1 << 16;

@@ -8,13 +8,12 @@ use std::marker::PhantomData;
 
 use glam::Vec3;
 
-use super::columns::{Columns, Ends, LANES, Material, Run};
-use super::lanes::Lanes;
-use super::prefetch::prefetch;
+use super::columns::{Columns, Ends, Material, Run};
 use super::quantities::{Change, Force, HalfEnergy, Quantity, Spring, Ways, difference};
-use super::{ChosenKernel, WithLanes};
-use crate::body::{Places, Vectors, View};
-use crate::springs::{Course, Link, Motion, Tangent, TileForces};
+use crate::order::LANES;
+use crate::simd::{ChosenKernel, Lanes, WithLanes, prefetch};
+use crate::soa::{Places, TileForces, Vectors, View};
+use crate::springs::{Course, Link, Motion, Tangent};
 
 impl Columns {
     /// Writes the forces on the nodes of the tile, N.

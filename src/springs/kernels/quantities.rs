@@ -1,6 +1,6 @@
 //! What is added up over the springs of a node: forces, how they change, energy.
 
-use super::lanes::Lanes;
+use crate::simd::Lanes;
 use crate::springs::law::{half_energy, pull};
 use crate::springs::{Link, Tangent};
 

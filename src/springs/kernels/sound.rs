@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::columns::{Columns, Gather, LANES};
-use crate::body::MARGIN;
-use crate::springs::TILE;
+use super::columns::{Columns, Gather};
+use crate::order::LANES;
+use crate::soa::{MARGIN, TILE};
 
 impl Columns {
     /// Whether these are columns of `nodes` in a body of `node_count`, with a table of `material_count` materials, that lead nowhere else.

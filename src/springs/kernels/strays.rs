@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use super::columns::{LANES, Line};
-use crate::error::Result;
-use crate::snapshot::saved;
+use super::columns::Line;
+use crate::base::Result;
+use crate::codec::saved;
+use crate::order::LANES;
 use crate::springs::Link;
 
 /// Links beside the columns of a tile.

@@ -1,9 +1,8 @@
 //! The few kinds of spring that most of a body's springs are.
 
-use crate::body::Spring;
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::saved;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::def::{Rounding, Spring};
 use crate::springs::kernels::Material;
 
 /// How many springs are looked at to find the kinds.
@@ -11,27 +10,6 @@ const SAMPLE: usize = 4096;
 
 /// The share of the sample that a kind needs: with fewer springs of each, an entry in a table is no gain.
 const SHARE: usize = 50;
-
-/// Rest lengths that come from positions are merged where they differ by no more than this part of themselves, however
-/// coarse the positions.
-const LARGEST_MERGER: f32 = 1e-3;
-
-/// What rest lengths may differ by, to be one.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rounding {
-    /// The largest coordinate that they were computed from, m; 0 where they were given.
-    pub reach: f32,
-}
-
-impl Rounding {
-    /// The width within which rest lengths of about this length are one, m.
-    fn width(self, length: f32) -> f32 {
-        // Each end is rounded by up to half a unit in the last place along each axis, and so are the length and its ends'
-        // difference.
-        let rounded = 4.0 * f32::EPSILON * self.reach;
-        (4.0 * f32::EPSILON * length).max(rounded.min(LARGEST_MERGER * length))
-    }
-}
 
 /// A kind, and the rest lengths that are its own.
 #[derive(Clone, Copy, Debug)]

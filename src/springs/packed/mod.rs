@@ -8,27 +8,23 @@
 
 mod materials;
 mod pack;
-mod split;
 #[cfg(test)]
 mod tests;
 
 use std::ops::Range;
 
+use crate::def::{Rounding, Spring};
+use crate::order::Costs;
 use materials::Kinds;
-pub(crate) use materials::Rounding;
 use pack::{Loose, NO_KIND, pack};
-pub(crate) use split::{Costs, Row, Split, cheapest};
 
 use super::ends::Ends;
-use super::kernels::{ChosenKernel, Columns, Material};
-use super::{
-    Change, Course, Link, Motion, Rewiring, Springs, TILE, TileForces, already_joined, not_joined, rewire_by,
-    tile_count, tile_nodes,
-};
-use crate::body::{Spring, View};
-use crate::error::Result;
-use crate::memory;
-use crate::snapshot::{Saved, Writer, saved};
+use super::kernels::{Columns, Material};
+use super::{Change, Course, Link, Motion, Rewiring, Springs, already_joined, not_joined, rewire_by};
+use crate::base::{Result, memory};
+use crate::codec::{Saved, Writer, saved};
+use crate::simd::ChosenKernel;
+use crate::soa::{TILE, TileForces, View, tile_count, tile_nodes};
 
 /// How many links may be added to a tile before it is packed again.
 const ADDED: usize = 256;

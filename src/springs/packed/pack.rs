@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use super::split::{Costs, GATHER, Row, Split, cheapest};
-use crate::error::Result;
-use crate::memory;
+use crate::base::{Result, memory};
+use crate::order::{Costs, GATHER, LANES, Row, Split, cheapest};
 use crate::springs::Link;
-use crate::springs::kernels::{Column, Columns, LANES, Line, Material, Neighbours, Parameters};
+use crate::springs::kernels::{Column, Columns, Line, Material, Neighbours, Parameters};
 
 /// Marks a link that is of no kind in the table of materials.
 pub(super) const NO_KIND: u16 = u16::MAX;

@@ -3,12 +3,12 @@ use std::collections::btree_map::Entry;
 
 use glam::{DVec3, Vec3};
 
-use super::{Packed, Rounding};
-use crate::body::{Records, Spring, Vectors, WriteRecords};
+use super::Packed;
+use crate::def::{Rounding, Spring};
 use crate::random::Random;
-use crate::springs::{
-    Change, Course, Kernel, Link, Motion, Rewiring, Springs, Tangent, TileForces, tile_count, tile_nodes,
-};
+use crate::simd::Kernel;
+use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
+use crate::springs::{Change, Course, Link, Motion, Rewiring, Springs, Tangent};
 
 const KERNELS: [Kernel; 4] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512, Kernel::Neon];
 

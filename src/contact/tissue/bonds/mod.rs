@@ -16,12 +16,11 @@ mod thread;
 
 use glam::{DVec3, Vec3};
 
-use crate::body::{Body, Bounds};
-use crate::diagnostics::StateHasher;
-use crate::error::Result;
-use crate::memory;
-use crate::slots::{SlotId, Slots};
-use crate::snapshot::saved;
+use crate::base::{Result, StateHasher, memory};
+use crate::body::Body;
+use crate::codec::saved;
+use crate::geometry::Bounds;
+use crate::ids::{SlotId, Slots};
 use crate::solver::Outcome;
 use crate::world::Anchor;
 

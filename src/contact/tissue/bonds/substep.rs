@@ -6,7 +6,7 @@ use super::super::Moment;
 use super::super::skin::Skin;
 use super::{Bond, Bonds, CLOSING_SPEED, Corner, End};
 use crate::body::Body;
-use crate::slots::Slots;
+use crate::ids::Slots;
 
 /// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
 const CLOSING_TIME: f64 = 0.02;

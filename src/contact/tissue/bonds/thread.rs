@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::super::Moment;
 use super::CLOSING_SPEED;
-use crate::snapshot::saved;
+use crate::codec::saved;
 
 /// Points that move against each other by no more than this part of their distance in a substep keep to their line.
 const RESOLVED: f64 = 0.5;

@@ -1,0 +1,84 @@
+//! Memory that grows with the caller's data, reserved so that running out of it is an answer, not an abort.
+
+use super::Result;
+
+/// A vector of `count` equal values.
+pub(crate) fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>> {
+    let mut values = reserved(count)?;
+    values.resize(count, value);
+    Ok(values)
+}
+
+/// An empty vector with room for `count` values.
+pub(crate) fn reserved<T>(count: usize) -> Result<Vec<T>> {
+    let mut values = Vec::new();
+    values.try_reserve_exact(count)?;
+    Ok(values)
+}
+
+/// A copy of `values`.
+pub(crate) fn copied<T: Copy>(values: &[T]) -> Result<Vec<T>> {
+    let mut copy = reserved(values.len())?;
+    copy.extend_from_slice(values);
+    Ok(copy)
+}
+
+/// Merges `more` into `values`, which has room for it, both in ascending order of their keys.
+pub(crate) fn merge<T: Copy, K: Ord>(values: &mut Vec<T>, more: &[T], key: impl Fn(&T) -> K) {
+    let mut known = values.len();
+    values.extend_from_slice(more);
+    // From the end: what is moved is not needed any more where it was.
+    for (left, added) in more.iter().enumerate().rev() {
+        while known > 0 && key(&values[known - 1]) > key(added) {
+            known -= 1;
+            values[known + left + 1] = values[known];
+        }
+        values[known + left] = *added;
+    }
+}
+
+/// Makes room for `count` values in all.
+pub(crate) fn reserve<T>(values: &mut Vec<T>, count: usize) -> Result<()> {
+    Ok(values.try_reserve_exact(count.saturating_sub(values.len()))?)
+}
+
+/// Gives back the room beyond the values. By a copy: `shrink_to_fit` makes one too of what is aligned by more than memory is anyway, and ends the program
+/// where there is none for it.
+pub(crate) fn shrink<T: Copy>(values: &mut Vec<T>) -> Result<()> {
+    if values.capacity() > values.len() {
+        *values = copied(values)?;
+    }
+    Ok(())
+}
+
+/// Sorts the values and leaves each once.
+pub(crate) fn sort_once<T: Ord>(values: &mut Vec<T>) {
+    values.sort_unstable();
+    values.dedup();
+}
+
+/// A value in a place of its own.
+#[allow(unsafe_code)]
+pub(crate) fn boxed<T>(value: T) -> Result<Box<T>> {
+    let mut one = reserved(1)?;
+    one.push(value);
+    let first = Box::into_raw(one.into_boxed_slice()).cast::<T>();
+    // SAFETY: a slice of one lies in memory as what is in it, and nobody else has it.
+    Ok(unsafe { Box::from_raw(first) })
+}
+
+/// What is there, or made in a place of its own.
+pub(crate) fn get_or_box<T: Default>(place: &mut Option<Box<T>>) -> Result<&mut T> {
+    let there = match place.take() {
+        Some(there) => there,
+        None => boxed(T::default())?,
+    };
+    Ok(place.insert(there))
+}
+
+/// Appends `value`, growing the vector fallibly.
+pub(crate) fn push<T>(values: &mut Vec<T>, value: T) -> Result<()> {
+    values.try_reserve(1)?;
+    values.push(value);
+    Ok(())
+}

@@ -1,0 +1,9 @@
+//! What every other module stands on: errors, memory that may run out, a hash of state, exact signs.
+
+mod error;
+mod hash;
+pub(crate) mod memory;
+pub(crate) mod symbolic_perturbation;
+
+pub use error::{Error, Result};
+pub(crate) use hash::StateHasher;

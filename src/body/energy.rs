@@ -1,0 +1,48 @@
+//! The energy of a body, added up in `f64`.
+
+use glam::Vec3;
+
+use super::Body;
+use crate::def::Energy;
+
+impl Energy {
+    pub(crate) fn of(body: &Body, gravity: Vec3) -> Self {
+        let mut energy = Self::default();
+        let (positions, velocities) = (body.state.positions(), body.velocities());
+        let gravity = gravity.as_dvec3();
+        let mut heavier = body.scaling.iter().flat_map(|scaling| scaling.heavier()).peekable();
+        for node in 0..body.node_count() {
+            let mass = f64::from(body.masses[node]);
+            let position = positions.get(node).as_dvec3();
+            let added = heavier.next_if(|sliver| sliver.node as usize == node);
+            if body.inverse_masses[node] > 0.0 {
+                let inertia = mass + added.map_or(0.0, |sliver| f64::from(sliver.added));
+                let held = body.pins.partial_axes_of(node as u32);
+                let velocity = Vec3::select(held, Vec3::ZERO, velocities[body.callers(node)]);
+                energy.kinetic += 0.5 * inertia * velocity.as_dvec3().length_squared();
+            }
+            energy.gravitational -= mass * gravity.dot(position + body.origin);
+            body.springs.visit(node, &mut |link| {
+                let neighbour = link.neighbour as usize;
+                // Each spring is met at both of its nodes.
+                if neighbour > node {
+                    let length = position.distance(positions.get(neighbour).as_dvec3());
+                    let stretch = length - f64::from(link.rest_length);
+                    energy.elastic += 0.5 * f64::from(link.stiffness) * stretch * stretch;
+                }
+            });
+        }
+        if let Some(elements) = &body.elements {
+            let mut growths = vec![0.0; elements.ring_count()];
+            energy.elastic += elements.exact_energy(|node| positions.get(node).as_dvec3(), &mut growths);
+        }
+        if let Some(terms) = &body.terms {
+            energy.elastic += terms.energy(&|node| positions.get(node).as_dvec3());
+        }
+        if let Some(enclosed) = &body.enclosed {
+            let [stored, work] = enclosed.energy(&|node| positions.get(node).as_dvec3());
+            energy.elastic += stored - work;
+        }
+        energy
+    }
+}

@@ -1,0 +1,155 @@
+//! A world as bytes: a header, and sections of what is written field by field next to where it is defined.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 0..8 | [`MAGIC`] |
+//! | 8..12 | [`VERSION`] |
+//! | 12..20 | the shape: a hash over the names and types of all fields |
+//! | 20..28 | how many bytes there are in all |
+//! | 28..36 | XXH3 of all that is before and behind it |
+//! | 36.. | sections: a tag of four bytes, eight bytes of how long it is, and what it holds |
+//!
+//! All numbers are little-endian.
+
+mod bytes;
+mod kernel;
+mod saved;
+
+use xxhash_rust::xxh3::Xxh3Default;
+
+pub(crate) use bytes::{Reader, Writer};
+pub(crate) use saved::{
+    Saved, floats_into, least_of_field, saved, saved_enum, shape_of_field, shape_of_name, shape_with,
+};
+
+use crate::base::{Error, Result};
+use crate::simd::ChosenKernel;
+
+/// No text begins so, and none comes through a transfer of text as it was.
+const MAGIC: [u8; 8] = *b"\x93sinew\r\n";
+
+/// To be raised where a field means something else than before, of the same name and type.
+const VERSION: u32 = 1;
+
+const CHECKSUM: usize = 28;
+const HEADER: usize = 36;
+
+/// Writes the header of bytes of this shape, to be sealed when all is behind it.
+pub(crate) fn begin(to: &mut Writer, shape: u64) {
+    to.put(&MAGIC);
+    VERSION.save(to);
+    shape.save(to);
+    0_u64.save(to);
+    0_u64.save(to);
+}
+
+/// Writes a section.
+pub(crate) fn write_section(to: &mut Writer, tag: [u8; 4], content: impl FnOnce(&mut Writer)) {
+    to.put(&tag);
+    let place = to.size();
+    0_u64.save(to);
+    let start = to.size();
+    content(to);
+    let size = to.size() - start;
+    to.end_section(size);
+    to.put_at(place, &(size as u64).to_le_bytes());
+}
+
+/// Completes the header.
+pub(crate) fn seal(bytes: &mut [u8]) {
+    let size = bytes.len() as u64;
+    bytes[CHECKSUM - 8..CHECKSUM].copy_from_slice(&size.to_le_bytes());
+    let checksum = checksum(bytes);
+    bytes[CHECKSUM..HEADER].copy_from_slice(&checksum.to_le_bytes());
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    let mut hasher = Xxh3Default::new();
+    hasher.update(&bytes[..CHECKSUM]);
+    hasher.update(&bytes[HEADER..]);
+    hasher.digest()
+}
+
+/// What is behind the header, where that is whole and of this shape.
+pub(crate) fn opened(bytes: &[u8], shape: u64) -> Result<&[u8]> {
+    let size = bytes.len();
+    let known = size.min(MAGIC.len());
+    if bytes[..known] != MAGIC[..known] {
+        return Err(Error::invalid("bytes are no world: they begin with something else"));
+    }
+    if size < HEADER {
+        return Err(Error::invalid(format!(
+            "size is {size}: bytes of a world have a header of {HEADER}"
+        )));
+    }
+    let number = |at: usize| bytes[at..].first_chunk().copied().map_or(0, u64::from_le_bytes);
+    let version = bytes[8..].first_chunk().copied().map_or(0, u32::from_le_bytes);
+    if version != VERSION || number(12) != shape {
+        return Err(Error::Unsupported(format!(
+            "bytes are of a world of another version of sinew: {version} {:016x}, this one reads {VERSION} {shape:016x}",
+            number(12)
+        )));
+    }
+    if number(20) != size as u64 {
+        return Err(Error::invalid(format!(
+            "size is {size}: the world in bytes was saved as {}",
+            number(20)
+        )));
+    }
+    if number(CHECKSUM) != checksum(bytes) {
+        return Err(Error::invalid(
+            "bytes are no world: some have changed since it was saved, as their checksum tells",
+        ));
+    }
+    Ok(&bytes[HEADER..])
+}
+
+/// The content of the section that comes next, which must have this tag, and what is behind it.
+pub(crate) fn section<'a>(bytes: &mut &'a [u8], tag: [u8; 4], kernel: ChosenKernel) -> Result<Reader<'a>> {
+    let refusal = |why: &str| {
+        let name = String::from_utf8_lossy(&tag);
+        Error::invalid(format!("bytes are no world: section {name} {why}"))
+    };
+    let (found, rest) = bytes.split_first_chunk().ok_or_else(|| refusal("is missing"))?;
+    if *found != tag {
+        return Err(refusal("is missing"));
+    }
+    let (size, rest) = rest.split_first_chunk().ok_or_else(|| refusal("ends early"))?;
+    let size = usize::try_from(u64::from_le_bytes(*size)).map_err(|_| refusal("ends early"))?;
+    let (content, rest) = rest.split_at_checked(size).ok_or_else(|| refusal("ends early"))?;
+    *bytes = rest;
+    Ok(Reader::new(content, kernel))
+}
+
+/// Refuses what is left of a section.
+pub(crate) fn at_end(from: &Reader) -> Result<()> {
+    if from.left() > 0 {
+        return Err(from.refusal("something is behind what a section holds"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::Kernel;
+
+    #[test]
+    fn what_is_saved_can_be_loaded_or_is_refused_by_both() {
+        let room = |beside: usize| {
+            let mut to = Writer::new(None);
+            write_section(&mut to, *b"LONG", |to| {
+                to.place(beside);
+            });
+            write_section(&mut to, *b"ROOM", |to| to.needs(2 << 30));
+            to
+        };
+        // Room is counted by section, whatever is beside it.
+        for beside in [0, 1 << 28] {
+            assert!(room(beside).is_too_large());
+        }
+        let kernel = Kernel::Portable.choose().expect("a kernel for every processor");
+        let mut from = section(&mut &b"ROOM\0\0\0\0\0\0\0\0"[..], *b"ROOM", kernel).expect("a section");
+        assert!(from.will_take(Some(2 << 30)).is_err());
+    }
+}

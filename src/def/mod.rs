@@ -1,0 +1,28 @@
+//! What callers say of bodies, as plain data that checks itself, and what bodies report.
+
+mod body;
+mod contact;
+mod material;
+mod report;
+mod sleep;
+mod spring_law;
+mod tearing;
+mod viscosity;
+mod yielding;
+
+pub use body::{BodyDefinition, Solver, Storage, Values};
+pub(crate) use body::{
+    MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite, finite_vector,
+    finite_vectors, node_indices, not_negative,
+};
+pub(crate) use contact::check_reach;
+pub use contact::{BodyContact, CollisionFilter, Detection};
+pub use material::{Material, Model};
+pub use report::{EnclosedReport, Energy, SolverReport, StorageReport};
+pub use sleep::Sleep;
+pub use spring_law::SpringLaw;
+pub(crate) use tearing::Withheld;
+pub use tearing::{TearReport, Tearing};
+pub use viscosity::Viscosity;
+pub(crate) use viscosity::{Carried, Course};
+pub use yielding::Yielding;

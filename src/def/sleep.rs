@@ -1,0 +1,36 @@
+//! When a body sleeps.
+
+use super::not_negative;
+use crate::base::{Error, Result};
+use crate::codec::saved;
+
+/// When tissue at rest is left alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sleep {
+    /// What is slower is at rest, m/s, at least 0; 0: the body never sleeps, and pays nothing for it.
+    pub speed: f32,
+    /// For how long it has to be at rest, s, above 0: some times what the tissue takes to settle.
+    pub time: f32,
+}
+
+saved!(Sleep { speed, time });
+
+impl Default for Sleep {
+    /// Never; after half a second.
+    fn default() -> Self {
+        Self { speed: 0.0, time: 0.5 }
+    }
+}
+
+impl Sleep {
+    pub(crate) fn check(&self) -> Result<()> {
+        not_negative("sleep_speed", self.speed)?;
+        if !(self.time > 0.0 && self.time.is_finite()) {
+            return Err(Error::invalid(format!(
+                "sleep_time is {}: must be above 0 and finite",
+                self.time
+            )));
+        }
+        Ok(())
+    }
+}

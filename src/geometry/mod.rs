@@ -1,0 +1,10 @@
+//! Boxes, trees of triangles, closest points and exact questions about them; nothing of bodies.
+
+mod bounds;
+pub(crate) mod forest;
+pub(crate) mod nearest;
+pub(crate) mod predicates;
+pub(crate) mod tree;
+
+pub(crate) use bounds::Bounds;
+pub(crate) use forest::Forest;

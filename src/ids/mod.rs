@@ -1,0 +1,5 @@
+//! Generational ids, and lists of what they name.
+
+mod slots;
+
+pub(crate) use slots::{SlotId, Slots};

@@ -1,0 +1,238 @@
+//! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
+
+use crate::base::{Error, Result};
+use crate::codec::{Reader, Saved, Writer, saved};
+
+/// Things in places that are used again.
+#[derive(Debug)]
+pub(crate) struct Slots<T> {
+    slots: Vec<Slot<T>>,
+    /// No place before this one is free.
+    first_free: usize,
+    /// How many live.
+    count: usize,
+    /// What they are, for messages.
+    noun: &'static str,
+}
+
+#[derive(Debug)]
+pub(crate) struct Slot<T> {
+    /// How many things have lived here.
+    generation: u32,
+    content: Option<T>,
+}
+
+saved!([T: Saved] Slot<T> { generation, content });
+
+impl<T: Saved> Slots<T> {
+    /// Writes all places.
+    pub fn save(&self, to: &mut Writer) {
+        let Self {
+            slots,
+            first_free: _,
+            count: _,
+            noun: _,
+        } = self;
+        slots.save(to);
+    }
+
+    /// Reads all places.
+    pub fn load(noun: &'static str, from: &mut Reader) -> Result<Self> {
+        let slots: Vec<Slot<T>> = Saved::load(from)?;
+        if slots.len() >= u32::MAX as usize || slots.iter().any(|slot| slot.generation == 0) {
+            return Err(from.refusal("a place that nothing ever had"));
+        }
+        Ok(Self {
+            first_free: slots.iter().position(is_usable).unwrap_or(slots.len()),
+            count: slots.iter().filter(|slot| slot.content.is_some()).count(),
+            slots,
+            noun,
+        })
+    }
+}
+
+/// Whether something can be put here.
+fn is_usable<T>(slot: &Slot<T>) -> bool {
+    slot.content.is_none() && slot.generation < u32::MAX
+}
+
+impl<T> Slot<T> {
+    /// What lives here.
+    pub fn content_mut(&mut self) -> Option<&mut T> {
+        self.content.as_mut()
+    }
+}
+
+/// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct SlotId {
+    pub index1: u32,
+    pub generation: u32,
+}
+
+saved!(SlotId { index1, generation });
+
+impl SlotId {
+    /// The place, counted from 0, of what is known to live.
+    pub fn index(self) -> usize {
+        self.index1 as usize - 1
+    }
+}
+
+impl<T> Slots<T> {
+    pub fn new(noun: &'static str) -> Self {
+        Self {
+            slots: Vec::new(),
+            first_free: 0,
+            count: 0,
+            noun,
+        }
+    }
+
+    /// How many places there are, free ones too.
+    pub fn places(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// How many live.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    pub fn insert(&mut self, content: T) -> Result<SlotId> {
+        let index = match self.slots[self.first_free..].iter().position(is_usable) {
+            Some(beyond) => self.first_free + beyond,
+            None => {
+                self.slots.try_reserve(1)?;
+                self.slots.push(Slot {
+                    generation: 0,
+                    content: None,
+                });
+                self.slots.len() - 1
+            }
+        };
+        let slot = &mut self.slots[index];
+        slot.generation += 1;
+        slot.content = Some(content);
+        self.first_free = index + 1;
+        self.count += 1;
+        Ok(SlotId {
+            index1: index as u32 + 1,
+            generation: slot.generation,
+        })
+    }
+
+    pub fn remove(&mut self, id: SlotId) -> Result<T> {
+        let index = self.index(id)?;
+        let content = self.slots[index].content.take().ok_or_else(|| stale(self.noun, id))?;
+        self.first_free = self.first_free.min(index);
+        self.count -= 1;
+        Ok(content)
+    }
+
+    /// Takes back what was inserted, where nobody has seen its id: it is given again.
+    pub fn take_back(&mut self, id: SlotId) -> Result<T> {
+        let content = self.remove(id)?;
+        let index = id.index();
+        self.slots[index].generation -= 1;
+        // A place that nothing ever had is none.
+        while self.slots.last().is_some_and(|slot| slot.generation == 0) {
+            self.slots.pop();
+        }
+        self.first_free = self.first_free.min(self.slots.len());
+        Ok(content)
+    }
+
+    pub fn get(&self, id: SlotId) -> Result<&T> {
+        let index = self.index(id)?;
+        self.slots[index].content.as_ref().ok_or_else(|| stale(self.noun, id))
+    }
+
+    pub fn get_mut(&mut self, id: SlotId) -> Result<&mut T> {
+        let index = self.index(id)?;
+        let Slots { slots, noun, .. } = self;
+        slots[index].content.as_mut().ok_or_else(|| stale(noun, id))
+    }
+
+    /// What lives at a place.
+    pub fn at(&self, place: usize) -> Option<&T> {
+        self.slots.get(place)?.content.as_ref()
+    }
+
+    /// The id of what lives at a place.
+    pub fn id_at(&self, place: usize) -> Option<SlotId> {
+        let slot = self.slots.get(place)?;
+        slot.content.as_ref()?;
+        Some(SlotId {
+            index1: place as u32 + 1,
+            generation: slot.generation,
+        })
+    }
+
+    /// What lives at a place.
+    pub fn at_mut(&mut self, place: usize) -> Option<&mut T> {
+        self.slots.get_mut(place)?.content.as_mut()
+    }
+
+    /// Removes what is not to stay.
+    pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
+        for (index, slot) in self.slots.iter_mut().enumerate() {
+            if slot.content.as_ref().is_some_and(|content| !stays(content)) {
+                slot.content = None;
+                self.first_free = self.first_free.min(index);
+                self.count -= 1;
+            }
+        }
+    }
+
+    /// All that live, with their places.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &T)> {
+        self.slots
+            .iter()
+            .enumerate()
+            .filter_map(|(index, slot)| slot.content.as_ref().map(|content| (index, content)))
+    }
+
+    /// All that live, with their ids.
+    pub fn iter_ids(&self) -> impl Iterator<Item = (SlotId, &T)> {
+        (1..).zip(&self.slots).filter_map(|(index1, slot)| {
+            let generation = slot.generation;
+            slot.content
+                .as_ref()
+                .map(|content| (SlotId { index1, generation }, content))
+        })
+    }
+
+    /// All that live, with their places.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut T)> {
+        self.slots
+            .iter_mut()
+            .enumerate()
+            .filter_map(|(index, slot)| slot.content.as_mut().map(|content| (index, content)))
+    }
+
+    /// All places, free ones too.
+    pub fn slots_mut(&mut self) -> &mut [Slot<T>] {
+        &mut self.slots
+    }
+
+    /// Where something lives.
+    pub fn place(&self, id: SlotId) -> Result<usize> {
+        self.index(id)
+    }
+
+    fn index(&self, id: SlotId) -> Result<usize> {
+        let index = (id.index1 as usize).wrapping_sub(1);
+        match self.slots.get(index) {
+            Some(slot) if slot.generation == id.generation && slot.content.is_some() => Ok(index),
+            _ => Err(stale(self.noun, id)),
+        }
+    }
+}
+
+fn stale(noun: &str, id: SlotId) -> Error {
+    Error::StaleId(format!(
+        "{noun} {{{}, {}}} does not exist, or no longer",
+        id.index1, id.generation
+    ))
+}

@@ -1,0 +1,308 @@
+//! Eight lanes of x86-64's AVX2, with fused multiply-add.
+
+use std::arch::x86_64::*;
+use std::array::from_fn;
+
+use glam::Vec3;
+
+use super::Lanes;
+use super::Record;
+use super::link_batches::{EightLinks, Sight};
+
+#[derive(Clone, Copy)]
+pub(super) struct Avx2Lanes(__m256);
+
+/// All bits of the lanes whose bit in `mask` is set.
+#[inline(always)]
+unsafe fn spread(mask: u32) -> __m256 {
+    // SAFETY: the caller promises the instructions.
+    unsafe {
+        let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+        let set = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bits);
+        _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, bits))
+    }
+}
+
+// SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
+// here asks for more than the alignment of a number.
+#[allow(clippy::undocumented_unsafe_blocks)]
+impl Lanes for Avx2Lanes {
+    const COUNT: usize = 8;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        Self(unsafe { _mm256_loadu_ps(from) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { _mm256_storeu_ps(to, self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+        unsafe { Self(eight(four_at(base, indices), four_at(base, indices.add(4)))) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
+        unsafe { Self(eight(four_near(base, indices), four_near(base, indices.add(4)))) }
+    }
+
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        let [x, y, z, _] =
+            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+        unsafe {
+            let [x, y, z] = vectors.map(|vector| vector.0);
+            let none = _mm256_setzero_ps();
+            let (low_xy, high_xy) = (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
+            let (low_z, high_z) = (_mm256_unpacklo_ps(z, none), _mm256_unpackhi_ps(z, none));
+            let pairs = [
+                _mm256_shuffle_ps::<0b0100_0100>(low_xy, low_z),
+                _mm256_shuffle_ps::<0b1110_1110>(low_xy, low_z),
+                _mm256_shuffle_ps::<0b0100_0100>(high_xy, high_z),
+                _mm256_shuffle_ps::<0b1110_1110>(high_xy, high_z),
+            ];
+            for (lane, pair) in pairs.into_iter().enumerate() {
+                add_record(sums, indices.add(lane), _mm256_castps256_ps128(pair));
+                add_record(sums, indices.add(lane + 4), _mm256_extractf128_ps::<1>(pair));
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
+        unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, subtrahend.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn size(self) -> Self {
+        Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm256_add_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn subtract(self, other: Self) -> Self {
+        Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply(self, other: Self) -> Self {
+        Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]) {
+        unsafe {
+            let guesses = squares.map(|square| _mm256_rsqrt_ps(square.0));
+            let roots: [__m256; N] = from_fn(|n| _mm256_mul_ps(squares[n].0, guesses[n]));
+            // Newton's step: 1 / length = guess * corrections / 2.
+            let corrections: [__m256; N] = from_fn(|n| _mm256_fnmadd_ps(roots[n], guesses[n], _mm256_set1_ps(3.0)));
+            let tensions: [__m256; N] = from_fn(|n| _mm256_mul_ps(half_tensions[n].0, guesses[n]));
+            let pulls = from_fn(|n| Self(_mm256_fnmadd_ps(tensions[n], corrections[n], stiffnesses[n].0)));
+            let halves = guesses.map(|guess| _mm256_mul_ps(guess, _mm256_set1_ps(0.5)));
+            let inverses = from_fn(|n| Self(_mm256_mul_ps(halves[n], corrections[n])));
+            (pulls, inverses)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
+        let count = sight.positions[0].len();
+        assert!(sight.positions.iter().all(|axis| axis.len() == count) && count <= i32::MAX as usize);
+        let first = links.as_ptr().cast::<f32>();
+        unsafe {
+            // Neighbour, stiffness, rest length, and so on: no place is taken twice where the three loads are blended.
+            let [a, b, c] = [0, 8, 16].map(|place| _mm256_loadu_ps(first.add(place)));
+            let neighbours = _mm256_blend_ps::<0b0010_0100>(_mm256_blend_ps::<0b1001_0010>(a, b), c);
+            let stiffnesses = _mm256_blend_ps::<0b0100_1001>(_mm256_blend_ps::<0b0010_0100>(a, b), c);
+            let rest_lengths = _mm256_blend_ps::<0b1001_0010>(_mm256_blend_ps::<0b0100_1001>(a, b), c);
+            let stiffnesses = _mm256_permutevar8x32_ps(stiffnesses, _mm256_setr_epi32(1, 4, 7, 2, 5, 0, 3, 6));
+            let rest_lengths = _mm256_permutevar8x32_ps(rest_lengths, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7));
+            let (neighbours, last) = (_mm256_castps_si256(neighbours), _mm256_set1_epi32(count as i32 - 1));
+            let within = _mm256_cmpeq_epi32(_mm256_max_epu32(neighbours, last), last);
+            assert!(_mm256_movemask_epi8(within) == -1, "a link leads to a node");
+            let [px, py, pz] = sight.positions;
+            let x = _mm256_sub_ps(at_neighbours(px, links), _mm256_set1_ps(sight.here.x));
+            let y = _mm256_sub_ps(at_neighbours(py, links), _mm256_set1_ps(sight.here.y));
+            let z = _mm256_sub_ps(at_neighbours(pz, links), _mm256_set1_ps(sight.here.z));
+            // Rounded as one link alone is, so that both ends of a spring pull alike wherever they are kept.
+            let [xx, yy, zz] = [_mm256_mul_ps(x, x), _mm256_mul_ps(y, y), _mm256_mul_ps(z, z)];
+            let square = _mm256_add_ps(_mm256_add_ps(xx, yy), zz);
+            let length = _mm256_sqrt_ps(square);
+            let tension = _mm256_mul_ps(stiffnesses, _mm256_sub_ps(length, rest_lengths));
+            let pull = _mm256_div_ps(tension, length);
+            let [x, y, z] = [_mm256_mul_ps(x, pull), _mm256_mul_ps(y, pull), _mm256_mul_ps(z, pull)];
+            let sum = Vec3::new(sum(x), sum(y), sum(z));
+            (!sum.is_nan()).then_some(sum)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn where_set(self, mask: u32) -> Self {
+        Self(unsafe { _mm256_and_ps(self.0, spread(mask)) })
+    }
+
+    #[inline(always)]
+    unsafe fn lesser(self, other: Self) -> Self {
+        Self(unsafe { _mm256_min_ps(other.0, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn greater(self, other: Self) -> Self {
+        Self(unsafe { _mm256_max_ps(other.0, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn any_nan(self) -> bool {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_UNORD_Q>(self.0, self.0)) != 0 }
+    }
+}
+
+/// A record, which is aligned.
+#[inline(always)]
+pub(super) unsafe fn record(place: *const Record) -> __m128 {
+    // SAFETY: the caller promises the instructions and the record.
+    unsafe { _mm_load_ps(place.cast()) }
+}
+
+/// The record of half an even index: half a record is as much as an address can be scaled by.
+#[inline(always)]
+pub(super) unsafe fn twice(base: *const Record, index: *const u16) -> *mut Record {
+    // SAFETY: the caller promises a readable index.
+    let halves = unsafe { usize::from(index.read()) };
+    base.cast::<[f32; 2]>().wrapping_add(halves).cast::<Record>().cast_mut()
+}
+
+/// Adds to the record of half an even index.
+#[inline(always)]
+pub(super) unsafe fn add_record(sums: *mut Record, index: *const u16, record: __m128) {
+    // SAFETY: the caller promises the instructions, a readable index and a writable record.
+    unsafe {
+        let place: *mut f32 = twice(sums, index).cast();
+        _mm_store_ps(place, _mm_add_ps(_mm_load_ps(place), record));
+    }
+}
+
+/// The numbers of eight records: four of them at a time in each half.
+#[inline(always)]
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx2Lanes; 4] {
+    // SAFETY: the caller promises the instructions and the records.
+    unsafe {
+        let a = eight(record(at(0)), record(at(4)));
+        let b = eight(record(at(1)), record(at(5)));
+        let c = eight(record(at(2)), record(at(6)));
+        let d = eight(record(at(3)), record(at(7)));
+        let (low_ab, high_ab) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (low_cd, high_cd) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
+            Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
+            Avx2Lanes(_mm256_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+            Avx2Lanes(_mm256_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
+        ]
+    }
+}
+
+/// The coordinates of eight neighbours.
+#[inline(always)]
+unsafe fn at_neighbours(axis: &[f32], [a, b, c, d, e, f, g, h]: &EightLinks) -> __m256 {
+    let at = |link: &[u32; 3]| axis.as_ptr().wrapping_add(link[0] as usize);
+    // SAFETY: the caller promises the instructions, and that the neighbours are there.
+    unsafe { eight(four(at(a), at(b), at(c), at(d)), four(at(e), at(f), at(g), at(h))) }
+}
+
+/// The sum of eight lanes.
+#[inline(always)]
+unsafe fn sum(lanes: __m256) -> f32 {
+    // SAFETY: the caller promises the instructions.
+    unsafe {
+        let four = _mm_add_ps(_mm256_castps256_ps128(lanes), _mm256_extractf128_ps::<1>(lanes));
+        let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+        _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
+    }
+}
+
+/// Four numbers from four places: on many processors in less time than their own instruction for it takes.
+#[inline(always)]
+unsafe fn four(a: *const f32, b: *const f32, c: *const f32, d: *const f32) -> __m128 {
+    // SAFETY: the caller promises the instructions and the places.
+    unsafe {
+        let lanes = _mm_load_ss(a);
+        let lanes = _mm_insert_ps::<0x10>(lanes, _mm_load_ss(b));
+        let lanes = _mm_insert_ps::<0x20>(lanes, _mm_load_ss(c));
+        _mm_insert_ps::<0x30>(lanes, _mm_load_ss(d))
+    }
+}
+
+/// The numbers at four indices.
+#[inline(always)]
+pub(super) unsafe fn four_at(base: *const f32, indices: *const u32) -> __m128 {
+    // SAFETY: the same contract; the indices may be read.
+    unsafe {
+        let [a, b, c, d] = indices.cast::<[u32; 4]>().read();
+        four(
+            base.wrapping_add(a as usize),
+            base.wrapping_add(b as usize),
+            base.wrapping_add(c as usize),
+            base.wrapping_add(d as usize),
+        )
+    }
+}
+
+/// The numbers at four small indices.
+#[inline(always)]
+pub(super) unsafe fn four_near(base: *const f32, indices: *const u16) -> __m128 {
+    // SAFETY: the same contract.
+    unsafe {
+        let [a, b, c, d] = indices.cast::<[u16; 4]>().read();
+        four(
+            base.wrapping_add(usize::from(a)),
+            base.wrapping_add(usize::from(b)),
+            base.wrapping_add(usize::from(c)),
+            base.wrapping_add(usize::from(d)),
+        )
+    }
+}
+
+/// Four lanes and four more.
+#[inline(always)]
+unsafe fn eight(low: __m128, high: __m128) -> __m256 {
+    // SAFETY: the same contract.
+    unsafe { _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high) }
+}

@@ -1,0 +1,206 @@
+//! Sixteen lanes of x86-64's AVX-512.
+
+use std::arch::x86_64::*;
+use std::array::from_fn;
+
+use glam::Vec3;
+
+use super::Lanes;
+use super::Record;
+use super::avx2::{Avx2Lanes, add_record, four_at, four_near, record, twice};
+use super::link_batches::{EightLinks, Sight};
+
+#[derive(Clone, Copy)]
+pub(super) struct Avx512Lanes(__m512);
+
+// SAFETY of every block: the caller promises the instructions, and that what pointers lead to is there; no load or store
+// here asks for more than the alignment of a number.
+#[allow(clippy::undocumented_unsafe_blocks)]
+impl Lanes for Avx512Lanes {
+    const COUNT: usize = 16;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self(unsafe { _mm512_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        Self(unsafe { _mm512_loadu_ps(from) })
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { _mm512_storeu_ps(to, self.0) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(base: *const f32, indices: *const u32) -> Self {
+        unsafe {
+            Self(sixteen(
+                four_at(base, indices),
+                four_at(base, indices.add(4)),
+                four_at(base, indices.add(8)),
+                four_at(base, indices.add(12)),
+            ))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn gather_near(base: *const f32, indices: *const u16) -> Self {
+        unsafe {
+            Self(sixteen(
+                four_near(base, indices),
+                four_near(base, indices.add(4)),
+                four_near(base, indices.add(8)),
+                four_near(base, indices.add(12)),
+            ))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn records(base: *const Record, indices: *const u32) -> [Self; 3] {
+        let [x, y, z, _] = unsafe { transposed(|lane: usize| base.wrapping_add(indices.add(lane).read() as usize)) };
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    unsafe fn records_near(base: *const Record, indices: *const u16) -> [Self; 3] {
+        let [x, y, z, _] =
+            unsafe { transposed(|lane: usize| base.wrapping_add(usize::from(indices.add(lane).read()))) };
+        [x, y, z]
+    }
+
+    #[inline(always)]
+    unsafe fn add_to_records(sums: *mut Record, indices: *const u16, vectors: [Self; 3]) {
+        unsafe {
+            let [x, y, z] = vectors.map(|vector| vector.0);
+            let none = _mm512_setzero_ps();
+            let (low_xy, high_xy) = (_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y));
+            let (low_z, high_z) = (_mm512_unpacklo_ps(z, none), _mm512_unpackhi_ps(z, none));
+            let quarters = [
+                _mm512_shuffle_ps::<0b0100_0100>(low_xy, low_z),
+                _mm512_shuffle_ps::<0b1110_1110>(low_xy, low_z),
+                _mm512_shuffle_ps::<0b0100_0100>(high_xy, high_z),
+                _mm512_shuffle_ps::<0b1110_1110>(high_xy, high_z),
+            ];
+            for (lane, quarter) in quarters.into_iter().enumerate() {
+                add_record(sums, indices.add(lane), _mm512_castps512_ps128(quarter));
+                add_record(sums, indices.add(lane + 4), _mm512_extractf32x4_ps::<1>(quarter));
+                add_record(sums, indices.add(lane + 8), _mm512_extractf32x4_ps::<2>(quarter));
+                add_record(sums, indices.add(lane + 12), _mm512_extractf32x4_ps::<3>(quarter));
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn records_twice(base: *const Record, indices: *const u16) -> [Self; 4] {
+        unsafe { transposed(|lane: usize| twice(base, indices.add(lane)).cast_const()) }
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_subtract(self, factor: Self, subtrahend: Self) -> Self {
+        Self(unsafe { _mm512_fmsub_ps(self.0, factor.0, subtrahend.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn size(self) -> Self {
+        Self(unsafe { _mm512_abs_ps(self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        Self(unsafe { _mm512_add_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn subtract(self, other: Self) -> Self {
+        Self(unsafe { _mm512_sub_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply(self, other: Self) -> Self {
+        Self(unsafe { _mm512_mul_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
+        Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn pulls<const N: usize>(
+        squares: [Self; N],
+        stiffnesses: [Self; N],
+        half_tensions: [Self; N],
+    ) -> ([Self; N], [Self; N]) {
+        unsafe {
+            let guesses = squares.map(|square| _mm512_rsqrt14_ps(square.0));
+            let roots: [__m512; N] = from_fn(|n| _mm512_mul_ps(squares[n].0, guesses[n]));
+            // Newton's step: 1 / length = guess * corrections / 2.
+            let corrections: [__m512; N] = from_fn(|n| _mm512_fnmadd_ps(roots[n], guesses[n], _mm512_set1_ps(3.0)));
+            let tensions: [__m512; N] = from_fn(|n| _mm512_mul_ps(half_tensions[n].0, guesses[n]));
+            let pulls = from_fn(|n| Self(_mm512_fnmadd_ps(tensions[n], corrections[n], stiffnesses[n].0)));
+            let halves = guesses.map(|guess| _mm512_mul_ps(guess, _mm512_set1_ps(0.5)));
+            let inverses = from_fn(|n| Self(_mm512_mul_ps(halves[n], corrections[n])));
+            (pulls, inverses)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn pull_eight(sight: Sight, links: &EightLinks) -> Option<Vec3> {
+        // Part of what a processor with AVX-512 has.
+        unsafe { Avx2Lanes::pull_eight(sight, links) }
+    }
+
+    #[inline(always)]
+    unsafe fn where_set(self, mask: u32) -> Self {
+        Self(unsafe { _mm512_maskz_mov_ps(mask as __mmask16, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn lesser(self, other: Self) -> Self {
+        Self(unsafe { _mm512_min_ps(other.0, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn greater(self, other: Self) -> Self {
+        Self(unsafe { _mm512_max_ps(other.0, self.0) })
+    }
+
+    #[inline(always)]
+    unsafe fn any_nan(self) -> bool {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_UNORD_Q>(self.0, self.0) != 0 }
+    }
+}
+
+/// The numbers of sixteen records: four of them at a time in each quarter.
+#[inline(always)]
+unsafe fn transposed(at: impl Fn(usize) -> *const Record) -> [Avx512Lanes; 4] {
+    // SAFETY: the caller promises the instructions and the records.
+    unsafe {
+        let a = sixteen(record(at(0)), record(at(4)), record(at(8)), record(at(12)));
+        let b = sixteen(record(at(1)), record(at(5)), record(at(9)), record(at(13)));
+        let c = sixteen(record(at(2)), record(at(6)), record(at(10)), record(at(14)));
+        let d = sixteen(record(at(3)), record(at(7)), record(at(11)), record(at(15)));
+        let (low_ab, high_ab) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (low_cd, high_cd) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            Avx512Lanes(_mm512_shuffle_ps::<0b0100_0100>(low_ab, low_cd)),
+            Avx512Lanes(_mm512_shuffle_ps::<0b1110_1110>(low_ab, low_cd)),
+            Avx512Lanes(_mm512_shuffle_ps::<0b0100_0100>(high_ab, high_cd)),
+            Avx512Lanes(_mm512_shuffle_ps::<0b1110_1110>(high_ab, high_cd)),
+        ]
+    }
+}
+
+#[inline(always)]
+unsafe fn sixteen(a: __m128, b: __m128, c: __m128, d: __m128) -> __m512 {
+    // SAFETY: the caller promises the instructions.
+    unsafe {
+        let lanes = _mm512_castps128_ps512(a);
+        let lanes = _mm512_insertf32x4::<1>(lanes, b);
+        let lanes = _mm512_insertf32x4::<2>(lanes, c);
+        _mm512_insertf32x4::<3>(lanes, d)
+    }
+}

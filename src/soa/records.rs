@@ -1,0 +1,63 @@
+//! Vectors of nodes a second time, as records: three numbers that lie together are one load, not three.
+
+use super::TILE;
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::simd::{Loops, Record};
+use crate::threads::Tiles;
+
+saved!(Record { 0 });
+
+/// One record per node.
+#[derive(Debug)]
+pub(crate) struct Records(Vec<Record>);
+
+saved!(Records { 0 });
+
+impl Records {
+    /// `count` of them, all zero.
+    pub fn zeros(count: usize) -> Result<Self> {
+        Ok(Self(memory::filled(Record::default(), count)?))
+    }
+
+    /// Makes room for so many in all.
+    pub fn reserve(&mut self, count: usize) -> Result<()> {
+        memory::reserve(&mut self.0, count)
+    }
+
+    /// Adds zeros, for which there is room, up to so many in all.
+    pub fn grow(&mut self, count: usize) {
+        self.0.resize(count, Record::default());
+    }
+
+    pub fn as_slice(&self) -> &[Record] {
+        &self.0
+    }
+
+    pub fn as_mut_slice(&mut self) -> &mut [Record] {
+        &mut self.0
+    }
+
+    pub fn tiles_mut(&mut self) -> Tiles<'_, Record> {
+        Tiles::new(&mut self.0, TILE)
+    }
+}
+
+/// Makes records of vectors.
+pub(crate) struct WriteRecords<'a> {
+    pub axes: [&'a [f32]; 3],
+    pub records: &'a mut [Record],
+}
+
+impl Loops for WriteRecords<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.records.len();
+        let [x, y, z] = self.axes.map(|axis| &axis[..count]);
+        for (node, record) in self.records.iter_mut().enumerate() {
+            *record = Record([x[node], y[node], z[node], 0.0]);
+        }
+    }
+}

@@ -1,0 +1,508 @@
+//! Modules of `src` import only modules that stand below them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A module, and the modules that it may import; lower ones first, so that no loop can be written.
+type Row<'a> = (&'a str, &'a [&'a str]);
+
+/// A file, and the modules that it imports although its module may not.
+type Debt<'a> = (&'a str, &'a [&'a str]);
+
+#[rustfmt::skip]
+const MAY_IMPORT: &[Row] = &[
+    ("base", &[]),
+    ("simd", &["base"]),
+    ("codec", &["base", "simd"]),
+    ("ids", &["base", "codec"]),
+    ("handover", &[]),
+    ("threads", &["base"]),
+    ("soa", &["base", "simd", "codec", "threads"]),
+    ("geometry", &["base", "simd", "codec"]),
+    ("order", &["base"]),
+    ("mesh", &["base", "geometry"]),
+    ("def", &["base", "codec", "soa", "mesh"]),
+    ("strain", &["base", "def"]),
+    ("raster", &["base"]),
+    ("springs", &["base", "simd", "codec", "soa", "order", "def"]),
+    ("elements", &["base", "simd", "codec", "threads", "soa", "def", "springs"]),
+    ("terms", &["base", "simd", "codec", "threads", "soa", "def", "springs"]),
+    ("enclosed", &["base", "codec", "threads", "soa", "def", "springs"]),
+    ("material", &["base", "mesh", "def", "elements"]),
+    ("cutting", &["base", "codec", "strain"]),
+    ("contact", &["base", "simd", "codec", "ids", "soa", "geometry", "mesh", "def", "raster"]),
+    ("readers", &["base", "codec", "handover", "threads", "soa"]),
+    ("solver", &["base", "simd", "codec", "ids", "threads", "soa", "geometry", "def", "springs", "elements", "terms",
+        "enclosed", "contact"]),
+    ("body", &["base", "simd", "codec", "ids", "threads", "soa", "geometry", "order", "mesh", "def", "springs",
+        "elements", "terms", "enclosed", "material", "cutting", "contact", "readers", "solver"]),
+    ("world", &["base", "simd", "codec", "ids", "handover", "threads", "soa", "mesh", "def", "cutting", "contact",
+        "readers", "solver", "body"]),
+    ("haptics", &["base", "handover", "def", "contact", "world"]),
+    ("embedding", &["base", "geometry", "mesh", "def", "cutting", "body", "world"]),
+    ("query", &["base", "geometry", "def", "body", "world"]),
+    ("detection", &["contact"]),
+    ("picture", &["base", "mesh", "def", "raster", "contact", "body", "world"]),
+    ("capi", &["base", "simd", "ids", "threads", "mesh", "def", "strain", "raster", "material", "cutting", "contact",
+        "readers", "solver", "body", "world", "haptics", "embedding", "query", "detection", "picture"]),
+];
+
+/// The imports that are left to remove. A debt that no longer exists fails the test: the list only shrinks.
+#[rustfmt::skip]
+const DEBTS: &[Debt] = &[
+    ("base/error.rs", &["world"]),
+    ("body/blade.rs", &["world"]),
+    ("body/material_point.rs", &["world"]),
+    ("body/mod.rs", &["world"]),
+    ("contact/candidates.rs", &["body"]),
+    ("contact/constraint.rs", &["body"]),
+    ("contact/contacts.rs", &["body"]),
+    ("contact/holds.rs", &["body"]),
+    ("contact/press_nodes.rs", &["body"]),
+    ("contact/report.rs", &["world"]),
+    ("contact/supports.rs", &["body"]),
+    ("contact/surface.rs", &["body"]),
+    ("contact/tissue/bonds/mod.rs", &["solver", "body", "world"]),
+    ("contact/tissue/bonds/substep.rs", &["body"]),
+    ("contact/tissue/change.rs", &["body"]),
+    ("contact/tissue/link.rs", &["body"]),
+    ("contact/tissue/mod.rs", &["body"]),
+    ("contact/tissue/skin.rs", &["body"]),
+    ("contact/tissue/wound.rs", &["body"]),
+    ("solver/attempt.rs", &["body"]),
+    ("solver/closing.rs", &["body"]),
+    ("solver/energy_monitor.rs", &["body"]),
+    ("solver/implicit/coarse.rs", &["body"]),
+    ("solver/implicit/contact.rs", &["body"]),
+    ("solver/implicit/energy.rs", &["body"]),
+    ("solver/implicit/gradient.rs", &["body"]),
+    ("solver/implicit/iterations.rs", &["body"]),
+    ("solver/implicit/rigid.rs", &["body"]),
+    ("solver/implicit/step.rs", &["body"]),
+    ("solver/kick.rs", &["body"]),
+    ("solver/lockstep.rs", &["body"]),
+    ("solver/mass_scaling.rs", &["body"]),
+    ("solver/newton/equation.rs", &["body"]),
+    ("solver/newton/rest.rs", &["body"]),
+    ("solver/newton/step.rs", &["body"]),
+    ("solver/pipeline.rs", &["body"]),
+    ("solver/substep.rs", &["body"]),
+    ("solver/verlet.rs", &["body"]),
+    ("world/haptics.rs", &["haptics"]),
+];
+
+/// A word, `::` or another sign of Rust text, and its line.
+#[derive(Clone, Copy)]
+struct Token<'a> {
+    text: &'a str,
+    line: usize,
+}
+
+/// The length of the string literal, with its quotes, that `text` begins with.
+fn string_length(text: &str) -> usize {
+    let mut escaped = false;
+    for (place, letter) in text.char_indices().skip(1) {
+        match letter {
+            _ if escaped => escaped = false,
+            '\\' => escaped = true,
+            '"' => return place + 1,
+            _ => {}
+        }
+    }
+    text.len()
+}
+
+/// The length of the raw string literal that `text` begins with, if there is one, from its first `#` or quote on.
+fn raw_string_length(text: &str) -> Option<usize> {
+    let hashes = text.len() - text.trim_start_matches('#').len();
+    let inner = text[hashes..].strip_prefix('"')?;
+    let end = format!("\"{}", &text[..hashes]);
+    Some(hashes + 1 + inner.find(&end).expect("raw strings end") + end.len())
+}
+
+/// The length of the block comment that `text` begins with.
+fn comment_length(text: &str) -> usize {
+    let mut depth = 0;
+    for (place, _) in text.char_indices() {
+        if text[place..].starts_with("/*") {
+            depth += 1;
+        } else if text[..place].ends_with("*/") && place > 3 {
+            depth -= 1;
+            if depth == 0 {
+                return place;
+            }
+        }
+    }
+    text.len()
+}
+
+/// The tokens of Rust text, without comments, strings and characters.
+fn tokens(text: &str) -> Vec<Token<'_>> {
+    let mut tokens = Vec::new();
+    let (mut place, mut line) = (0, 1);
+    while let Some(first) = text[place..].chars().next() {
+        let rest = &text[place..];
+        let word = rest.len()
+            - rest
+                .trim_start_matches(|letter: char| letter.is_alphanumeric() || letter == '_')
+                .len();
+        let (length, is_token) = if rest.starts_with("//") {
+            (rest.find('\n').unwrap_or(rest.len()), false)
+        } else if rest.starts_with("/*") {
+            (comment_length(rest), false)
+        } else if first == '"' {
+            (string_length(rest), false)
+        } else if first == '\'' {
+            // A lifetime has no second quote behind its first letter.
+            let character = &rest[1..];
+            let letter = character.chars().next().map_or(0, char::len_utf8);
+            let closed = match character.strip_prefix('\\') {
+                Some(escape) => escape[1..].find('\'').map(|end| end + 4),
+                None => character[letter..].starts_with('\'').then_some(letter + 2),
+            };
+            (closed.unwrap_or(1), false)
+        } else if let Some(raw) = matches!(&rest[..word], "r" | "br" | "cr")
+            .then(|| raw_string_length(&rest[word..]))
+            .flatten()
+        {
+            (word + raw, false)
+        } else if word > 0 {
+            (word, true)
+        } else if rest.starts_with("::") {
+            (2, true)
+        } else {
+            (first.len_utf8(), !first.is_whitespace())
+        };
+        if is_token {
+            let text = &rest[..length];
+            tokens.push(Token { text, line });
+        }
+        line += rest[..length].matches('\n').count();
+        place += length;
+    }
+    tokens
+}
+
+/// Removes the items marked `#[cfg(test)]`; returns the names of the modules among them that are files.
+fn remove_tests<'a>(tokens: &mut Vec<Token<'a>>) -> Vec<&'a str> {
+    const MARK: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
+    let mut files = Vec::new();
+    while let Some(start) = tokens
+        .windows(MARK.len())
+        .position(|window| window.iter().map(|token| token.text).eq(MARK))
+    {
+        let item = start + MARK.len();
+        let mut depth = 0;
+        let length = tokens[item..].iter().position(|token| {
+            match token.text {
+                "{" => depth += 1,
+                "}" => depth -= 1,
+                _ => {}
+            }
+            depth == 0 && matches!(token.text, "}" | ";")
+        });
+        let end = item + length.expect("items end") + 1;
+        if let [.., module, name, end] = &tokens[item..end]
+            && (module.text, end.text) == ("mod", ";")
+        {
+            files.push(name.text);
+        }
+        tokens.drain(start..end);
+    }
+    files
+}
+
+/// Adds the paths that a use tree or a path stands for, from `at` on, each behind `before`; returns where it ends.
+fn add_paths<'a>(
+    tokens: &[Token<'a>],
+    mut at: usize,
+    before: &[&'a str],
+    found: &mut Vec<(usize, Vec<&'a str>)>,
+) -> usize {
+    if tokens[at].text == "{" {
+        at += 1;
+        while tokens[at].text != "}" {
+            at = match tokens[at].text {
+                "," => at + 1,
+                _ => add_paths(tokens, at, before, found),
+            };
+        }
+        return at + 1;
+    }
+    let mut path = before.to_vec();
+    match tokens[at].text {
+        "super" => {
+            path.pop();
+        }
+        "self" => {}
+        name => path.push(name),
+    }
+    let goes_on = |token: &Token| token.text == "{" || token.text == "*" || token.text.starts_with(char::is_alphabetic);
+    match tokens.get(at + 1..at + 3) {
+        Some([colons, next]) if colons.text == "::" && goes_on(next) => add_paths(tokens, at + 2, &path, found),
+        _ => {
+            found.push((tokens[at].line, path));
+            at + if tokens.get(at + 1).is_some_and(|token| token.text == "as") {
+                3
+            } else {
+                1
+            }
+        }
+    }
+}
+
+/// The paths from the root of the crate that a module's text names by `crate::` or `super::`, with their lines.
+fn crate_paths<'a>(tokens: &[Token<'a>], module: &[&'a str]) -> Vec<(usize, Vec<&'a str>)> {
+    let mut found = Vec::new();
+    let mut open: Vec<Option<&str>> = Vec::new();
+    let mut at = 0;
+    while at < tokens.len() {
+        let text = |at: usize| tokens.get(at).map_or("", |token| token.text);
+        let is_first = at == 0 || text(at - 1) != "::";
+        match (text(at), text(at + 1), text(at + 2)) {
+            ("mod", name, "{") => {
+                open.push(Some(name));
+                at += 3;
+            }
+            ("crate", "::", _) if is_first => at = add_paths(tokens, at + 2, &[], &mut found),
+            ("super", "::", _) if is_first => {
+                let inner: Vec<_> = module.iter().copied().chain(open.iter().copied().flatten()).collect();
+                at = add_paths(tokens, at, &inner, &mut found);
+            }
+            (sign, _, _) => {
+                match sign {
+                    "{" => open.push(None),
+                    "}" => {
+                        open.pop();
+                    }
+                    _ => {}
+                }
+                at += 1;
+            }
+        }
+    }
+    found
+}
+
+/// The module that a file of `src` holds, from the root of the crate.
+fn module_of(file: &str) -> Vec<&str> {
+    let path = file.strip_suffix(".rs").expect("a file of Rust");
+    let path = path.strip_suffix("/mod").unwrap_or(path);
+    path.split('/').collect()
+}
+
+/// The names that the root of the crate re-exports, each with the module that it is from.
+fn root_names<'a>(tokens: &[Token<'a>]) -> BTreeMap<&'a str, &'a str> {
+    let mut paths = Vec::new();
+    for at in 0..tokens.len() {
+        if tokens[at].text == "use" {
+            add_paths(tokens, at + 1, &[], &mut paths);
+        }
+    }
+    paths.iter().map(|(_, path)| (path[path.len() - 1], path[0])).collect()
+}
+
+/// What is wrong with a table: a module that stands in it twice, or may import one that does not stand before it.
+fn faults_of_table(table: &[Row]) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut below = BTreeSet::new();
+    for (module, imports) in table {
+        for import in imports.iter().filter(|import| !below.contains(*import)) {
+            faults.push(format!(
+                "the table: {module} may not import {import}, which does not stand above it in the list"
+            ));
+        }
+        if !below.insert(module) {
+            faults.push(format!("the table: {module} has two rows"));
+        }
+    }
+    faults
+}
+
+/// What is wrong with files, given as their paths in `src` and their texts.
+fn faults(sources: &[(String, String)], table: &[Row], debts: &[Debt]) -> Vec<String> {
+    let mut faults = faults_of_table(table);
+    let mut tests = BTreeSet::new();
+    let mut root = BTreeMap::new();
+    let mut files = Vec::new();
+    for (file, text) in sources {
+        let mut tokens = tokens(text);
+        for name in remove_tests(&mut tokens) {
+            let parent = if file == "lib.rs" { Vec::new() } else { module_of(file) };
+            tests.insert([parent, vec![name]].concat());
+        }
+        match file.as_str() {
+            "lib.rs" => root = root_names(&tokens),
+            _ => files.push((file.as_str(), module_of(file), tokens)),
+        }
+    }
+    files.retain(|(_, module, _)| !(1..=module.len()).any(|length| tests.contains(&module[..length])));
+
+    let mut imported = BTreeSet::new();
+    let mut owed = BTreeSet::new();
+    for (file, module, tokens) in &files {
+        let Some((_, allowed)) = table.iter().find(|(name, _)| *name == module[0]) else {
+            faults.push(format!("{file}: the table has no row of {}", module[0]));
+            continue;
+        };
+        let debt = debts
+            .iter()
+            .find(|(debtor, _)| debtor == file)
+            .map_or(&[][..], |(_, imports)| imports);
+        for (line, path) in crate_paths(tokens, module) {
+            let Some(&first) = path.first() else {
+                continue;
+            };
+            let import = root.get(first).copied().unwrap_or(first);
+            if import == module[0] {
+            } else if allowed.contains(&import) {
+                imported.insert((module[0], import));
+            } else if debt.contains(&import) {
+                owed.insert((*file, import));
+            } else {
+                faults.push(format!("{file}:{line}: {} may not import {import}", module[0]));
+            }
+        }
+    }
+
+    for &(module, imports) in table {
+        if !files.iter().any(|(_, path, _)| path[0] == module) {
+            faults.push(format!("the table: there is no module {module}"));
+        }
+        for import in imports.iter().filter(|import| !imported.contains(&(module, **import))) {
+            faults.push(format!(
+                "the table: {module} does not import {import}: remove the entry"
+            ));
+        }
+    }
+    for &(file, imports) in debts {
+        for import in imports.iter().filter(|import| !owed.contains(&(file, **import))) {
+            faults.push(format!(
+                "the debts: {file} does not import {import} any more: remove the entry"
+            ));
+        }
+    }
+    faults
+}
+
+/// Adds the files of Rust in a directory, as their paths in `src` and their texts.
+fn read_sources(directory: &Path, src: &Path, sources: &mut Vec<(String, String)>) {
+    for entry in fs::read_dir(directory).expect("src can be read") {
+        let path = entry.expect("src can be read").path();
+        if path.is_dir() {
+            read_sources(&path, src, sources);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let name: Vec<_> = path
+                .strip_prefix(src)
+                .expect("a path in src")
+                .iter()
+                .map(|part| part.to_string_lossy())
+                .collect();
+            sources.push((name.join("/"), fs::read_to_string(&path).expect("a file of Rust")));
+        }
+    }
+}
+
+#[test]
+fn modules_import_only_what_stands_below_them() {
+    let src = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut sources = Vec::new();
+    read_sources(&src, &src, &mut sources);
+    sources.sort();
+    assert!(sources.len() > 100, "src was read");
+    let faults = faults(&sources, MAY_IMPORT, DEBTS);
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// The faults of files that are planted beside a root and three modules that are as they should be.
+fn faults_beside(planted: &[(&str, &str)], debts: &[Debt]) -> Vec<String> {
+    let table: &[Row] = &[("low", &[]), ("middle", &["low"]), ("high", &["low", "middle"])];
+    let whole = [
+        (
+            "lib.rs",
+            "mod low; mod middle; mod high; pub use high::{World, inner::Body}; #[cfg(test)] mod trial;",
+        ),
+        ("low.rs", "pub(crate) const LOW: u32 = 1;"),
+        ("middle.rs", "use crate::low::LOW;"),
+        ("high/mod.rs", "use super::{low, middle::{self, Name}}; mod inner;"),
+        ("trial.rs", "use crate::high;"),
+    ];
+    let sources: Vec<_> = whole
+        .iter()
+        .chain(planted)
+        .map(|(file, text)| ((*file).to_owned(), (*text).to_owned()))
+        .collect();
+    faults(&sources, table, debts)
+}
+
+#[test]
+fn a_planted_import_is_found_however_it_is_written() {
+    assert_eq!(faults_beside(&[], &[]), [""; 0]);
+    for planted in [
+        "use crate::high::World;",
+        "use crate::{low::LOW, high};",
+        "use crate::{low::{LOW}, high::{self}};",
+        "use crate::World;",
+        "use crate::{low, Body};",
+        "pub(crate) use crate::high::*;",
+        "fn f<'a>(quote: char) -> crate::high::World { g('\"', '\\'', 'x') }",
+        "use super::super::high;",
+        "mod inner { mod deeper { use super::super::super::super::high; } }",
+        "#[cfg(test)] mod tests { fn f() {} } use crate::high;",
+        "/* a /* nested */ comment */ use crate::high;",
+        "const TEXT: &str = r#\"a \" quote\"#; use crate::high;",
+        "macro_rules! make { () => { $crate::high::World } }",
+    ] {
+        let text = format!("use crate::low;\n{planted}");
+        let found = faults_beside(&[("middle/part.rs", &text)], &[]);
+        assert_eq!(found, ["middle/part.rs:2: middle may not import high"], "{planted}");
+        let owed = faults_beside(&[("middle/part.rs", &text)], &[("middle/part.rs", &["high"])]);
+        assert_eq!(owed, [""; 0], "{planted}");
+    }
+}
+
+#[test]
+fn what_is_no_import_is_none() {
+    for harmless in [
+        "// use crate::high;",
+        "/* use crate::high; */",
+        "const TEXT: &str = \"use \\\" crate::high;\";",
+        "const TEXT: &str = r#\"use crate::high;\"#;",
+        "#[cfg(test)]\nmod tests { use crate::high; fn f() { if true {} } }",
+        "#[cfg(test)]\nuse crate::high;",
+        "mod inner { use super::high; }",
+        "use super::high;",
+        "use super::{low::{self as bottom}, super::low};",
+        "pub(crate) fn f() {}",
+    ] {
+        assert_eq!(
+            faults_beside(&[("middle/part.rs", harmless)], &[]),
+            [""; 0],
+            "{harmless}"
+        );
+    }
+}
+
+#[test]
+fn a_debt_that_is_paid_and_a_module_without_a_row_are_found() {
+    let paid = faults_beside(&[], &[("middle.rs", &["high"])]);
+    assert_eq!(
+        paid,
+        ["the debts: middle.rs does not import high any more: remove the entry"]
+    );
+    let unknown = faults_beside(&[("other.rs", "")], &[]);
+    assert_eq!(unknown, ["other.rs: the table has no row of other"]);
+}
+
+#[test]
+fn a_planted_loop_in_the_table_is_found() {
+    assert_eq!(faults_of_table(MAY_IMPORT), [""; 0]);
+    for planted in [
+        &[("low", &["high"][..]), ("high", &["low"])][..],
+        &[("low", &["low"])],
+        &[("low", &[]), ("high", &["low"]), ("low", &["high"])],
+    ] {
+        assert_eq!(faults_of_table(planted).len(), 1, "{planted:?}");
+    }
+}
