@@ -55,7 +55,7 @@ const PARTING_SHARE: f32 = 0.03;
 
 /// All contacts together part a body with a force that would take this long to make it as fast, s. So where bodies hold each other, or others press
 /// them together, nothing is wound up.
-const PARTING_TIME: f32 = 0.02;
+const PARTING_TIME: f32 = 0.005;
 
 /// Sweeps over what began too close.
 const PARTING_SWEEPS: u32 = 4;
@@ -427,7 +427,7 @@ impl Tissue {
     fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
         let Self { links, skins, .. } = self;
         links.retain(|link| link.depth > 0.0);
-        let count = links.len() as f32;
+        let pressing: f32 = links.iter().map(Link::impulse).sum();
         for link in &mut *links {
             let skin = |side: usize| skins[link.sides[side].body].as_ref();
             let (Some(first), Some(second)) = (skin(0), skin(1)) else {
@@ -439,8 +439,8 @@ impl Tissue {
             };
             let speed = (PARTING_SPEED * first.extent.min(second.extent)).max(PARTING_SHARE * against);
             // What presses harder than this would have work done to be parted.
-            let most = first.mass.min(second.mass) * speed / (PARTING_TIME * count);
-            let ease = (1.0 - link.impulse() / (most * duration)).max(0.0);
+            let most = first.mass.min(second.mass) * speed / PARTING_TIME;
+            let ease = (1.0 - pressing / (most * duration)).max(0.0);
             let speed = (speed * ease).min(PUSHED_OUT * link.depth / duration);
             link.begin_parting(speed, skins);
         }

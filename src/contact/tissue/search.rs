@@ -165,7 +165,12 @@ impl Search<'_> {
                     touched = Some((distance, triangle, found));
                 }
             });
-            let nearest_there = if behind.is_some() { 0.0 } else { front };
+            // What was made within another is led out as far as its thickness asks for.
+            let nearest_there = match behind {
+                Some(_) if self.measures == Measure::Reductions => f32::INFINITY,
+                Some(_) => 0.0,
+                None => front,
+            };
             self.measure(kept.as_deref_mut(), Part::Corner(corner), nearest_there);
             // On the wrong side it is led out, or let out where it is deep.
             let is_behind = behind.is_some();
