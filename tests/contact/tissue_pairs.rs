@@ -391,8 +391,10 @@ fn what_is_thrown_does_not_pass() {
             contact,
         );
         throw(&mut world, stone, Vec3::new(0.0, -speed, 0.0));
+        let mut crossings = 0;
         for index in 0..40 {
             let report = step(&mut world, dt);
+            crossings = report.crossings;
             // What is as fast as that crushes itself flat, and then some of it passes: that is told.
             assert!(
                 report.crossings == 0 || speed > 10.0,
@@ -404,8 +406,8 @@ fn what_is_thrown_does_not_pass() {
             centre(body(&world, stone)).y,
             f64::from(body(&world, low).positions()[60].y),
         ];
-        // What has passed comes back slowly, so that no energy is made: some of what is fastest is still behind.
-        let is_ahead = stone > below || speed > 10.0 && stone > below - 0.01;
+        // What has passed comes back slowly, so that no energy is made: what is fastest may still be on its way, and that is told.
+        let is_ahead = stone > below || speed > 10.0 && crossings > 0;
         assert!(
             is_ahead && below < -0.01,
             "{detection:?}, {speed} m/s: the stone is at {stone}, the net at {below}"
@@ -536,8 +538,8 @@ fn what_is_cut_open_has_no_inside() {
             body.remove_spring(top, above).expect("a spring");
             assert!(!body.is_closed());
         }
-        // It is led out by less than a third of its own extent in a second.
-        for _ in 0..2000 {
+        // It is led out by about its own extent in a second.
+        for _ in 0..1000 {
             step(&mut world, 1e-3);
         }
         let height = centre(body(&world, small)).y;

@@ -48,14 +48,14 @@ const TRAVEL: f32 = 0.5;
 
 /// How fast what began too close is moved apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so it
 /// bounds the energy that they gain.
-const PARTING_SPEED: f32 = 0.3;
+const PARTING_SPEED: f32 = 1.0;
 
 /// Or as a part of how fast the bodies are against each other: at most a thousandth of their energy.
 const PARTING_SHARE: f32 = 0.03;
 
 /// All contacts together part a body with a force that would take this long to make it as fast, s. So where bodies hold each other, or others press
 /// them together, nothing is wound up.
-const PARTING_TIME: f32 = 0.005;
+const PARTING_TIME: f32 = 0.02;
 
 /// Sweeps over what began too close.
 const PARTING_SWEEPS: u32 = 4;
