@@ -39,8 +39,6 @@ pub(super) struct Link {
     /// How much faster each of these becomes for an impulse, 1/kg.
     answers: [[Vec3; MOST]; 2],
     mass: f32,
-    /// The most that it gives where it parts, N s.
-    most: f32,
     /// What it has given so far, N s.
     impulse: f32,
     friction_impulse: Vec3,
@@ -56,7 +54,6 @@ saved!(Link {
     movers,
     answers,
     mass,
-    most,
     impulse,
     friction_impulse
 });
@@ -124,7 +121,6 @@ impl Link {
             movers,
             answers,
             mass: 1.0 / whole.max(leverage),
-            most: f32::INFINITY,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
         })
@@ -134,11 +130,6 @@ impl Link {
     pub fn allow_gap(&mut self, gap: f32, duration: f32) {
         self.depth = -gap;
         self.least_speed = -gap.max(0.0) / duration;
-    }
-
-    /// What it has given along the normal, N s.
-    pub fn impulse(&self) -> f32 {
-        self.impulse
     }
 
     /// Whether it has given anything.
@@ -176,51 +167,21 @@ impl Link {
         }
     }
 
-    /// Makes the contact one that began too close, and whose sides are to move apart at this speed, m/s, beside their velocities: these are those of
-    /// displacements from now on, and none yet. Sides that a cut has parted begin too close: they are moved no harder than they were kept from
-    /// going, so that nothing parts them where nothing presses.
-    pub fn begin_parting(&mut self, speed: f32, skins: &mut [Option<Skin>]) {
-        self.most = if self.is_parted { self.impulse } else { f32::INFINITY };
-        self.least_speed = speed;
-        self.impulse = 0.0;
-        for (side, movers) in self.sides.iter().zip(&self.movers) {
-            if let Some(skin) = &mut skins[side.body] {
-                movers
-                    .iter()
-                    .for_each(|&(node, _)| skin.velocities.set(node as usize, Vec3::ZERO));
-            }
+    /// The displacements, m, that move the sides apart by `way`, m, in a substep of `duration` seconds.
+    ///
+    /// Sides that a cut has parted begin too close: they go no further than they were kept from going, so that nothing parts them where nothing
+    /// presses.
+    pub fn parting(&self, way: f32, duration: f32) -> impl Iterator<Item = (usize, usize, Vec3)> + '_ {
+        let mut push = way * self.mass;
+        if self.is_parted {
+            push = push.min(self.impulse * duration);
         }
-    }
-
-    /// Moves the sides apart as fast as they are to be.
-    pub fn part(&mut self, skins: &mut [Option<Skin>]) {
-        let missing = self.least_speed - self.velocity(skins).dot(self.normal);
-        let impulse = (self.impulse + missing * self.mass).clamp(0.0, self.most.max(0.0));
-        let given = self.normal * (impulse - self.impulse);
-        self.impulse = impulse;
-        if given != Vec3::ZERO {
-            self.give(given, skins);
-        }
-    }
-
-    /// Shows by how much nodes of the sides are displaced in `duration` seconds, each node once.
-    pub fn take_displacements(
-        &self,
-        duration: f32,
-        skins: &mut [Option<Skin>],
-        mut see: impl FnMut(usize, usize, Vec3),
-    ) {
-        for (side, movers) in self.sides.iter().zip(&self.movers) {
-            let Some(skin) = &mut skins[side.body] else { continue };
-            for &(node, _) in movers {
-                let node = node as usize;
-                let velocity = skin.velocities.get(node);
-                if velocity != Vec3::ZERO {
-                    skin.velocities.set(node, Vec3::ZERO);
-                    see(side.body, node, velocity * duration);
-                }
-            }
-        }
+        let push = self.normal * push;
+        (0..2).flat_map(move |side| {
+            let sign = [1.0, -1.0][side];
+            let (body, movers) = (self.sides[side].body, self.movers[side]);
+            (0..MOST).map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
+        })
     }
 
     /// The nodes that move a side, with their parts of it.

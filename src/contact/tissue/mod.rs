@@ -46,19 +46,9 @@ const FASTER: f32 = 2.0;
 /// How far bodies come against each other in a substep, as a part of the short edges.
 const TRAVEL: f32 = 0.5;
 
-/// How fast what began too close is moved apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so it
-/// bounds the energy that they gain.
-const PARTING_SPEED: f32 = 1.0;
-
-/// Or as a part of how fast the bodies are against each other: at most a thousandth of their energy.
-const PARTING_SHARE: f32 = 0.03;
-
-/// All contacts together part a body with a force that would take this long to make it as fast, s. So where bodies hold each other, or others press
-/// them together, nothing is wound up.
-const PARTING_TIME: f32 = 0.02;
-
-/// Sweeps over what began too close.
-const PARTING_SWEEPS: u32 = 4;
+/// How fast one contact moves what began too close apart at most, as a part of the smaller body's extent, 1/s. The bodies keep about this speed, so
+/// it bounds the energy that they gain.
+const PARTING_SPEED: f32 = 0.3;
 
 /// How much further than they can come bodies count as near, as a part of their extents.
 const MARGIN: f32 = 0.005;
@@ -423,36 +413,18 @@ impl Tissue {
         }
     }
 
-    /// Moves what began too close apart, without giving it speed: displacements that are found like impulses, each no larger than needed.
-    fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
-        let Self { links, skins, .. } = self;
-        links.retain(|link| link.depth > 0.0);
-        let pressing: f32 = links.iter().map(Link::impulse).sum();
-        for link in &mut *links {
-            let skin = |side: usize| skins[link.sides[side].body].as_ref();
-            let (Some(first), Some(second)) = (skin(0), skin(1)) else {
-                continue;
-            };
-            let against = match link.sides.map(|side| bodies.at(side.body)) {
-                [Some(first), Some(second)] => relative_speed(first, second),
-                _ => 0.0,
-            };
-            let speed = (PARTING_SPEED * first.extent.min(second.extent)).max(PARTING_SHARE * against);
-            // What presses harder than this would have work done to be parted.
-            let most = first.mass.min(second.mass) * speed / PARTING_TIME;
-            let ease = (1.0 - pressing / (most * duration)).max(0.0);
-            let speed = (speed * ease).min(PUSHED_OUT * link.depth / duration);
-            link.begin_parting(speed, skins);
-        }
-        for _ in 0..PARTING_SWEEPS {
-            links.iter_mut().for_each(|link| link.part(skins));
-        }
-        for link in &*links {
-            link.take_displacements(duration, skins, |place, node, displacement| {
+    /// Moves what began too close apart, without giving it speed.
+    fn part(&self, bodies: &mut Slots<Body>, duration: f32) {
+        for link in self.links.iter().filter(|link| link.depth > 0.0) {
+            let extents = link
+                .sides
+                .map(|side| self.skins[side.body].as_ref().map_or(0.0, |skin| skin.extent));
+            let most = PARTING_SPEED * extents[0].min(extents[1]) * duration;
+            for (place, node, displacement) in link.parting(most.min(PUSHED_OUT * link.depth), duration) {
                 if let Some(body) = bodies.at_mut(place) {
                     body.part_substep(node, displacement);
                 }
-            });
+            }
         }
     }
 

@@ -46,8 +46,6 @@ pub(crate) struct Skin {
     pub short: f32,
     /// How far it reached along an axis at first, m.
     pub extent: f32,
-    /// The mass of its body at first, kg.
-    pub mass: f32,
     /// Where nodes were at first, in the body's coordinates, where it meets itself.
     pub(super) firsts: Option<Vectors>,
     /// How far any node goes, m.
@@ -84,7 +82,6 @@ saved!(Skin {
     given,
     short,
     extent,
-    mass,
     firsts,
     travel,
     meets_bodies,
@@ -185,7 +182,6 @@ impl Skin {
         let bounds = forest.bounds();
         let mut skin = Self {
             extent: (bounds.max - bounds.min).max_element(),
-            mass: body.masses.iter().sum(),
             room: nodes.len() + edges.len() + triangles.len(),
             short: short_of(lengths(), edges.len())?,
             firsts,
