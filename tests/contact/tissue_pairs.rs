@@ -539,7 +539,7 @@ fn what_is_cut_open_has_no_inside() {
             assert!(!body.is_closed());
         }
         // It is led out at a bounded speed.
-        for _ in 0..400 {
+        for _ in 0..3000 {
             step(&mut world, 1e-3);
         }
         let height = centre(body(&world, small)).y;
