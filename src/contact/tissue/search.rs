@@ -56,12 +56,10 @@ pub(super) enum Measure {
 }
 
 impl Search<'_> {
-    /// Shows all that meets. `kept` are the clearances of two bodies, by the same order.
+    /// Shows all that meets. `kept` are the clearances of the two parties; a surface with itself has none.
     pub fn run(&self, kept: [&mut Option<Clearances>; 2], mut see: impl FnMut(Touch)) {
         let [first, second] = self.parties;
-        let [of_first, of_second] = kept.map(Option::as_mut);
-        let of_first = of_first.filter(|_| !self.is_of_one());
-        let mut of_first = of_first;
+        let [mut of_first, of_second] = kept.map(Option::as_mut);
         self.nodes_with_faces(first, second, of_first.as_deref_mut(), &mut see);
         if !self.is_of_one() {
             self.nodes_with_faces(second, first, of_second, &mut see);

@@ -169,19 +169,17 @@ impl Skin {
         } else {
             None
         };
+        let bounds = forest.bounds();
+        let extent = (bounds.max - bounds.min).max_element();
         let asks_for_images = contact.with_bodies && contact.detection == Detection::ImageSpace;
         let resolution = if asks_for_images && contact.resolution > 0.0 {
             contact.resolution
         } else {
-            let bounds = forest.bounds();
             let chosen = lengths().sum::<f32>() / (edges.len() as f32 * PIXELS_OF_EDGE);
-            chosen
-                .max((bounds.max - bounds.min).max_element() / PIXELS)
-                .max(f32::MIN_POSITIVE)
+            chosen.max(extent / PIXELS).max(f32::MIN_POSITIVE)
         };
-        let bounds = forest.bounds();
         let mut skin = Self {
-            extent: (bounds.max - bounds.min).max_element(),
+            extent,
             room: nodes.len() + edges.len() + triangles.len(),
             short: short_of(lengths(), edges.len())?,
             firsts,
