@@ -4,7 +4,7 @@ use glam::{BVec3, DVec3, Vec3, Vec3A};
 
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
-use super::impulses::LEVERAGE;
+use super::impulses::{LEVERAGE, PUSHED_OUT};
 use super::press::Press;
 use super::supports::{MOST, Supports};
 use crate::body::Mobility;
@@ -55,6 +55,8 @@ pub(super) struct Constraint {
     impulse: f32,
     /// What friction has given so far, N s.
     friction_impulse: Vec3,
+    /// What of that its tool's load has, N s.
+    pub counted: Vec3,
     /// For a rounded tool: the ends of the segment within it when the contact ends, as far as this feature meets it, and its radius.
     pub rounded: Option<([Vec3; 2], f32)>,
 }
@@ -81,6 +83,7 @@ saved!(Constraint {
     firmness,
     impulse,
     friction_impulse,
+    counted,
     rounded
 });
 
@@ -138,6 +141,7 @@ impl Constraint {
             firmness: fading * rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            counted: Vec3::ZERO,
             rounded: None,
         })
     }
@@ -245,6 +249,15 @@ impl Constraint {
             let position = positions.get(node) + push * answer;
             positions.set(node, position);
         }
+    }
+
+    /// How much further its nodes are to go to end the slice of `duration` seconds outside of the tool, or less deep within it, m.
+    pub fn lacks(&self, positions: &Vectors, duration: f32) -> f32 {
+        let nodes = self.nodes().iter().zip(self.starts).zip(self.shares);
+        let way: Vec3 = nodes
+            .map(|((&node, start), share)| (positions.get(node as usize) - start) * share)
+            .sum();
+        self.least_speed * duration + PUSHED_OUT * self.depth.max(0.0) - way.dot(self.normal)
     }
 
     fn velocity(&self, velocities: &Vectors) -> Vec3 {

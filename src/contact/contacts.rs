@@ -54,6 +54,15 @@ saved!(Load {
     angular_impulse
 });
 
+impl Load {
+    /// Adds an impulse at this place, from the tool's position.
+    pub(super) fn add(&mut self, impulse: Vec3, arm: Vec3) {
+        let impulse = impulse.as_dvec3();
+        self.impulse += impulse;
+        self.angular_impulse += arm.as_dvec3().cross(impulse);
+    }
+}
+
 /// The contacts of one body; kept only in worlds that have tools.
 #[derive(Debug)]
 pub(crate) struct Contacts {
@@ -63,19 +72,21 @@ pub(crate) struct Contacts {
     pub filter: CollisionFilter,
     pub(super) features: Features,
     pub(super) candidates: Candidates,
-    constraints: Vec<Constraint>,
-    nodes: NodeContacts,
+    pub(super) constraints: Vec<Constraint>,
+    pub(super) nodes: NodeContacts,
     /// Nodes that may touch a round tool within a slice.
     undecided: Vec<u32>,
-    presses: Presses,
+    pub(super) presses: Presses,
     /// How many of them are solved together.
     together: usize,
     /// The first of them, which a solved equation has seen.
     pub holds: Holds,
     /// By the place of a tool among those of the step.
-    loads: Vec<Load>,
+    pub(super) loads: Vec<Load>,
     /// What a contact's last impulse stands for, s.
     pressed_for: f32,
+    /// How long the slice was that contacts were found for last, s.
+    pub(super) found_for: f32,
     /// What the last step that became current left, in the order of tools.
     touches: Vec<Touch>,
     /// By a tool's place in the world: whether it touched in the last step that became current, and in the one before.
@@ -103,6 +114,7 @@ saved!(Contacts {
     holds,
     loads,
     pressed_for,
+    found_for,
     touches,
     touched,
     given,
@@ -128,6 +140,9 @@ pub(crate) struct Meeting<'a> {
     pub drifts: bool,
     /// Contacts that are open by less count, m.
     pub slack: f32,
+    /// How fast nodes of bodies are that take the substep together with this one, m/s: what those do to it is found after this, and then
+    /// tools act [again](Contacts::sweep).
+    pub neighbor_speed: Option<f32>,
     /// What tools keep off the surface, m.
     pub thickness: f32,
     /// No node is faster, m/s.
@@ -172,6 +187,7 @@ impl Contacts {
             features,
             loads: Vec::new(),
             pressed_for: 0.0,
+            found_for: 0.0,
             touches: Vec::new(),
             touched: Vec::new(),
             given: Bounds::EMPTY,
@@ -451,6 +467,7 @@ impl Contacts {
             1
         };
         self.pressed_for = meeting.kick() / slices as f32;
+        self.found_for = meeting.substep / slices as f32;
         for index in 0..slices {
             let part = |index: u32| f64::from(index) / f64::from(slices);
             let slice = Slice {
@@ -505,6 +522,7 @@ impl Contacts {
         let count = self.candidates.near().len();
         let all = self.candidates.masks.iter().fold(0, |all, mask| all | mask);
         let is_alone = meeting.bindings.is_none()
+            && meeting.neighbor_speed.is_none()
             && all.count_ones() == 1
             && all.leading_zeros() > 0
             && self
@@ -676,7 +694,8 @@ impl Contacts {
     fn find_candidates(&mut self, meeting: &Meeting) {
         let tools = met(meeting.tools, self.filter);
         let tool_speed = self.tool_speed(meeting.tools, meeting.dt);
-        let travel = meeting.substep * (meeting.fastest + tool_speed);
+        let fastest = meeting.fastest.max(meeting.neighbor_speed.unwrap_or(0.0));
+        let travel = meeting.substep * (fastest + tool_speed);
         if self.candidates.spend(travel) || self.candidates.renew(meeting.positions, travel) {
             return;
         }
@@ -835,10 +854,8 @@ impl Contacts {
         if contact.given() == Vec3::ZERO {
             return;
         }
-        let load = &mut self.loads[contact.tool];
+        self.loads[contact.tool].add(-contact.given(), contact.arm);
         let received = -contact.given().as_dvec3();
-        load.impulse += received;
-        load.angular_impulse += contact.arm.as_dvec3().cross(received);
         let node = contact.node as usize;
         if let Some(pin) = meeting.pins.get_mut(contact.node) {
             pin.force_sum += received / f64::from(meeting.substep);
@@ -855,10 +872,8 @@ impl Contacts {
 
     /// Adds what a contact gave to its tool's load, and moves its nodes.
     fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint, moves: bool) {
-        let load = &mut self.loads[constraint.tool];
+        self.loads[constraint.tool].add(-constraint.given(), constraint.arm);
         let received = -constraint.given().as_dvec3();
-        load.impulse += received;
-        load.angular_impulse += constraint.arm.as_dvec3().cross(received);
         let supports = constraint.starts.iter().zip(constraint.shares);
         for (&node, (&start, share)) in constraint.nodes().iter().zip(supports) {
             if let Some(pin) = meeting.pins.get_mut(node) {

@@ -82,6 +82,7 @@ pub(super) fn meet_plane(meeting: &Meeting, slice: &Slice, motion: &Motion, node
     let ahead = if meeting.drifts {
         (closing + surface_velocity.length()) * slice.duration + meeting.slack
     } else {
+        let closing = closing.max(meeting.neighbor_speed.unwrap_or(0.0));
         LEFT * closing * slice.duration + ROUNDING * position.abs().max(point.abs()).max_element()
     };
     (gap <= meeting.thickness + ahead).then_some(ContactGeometry {

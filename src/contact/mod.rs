@@ -1,5 +1,6 @@
 //! What instruments do to tissue, and tissue to them.
 
+mod beside_tissue;
 mod candidates;
 pub(crate) mod closest;
 mod constraint;

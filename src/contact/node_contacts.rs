@@ -9,7 +9,7 @@ use super::candidates::NearestPlane;
 use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
-use super::impulses::{LEVERAGE, relax};
+use super::impulses::{LEVERAGE, PUSHED_OUT, Sweep, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
 use super::path::{Motion, Solid};
 use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
@@ -208,6 +208,8 @@ pub(super) struct NodeContact {
     /// What the node has received so far along the normal, N s, at least 0, and by friction.
     impulse: f32,
     friction_impulse: Vec3,
+    /// What of that its tool's load has, N s.
+    pub counted: Vec3,
 }
 
 saved!(NodeContact {
@@ -225,7 +227,8 @@ saved!(NodeContact {
     free_mass,
     give,
     impulse,
-    friction_impulse
+    friction_impulse,
+    counted
 });
 
 impl NodeContact {
@@ -266,6 +269,7 @@ impl NodeContact {
             give: 1.0 - rigid / inverse_mass,
             impulse: 0.0,
             friction_impulse: Vec3::ZERO,
+            counted: Vec3::ZERO,
         })
     }
 
@@ -291,6 +295,12 @@ impl NodeContact {
         let node = self.node as usize;
         let push = self.normal * (way * self.effective_mass) * self.answer;
         positions.set(node, positions.get(node) + push);
+    }
+
+    /// How much further the node is to go to end the slice of `duration` seconds outside of the tool, or less deep within it, m.
+    pub fn lacks(&self, positions: &Vectors, duration: f32) -> f32 {
+        let way = (positions.get(self.node as usize) - self.start).dot(self.normal);
+        self.least_speed * duration + PUSHED_OUT * self.depth.max(0.0) - way
     }
 
     /// Gives the node's velocity what is missing, or takes back what was too much: how much that changed, m/s.
@@ -360,6 +370,10 @@ impl NodeContacts {
         self.0.clear();
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -379,6 +393,24 @@ impl NodeContacts {
             self.0.push(contact);
         }
         has_room
+    }
+
+    pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, NodeContact> {
+        self.0.iter_mut()
+    }
+
+    /// One sweep on velocities that something else has changed: the most that a contact changed, m/s.
+    pub fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
+        let pressing = self.0.iter_mut();
+        let pressing = pressing.filter(|contact| sweep == Sweep::All || contact.impulse > 0.0);
+        let changes = pressing.map(|contact| {
+            let node = contact.node as usize;
+            let mut velocity = velocities.get(node);
+            let change = contact.press(&mut velocity);
+            velocities.set(node, velocity);
+            change
+        });
+        changes.fold(0.0, f32::max)
     }
 
     /// Gives the impulses, in so many sweeps over the contacts of a node at most.

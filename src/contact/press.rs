@@ -139,13 +139,37 @@ impl Presses {
             largest
         });
 
-        for (constraint, press) in constraints.iter_mut().zip(presses) {
-            constraint.take(press);
-        }
         for (&node, velocity) in nodes.iter().zip(own) {
             velocities.set(node as usize, Vec3::from(*velocity));
         }
+        self.hand_over(constraints);
         first
+    }
+}
+
+impl Presses {
+    /// One sweep over the contacts that [`Presses::solve`] has gathered, on velocities that something else has changed since: the most that one
+    /// of them changed, m/s.
+    pub fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
+        for (own, &node) in self.velocities.iter_mut().zip(&self.nodes) {
+            *own = velocities.get(node as usize).into();
+        }
+        let pressing = self.presses.iter_mut();
+        let pressing = pressing.filter(|press| sweep == Sweep::All || press.presses());
+        let largest = pressing
+            .map(|press| press.solve(&mut self.velocities))
+            .fold(0.0, f32::max);
+        for (&node, &own) in self.nodes.iter().zip(&self.velocities) {
+            velocities.set(node as usize, own.into());
+        }
+        largest
+    }
+
+    /// Hands over what contacts gave.
+    pub fn hand_over(&self, constraints: &mut [Constraint]) {
+        for (constraint, press) in constraints.iter_mut().zip(&self.presses) {
+            constraint.take(press);
+        }
     }
 }
 

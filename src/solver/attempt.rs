@@ -40,6 +40,8 @@ pub(crate) struct StepRequest<'a> {
     /// Metres; 0: off.
     pub tolerance: f32,
     pub tools: &'a [ToolPath],
+    /// How fast nodes of the bodies are that take their substeps together, m/s; `None`: each body steps by itself.
+    pub neighbor_speed: Option<f32>,
 }
 
 impl StepRequest<'_> {

@@ -137,9 +137,14 @@ impl Together<'_> {
             team,
         } = self;
         let (request, team) = (*request, *team);
+        let gravity = request.gravity.as_dvec3();
+        let fall = request.gravity.length() * request.dt;
+        let request = &StepRequest {
+            neighbor_speed: Some(tissue.fastest(island, bodies) + fall),
+            ..*request
+        };
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
         let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
-        let gravity = request.gravity.as_dvec3();
         tissue.bonds.begin(request.dt);
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
             walk.carry = walk.start;

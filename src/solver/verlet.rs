@@ -349,7 +349,8 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         end: part.end,
         substep: part.substep,
         drifts: part.drifts,
-        slack: 0.0,
+        slack: part.substep * request.neighbor_speed.unwrap_or(0.0),
+        neighbor_speed: request.neighbor_speed,
         thickness: contacts.thickness,
         fastest,
         mobility: Mobility {

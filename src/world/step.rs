@@ -121,6 +121,7 @@ impl World {
                 0.0
             },
             tools: paths,
+            neighbor_speed: None,
         };
         let Some(tissue) = tissue else {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);

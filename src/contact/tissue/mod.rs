@@ -327,6 +327,7 @@ impl Tissue {
         }
         self.bonds.follow(bodies, &self.skins, moment);
         self.draw(island, bodies, moment);
+        self.begin_with_tools(island, bodies, moment);
         self.solve(island, bodies, moment);
         for link in &self.links {
             for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
@@ -340,10 +341,69 @@ impl Tissue {
                 }
             }
         }
+        self.end_with_tools(island, bodies, moment);
         self.bonds.give(bodies, &self.skins, moment);
         if moment.drifts {
             self.part(bodies, moment.duration);
             self.bonds.part(bodies, moment.duration);
+            for &place in self.islands.members(island) {
+                if let Some(body) = bodies.at_mut(place as usize)
+                    && let Some(contacts) = body.contacts.as_ref().filter(|contacts| contacts.may_press())
+                {
+                    contacts.keep_out(body.state.substep().next_positions);
+                }
+            }
+        }
+    }
+
+    /// The speed of the fastest node of an island, m/s, as far as velocities are kept.
+    pub fn fastest(&self, island: usize, bodies: &Slots<Body>) -> f32 {
+        let members = self.islands.members(island).iter();
+        let members = members.filter_map(|&place| bodies.at(place as usize));
+        let speeds = members
+            .map(|body| velocities(body))
+            .map(|all| all.min.abs().max(all.max.abs()).length());
+        speeds.fold(0.0, f32::max)
+    }
+
+    /// Has contacts with tools go on from what they have done in the substep.
+    fn begin_with_tools(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+        for &place in self.islands.members(island) {
+            let place = place as usize;
+            let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place)) else {
+                continue;
+            };
+            if !moment.concerns(body) {
+                continue;
+            }
+            let Some(mut contacts) = body.contacts.take() else {
+                continue;
+            };
+            contacts.begin_sweeps(|node| skin.velocities.set(node, body.mean_velocity(node)));
+            body.contacts = Some(contacts);
+        }
+    }
+
+    /// Gives nodes and tools what contacts with tools have done beside those of tissue.
+    fn end_with_tools(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+        for &place in self.islands.members(island) {
+            let place = place as usize;
+            let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place)) else {
+                continue;
+            };
+            if !moment.concerns(body) {
+                continue;
+            }
+            let Some(mut contacts) = body.contacts.take() else {
+                continue;
+            };
+            let Skin { velocities, given, .. } = skin;
+            contacts.end_sweeps(velocities, |node, impulse| {
+                let velocity = velocities.get(node);
+                *given = given.with(velocity);
+                body.nudge(node, velocity, impulse, moment);
+            });
+            body.contacts = Some(contacts);
         }
     }
 
@@ -379,7 +439,7 @@ impl Tissue {
     }
 
     /// Finds contacts and gives their impulses, until they lead to no others.
-    fn solve(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn solve(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         let mut first = None;
         for _ in 0..SEARCHES {
             let known = self.links.len();
@@ -391,12 +451,30 @@ impl Tissue {
                 break;
             }
             let Self {
-                links, skins, bonds, ..
+                links,
+                skins,
+                bonds,
+                islands,
+                ..
             } = self;
             first = Some(relax(SWEEPS, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
-                changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment))
+                let changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
+                let members = islands.members(island).iter().map(|&place| place as usize);
+                members.fold(changed, |changed, place| {
+                    let (Some(Some(skin)), Some(body)) = (skins.get_mut(place), bodies.at_mut(place)) else {
+                        return changed;
+                    };
+                    let is_pressed = moment.concerns(body);
+                    let contacts = body
+                        .contacts
+                        .as_mut()
+                        .filter(|contacts| is_pressed && contacts.may_press());
+                    contacts.map_or(changed, |contacts| {
+                        changed.max(contacts.sweep(&mut skin.velocities, sweep))
+                    })
+                })
             }));
         }
     }

@@ -96,7 +96,8 @@ impl Substep<'_> {
         velocities: &mut Vectors,
         act: impl FnOnce(&mut Contacts, Meeting, &dyn Fn(usize, f64) -> f32),
     ) {
-        let slack = SLACK * body.extent();
+        let neighbor_speed = self.request.neighbor_speed;
+        let slack = SLACK * body.extent() + self.step as f32 * neighbor_speed.unwrap_or(0.0);
         let Some(contacts) = &mut body.contacts else {
             return;
         };
@@ -115,6 +116,7 @@ impl Substep<'_> {
             substep: self.step as f32,
             drifts: true,
             slack,
+            neighbor_speed,
             thickness: contacts.thickness,
             fastest: bounds.min.abs().max(bounds.max.abs()).length(),
             mobility: Mobility {
