@@ -25,4 +25,5 @@ mod rest;
 mod stop;
 mod sweep;
 mod thin;
+mod tissue_on_tools;
 mod tissue_pairs;
