@@ -132,37 +132,43 @@ static void grasping(const char *directory, float *trace) {
   sinew_world_destroy(world);
 }
 
-/* The first values of a trace as a line over two axes: nodes that springs connect. */
+/* Adds a thick line from a to b in the plane z = 0, as two triangles with nodes of their own. */
+static void add_line(float *positions, uint32_t *triangles, uint32_t line, const float a[2], const float b[2]) {
+  const float thickness = 0.006f, length = hypotf(b[0] - a[0], b[1] - a[1]) + 1e-6f;
+  const float aside[2] = {-thickness * (b[1] - a[1]) / length, thickness * (b[0] - a[0]) / length};
+  const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
+  for (int k = 0; k < 2; k++) {
+    positions[12 * line + k] = a[k] - aside[k];
+    positions[12 * line + 3 + k] = b[k] - aside[k];
+    positions[12 * line + 6 + k] = b[k] + aside[k];
+    positions[12 * line + 9 + k] = a[k] + aside[k];
+  }
+  for (int i = 0; i < 6; i++) triangles[6 * line + i] = 4 * line + corners[i];
+}
+
+/* Draws the first values of a trace over two axes, as a body that is a flat surface. */
 static void draw_trace(const char *directory, const float *trace, int count, float largest) {
-  float positions[3 * (FRAMES + 3)] = {0};
-  uint32_t springs[2 * (FRAMES + 2)];
+  static const float top[2] = {-0.62f, 0.42f}, origin[2] = {-0.62f, -0.42f}, right[2] = {0.62f, -0.42f};
+  float positions[12 * (FRAMES + 2)] = {0}, points[FRAMES][2];
+  uint32_t triangles[6 * (FRAMES + 2)], lines = 0;
   sinew_world *world = create_world(0.0f);
   sinew_picture_def picture = view(0.0f, 0.0f, 2.1f, 0.0f);
   sinew_body_def def;
-  sinew_body_id line;
-  for (int i = 0; i < FRAMES + 3; i++) {
-    const int shown = i < count ? i : count - 1; /* later nodes wait at the end of the line */
-    positions[3 * i] = -0.6f + 1.2f * (float)shown / (FRAMES - 1);
-    positions[3 * i + 1] = -0.4f + 0.8f * trace[shown] / largest;
-  }
-  /* The last three nodes are the axes: the top of the force axis, the origin, the end of the time axis. */
-  for (int i = FRAMES; i < FRAMES + 3; i++) {
-    positions[3 * i] = i == FRAMES + 2 ? 0.6f : -0.62f;
-    positions[3 * i + 1] = i == FRAMES ? 0.42f : -0.42f;
-  }
-  uint32_t spring_count = 0;
-  for (uint32_t i = 0; i + 1 < FRAMES + 3; i++) {
-    if (i == FRAMES - 1 || (i < FRAMES && (int)i + 1 >= count)) continue;
-    springs[2 * spring_count] = i;
-    springs[2 * spring_count++ + 1] = i + 1;
+  sinew_body_id body;
+  add_line(positions, triangles, lines++, top, origin);
+  add_line(positions, triangles, lines++, origin, right);
+  for (int i = 0; i < count; i++) {
+    points[i][0] = -0.6f + 1.2f * (float)i / (FRAMES - 1);
+    points[i][1] = -0.4f + 0.8f * trace[i] / largest;
+    if (i > 0) add_line(positions, triangles, lines++, points[i - 1], points[i]);
   }
   CHECK(sinew_body_def_init(&def, sizeof def));
   def.positions = positions;
-  def.node_count = FRAMES + 3;
-  def.springs = springs;
-  def.spring_count = spring_count;
+  def.node_count = 4 * (size_t)lines;
+  def.triangles = triangles;
+  def.triangle_count = 2 * (size_t)lines;
   def.node_mass = 1.0f;
-  CHECK(sinew_body_create(world, &def, &line));
+  CHECK(sinew_body_create(world, &def, &body));
   save_frame(world, &picture, directory, "force", count - 1);
   sinew_world_destroy(world);
 }
