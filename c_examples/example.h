@@ -40,7 +40,7 @@ static inline double seconds_now(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Node i of what the library lends: no copy, whatever its layout. */
+/* Node i of a view: no copy, for any stride. */
 static inline const float *node(sinew_vec3_view view, size_t i) {
   return (const float *)((const char *)view.data + i * view.stride);
 }
@@ -80,7 +80,7 @@ static inline sinew_world *create_world(float gravity) {
 }
 
 /* A square cloth in the plane y = 0, by its side [m] and the cells along it. */
-static inline sinew_mesh *create_cloth(float side, uint32_t cell_count) {
+static inline sinew_mesh *cloth_mesh(float side, uint32_t cell_count) {
   const float size[2] = {side, side};
   const uint32_t cells[2] = {cell_count, cell_count};
   sinew_mesh *mesh;

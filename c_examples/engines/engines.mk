@@ -1,4 +1,4 @@
-# make engines    the library in other engines, each by itself: runs what can run here, and leaves pictures in target/pictures/
+# make engines    the library in other engines, one after another: runs those that are installed, and leaves pictures in target/pictures/
 # make love, viewer, mono, bullet, godot    one of them; Debian's packages are named beside it below
 # make viewer WINDOW=1    the viewer in a window, for a person
 
@@ -11,7 +11,7 @@ DISPLAYED := $(if $(DISPLAY),,xvfb-run -a -s '-screen 0 1280x1024x24')
 engine_folders: | $(BUILD)/$(SONAME)
 	mkdir -p $(ENGINE_BUILD)/home $(PICTURES)
 
-# What is missing is told of, and the others go on.
+# Missing engines are reported, and the others go on.
 engines: engine_folders
 	@failed=; for engine in $(ENGINES); do echo; echo "== $$engine"; $(MAKE) --no-print-directory $$engine || failed="$$failed $$engine"; done; \
 	  test -z "$$failed" || { echo "not run:$$failed"; exit 1; }

@@ -15,7 +15,7 @@
 
 int main(void) {
   sinew_world *world = create_world(0.0f);
-  sinew_mesh *mesh = create_cloth(0.1f, 20);
+  sinew_mesh *mesh = cloth_mesh(0.1f, 20);
   sinew_body_def def = body_from_mesh(mesh);
   def.stiffness = 500.0f;
   def.node_mass = 1e-4f;

@@ -14,7 +14,7 @@ int main(void) {
   sinew_world *world = create_world(9.81f);
 
   /* A sheet in the plane y = 0; nodes at its left border are pinned. */
-  sinew_mesh *mesh = create_cloth(0.1f, 10);
+  sinew_mesh *mesh = cloth_mesh(0.1f, 10);
   sinew_body_def def = body_from_mesh(mesh);
   def.stiffness = 50.0f;      /* N/m */
   def.node_mass = 1e-4f;      /* kg */

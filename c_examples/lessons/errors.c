@@ -26,7 +26,7 @@ static int succeeded(sinew_status status, const char *what) {
 
 int main(void) {
   sinew_world *world = create_world(9.81f);
-  sinew_mesh *mesh = create_cloth(0.1f, 10);
+  sinew_mesh *mesh = cloth_mesh(0.1f, 10);
   sinew_mesh *missing = NULL;
 
   sinew_body_def def = body_from_mesh(mesh);

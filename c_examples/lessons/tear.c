@@ -1,6 +1,6 @@
 /* Pull a sheet until it tears.
  *
- * A body tears by itself if it has spare_nodes, most_tears and a limit: a strain or a force. Here a strip with a notch
+ * A body tears automatically if it has spare_nodes, most_tears and a limit: a strain or a force. Here a strip with a notch
  * is pulled by its ends. The tear starts at the notch and runs across the strip.
  *
  * Output:

@@ -42,7 +42,7 @@ static void update(buffers *gpu, const sinew_world *world, sinew_body_id body) {
 
 int main(void) {
   sinew_world *world = create_world(0.0f);
-  sinew_mesh *mesh = create_cloth(0.1f, 10);
+  sinew_mesh *mesh = cloth_mesh(0.1f, 10);
   sinew_body_def def = body_from_mesh(mesh);
   def.stiffness = 50.0f;
   def.node_mass = 1e-4f;

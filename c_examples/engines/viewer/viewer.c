@@ -282,7 +282,7 @@ static void draw_words(size_t node_count) {
   write_text(line, 24, 50, 3);
   glColor3f(1, 0.75f, 0.4f), write_text(view.said, 24, 76, 2);
   glColor3f(0.6f, 0.64f, 0.7f);
-  write_text("left: pull   right: press   middle: cut   wheel   arrows   S: storage   V: solver   R: anew", 24, HEIGHT - 32, 2);
+  write_text("left: pull   right: press   middle: cut   wheel   arrows   S: storage   V: solver   R: reset", 24, HEIGHT - 32, 2);
 }
 
 static void draw(void) {
