@@ -1,6 +1,7 @@
 # make engines    the library in other engines, one after another: runs those that are installed, and leaves pictures in target/pictures/
 # make love, viewer, mono, bullet, godot    one of them; Debian's packages are named beside it below
-# make viewer WINDOW=1    the viewer in a window, for a person
+# make samples              the viewer under its other name; it has a list of scenes (key N)
+# make samples WINDOW=1     the viewer in a window, for a person
 
 ENGINES := love viewer mono bullet godot
 ENGINE_BUILD := $(BUILD)/engines
@@ -27,6 +28,8 @@ viewer: engine_folders
 	  $$(pkg-config --cflags --libs sdl2) -lGL $(ENGINE_LINK)
 	$(if $(WINDOW),$(ENGINE_BUILD)/viewer,$(DISPLAYED) $(ENGINE_BUILD)/viewer -o $(PICTURES))
 
+samples: viewer
+
 # mono-mcs, mono-runtime
 mono: engine_folders
 	mcs -unsafe -warnaserror -out:$(ENGINE_BUILD)/sinew.exe engines/mono/*.cs
@@ -45,4 +48,4 @@ godot: engine_folders
 	HOME=$(abspath $(ENGINE_BUILD)/home) SINEW_SHIM=$(abspath $(ENGINE_BUILD))/libsoft.so SINEW_PICTURE=$(abspath $(PICTURES))/godot.png \
 	  $(GODOT) --path engines/godot
 
-.PHONY: engines engine_folders $(ENGINES)
+.PHONY: engines engine_folders samples $(ENGINES)
