@@ -24,7 +24,7 @@ int main(void) {
   def.spare_nodes = 1000;
   def.tear_strain = 0.3f; /* a spring that is 30 % longer tears */
   def.most_tears = 20;    /* per step */
-  def.smallest_piece = 2e-4f; /* m^2: tears do not make crumbs */
+  def.smallest_piece = 2e-4f; /* m^2: no smaller fragment tears off */
   sinew_body_id sheet;
   CHECK(sinew_body_create(world, &def, &sheet));
   sinew_mesh_destroy(mesh);
