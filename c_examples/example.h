@@ -149,7 +149,7 @@ static inline char *path_in(const char *directory, const char *name) {
 
 static inline FILE *create_file(const char *directory, const char *name) {
   char *path = path_in(directory, name);
-  FILE *file = fopen(path, "w");
+  FILE *file = fopen(path, "wb");
   if (file == NULL) fail("cannot write", path);
   free(path);
   return file;
