@@ -1,4 +1,4 @@
-/* What is drawn is not what is solved: tissue made of a fine drawn surface in one call, pressed by a ball, and drawn as it was made beside the
+/* What is drawn is not what is solved: tissue made of a fine render surface in one call, pressed by a ball, and drawn as it was made beside the
  * coarse body that is simulated. C99.
  *
  *   drawn [-o directory] [-n frames]     drawn.png, and on the standard output what it took */

@@ -1,4 +1,4 @@
-/* What cloth.c and press.c share: errors, a clock, a progress line, and the camera of their pictures. POSIX and C99. */
+/* Helpers that the examples share: errors, definitions from meshes, a clock, a progress line and cameras. POSIX, C99. */
 #ifndef SINEW_EXAMPLE_H
 #define SINEW_EXAMPLE_H
 
@@ -40,7 +40,7 @@ static inline double seconds_now(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Node i of what the library lends: no copy, whatever its layout. */
+/* Node i of a view: no copy, for any stride. */
 static inline const float *node(sinew_vec3_view view, size_t i) {
   return (const float *)((const char *)view.data + i * view.stride);
 }
@@ -79,6 +79,51 @@ static inline sinew_world *create_world(float gravity) {
   return world;
 }
 
+/* A square cloth in the plane y = 0, by its side [m] and the cells along it. */
+static inline sinew_mesh *cloth_mesh(float side, uint32_t cell_count) {
+  const float size[2] = {side, side};
+  const uint32_t cells[2] = {cell_count, cell_count};
+  sinew_mesh *mesh;
+  CHECK(sinew_mesh_create_cloth(size, cells, &mesh));
+  return mesh;
+}
+
+/* A body definition with the nodes and elements of a mesh. Keep the mesh until the body is created. */
+static inline sinew_body_def body_from_mesh(const sinew_mesh *mesh) {
+  sinew_body_def def;
+  sinew_mesh_view shape;
+  shape.struct_size = sizeof shape;
+  CHECK(sinew_mesh_get_view(mesh, &shape));
+  CHECK(sinew_body_def_init(&def, sizeof def));
+  def.positions = shape.positions;
+  def.node_count = shape.node_count;
+  def.tetrahedra = shape.tetrahedra;
+  def.tetrahedron_count = shape.tetrahedron_count;
+  if (shape.tetrahedron_count == 0) {
+    def.triangles = shape.triangles;
+    def.triangle_count = shape.triangle_count;
+  }
+  return def;
+}
+
+/* Pins the nodes whose coordinate along an axis (0 to 2) is below a limit [m]. Returns their number. */
+static inline size_t pin_below(sinew_world *world, sinew_body_id body, int axis, float limit) {
+  sinew_vec3_view nodes;
+  size_t i, count = 0;
+  CHECK(sinew_body_get_positions(world, body, &nodes));
+  for (i = 0; i < nodes.count; i++) {
+    if (node(nodes, i)[axis] >= limit) continue;
+    CHECK(sinew_body_pin(world, body, (uint32_t)i));
+    count++;
+  }
+  return count;
+}
+
+/* Takes a number of equal steps of dt [s]. */
+static inline void step_world(sinew_world *world, double dt, int count) {
+  for (; count > 0; count--) CHECK(sinew_world_step(world, (float)dt, NULL));
+}
+
 /* 0 to 1 and level at both ends: how an instrument starts and stops. */
 static inline double smooth(double t) {
   t = t < 0 ? 0 : t > 1 ? 1 : t;
@@ -104,7 +149,7 @@ static inline char *path_in(const char *directory, const char *name) {
 
 static inline FILE *create_file(const char *directory, const char *name) {
   char *path = path_in(directory, name);
-  FILE *file = fopen(path, "w");
+  FILE *file = fopen(path, "wb");
   if (file == NULL) fail("cannot write", path);
   free(path);
   return file;

@@ -126,7 +126,7 @@ static double texture_area(const drawing *mine) {
   return sum;
 }
 
-/* How much the drawn surface encloses at rest: all of it, whatever was cut. */
+/* Volume that the render surface encloses at rest: all of it, whatever was cut. */
 static double enclosed_volume(const drawing *mine) {
   double sum = 0;
   size_t i;

@@ -1,4 +1,4 @@
-#include <sinew.hpp> // quickstart.c in C++17: what is made is ended by itself, what is refused is thrown
+#include <sinew.hpp> // quickstart.c in C++17: objects are destroyed automatically, errors are exceptions
 #include <cstdio>
 
 int main() try {

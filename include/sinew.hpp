@@ -80,7 +80,7 @@ private:
   std::size_t size_ = 0;
 };
 
-// Vectors as the library lends them, whatever their stride.
+// Borrowed vectors with any stride.
 template <class View> struct vectors : View {
   std::size_t size() const { return this->count; }
   auto operator[](std::size_t i) const {

@@ -216,10 +216,43 @@ fn a_first_refusal_for_want_of_memory_is_an_answer() {
 #[test]
 fn the_examples_compile_as_c_and_as_cxx() {
     for compiler in Compiler::installed() {
-        for source in sources("c_examples") {
-            compiler.build(&source, &SHARED);
+        for folder in ["c_examples", "c_examples/lessons"] {
+            for source in sources(folder) {
+                compiler.build(&source, &SHARED);
+            }
         }
     }
+}
+
+/// Lessons are short, listed in the guide, and print what the comment at their top says.
+#[test]
+fn lessons_print_the_output_that_they_state() {
+    let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") else {
+        return;
+    };
+    let index = std::fs::read_to_string(root().join("docs/guide/examples.md")).expect("the list of examples");
+    let lessons = sources("c_examples/lessons");
+    assert!(lessons.len() >= 18, "{} lessons", lessons.len());
+    let mut wrong = Vec::new();
+    for lesson in lessons {
+        let name = lesson.file_name().expect("a file").to_string_lossy();
+        let text = std::fs::read_to_string(&lesson).expect("a lesson");
+        let (comment, _) = text.split_once("\n */\n").expect("a comment at the top");
+        let (_, stated) = comment.split_once(" * Output:\n").expect("a stated output");
+        let stated: Vec<&str> = stated.lines().map(|line| line.trim_start_matches(" *   ")).collect();
+        let output = succeed(&mut Command::new(compiler.build(&lesson, &SHARED)));
+        let printed = String::from_utf8_lossy(&output.stdout);
+        if printed.lines().collect::<Vec<_>>() != stated {
+            wrong.push(format!("{name} prints:\n{printed}"));
+        }
+        if text.lines().count() > 80 {
+            wrong.push(format!("{name} has more than 80 lines"));
+        }
+        if !index.contains(&format!("`{name}`")) {
+            wrong.push(format!("docs/guide/examples.md lacks {name}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// The headers of C below `include/`.

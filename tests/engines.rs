@@ -109,7 +109,12 @@ fn the_viewer_pulls_presses_and_cuts() {
         for did in ["pulled", "pressed", "cut"] {
             assert!(said.lines().any(|line| line.starts_with(did)), "{said}");
         }
-        for picture in ["viewer_pull.png", "viewer_press.png", "viewer_cut.png"] {
+        for scene in ["CLOTH", "TEARING", "PRESSURE"] {
+            assert!(said.lines().any(|line| line.starts_with(scene)), "{said}");
+        }
+        let by_hand = ["viewer_pull.png", "viewer_press.png", "viewer_cut.png"];
+        let scenes = ["viewer_scene_1.png", "viewer_scene_2.png", "viewer_scene_3.png"];
+        for picture in by_hand.into_iter().chain(scenes) {
             shows_something("viewer", picture);
         }
     }

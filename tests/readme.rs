@@ -130,7 +130,7 @@ fn the_smallest_program_is_the_one_that_runs() {
 
 #[test]
 fn what_else_the_documents_show_is_part_of_programs_that_run() {
-    let programs: String = ["c_examples", "tests/c"]
+    let programs: String = ["c_examples", "c_examples/lessons", "tests/c"]
         .iter()
         .flat_map(|folder| files(Path::new(folder)))
         .filter(|path| path.extension().is_some_and(|extension| extension == "c"))

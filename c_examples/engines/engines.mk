@@ -1,6 +1,7 @@
-# make engines    the library in other engines, each by itself: runs what can run here, and leaves pictures in target/pictures/
+# make engines    the library in other engines, one after another: runs those that are installed, and leaves pictures in target/pictures/
 # make love, viewer, mono, bullet, godot    one of them; Debian's packages are named beside it below
-# make viewer WINDOW=1    the viewer in a window, for a person
+# make samples              the viewer under its other name; it has a list of scenes (key N)
+# make samples WINDOW=1     the viewer in a window, for a person
 
 ENGINES := love viewer mono bullet godot
 ENGINE_BUILD := $(BUILD)/engines
@@ -11,7 +12,7 @@ DISPLAYED := $(if $(DISPLAY),,xvfb-run -a -s '-screen 0 1280x1024x24')
 engine_folders: | $(BUILD)/$(SONAME)
 	mkdir -p $(ENGINE_BUILD)/home $(PICTURES)
 
-# What is missing is told of, and the others go on.
+# Missing engines are reported, and the others go on.
 engines: engine_folders
 	@failed=; for engine in $(ENGINES); do echo; echo "== $$engine"; $(MAKE) --no-print-directory $$engine || failed="$$failed $$engine"; done; \
 	  test -z "$$failed" || { echo "not run:$$failed"; exit 1; }
@@ -26,6 +27,8 @@ viewer: engine_folders
 	$(CC) -std=c99 $(WARNINGS) $(CFLAGS) -I../include engines/viewer/viewer.c -o $(ENGINE_BUILD)/viewer \
 	  $$(pkg-config --cflags --libs sdl2) -lGL $(ENGINE_LINK)
 	$(if $(WINDOW),$(ENGINE_BUILD)/viewer,$(DISPLAYED) $(ENGINE_BUILD)/viewer -o $(PICTURES))
+
+samples: viewer
 
 # mono-mcs, mono-runtime
 mono: engine_folders
@@ -45,4 +48,4 @@ godot: engine_folders
 	HOME=$(abspath $(ENGINE_BUILD)/home) SINEW_SHIM=$(abspath $(ENGINE_BUILD))/libsoft.so SINEW_PICTURE=$(abspath $(PICTURES))/godot.png \
 	  $(GODOT) --path engines/godot
 
-.PHONY: engines engine_folders $(ENGINES)
+.PHONY: engines engine_folders samples $(ENGINES)

@@ -49,7 +49,7 @@ static void feel(sinew_haptic *haptic) /* the device's thread */
     float position[3], orientation[4], velocity[3], spin[3];
     sinew_haptic_result felt;
     felt.struct_size = sizeof felt;
-    while (driver_wait()) { /* yours: until the next millisecond; 0: the device is gone */
+    while (driver_wait()) { /* yours: until the next millisecond; 0: the device is disconnected */
         driver_read(position, orientation, velocity, spin); /* yours: m, x y z w, m/s, rad/s, in the world's axes */
         if (sinew_haptic_tick(haptic, position, orientation, velocity, spin, 1e-3f, &felt) == SINEW_STATUS_OK)
             driver_write(felt.force, felt.torque); /* yours: N, N m */

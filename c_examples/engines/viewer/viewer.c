@@ -4,7 +4,8 @@
  *   viewer -o DIRECTORY   by itself, unseen: plays what a hand would do, leaves pictures and tells what did not hold
  *
  * Left button: pull.  Right button: press with a ball.  Middle button, or left with Shift: cut.  Wheel: nearer.  Arrows: turn.
- * S: next storage.  V: next solver.  R: a new organ.  Space: stop and go.  Escape: end. */
+ * N: next scene.  S: next storage.  V: next solver.  R: the scene from its start.  Period: a single step.
+ *  Space: stop and go.  Escape: end. */
 #include "../../example.h"
 #include "png.h"
 #include <SDL.h>
@@ -21,17 +22,21 @@
 static const char *const STORAGES[] = {"PACKED", "EFFICIENT", "FAST LINK", "DYNAMIC BULK"};
 static const char *const SOLVERS[] = {"VERLET", "IMPLICIT", "NEWTON"};
 
+/* Scenes of one body each, in the order of the key N. */
+typedef enum scene { ORGAN, CLOTH, TEARING, PRESSURE, SCENE_COUNT } scene;
+static const char *const SCENES[] = {"ORGAN", "CLOTH", "TEARING", "PRESSURE"};
+
 typedef enum deed { IDLE, PULLS, PRESSES, CUTS } deed;
 
 static struct {
   sinew_world *world;
   sinew_mesh *mesh;
   sinew_body_id body;
-  uint32_t storage, solver;
+  uint32_t storage, solver, scene;
   sinew_tool_id tool;            /* while something is held or pressed */
   sinew_attachment_id held;
   deed hand;
-  int stopped, over;
+  int stopped, single, over; /* single: one step although stopped */
   float reach, depth;            /* m: from the eye to what the mouse met, and how far the ball is in */
   float turn, tilt, away;        /* rad, rad, m: the camera */
   float eye[3], axes[3][3];      /* its place; right, up, back */
@@ -60,30 +65,67 @@ static void release(void) {
   view.tool = none, view.held = nothing, view.hand = IDLE;
 }
 
-/* A new organ, with this storage and solver; what it lies on is pinned. */
-static void create_organ(void) {
-  sinew_mesh_view shape;
+/* The mesh of the scene: an organ of tetrahedra, or a cloth. */
+static void create_mesh(void) {
+  sinew_mesh_destroy(view.mesh);
+  if (view.scene == CLOTH || view.scene == TEARING)
+    view.mesh = cloth_mesh(LENGTH, 20);
+  else
+    CHECK(sinew_mesh_create_organ(LENGTH, 0.011f, &view.mesh));
+}
+
+/* Pins two opposite sides of a cloth, and pulls them apart by a part of its length. */
+static void hang_cloth(float part) {
+  sinew_vec3_view nodes;
+  float *moved;
+  size_t i;
+  CHECK(sinew_body_get_positions(view.world, view.body, &nodes));
+  moved = (float *)allocate(3 * nodes.count, sizeof *moved);
+  for (i = 0; i < nodes.count; i++) {
+    memcpy(moved + 3 * i, node(nodes, i), 3 * sizeof *moved);
+    if (fabsf(moved[3 * i]) > 0.49f * LENGTH) CHECK(sinew_body_pin(view.world, view.body, (uint32_t)i));
+    moved[3 * i] *= 1 + part;
+  }
+  CHECK(sinew_body_set_positions(view.world, view.body, moved, nodes.count));
+  free(moved);
+}
+
+/* The body of the scene at its start, with this storage and solver. */
+static void create_scene(void) {
+  const int is_cloth = view.scene == CLOTH || view.scene == TEARING;
   sinew_body_def def;
   float low = 1, high = -1;
   size_t i;
   release();
   if (view.body.index1) CHECK(sinew_body_destroy(view.world, view.body));
-  shape.struct_size = sizeof shape;
-  CHECK(sinew_mesh_get_view(view.mesh, &shape));
-  CHECK(sinew_body_def_init(&def, sizeof def));
-  def.positions = shape.positions, def.node_count = shape.node_count;
-  def.tetrahedra = shape.tetrahedra, def.tetrahedron_count = shape.tetrahedron_count;
-  def.material = SINEW_MATERIAL_SPRINGS, def.young_modulus = 6000, def.density = 1060, def.volume_stiffness = 2000;
-  def.storage = view.storage, def.solver = view.solver;
-  def.spare_nodes = 6000, def.mass_scaling = 0.05f;
+  create_mesh();
+  def = body_from_mesh(view.mesh);
+  def.storage = view.storage;
+  def.solver = view.solver;
+  def.spare_nodes = 6000;
+  def.mass_scaling = 0.05f;
   if (view.storage == SINEW_STORAGE_FAST_LINK) def.springs_per_node = 64; /* room for what cuts add */
-  for (i = 0; i < shape.node_count; i++) {
-    low = fminf(low, shape.positions[3 * i + 1]), high = fmaxf(high, shape.positions[3 * i + 1]);
-  }
-  def.node_damping = 20 * 1060 * 1e-6f; /* 20 / s, of about a cubic centimetre each */
-  CHECK(sinew_body_create(view.world, &def, &view.body));
-  for (i = 0; i < shape.node_count; i++) {
-    if (shape.positions[3 * i + 1] < low + 0.12f * (high - low)) CHECK(sinew_body_pin(view.world, view.body, (uint32_t)i));
+  if (is_cloth) {
+    def.node_mass = 1e-4f;
+    def.node_damping = 2e-3f;
+    def.stiffness = 50;
+    if (view.scene == TEARING) def.tear_strain = 0.5f;
+    if (view.scene == TEARING) def.most_tears = 4;
+    CHECK(sinew_body_create(view.world, &def, &view.body));
+    hang_cloth(view.scene == TEARING ? 0.2f : 0.0f);
+  } else {
+    def.material = SINEW_MATERIAL_SPRINGS;
+    def.young_modulus = 6000;
+    def.density = 1060;
+    def.volume_stiffness = 2000;
+    def.node_damping = 20 * 1060 * 1e-6f; /* 20 / s, of about a cubic centimeter each */
+    if (view.scene == PRESSURE) def.pressure = 800;
+    for (i = 0; i < def.node_count; i++) {
+      low = fminf(low, def.positions[3 * i + 1]);
+      high = fmaxf(high, def.positions[3 * i + 1]);
+    }
+    CHECK(sinew_body_create(view.world, &def, &view.body));
+    pin_below(view.world, view.body, 1, low + 0.12f * (high - low));
   }
   view.cuts = 0;
 }
@@ -165,9 +207,11 @@ static void mouse_moved(int x, int y) {
 
 static void key_down(SDL_Keycode key) {
   switch (key) {
-    case SDLK_s: view.storage = (view.storage + 1) % 4, create_organ(); break;
-    case SDLK_v: view.solver = (view.solver + 1) % 3, create_organ(); break;
-    case SDLK_r: create_organ(); break;
+    case SDLK_s: view.storage = (view.storage + 1) % 4, create_scene(); break;
+    case SDLK_v: view.solver = (view.solver + 1) % 3, create_scene(); break;
+    case SDLK_n: view.scene = (view.scene + 1) % SCENE_COUNT, create_scene(); break;
+    case SDLK_PERIOD: view.stopped = view.single = 1; break;
+    case SDLK_r: create_scene(); break;
     case SDLK_SPACE: view.stopped = !view.stopped; break;
     case SDLK_LEFT: view.turn -= 0.1f; break;
     case SDLK_RIGHT: view.turn += 0.1f; break;
@@ -276,13 +320,13 @@ static void draw_words(size_t node_count) {
   glMatrixMode(GL_PROJECTION), glLoadIdentity(), glOrtho(0, WIDTH, HEIGHT, 0, -1, 1);
   glMatrixMode(GL_MODELVIEW), glLoadIdentity();
   glColor3f(0.92f, 0.94f, 0.96f);
-  snprintf(line, sizeof line, "%s  %s  %lu nodes", STORAGES[view.storage], SOLVERS[view.solver], (unsigned long)node_count);
+  snprintf(line, sizeof line, "%s  %s  %s  %lu nodes", SCENES[view.scene], STORAGES[view.storage], SOLVERS[view.solver], (unsigned long)node_count);
   write_text(line, 24, 24, 3);
   snprintf(line, sizeof line, "%.1f ms   %.2f N   %u cuts", view.milliseconds, view.force, view.cuts);
   write_text(line, 24, 50, 3);
   glColor3f(1, 0.75f, 0.4f), write_text(view.said, 24, 76, 2);
   glColor3f(0.6f, 0.64f, 0.7f);
-  write_text("left: pull   right: press   middle: cut   wheel   arrows   S: storage   V: solver   R: anew", 24, HEIGHT - 32, 2);
+  write_text("left: pull   right: press   middle: cut   wheel   arrows   N: scene   S: storage   V: solver   R: reset", 24, HEIGHT - 32, 2);
 }
 
 static void draw(void) {
@@ -410,6 +454,18 @@ static void play_all(void) {
   printf("cut %u times, %lu triangles, one lip pulled with %.2f N, %.1f ms a frame\n", view.cuts, (unsigned long)view.triangles, view.force,
          view.milliseconds);
   save(play.directory, "viewer_cut.png");
+  push_button(SDL_MOUSEBUTTONUP, SDL_BUTTON_LEFT), play_frames(1, 0, 0);
+  for (i = 1; i < SCENE_COUNT; i++) { /* the other scenes, pulled by their middle */
+    char name[64];
+    push_key(SDLK_n), play_frames(10, 0, 0);
+    expect(view.scene == (uint32_t)i, "the next scene is shown");
+    play.x = WIDTH / 2, play.y = HEIGHT / 2;
+    push_button(SDL_MOUSEBUTTONDOWN, SDL_BUTTON_LEFT), play_frames(25, 0, -6);
+    printf("%s: %.2f N, %lu triangles, %.1f ms a frame\n", SCENES[i], view.force, (unsigned long)view.triangles, view.milliseconds);
+    snprintf(name, sizeof name, "viewer_scene_%d.png", i);
+    save(play.directory, name);
+    push_button(SDL_MOUSEBUTTONUP, SDL_BUTTON_LEFT), play_frames(1, 0, 0);
+  }
   expect(!view.stopped && view.said[0] == 0, "nothing was refused");
 }
 
@@ -429,8 +485,7 @@ int main(int argc, char **argv) {
 
   view.turn = 0.4f, view.tilt = 0.6f, view.away = 0.5f;
   view.world = create_world(9.81f);
-  CHECK(sinew_mesh_create_organ(LENGTH, 0.011f, &view.mesh));
-  create_organ();
+  create_scene();
   place_camera();
   if (alone) {
     play.directory = chosen.directory;
@@ -441,7 +496,8 @@ int main(int argc, char **argv) {
     int x, y;
     while (SDL_PollEvent(&event)) handle(&event);
     SDL_GetMouseState(&x, &y);
-    if (!view.stopped) step(x, y);
+    if (!view.stopped || view.single) step(x, y);
+    view.single = 0;
     draw();
     SDL_GL_SwapWindow(window);
   }
