@@ -8,8 +8,8 @@ use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::{Error, Result};
 use crate::def::{
-    BodyContact, BodyDefinition, CollisionFilter, Material, Model, Sleep, Solver, SpringLaw, Storage, Tearing, Values,
-    Viscosity, Yielding,
+    BodyContact, BodyDefinition, CollisionFilter, ElementLaw, Material, Model, Sleep, Solver, SpringLaw, Storage,
+    Tearing, Values, Viscosity, Yielding,
 };
 
 /// Layout optimized for the processor; default.
@@ -47,6 +47,13 @@ pub const SINEW_SPRING_LAW_LINEAR: u32 = 0;
 pub const SINEW_SPRING_LAW_EXPONENTIAL: u32 = 1;
 /// Polynomial: e becomes e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit; linear beyond.
 pub const SINEW_SPRING_LAW_CUBIC: u32 = 2;
+
+/// St Venant-Kirchhoff with a signed volume term: the fastest. Default.
+pub const SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF: u32 = 0;
+/// Stable neo-Hookean (Smith, de Goes, Kim 2018): right in large strains of rubber-like tissue.
+pub const SINEW_ELEMENT_LAW_NEO_HOOKEAN: u32 = 1;
+/// Mooney-Rivlin with c1 + c2 = half the shear modulus; mooney_ratio is c2's part of it.
+pub const SINEW_ELEMENT_LAW_MOONEY_RIVLIN: u32 = 2;
 
 /// Geometry, material and settings of a body.
 ///
@@ -277,6 +284,12 @@ pub struct sinew_body_def {
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,
+    /// Law of the tetrahedra of SINEW_MATERIAL_TETRAHEDRA, a sinew_element_law value; default ST_VENANT_KIRCHHOFF.
+    ///
+    /// With another law retardation_time and yield_strain must be 0.
+    pub element_law: u32,
+    /// MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1; else 0.
+    pub mooney_ratio: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -290,6 +303,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, contact_thickness),
         offset_of!(Self, spare_nodes),
         offset_of!(Self, sleep_speed),
+        offset_of!(Self, element_law),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -370,6 +384,8 @@ impl sinew_body_def {
             smallest_piece: 0.0,
             sleep_speed: Sleep::default().speed,
             sleep_time: Sleep::default().time,
+            element_law: SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF,
+            mooney_ratio: 0.0,
         }
     }
 
@@ -403,6 +419,30 @@ impl sinew_body_def {
             density: self.density,
             thickness: self.thickness,
         }))
+    }
+
+    fn element_law(&self) -> Result<ElementLaw> {
+        let law = match self.element_law {
+            SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF => ElementLaw::StVenantKirchhoff,
+            SINEW_ELEMENT_LAW_NEO_HOOKEAN => ElementLaw::NeoHookean,
+            SINEW_ELEMENT_LAW_MOONEY_RIVLIN => {
+                return Ok(ElementLaw::MooneyRivlin {
+                    ratio: self.mooney_ratio,
+                });
+            }
+            unknown => {
+                return Err(Error::invalid(format!(
+                    "element_law is {unknown}: no SINEW_ELEMENT_LAW_..."
+                )));
+            }
+        };
+        if self.mooney_ratio != 0.0 {
+            return Err(Error::invalid(format!(
+                "mooney_ratio is {} while element_law is not SINEW_ELEMENT_LAW_MOONEY_RIVLIN: must be 0",
+                self.mooney_ratio
+            )));
+        }
+        Ok(law)
     }
 
     fn contact(&self) -> Result<BodyContact> {
@@ -505,6 +545,7 @@ impl sinew_body_def {
                 home_stiffnesses: values("home_stiffnesses", self.home_stiffnesses, nodes, self.home_stiffness)?,
                 bending_stiffness: self.bending_stiffness,
                 spring_law: self.spring_law()?,
+                element_law: self.element_law()?,
                 fibre_directions: directions.unwrap_or(&[]),
                 fibre_stiffnesses: values(
                     "fibre_stiffnesses",
