@@ -38,6 +38,11 @@ const ENUMS: [(&str, &str, &str); 12] = [
         "Force law of springs under a strain e.",
     ),
     (
+        "sinew_element_law",
+        "SINEW_ELEMENT_LAW_",
+        "Hyperelastic law of finite elements.",
+    ),
+    (
         "sinew_preset",
         "SINEW_PRESET_",
         "Tissues with values from the literature.",

@@ -67,6 +67,8 @@ public unsafe struct BodyDef
     public float toughness, tear_strain, tear_force;
     public uint most_tears;
     public float smallest_piece, sleep_speed, sleep_time;
+    public uint element_law;
+    public float mooney_ratio;
 }
 
 [StructLayout(LayoutKind.Sequential)]

@@ -44,7 +44,11 @@ fn check(law: impl Hyperelastic) {
     for kappa in [0.0, 1.5, 30.0] {
         let (least, most) = (1.0 / (kappa + 2.0 / 3.0), 1.0 / (kappa + 2.0));
         let rest = Strained::new(law, IDENTITY, kappa);
-        assert!(rest.lift() < 1e-12 && (rest.stiffening(least, most) - 1.0).abs() < 0.1);
+        // Nothing is lifted at rest, and the bound is near what it bounds there; without lambda nothing makes up for what I2 and J do apart.
+        let highest = if kappa > 0.0 { 1.25 } else { 4.01 };
+        assert!(rest.lift() < 1e-12, "{}", rest.lift());
+        let stiffening = rest.stiffening(least, most);
+        assert!((1.0..highest).contains(&stiffening), "{stiffening}");
         for gradient in deformations(&mut random) {
             let at = Strained::new(law, gradient, kappa);
             let size = 1.0 + kappa + inner(at.stress(), at.stress()).sqrt();
@@ -80,7 +84,7 @@ fn check(law: impl Hyperelastic) {
 fn check_bound(at: &Strained<f64>, random: &mut Random, most: f64, shear: f64) {
     let regular = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
     let needle = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]];
-    let gradients: Columns4 = if shear < 0.5 { regular } else { needle };
+    let gradients: [[f64; 3]; 4] = if shear < 0.5 { regular } else { needle };
     let sizes = gradients.map(|gradient| gradient.iter().map(|x| x * x).sum::<f64>().sqrt());
     let all: f64 = sizes.iter().sum();
     let (mut change, mut bound) = ([[0.0; 3]; 3], 0.0);
@@ -96,8 +100,6 @@ fn check_bound(at: &Strained<f64>, random: &mut Random, most: f64, shear: f64) {
     let form = inner(at.stress_change(change, 0.0), change);
     assert!(form <= bound * (1.0 + 1e-9), "{form} {bound} {:?}", at.gradient);
 }
-
-type Columns4 = [[f64; 3]; 4];
 
 #[test]
 fn stresses_and_tangents_are_derivatives_and_their_bounds_hold() {
