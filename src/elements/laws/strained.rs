@@ -5,7 +5,8 @@
 //!
 //! With principal stretches s and products c of two of them, that of all terms but w11 is known in the frame of the stretches: pairs of entries
 //! across have `2 w1 + 2 w2 s_k² ± (2 w2 c_k + wJ s_k)`, and entries along have `2 w1 + 2 w2 (I1 + 2 s s^T - 3 s_k²) + wJ O + wJJ c c^T`, where O has s_k
-//! beside its diagonal and is also `(c c^T - diag c²) / J`. Bounds on these make the tangent positive, and tell how stiff it is.
+//! beside its diagonal and is also `(c c^T - diag c²) / J`. With `wJ = -4 w2 + r` those along have `2 w1 + r O + wJJ c c^T` and
+//! `2 w2 (I1 - s_k² + 2 (Oc - O))`, Oc with c_k beside its diagonal. Bounds on these make the tangent positive, and tell how stiff it is.
 
 use super::Hyperelastic;
 use crate::simd::Real;
@@ -112,8 +113,9 @@ struct Bounds<R> {
     least_product: R,
     /// The square of the least.
     least_square: R,
-    /// The largest eigenvalue of O.
+    /// The largest eigenvalue of O, and that of O with c_k off its diagonal, less.
     across: R,
+    between: R,
     i2: R,
     volume: R,
     /// The same, above 0.
@@ -193,6 +195,9 @@ impl<R: Real> Strained<R> {
         let volume = self.growth + R::of(1.0);
         let inverted = (least - volume).greater(zero) * R::of(1e6);
         let low = volume / square;
+        let i2 = inner(self.cofactors, self.cofactors);
+        // The sum of the squares of s_k - c_k, by 4/3.
+        let apart = (self.i1 + i2 - R::of(6.0) * volume) * R::of(4.0 / 3.0);
         Bounds {
             stretch,
             square,
@@ -200,7 +205,8 @@ impl<R: Real> Strained<R> {
             least_product: (volume / stretch - inverted).greater(zero - R::of(0.5) * self.i1),
             least_square: low * low,
             across: R::of(2.0) * root(self.i1 * R::of(1.0 / 3.0)),
-            i2: inner(self.cofactors, self.cofactors),
+            between: root(apart).lesser(R::of(0.1) * root(R::of(100.0) * apart)),
+            i2,
             volume,
             positive: volume.greater(least),
             inverted,
@@ -218,9 +224,11 @@ impl<R: Real> Strained<R> {
         let across = (size * at.stretch - of_i2 * (at.least_square + at.least_product))
             .greater(pulled + of_i2 * (at.square - at.least_square));
         // O with its eigenvalues, or as what is along c c^T and beside it.
-        let apart = (size - at.volume * wjj).greater(zero) * at.i2 / at.positive + size * at.inverted;
-        let along = (size * at.across).lesser(apart.greater(pulled * at.across));
-        let along = along + of_i2 * (R::of(3.0) * at.square - self.i1).greater(zero);
+        let rest = wj + two * of_i2;
+        let pulled = rest.greater(zero) * at.across;
+        let apart = (rest.size() - at.volume * wjj).greater(zero) * at.i2 / at.positive + rest.size() * at.inverted;
+        let along = (rest.size() * at.across).lesser(apart.greater(pulled));
+        let along = along + of_i2 * (two * at.between + at.square - self.i1).greater(zero);
         (across.greater(along) - of_i1).greater(zero)
     }
 
@@ -229,21 +237,22 @@ impl<R: Real> Strained<R> {
     #[inline(always)]
     pub fn stiffening(&self, least: R, most: R) -> R {
         let ([w1, w2, wj], [w11, wjj]) = (self.slopes, self.curvatures);
-        let (zero, one, two, three) = (R::of(0.0), R::of(1.0), R::of(2.0), R::of(3.0));
+        let (zero, one, two) = (R::of(0.0), R::of(1.0), R::of(2.0));
         let (of_i1, of_i2, size) = (two * w1, two * w2, wj.size());
         let at = self.bounds();
         let pressed = size * at.stretch - of_i2 * at.least_product.greater(zero);
         let pulled = of_i2 * at.square + wj.greater(zero) * at.stretch;
         let across = of_i1 + of_i2 * at.square + pressed.greater(pulled);
-        let along = of_i1 + of_i2 * (self.i1 - three * at.least_square);
-        let strains = (R::of(4.0) * w11 + two * of_i2) * at.square;
+        let along = of_i1 + of_i2 * (self.i1 - at.least_square + two * at.between);
+        let rest = wj + two * of_i2;
+        let strains = R::of(4.0) * w11 * at.square;
         // O as above.
         let apart = relative(
-            across.greater(along + size * (at.area / at.positive + at.inverted)),
-            (wjj + wj / at.positive).greater(zero) * at.area + strains,
+            across.greater(along + rest.size() * (at.area / at.positive + at.inverted)),
+            (wjj + rest / at.positive).greater(zero) * at.area + strains,
             [least, most],
         );
-        let shear = across.greater(along + size * at.across);
+        let shear = across.greater(along + rest.size() * at.across);
         let whole = relative(shear, wjj * at.area + strains, [least, most]);
         apart.lesser(whole).greater(one)
     }

@@ -44,11 +44,10 @@ fn check(law: impl Hyperelastic) {
     for kappa in [0.0, 1.5, 30.0] {
         let (least, most) = (1.0 / (kappa + 2.0 / 3.0), 1.0 / (kappa + 2.0));
         let rest = Strained::new(law, IDENTITY, kappa);
-        // Nothing is lifted at rest, and the bound is near what it bounds there; without lambda nothing makes up for what I2 and J do apart.
-        let highest = if kappa > 0.0 { 1.25 } else { 4.01 };
+        // Nothing is lifted at rest, and the bound is near what it bounds there.
         assert!(rest.lift() < 1e-12, "{}", rest.lift());
         let stiffening = rest.stiffening(least, most);
-        assert!((1.0..highest).contains(&stiffening), "{stiffening}");
+        assert!((1.0..1.3).contains(&stiffening), "{stiffening}");
         for gradient in deformations(&mut random) {
             let at = Strained::new(law, gradient, kappa);
             let size = 1.0 + kappa + inner(at.stress(), at.stress()).sqrt();
