@@ -32,6 +32,9 @@ pub const SINEW_SHAPE_PLANE: u32 = 2;
 /// Closed triangle mesh.
 pub const SINEW_SHAPE_MESH: u32 = 3;
 
+/// Box along the axes about the origin, with sharp edges.
+pub const SINEW_SHAPE_BOX: u32 = 4;
+
 /// Exact distances, swept over the step.
 pub const SINEW_DETECTION_EXACT: u32 = 0;
 /// Rays cast through depth images.
@@ -91,11 +94,19 @@ pub struct sinew_tool_def {
     pub collision_category: u32,
     /// Bits of the categories that this tool collides with; default 0xffffffff.
     pub collision_mask: u32,
+    /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
+    pub half_extents: [f32; 3],
+    /// Reserved; must be 0.
+    pub reserved1: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_tool_def {
-    const SIZES: &'static [usize] = &[offset_of!(Self, resolution), size_of::<Self>()];
+    const SIZES: &'static [usize] = &[
+        offset_of!(Self, resolution),
+        offset_of!(Self, half_extents),
+        size_of::<Self>(),
+    ];
     const NAME: &'static str = "sinew_tool_def";
 }
 
@@ -148,6 +159,8 @@ impl sinew_tool_def {
             force_limit: f32::INFINITY,
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
+            half_extents: [0.0; 3],
+            reserved1: 0,
         }
     }
 
@@ -158,6 +171,7 @@ impl sinew_tool_def {
     unsafe fn definition<'a>(&self) -> Result<ToolDefinition<'a>> {
         memory::reserved("reserved0", self.reserved0)?;
         memory::reserved("reserved", self.reserved)?;
+        memory::reserved("reserved1", self.reserved1)?;
         let detection = detection("detection", self.detection)?;
         let shape = match self.shape {
             SINEW_SHAPE_SPHERE => Shape::Sphere { radius: self.radius },
@@ -166,6 +180,9 @@ impl sinew_tool_def {
                 half_length: self.half_length,
             },
             SINEW_SHAPE_PLANE => Shape::Plane,
+            SINEW_SHAPE_BOX => Shape::Box {
+                half_extents: Vec3::from_array(self.half_extents),
+            },
             SINEW_SHAPE_MESH => Shape::Mesh {
                 // SAFETY: the same contract.
                 positions: unsafe { memory::array("positions", self.positions.cast(), self.node_count) }?,

@@ -275,3 +275,12 @@ fn a_turning_capsule_sweeps_what_is_in_its_way() {
         failures.join("\n")
     );
 }
+
+#[test]
+fn a_box_carries_the_cloth_with_it() {
+    let half_extents = Vec3::new(0.01, 0.005, 0.015);
+    let shape = Shape::Box { half_extents };
+    put_through_everywhere(&[8], |_, _| 0, shape, Quat::IDENTITY, 0.0);
+    let on_a_corner = Quat::from_rotation_x(0.7) * Quat::from_rotation_z(0.6);
+    put_through_everywhere(&[8], |_, _| 0, shape, on_a_corner, 0.015);
+}

@@ -95,6 +95,8 @@ public unsafe struct ToolDef
     public uint reserved;
     public float resolution, force_limit;
     public uint collision_category, collision_mask;
+    public fixed float half_extents[3];
+    public uint reserved1;
 }
 
 [StructLayout(LayoutKind.Sequential)]
