@@ -39,7 +39,7 @@ pub const SINEW_SHAPE_BOX: u32 = 4;
 pub const SINEW_DETECTION_EXACT: u32 = 0;
 /// Rays cast through depth images.
 pub const SINEW_DETECTION_IMAGE_SPACE: u32 = 1;
-/// Sampled signed distance; only for mesh tools.
+/// Sampled signed distance; only for mesh and box tools.
 pub const SINEW_DETECTION_DISTANCE_FIELD: u32 = 2;
 
 /// Shape and settings of a rigid tool.
@@ -78,7 +78,7 @@ pub struct sinew_tool_def {
     pub orientation: [f32; 4],
     /// Reserved; must be 0.
     pub reserved: u32,
-    /// [m] Mesh: pixel size of the images or cell size of the distance field; 0 (default): automatic.
+    /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default): automatic.
     ///
     /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if less. Refused
     /// above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory: about 24 bytes per pixel of 3
@@ -221,7 +221,7 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
 
 /// Creates a tool in a world, and copies everything that `def` points to.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD without a mesh, or IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD with a sphere, capsule or plane, or IMAGE_SPACE with a plane.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of

@@ -106,7 +106,7 @@ fn organs_of_tetrahedra_come_back_from_anywhere() {
 
 #[test]
 fn organs_of_hyperelastic_laws_come_back_from_anywhere() {
-    let mesh = Mesh::organ(0.1, 0.02).expect("an organ");
+    let mesh = Mesh::organ(0.1, 0.0125).expect("an organ");
     for (law, nu) in [
         (ElementLaw::NeoHookean, 0.3),
         (ElementLaw::NeoHookean, 0.45),
