@@ -342,7 +342,8 @@ impl Deformed {
     /// The same, positive semidefinite: pressure pushes nothing sideways.
     pub fn clamped_stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
         if let Some(strained) = self.strained() {
-            return self.stiffness_of(&strained, strained.lift(), [a, b]);
+            let (strained, lift) = strained.positive();
+            return self.stiffness_of(&strained, lift, [a, b]);
         }
         let stress = self.stress();
         let [x, y, z] = [stress.x_axis, stress.y_axis, stress.z_axis].map(DVec3::abs);

@@ -190,7 +190,7 @@ impl<R: Real> Strained<R> {
     #[inline(always)]
     fn bounds(&self) -> Bounds<R> {
         let (zero, least) = (R::of(0.0), R::of(1e-3));
-        let square = largest(self.gradient);
+        let square = largest(self.gradient).greater(R::of(1e-12));
         let stretch = root(square);
         let volume = self.growth + R::of(1.0);
         let inverted = (least - volume).greater(zero) * R::of(1e6);
@@ -213,13 +213,20 @@ impl<R: Real> Strained<R> {
         }
     }
 
-    /// What has to be added to the tangent that nothing of it is negative, Pa. It is of the order of the stress, and 0 at rest.
+    /// The same with no more pressure than its tangent can have, and what has to be added to the latter that nothing of it is negative, Pa. At
+    /// rest that is all of the pressure and nothing. What pressure does beyond draws one way as much as it pushes another.
     #[inline(always)]
-    pub fn lift(&self) -> R {
+    pub fn positive(mut self) -> (Self, R) {
         let ([w1, w2, wj], [_, wjj]) = (self.slopes, self.curvatures);
         let (zero, two) = (R::of(0.0), R::of(2.0));
-        let (of_i1, of_i2, size) = (two * w1, two * w2, wj.size());
+        let (of_i1, of_i2) = (two * w1, two * w2);
         let at = self.bounds();
+        let high = of_i1 / at.across;
+        let across = (of_i1 + of_i2 * (at.least_square + at.least_product).greater(zero)) / at.stretch;
+        let along = high.greater(at.volume.greater(zero) * (wjj + of_i1 / at.i2)) + two * of_i2;
+        let wj = wj.greater(zero - across.lesser(along)).lesser(high);
+        self.slopes[2] = wj;
+        let size = wj.size();
         let pulled = wj.greater(zero) * at.stretch;
         let across = (size * at.stretch - of_i2 * (at.least_square + at.least_product))
             .greater(pulled + of_i2 * (at.square - at.least_square));
@@ -229,7 +236,7 @@ impl<R: Real> Strained<R> {
         let apart = (rest.size() - at.volume * wjj).greater(zero) * at.i2 / at.positive + rest.size() * at.inverted;
         let along = (rest.size() * at.across).lesser(apart.greater(pulled));
         let along = along + of_i2 * (two * at.between + at.square - self.i1).greater(zero);
-        (across.greater(along) - of_i1).greater(zero)
+        (self, (across.greater(along) - of_i1).greater(zero))
     }
 
     /// How much stiffer it is than at rest at most, at least 1. It is `(A g + B) / (K + 2 mu g)`, of which a part g from a third to 1 counts as shear.

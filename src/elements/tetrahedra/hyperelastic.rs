@@ -100,7 +100,8 @@ impl<H: Hyperelastic, const RINGS: bool> WithLanes for Changes<'_, H, RINGS> {
                     let (edges, pressure) = Tetrahedra::edges::<L>(ways, group, first);
                     let change = numbers(times_upper(edges, inverse));
                     // The pressure of rings pushes nothing sideways: what is left is positive with the lift.
-                    let mut changed = strained.stress_change(change, strained.lift());
+                    let (strained, lift) = strained.positive();
+                    let mut changed = strained.stress_change(change, lift);
                     if RINGS {
                         changed = strained.with_pressure_change(changed, InLanes::new(pressure));
                     }
