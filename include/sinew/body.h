@@ -56,6 +56,16 @@ typedef enum sinew_spring_law {
   SINEW_SPRING_LAW_CUBIC = 2
 } sinew_spring_law;
 
+/// Hyperelastic law of finite elements.
+typedef enum sinew_element_law {
+  /// St Venant-Kirchhoff with a signed volume term: the fastest. Default.
+  SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF = 0,
+  /// Stable neo-Hookean (Smith, de Goes, Kim 2018): right in large strains of rubber-like tissue.
+  SINEW_ELEMENT_LAW_NEO_HOOKEAN = 1,
+  /// Mooney-Rivlin with c1 + c2 = half the shear modulus; mooney_ratio is c2's part of it.
+  SINEW_ELEMENT_LAW_MOONEY_RIVLIN = 2
+} sinew_element_law;
+
 /// Geometry, material and settings of a body.
 /// Filled by sinew_body_def_init; read only during sinew_body_create.
 typedef struct sinew_body_def {
@@ -245,6 +255,10 @@ typedef struct sinew_body_def {
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
+  /// Law of the tetrahedra of SINEW_MATERIAL_TETRAHEDRA, a sinew_element_law value; default
+  /// ST_VENANT_KIRCHHOFF. With another law retardation_time and yield_strain must be 0.
+  uint32_t element_law;
+  float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1; else 0.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).

@@ -155,7 +155,7 @@ typedef struct sinew_triangle_view {
 typedef enum sinew_detection {
   SINEW_DETECTION_EXACT = 0,          ///< Exact distances, swept over the step.
   SINEW_DETECTION_IMAGE_SPACE = 1,    ///< Rays cast through depth images.
-  SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh tools.
+  SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh and box tools.
 } sinew_detection;
 
 // sinew/world.h: a world and its steps.
@@ -394,6 +394,16 @@ typedef enum sinew_spring_law {
   SINEW_SPRING_LAW_CUBIC = 2
 } sinew_spring_law;
 
+/// Hyperelastic law of finite elements.
+typedef enum sinew_element_law {
+  /// St Venant-Kirchhoff with a signed volume term: the fastest. Default.
+  SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF = 0,
+  /// Stable neo-Hookean (Smith, de Goes, Kim 2018): right in large strains of rubber-like tissue.
+  SINEW_ELEMENT_LAW_NEO_HOOKEAN = 1,
+  /// Mooney-Rivlin with c1 + c2 = half the shear modulus; mooney_ratio is c2's part of it.
+  SINEW_ELEMENT_LAW_MOONEY_RIVLIN = 2
+} sinew_element_law;
+
 /// Geometry, material and settings of a body.
 /// Filled by sinew_body_def_init; read only during sinew_body_create.
 typedef struct sinew_body_def {
@@ -583,6 +593,10 @@ typedef struct sinew_body_def {
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
+  /// Law of the tetrahedra of SINEW_MATERIAL_TETRAHEDRA, a sinew_element_law value; default
+  /// ST_VENANT_KIRCHHOFF. With another law retardation_time and yield_strain must be 0.
+  uint32_t element_law;
+  float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1; else 0.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -712,7 +726,8 @@ typedef enum sinew_shape {
   SINEW_SHAPE_SPHERE = 0,   ///< Sphere about the origin.
   SINEW_SHAPE_CAPSULE = 1,  ///< Cylinder along y about the origin, with round caps.
   SINEW_SHAPE_PLANE = 2,    ///< Plane y = 0 with free space above.
-  SINEW_SHAPE_MESH = 3      ///< Closed triangle mesh.
+  SINEW_SHAPE_MESH = 3,     ///< Closed triangle mesh.
+  SINEW_SHAPE_BOX = 4       ///< Box along the axes about the origin, with sharp edges.
 } sinew_shape;
 
 /// Shape and settings of a rigid tool.
@@ -739,10 +754,10 @@ typedef struct sinew_tool_def {
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh: pixel size of the images or cell size of the distance field; 0 (default): automatic.
-  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
-  /// less. Refused above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory:
-  /// about 24 bytes per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default):
+  /// automatic. Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the
+  /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
+  /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
   float resolution;
   /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue
   /// stops it. Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
@@ -752,13 +767,17 @@ typedef struct sinew_tool_def {
   uint32_t collision_category;
   /// Bits of the categories that this tool collides with; default 0xffffffff.
   uint32_t collision_mask;
+  /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
+  float half_extents[3];
+  uint32_t reserved1;           ///< Reserved; must be 0.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
 sinew_status sinew_tool_def_init(sinew_tool_def *def, size_t struct_size);
 
 /// Creates a tool in a world, and copies everything that `def` points to.
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD without a mesh, or IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD with a sphere, capsule or plane, or
+/// IMAGE_SPACE with a plane.
 sinew_status sinew_tool_create(sinew_world *world, const sinew_tool_def *def, sinew_tool_id *out);
 
 /// Destroys a tool and releases everything attached to it.

@@ -42,17 +42,16 @@ pub const SINEW_MATERIAL_TETRAHEDRA: u32 = 2;
 
 /// Force = stiffness * rest length * strain e. Default.
 pub const SINEW_SPRING_LAW_LINEAR: u32 = 0;
-/// J-shaped: e becomes (exp(spring_steepness e) - 1) / spring_steepness for e from 0 to spring_limit; linear
-/// beyond.
+/// J-shaped: (exp(spring_steepness e) - 1) / spring_steepness up to spring_limit, linear beyond.
 pub const SINEW_SPRING_LAW_EXPONENTIAL: u32 = 1;
-/// Polynomial: e becomes e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit; linear beyond.
+/// Polynomial: e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit, linear beyond.
 pub const SINEW_SPRING_LAW_CUBIC: u32 = 2;
 
-/// St Venant-Kirchhoff with a signed volume term: the fastest. Default.
+/// With a volume term; default.
 pub const SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF: u32 = 0;
-/// Stable neo-Hookean (Smith, de Goes, Kim 2018): right in large strains of rubber-like tissue.
+/// Stable (Smith, de Goes, Kim 2018).
 pub const SINEW_ELEMENT_LAW_NEO_HOOKEAN: u32 = 1;
-/// Mooney-Rivlin with c1 + c2 = half the shear modulus; mooney_ratio is c2's part of it.
+/// See mooney_ratio.
 pub const SINEW_ELEMENT_LAW_MOONEY_RIVLIN: u32 = 2;
 
 /// Geometry, material and settings of a body.
@@ -91,9 +90,9 @@ pub struct sinew_body_def {
     pub rest_lengths: *const f32,
     /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
     pub spring_dampings: *const f32,
-    /// [N/m] Stiffness of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without springs.
+    /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
     pub stiffness: f32,
-    /// [N s/m] Damping of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without springs.
+    /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
     pub spring_damping: f32,
     /// 3 * triangle_count node indices, outward: the render and contact surface; nullable.
     ///
@@ -152,7 +151,7 @@ pub struct sinew_body_def {
     /// Exact for cells and equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or
     /// two layers of tetrahedra much softer.
     pub young_modulus: f32,
-    /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value within 0.001.
+    /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
     pub poisson_ratio: f32,
     /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
     ///
@@ -163,7 +162,7 @@ pub struct sinew_body_def {
     /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0.
     ///
     /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from any inversion. Must be 0 with
-    /// SINEW_MATERIAL_TETRAHEDRA.
+    /// TETRAHEDRA.
     pub volume_stiffness: f32,
     /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness.
     ///
@@ -177,7 +176,7 @@ pub struct sinew_body_def {
     /// than two triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the bending
     /// of the triangles that have the edge.
     pub bending_stiffness: f32,
-    /// Force law of springs, a sinew_spring_law value; default LINEAR. Springs added later are linear.
+    /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
     pub spring_law: u32,
     /// EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
     pub spring_steepness: f32,
@@ -272,9 +271,9 @@ pub struct sinew_body_def {
     ///
     /// SINEW_STATUS_UNSUPPORTED for a body of elements without springs.
     pub tear_force: f32,
-    /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes above 0.
+    /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
     pub most_tears: u32,
-    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. Tears never make a smaller one.
+    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear makes a smaller one.
     pub smallest_piece: f32,
     /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps.
     ///
@@ -284,11 +283,9 @@ pub struct sinew_body_def {
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,
-    /// Law of the tetrahedra of SINEW_MATERIAL_TETRAHEDRA, a sinew_element_law value; default ST_VENANT_KIRCHHOFF.
-    ///
-    /// With another law retardation_time and yield_strain must be 0.
+    /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
     pub element_law: u32,
-    /// MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1; else 0.
+    /// MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
     pub mooney_ratio: f32,
 }
 

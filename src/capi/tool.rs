@@ -221,7 +221,7 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
 
 /// Creates a tool in a world, and copies everything that `def` points to.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD with a sphere, capsule or plane, or IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD of a round shape, or either of a plane.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
