@@ -69,8 +69,7 @@ typedef struct sinew_tool_def {
 sinew_status sinew_tool_def_init(sinew_tool_def *def, size_t struct_size);
 
 /// Creates a tool in a world, and copies everything that `def` points to.
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD with a sphere, capsule or plane, or
-/// IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD of a round shape, or either of a plane.
 sinew_status sinew_tool_create(sinew_world *world, const sinew_tool_def *def, sinew_tool_id *out);
 
 /// Destroys a tool and releases everything attached to it.
@@ -81,8 +80,8 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 /// Moves a tool to a new pose during the next step.
 /// The tool moves along a straight line and rotates through the shorter arc, at constant speed.
 /// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. If force_limit stops the tool early, the remaining motion is discarded: call again
-/// for every step.
+/// unchanged. If force_limit stops the tool early, the rest is discarded: call again for every
+/// step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
                                  const float *orientation);
@@ -108,8 +107,7 @@ sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, flo
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
 /// Sets the collision category and mask of a tool from the next step on.
-/// With mask 0 the tool collides with nothing. Tissue inside it is pushed out once it collides
-/// again.
+/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
                                       uint32_t mask);
 

@@ -34,7 +34,7 @@ pub const SINEW_MATERIAL_NONE: u32 = 0;
 ///
 /// They imply a Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
 pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
-/// Finite elements: St Venant-Kirchhoff with a signed volume term.
+/// Finite elements of element_law.
 ///
 /// Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a compression of about 20 %, stable beyond. The body
 /// has no springs but those given. sinew_body_remove_spring removes the tetrahedra that have the edge.
@@ -123,8 +123,7 @@ pub struct sinew_body_def {
     pub iterations: u32,
     /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1.
     ///
-    /// It bounds the error relative to the displacement that forces cause in the step. 0 (default) is 0.01 for
-    /// IMPLICIT and 1e-6 for NEWTON.
+    /// It bounds the error relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
     pub accuracy: f32,
     /// Reserved; must be 0.
     pub reserved1: u32,
@@ -161,8 +160,7 @@ pub struct sinew_body_def {
     pub thickness: f32,
     /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0.
     ///
-    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from any inversion. Must be 0 with
-    /// TETRAHEDRA.
+    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
     pub volume_stiffness: f32,
     /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness.
     ///
@@ -207,7 +205,7 @@ pub struct sinew_body_def {
     /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
     ///
     /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not yield.
-    /// Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so longer steps slow their flow.
+    /// Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long steps slow it.
     pub yield_strain: f32,
     /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
     pub largest_set: f32,
@@ -235,8 +233,7 @@ pub struct sinew_body_def {
     pub meets_bodies: u32,
     /// 1: collides with itself; 0 (default): does not.
     ///
-    /// The two sides of a cut then rest against each other with no gap. The cut-boundary edges of a sheet may slide
-    /// over each other until they have separated.
+    /// The two sides of a cut then rest against each other with no gap. The cut-boundary edges of a sheet may slide over each other until separated.
     pub meets_itself: u32,
     /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE.
     ///
@@ -273,7 +270,7 @@ pub struct sinew_body_def {
     pub tear_force: f32,
     /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
     pub most_tears: u32,
-    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear makes a smaller one.
+    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
     pub smallest_piece: f32,
     /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps.
     ///

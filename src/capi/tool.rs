@@ -257,7 +257,7 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
 ///
 /// The tool moves along a straight line and rotates through the shorter arc, at constant speed. `position` [m] is 3
 /// floats, each within 1e9; `orientation` is x y z w, not zero, nullable: unchanged. If force_limit stops the tool
-/// early, the remaining motion is discarded: call again for every step.
+/// early, the rest is discarded: call again for every step.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 ///
@@ -313,7 +313,7 @@ pub unsafe extern "C" fn sinew_tool_set_force_limit(
 
 /// Sets the collision category and mask of a tool from the next step on.
 ///
-/// With mask 0 the tool collides with nothing. Tissue inside it is pushed out once it collides again.
+/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
