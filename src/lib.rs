@@ -37,8 +37,8 @@ pub use base::{Error, Result};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
 pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
 pub use def::{
-    BodyContact, BodyDefinition, CollisionFilter, Detection, EnclosedReport, Energy, Material, Model, Sleep, Solver,
-    SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
+    BodyContact, BodyDefinition, CollisionFilter, Detection, ElementLaw, EnclosedReport, Energy, Material, Model,
+    Sleep, Solver, SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
 };
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};

@@ -20,8 +20,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::Vec3;
 use sinew::mesh::{Mesh, MeshFormat, load};
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, BodyReader, Embedding, EmbeddingDefinition, Material, Model, Sleep, Solver,
-    SpringLaw, Tearing, Values, Viscosity, World, WorldDefinition, Yielding,
+    BodyContact, BodyDefinition, BodyId, BodyReader, ElementLaw, Embedding, EmbeddingDefinition, Material, Model,
+    Sleep, Solver, SpringLaw, Tearing, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 const SUBSTEPS: u32 = 16;
@@ -239,6 +239,7 @@ fn main() -> ExitCode {
                 home_stiffnesses: Values::Each(&none[..node_count]),
                 bending_stiffness: 0.0,
                 spring_law: SpringLaw::Linear,
+                element_law: ElementLaw::default(),
                 fibre_directions: &nowhere,
                 fibre_stiffnesses: Values::Each(&none[..tetrahedron_count]),
                 viscosity: Viscosity::default(),
@@ -430,6 +431,30 @@ fn main() -> ExitCode {
             "tetrahedra, nu 0.45",
             BodyDefinition {
                 material: Some(tissue(Model::Tetrahedra, 0.45)),
+                ..plain
+            },
+        ),
+        (
+            "tetrahedra, neo-Hookean, nu 0.3",
+            BodyDefinition {
+                material: Some(tissue(Model::Tetrahedra, 0.3)),
+                element_law: ElementLaw::NeoHookean,
+                ..plain
+            },
+        ),
+        (
+            "tetrahedra, Mooney and Rivlin, nu 0.3",
+            BodyDefinition {
+                material: Some(tissue(Model::Tetrahedra, 0.3)),
+                element_law: ElementLaw::MooneyRivlin { ratio: 0.3 },
+                ..plain
+            },
+        ),
+        (
+            "tetrahedra, neo-Hookean, nu 0.45",
+            BodyDefinition {
+                material: Some(tissue(Model::Tetrahedra, 0.45)),
+                element_law: ElementLaw::NeoHookean,
                 ..plain
             },
         ),

@@ -140,7 +140,7 @@ typedef struct sinew_triangle_view {
 typedef enum sinew_detection {
   SINEW_DETECTION_EXACT = 0,          ///< Exact distances, swept over the step.
   SINEW_DETECTION_IMAGE_SPACE = 1,    ///< Rays cast through depth images.
-  SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh tools.
+  SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh and box tools.
 } sinew_detection;
 
 #ifdef __cplusplus

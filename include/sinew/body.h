@@ -14,18 +14,6 @@ extern "C" {
 
 // ---- Creation -----------------------------------------------------------------------------------
 
-/// Source of the forces between the nodes of elements.
-typedef enum sinew_material {
-  SINEW_MATERIAL_NONE = 0,       ///< Springs as given, or one stiffness for all. Default.
-  /// Springs along the element edges, with stiffnesses computed from young_modulus. They imply a
-  /// Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
-  SINEW_MATERIAL_SPRINGS = 1,
-  /// Finite elements: St Venant-Kirchhoff with a signed volume term. Accepts a Poisson's ratio from
-  /// 0 to 0.49. Accurate up to a compression of about 20 %, stable beyond. The body has no springs
-  /// but those given. sinew_body_remove_spring removes the tetrahedra that have the edge.
-  SINEW_MATERIAL_TETRAHEDRA = 2
-} sinew_material;
-
 /// Memory layout of the springs of a body.
 typedef enum sinew_storage {
   SINEW_STORAGE_PACKED = 0,       ///< Layout optimized for the processor; default.
@@ -45,16 +33,33 @@ typedef enum sinew_solver {
   SINEW_SOLVER_NEWTON = 2
 } sinew_solver;
 
+/// Source of the forces between the nodes of elements.
+typedef enum sinew_material {
+  SINEW_MATERIAL_NONE = 0,       ///< Springs as given, or one stiffness for all. Default.
+  /// Springs along the element edges, with stiffnesses computed from young_modulus. They imply a
+  /// Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
+  SINEW_MATERIAL_SPRINGS = 1,
+  /// Finite elements of element_law. Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a
+  /// compression of about 20 %, stable beyond. The body has no springs but those given.
+  /// sinew_body_remove_spring removes the tetrahedra that have the edge.
+  SINEW_MATERIAL_TETRAHEDRA = 2
+} sinew_material;
+
 /// Force law of springs under a strain e.
 typedef enum sinew_spring_law {
   SINEW_SPRING_LAW_LINEAR = 0,       ///< Force = stiffness * rest length * strain e. Default.
-  /// J-shaped: e becomes (exp(spring_steepness e) - 1) / spring_steepness for e from 0 to
-  /// spring_limit; linear beyond.
+  /// J-shaped: (exp(spring_steepness e) - 1) / spring_steepness up to spring_limit, linear beyond.
   SINEW_SPRING_LAW_EXPONENTIAL = 1,
-  /// Polynomial: e becomes e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit; linear
-  /// beyond.
+  /// Polynomial: e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit, linear beyond.
   SINEW_SPRING_LAW_CUBIC = 2
 } sinew_spring_law;
+
+/// Hyperelastic law of finite elements.
+typedef enum sinew_element_law {
+  SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF = 0,  ///< With a volume term; default.
+  SINEW_ELEMENT_LAW_NEO_HOOKEAN = 1,  ///< Stable (Smith, de Goes, Kim 2018).
+  SINEW_ELEMENT_LAW_MOONEY_RIVLIN = 2  ///< See mooney_ratio.
+} sinew_element_law;
 
 /// Geometry, material and settings of a body.
 /// Filled by sinew_body_def_init; read only during sinew_body_create.
@@ -80,11 +85,9 @@ typedef struct sinew_body_def {
   const float *rest_lengths;       ///< [m] spring_count floats; nullable: from the rest positions.
   /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
   const float *spring_dampings;
-  /// [N/m] Stiffness of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without
-  /// springs.
+  /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
   float stiffness;
-  /// [N s/m] Damping of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without
-  /// springs.
+  /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
   float spring_damping;
   /// 3 * triangle_count node indices, outward: the render and contact surface; nullable. NULL takes
   /// the boundary of the tetrahedra or cells.
@@ -106,8 +109,8 @@ typedef struct sinew_body_def {
   /// for NEWTON. Each part of a subdivided step gets at least 1/32 of it.
   uint32_t iterations;
   /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1. It bounds the error
-  /// relative to the displacement that forces cause in the step. 0 (default) is 0.01 for IMPLICIT
-  /// and 1e-6 for NEWTON.
+  /// relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for
+  /// NEWTON.
   float accuracy;
   uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
@@ -128,8 +131,7 @@ typedef struct sinew_body_def {
   /// equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or two
   /// layers of tetrahedra much softer.
   float young_modulus;
-  /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value within
-  /// 0.001.
+  /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
   float poisson_ratio;
   /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
   /// Every node must then belong to an element, masses must be NULL and node_mass 0.
@@ -137,8 +139,7 @@ typedef struct sinew_body_def {
   /// [m] Thickness of a material that fills triangles, above 0; else 0.
   float thickness;
   /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0. 0.3
-  /// to 0.6 of Young's modulus lets a body of springs recover from any inversion. Must be 0 with
-  /// SINEW_MATERIAL_TETRAHEDRA.
+  /// to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
   float volume_stiffness;
   /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness. An
   /// anchor spring pulls a node to its rest position in the world.
@@ -150,8 +151,7 @@ typedef struct sinew_body_def {
   /// triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the
   /// bending of the triangles that have the edge.
   float bending_stiffness;
-  /// Force law of springs, a sinew_spring_law value; default LINEAR. Springs added later are
-  /// linear.
+  /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
   uint32_t spring_law;
   float spring_steepness;          ///< EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
   float spring_quadratic;          ///< CUBIC: its square is at most 3 * spring_cubic; else 0.
@@ -176,8 +176,8 @@ typedef struct sinew_body_def {
   float relaxation_time;
   /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
   /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not
-  /// yield. Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so longer
-  /// steps slow their flow.
+  /// yield. Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long
+  /// steps slow it.
   float yield_strain;
   /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
   float largest_set;
@@ -201,7 +201,7 @@ typedef struct sinew_body_def {
   /// 1: collides with other bodies that also have 1; 0 (default): does not.
   uint32_t meets_bodies;
   /// 1: collides with itself; 0 (default): does not. The two sides of a cut then rest against each
-  /// other with no gap. The cut-boundary edges of a sheet may slide over each other until they have
+  /// other with no gap. The cut-boundary edges of a sheet may slide over each other until
   /// separated.
   uint32_t meets_itself;
   /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. IMAGE_SPACE applies
@@ -232,11 +232,9 @@ typedef struct sinew_body_def {
   /// [N] Force above which a spring tears, at least 0; 0 (default): never. SINEW_STATUS_UNSUPPORTED
   /// for a body of elements without springs.
   float tear_force;
-  /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes above
-  /// 0.
+  /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
   uint32_t most_tears;
-  /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. Tears never make a
-  /// smaller one.
+  /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
   float smallest_piece;
   /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps. Parts
   /// that stay slower for sleep_time, and that no force would accelerate to that speed in that
@@ -245,6 +243,9 @@ typedef struct sinew_body_def {
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
+  /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
+  uint32_t element_law;
+  float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -273,8 +274,7 @@ sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id b
 
 /// Moves all nodes to new positions without a sweep.
 /// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and
-/// attached nodes stay attached at their new positions. `node_count` must be the body's number of
-/// nodes.
+/// attached nodes stay attached at their new positions. `node_count` must be the body's.
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
                                       const float *positions, size_t node_count);
 
@@ -290,8 +290,7 @@ sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id bo
                                       sinew_triangle_view *out);
 
 /// Writes 1 if the surface of a body is closed, else 0.
-/// Only a closed body pushes out what is inside it. Removing a spring on a surface edge opens the
-/// surface.
+/// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
 sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, uint32_t *out);
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
@@ -325,8 +324,7 @@ sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t nod
 /// Pins a node along some axes and frees it along the others.
 /// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis
 /// keeps the velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or a node of mass 0 would be
-/// free.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
                                  uint32_t axes);
 
@@ -336,7 +334,7 @@ sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 
 /// Moves a pinned node to a new position during the next step.
-/// The node moves along a straight line, and only along its pinned axes. `position` [m] points to 3
+/// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3
 /// floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,

@@ -155,7 +155,7 @@ typedef struct sinew_triangle_view {
 typedef enum sinew_detection {
   SINEW_DETECTION_EXACT = 0,          ///< Exact distances, swept over the step.
   SINEW_DETECTION_IMAGE_SPACE = 1,    ///< Rays cast through depth images.
-  SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh tools.
+  SINEW_DETECTION_DISTANCE_FIELD = 2  ///< Sampled signed distance; only for mesh and box tools.
 } sinew_detection;
 
 // sinew/world.h: a world and its steps.
@@ -202,8 +202,8 @@ typedef struct sinew_world_def {
   float tolerance;
   uint32_t reserved;          ///< Reserved; must be 0.
   /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
-  /// It must stay valid while the world lives. It is not called if thread_count is 1, or in steps
-  /// too small to share.
+  /// It must stay valid while the world lives. It is not called if thread_count is 1, or in small
+  /// steps.
   sinew_run_tasks run_tasks;
   void *tasks_context;        ///< First argument of run_tasks; nullable.
   uint32_t kernel;            ///< SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.
@@ -352,18 +352,6 @@ sinew_status sinew_mesh_get_view(const sinew_mesh *mesh, sinew_mesh_view *out);
 
 // ---- Creation -----------------------------------------------------------------------------------
 
-/// Source of the forces between the nodes of elements.
-typedef enum sinew_material {
-  SINEW_MATERIAL_NONE = 0,       ///< Springs as given, or one stiffness for all. Default.
-  /// Springs along the element edges, with stiffnesses computed from young_modulus. They imply a
-  /// Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
-  SINEW_MATERIAL_SPRINGS = 1,
-  /// Finite elements: St Venant-Kirchhoff with a signed volume term. Accepts a Poisson's ratio from
-  /// 0 to 0.49. Accurate up to a compression of about 20 %, stable beyond. The body has no springs
-  /// but those given. sinew_body_remove_spring removes the tetrahedra that have the edge.
-  SINEW_MATERIAL_TETRAHEDRA = 2
-} sinew_material;
-
 /// Memory layout of the springs of a body.
 typedef enum sinew_storage {
   SINEW_STORAGE_PACKED = 0,       ///< Layout optimized for the processor; default.
@@ -383,16 +371,33 @@ typedef enum sinew_solver {
   SINEW_SOLVER_NEWTON = 2
 } sinew_solver;
 
+/// Source of the forces between the nodes of elements.
+typedef enum sinew_material {
+  SINEW_MATERIAL_NONE = 0,       ///< Springs as given, or one stiffness for all. Default.
+  /// Springs along the element edges, with stiffnesses computed from young_modulus. They imply a
+  /// Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
+  SINEW_MATERIAL_SPRINGS = 1,
+  /// Finite elements of element_law. Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a
+  /// compression of about 20 %, stable beyond. The body has no springs but those given.
+  /// sinew_body_remove_spring removes the tetrahedra that have the edge.
+  SINEW_MATERIAL_TETRAHEDRA = 2
+} sinew_material;
+
 /// Force law of springs under a strain e.
 typedef enum sinew_spring_law {
   SINEW_SPRING_LAW_LINEAR = 0,       ///< Force = stiffness * rest length * strain e. Default.
-  /// J-shaped: e becomes (exp(spring_steepness e) - 1) / spring_steepness for e from 0 to
-  /// spring_limit; linear beyond.
+  /// J-shaped: (exp(spring_steepness e) - 1) / spring_steepness up to spring_limit, linear beyond.
   SINEW_SPRING_LAW_EXPONENTIAL = 1,
-  /// Polynomial: e becomes e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit; linear
-  /// beyond.
+  /// Polynomial: e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit, linear beyond.
   SINEW_SPRING_LAW_CUBIC = 2
 } sinew_spring_law;
+
+/// Hyperelastic law of finite elements.
+typedef enum sinew_element_law {
+  SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF = 0,  ///< With a volume term; default.
+  SINEW_ELEMENT_LAW_NEO_HOOKEAN = 1,  ///< Stable (Smith, de Goes, Kim 2018).
+  SINEW_ELEMENT_LAW_MOONEY_RIVLIN = 2  ///< See mooney_ratio.
+} sinew_element_law;
 
 /// Geometry, material and settings of a body.
 /// Filled by sinew_body_def_init; read only during sinew_body_create.
@@ -418,11 +423,9 @@ typedef struct sinew_body_def {
   const float *rest_lengths;       ///< [m] spring_count floats; nullable: from the rest positions.
   /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
   const float *spring_dampings;
-  /// [N/m] Stiffness of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without
-  /// springs.
+  /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
   float stiffness;
-  /// [N s/m] Damping of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without
-  /// springs.
+  /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
   float spring_damping;
   /// 3 * triangle_count node indices, outward: the render and contact surface; nullable. NULL takes
   /// the boundary of the tetrahedra or cells.
@@ -444,8 +447,8 @@ typedef struct sinew_body_def {
   /// for NEWTON. Each part of a subdivided step gets at least 1/32 of it.
   uint32_t iterations;
   /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1. It bounds the error
-  /// relative to the displacement that forces cause in the step. 0 (default) is 0.01 for IMPLICIT
-  /// and 1e-6 for NEWTON.
+  /// relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for
+  /// NEWTON.
   float accuracy;
   uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
@@ -466,8 +469,7 @@ typedef struct sinew_body_def {
   /// equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or two
   /// layers of tetrahedra much softer.
   float young_modulus;
-  /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value within
-  /// 0.001.
+  /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
   float poisson_ratio;
   /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
   /// Every node must then belong to an element, masses must be NULL and node_mass 0.
@@ -475,8 +477,7 @@ typedef struct sinew_body_def {
   /// [m] Thickness of a material that fills triangles, above 0; else 0.
   float thickness;
   /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0. 0.3
-  /// to 0.6 of Young's modulus lets a body of springs recover from any inversion. Must be 0 with
-  /// SINEW_MATERIAL_TETRAHEDRA.
+  /// to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
   float volume_stiffness;
   /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness. An
   /// anchor spring pulls a node to its rest position in the world.
@@ -488,8 +489,7 @@ typedef struct sinew_body_def {
   /// triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the
   /// bending of the triangles that have the edge.
   float bending_stiffness;
-  /// Force law of springs, a sinew_spring_law value; default LINEAR. Springs added later are
-  /// linear.
+  /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
   uint32_t spring_law;
   float spring_steepness;          ///< EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
   float spring_quadratic;          ///< CUBIC: its square is at most 3 * spring_cubic; else 0.
@@ -514,8 +514,8 @@ typedef struct sinew_body_def {
   float relaxation_time;
   /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
   /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not
-  /// yield. Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so longer
-  /// steps slow their flow.
+  /// yield. Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long
+  /// steps slow it.
   float yield_strain;
   /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
   float largest_set;
@@ -539,7 +539,7 @@ typedef struct sinew_body_def {
   /// 1: collides with other bodies that also have 1; 0 (default): does not.
   uint32_t meets_bodies;
   /// 1: collides with itself; 0 (default): does not. The two sides of a cut then rest against each
-  /// other with no gap. The cut-boundary edges of a sheet may slide over each other until they have
+  /// other with no gap. The cut-boundary edges of a sheet may slide over each other until
   /// separated.
   uint32_t meets_itself;
   /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE. IMAGE_SPACE applies
@@ -570,11 +570,9 @@ typedef struct sinew_body_def {
   /// [N] Force above which a spring tears, at least 0; 0 (default): never. SINEW_STATUS_UNSUPPORTED
   /// for a body of elements without springs.
   float tear_force;
-  /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes above
-  /// 0.
+  /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
   uint32_t most_tears;
-  /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. Tears never make a
-  /// smaller one.
+  /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
   float smallest_piece;
   /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps. Parts
   /// that stay slower for sleep_time, and that no force would accelerate to that speed in that
@@ -583,6 +581,9 @@ typedef struct sinew_body_def {
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
+  /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
+  uint32_t element_law;
+  float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -611,8 +612,7 @@ sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id b
 
 /// Moves all nodes to new positions without a sweep.
 /// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and
-/// attached nodes stay attached at their new positions. `node_count` must be the body's number of
-/// nodes.
+/// attached nodes stay attached at their new positions. `node_count` must be the body's.
 sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
                                       const float *positions, size_t node_count);
 
@@ -628,8 +628,7 @@ sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id bo
                                       sinew_triangle_view *out);
 
 /// Writes 1 if the surface of a body is closed, else 0.
-/// Only a closed body pushes out what is inside it. Removing a spring on a surface edge opens the
-/// surface.
+/// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
 sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, uint32_t *out);
 
 /// Writes the mass of a node [kg]; 0 for a permanent pin or a node bound to others.
@@ -663,8 +662,7 @@ sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t nod
 /// Pins a node along some axes and frees it along the others.
 /// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis
 /// keeps the velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or a node of mass 0 would be
-/// free.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
                                  uint32_t axes);
 
@@ -674,7 +672,7 @@ sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_
 sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
 
 /// Moves a pinned node to a new position during the next step.
-/// The node moves along a straight line, and only along its pinned axes. `position` [m] points to 3
+/// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3
 /// floats.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
@@ -712,7 +710,8 @@ typedef enum sinew_shape {
   SINEW_SHAPE_SPHERE = 0,   ///< Sphere about the origin.
   SINEW_SHAPE_CAPSULE = 1,  ///< Cylinder along y about the origin, with round caps.
   SINEW_SHAPE_PLANE = 2,    ///< Plane y = 0 with free space above.
-  SINEW_SHAPE_MESH = 3      ///< Closed triangle mesh.
+  SINEW_SHAPE_MESH = 3,     ///< Closed triangle mesh.
+  SINEW_SHAPE_BOX = 4       ///< Box along the axes about the origin, with sharp edges.
 } sinew_shape;
 
 /// Shape and settings of a rigid tool.
@@ -739,10 +738,10 @@ typedef struct sinew_tool_def {
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh: pixel size of the images or cell size of the distance field; 0 (default): automatic.
-  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
-  /// less. Refused above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory:
-  /// about 24 bytes per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default):
+  /// automatic. Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the
+  /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
+  /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
   float resolution;
   /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue
   /// stops it. Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
@@ -752,13 +751,16 @@ typedef struct sinew_tool_def {
   uint32_t collision_category;
   /// Bits of the categories that this tool collides with; default 0xffffffff.
   uint32_t collision_mask;
+  /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
+  float half_extents[3];
+  uint32_t reserved1;           ///< Reserved; must be 0.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
 sinew_status sinew_tool_def_init(sinew_tool_def *def, size_t struct_size);
 
 /// Creates a tool in a world, and copies everything that `def` points to.
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD without a mesh, or IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD of a round shape, or either of a plane.
 sinew_status sinew_tool_create(sinew_world *world, const sinew_tool_def *def, sinew_tool_id *out);
 
 /// Destroys a tool and releases everything attached to it.
@@ -769,8 +771,8 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 /// Moves a tool to a new pose during the next step.
 /// The tool moves along a straight line and rotates through the shorter arc, at constant speed.
 /// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. If force_limit stops the tool early, the remaining motion is discarded: call again
-/// for every step.
+/// unchanged. If force_limit stops the tool early, the rest is discarded: call again for every
+/// step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
                                  const float *orientation);
@@ -796,8 +798,7 @@ sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, flo
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
 /// Sets the collision category and mask of a tool from the next step on.
-/// With mask 0 the tool collides with nothing. Tissue inside it is pushed out once it collides
-/// again.
+/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
                                       uint32_t mask);
 

@@ -19,7 +19,8 @@ typedef enum sinew_shape {
   SINEW_SHAPE_SPHERE = 0,   ///< Sphere about the origin.
   SINEW_SHAPE_CAPSULE = 1,  ///< Cylinder along y about the origin, with round caps.
   SINEW_SHAPE_PLANE = 2,    ///< Plane y = 0 with free space above.
-  SINEW_SHAPE_MESH = 3      ///< Closed triangle mesh.
+  SINEW_SHAPE_MESH = 3,     ///< Closed triangle mesh.
+  SINEW_SHAPE_BOX = 4       ///< Box along the axes about the origin, with sharp edges.
 } sinew_shape;
 
 /// Shape and settings of a rigid tool.
@@ -46,10 +47,10 @@ typedef struct sinew_tool_def {
   /// Initial orientation x y z w, normalized by the library, not zero; default 0 0 0 1.
   float orientation[4];
   uint32_t reserved;            ///< Reserved; must be 0.
-  /// [m] Mesh: pixel size of the images or cell size of the distance field; 0 (default): automatic.
-  /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if
-  /// less. Refused above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory:
-  /// about 24 bytes per pixel of 3 images, 4 bytes per sample.
+  /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default):
+  /// automatic. Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the
+  /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
+  /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
   float resolution;
   /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue
   /// stops it. Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
@@ -59,13 +60,16 @@ typedef struct sinew_tool_def {
   uint32_t collision_category;
   /// Bits of the categories that this tool collides with; default 0xffffffff.
   uint32_t collision_mask;
+  /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
+  float half_extents[3];
+  uint32_t reserved1;           ///< Reserved; must be 0.
 } sinew_tool_def;
 
 /// Fills a tool definition with its defaults; `struct_size` is sizeof(sinew_tool_def).
 sinew_status sinew_tool_def_init(sinew_tool_def *def, size_t struct_size);
 
 /// Creates a tool in a world, and copies everything that `def` points to.
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD without a mesh, or IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD of a round shape, or either of a plane.
 sinew_status sinew_tool_create(sinew_world *world, const sinew_tool_def *def, sinew_tool_id *out);
 
 /// Destroys a tool and releases everything attached to it.
@@ -76,8 +80,8 @@ sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
 /// Moves a tool to a new pose during the next step.
 /// The tool moves along a straight line and rotates through the shorter arc, at constant speed.
 /// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable:
-/// unchanged. If force_limit stops the tool early, the remaining motion is discarded: call again
-/// for every step.
+/// unchanged. If force_limit stops the tool early, the rest is discarded: call again for every
+/// step.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
                                  const float *orientation);
@@ -103,8 +107,7 @@ sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, flo
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
 /// Sets the collision category and mask of a tool from the next step on.
-/// With mask 0 the tool collides with nothing. Tissue inside it is pushed out once it collides
-/// again.
+/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
                                       uint32_t mask);
 

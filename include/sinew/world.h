@@ -52,8 +52,8 @@ typedef struct sinew_world_def {
   float tolerance;
   uint32_t reserved;          ///< Reserved; must be 0.
   /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
-  /// It must stay valid while the world lives. It is not called if thread_count is 1, or in steps
-  /// too small to share.
+  /// It must stay valid while the world lives. It is not called if thread_count is 1, or in small
+  /// steps.
   sinew_run_tasks run_tasks;
   void *tasks_context;        ///< First argument of run_tasks; nullable.
   uint32_t kernel;            ///< SIMD level, a sinew_kernel value; default SINEW_KERNEL_BEST.

@@ -227,7 +227,7 @@ pub unsafe extern "C" fn sinew_body_get_velocities(
 
 /// Writes 1 if the surface of a body is closed, else 0.
 ///
-/// Only a closed body pushes out what is inside it. Removing a spring on a surface edge opens the surface.
+/// Only a closed body pushes out what is inside it. Removing a spring on its surface opens it.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `out` is NULL or writable.
@@ -271,7 +271,7 @@ pub unsafe extern "C" fn sinew_body_set_collision(
 /// Moves all nodes to new positions without a sweep.
 ///
 /// `positions` [m] holds 3 * node_count floats. Velocities stay. Pinned nodes move too, and attached nodes stay
-/// attached at their new positions. `node_count` must be the body's number of nodes.
+/// attached at their new positions. `node_count` must be the body's.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `positions` is NULL or as long as stated.
@@ -333,7 +333,7 @@ pub unsafe extern "C" fn sinew_body_pin(world: *mut sinew_world, body: sinew_bod
 /// `axes` is a sum of SINEW_AXIS_X, SINEW_AXIS_Y and SINEW_AXIS_Z; 0 unpins the node. A freed axis keeps the
 /// velocity of its pin. Changing the axes cancels a pending sinew_body_move_pin.
 ///
-/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds the node, or a node of mass 0 would be free.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds it, or a node of mass 0 would be free.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -374,7 +374,7 @@ pub unsafe extern "C" fn sinew_body_unpin(world: *mut sinew_world, body: sinew_b
 
 /// Moves a pinned node to a new position during the next step.
 ///
-/// The node moves along a straight line, and only along its pinned axes. `position` [m] points to 3 floats.
+/// The node moves along a straight line, and only along its pinned axes. `position` [m] is 3 floats.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the node is not pinned, or a tool holds it.
 ///

@@ -8,8 +8,8 @@ use super::status::sinew_status;
 use super::tool::{SINEW_DETECTION_EXACT, detection};
 use crate::base::{Error, Result};
 use crate::def::{
-    BodyContact, BodyDefinition, CollisionFilter, Material, Model, Sleep, Solver, SpringLaw, Storage, Tearing, Values,
-    Viscosity, Yielding,
+    BodyContact, BodyDefinition, CollisionFilter, ElementLaw, Material, Model, Sleep, Solver, SpringLaw, Storage,
+    Tearing, Values, Viscosity, Yielding,
 };
 
 /// Layout optimized for the processor; default.
@@ -34,7 +34,7 @@ pub const SINEW_MATERIAL_NONE: u32 = 0;
 ///
 /// They imply a Poisson's ratio of 1/4 for tetrahedra and cells, and of 1/3 in the plane for triangles.
 pub const SINEW_MATERIAL_SPRINGS: u32 = 1;
-/// Finite elements: St Venant-Kirchhoff with a signed volume term.
+/// Finite elements of element_law.
 ///
 /// Accepts a Poisson's ratio from 0 to 0.49. Accurate up to a compression of about 20 %, stable beyond. The body
 /// has no springs but those given. sinew_body_remove_spring removes the tetrahedra that have the edge.
@@ -42,11 +42,17 @@ pub const SINEW_MATERIAL_TETRAHEDRA: u32 = 2;
 
 /// Force = stiffness * rest length * strain e. Default.
 pub const SINEW_SPRING_LAW_LINEAR: u32 = 0;
-/// J-shaped: e becomes (exp(spring_steepness e) - 1) / spring_steepness for e from 0 to spring_limit; linear
-/// beyond.
+/// J-shaped: (exp(spring_steepness e) - 1) / spring_steepness up to spring_limit, linear beyond.
 pub const SINEW_SPRING_LAW_EXPONENTIAL: u32 = 1;
-/// Polynomial: e becomes e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit; linear beyond.
+/// Polynomial: e + spring_quadratic e^2 + spring_cubic e^3 up to spring_limit, linear beyond.
 pub const SINEW_SPRING_LAW_CUBIC: u32 = 2;
+
+/// With a volume term; default.
+pub const SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF: u32 = 0;
+/// Stable (Smith, de Goes, Kim 2018).
+pub const SINEW_ELEMENT_LAW_NEO_HOOKEAN: u32 = 1;
+/// See mooney_ratio.
+pub const SINEW_ELEMENT_LAW_MOONEY_RIVLIN: u32 = 2;
 
 /// Geometry, material and settings of a body.
 ///
@@ -84,9 +90,9 @@ pub struct sinew_body_def {
     pub rest_lengths: *const f32,
     /// [N s/m] spring_count floats, along the spring; nullable: spring_damping.
     pub spring_dampings: *const f32,
-    /// [N/m] Stiffness of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without springs.
+    /// [N/m] Stiffness of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
     pub stiffness: f32,
-    /// [N s/m] Damping of each spring; default 0. Must be 0 for SINEW_MATERIAL_TETRAHEDRA without springs.
+    /// [N s/m] Damping of each spring; default 0. Must be 0 for TETRAHEDRA without springs.
     pub spring_damping: f32,
     /// 3 * triangle_count node indices, outward: the render and contact surface; nullable.
     ///
@@ -117,8 +123,7 @@ pub struct sinew_body_def {
     pub iterations: u32,
     /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1.
     ///
-    /// It bounds the error relative to the displacement that forces cause in the step. 0 (default) is 0.01 for
-    /// IMPLICIT and 1e-6 for NEWTON.
+    /// It bounds the error relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for NEWTON.
     pub accuracy: f32,
     /// Reserved; must be 0.
     pub reserved1: u32,
@@ -145,7 +150,7 @@ pub struct sinew_body_def {
     /// Exact for cells and equilateral triangles; an irregular mesh of springs is 4 to 8 % softer, a mesh of one or
     /// two layers of tetrahedra much softer.
     pub young_modulus: f32,
-    /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value within 0.001.
+    /// Poisson's ratio; TETRAHEDRA: 0 to 0.49; SPRINGS: 0 (default) or the implied value +- 0.001.
     pub poisson_ratio: f32,
     /// [kg/m^3] Above 0: nodes share the mass of their elements; 0 (default): masses or node_mass.
     ///
@@ -155,8 +160,7 @@ pub struct sinew_body_def {
     pub thickness: f32,
     /// [Pa] Resistance of each tetrahedron to volume change and inversion, at least 0; default 0.
     ///
-    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from any inversion. Must be 0 with
-    /// SINEW_MATERIAL_TETRAHEDRA.
+    /// 0.3 to 0.6 of Young's modulus lets a body of springs recover from inversion. 0 with TETRAHEDRA.
     pub volume_stiffness: f32,
     /// [N/m] node_count floats, at least 0, of the anchor springs; nullable: home_stiffness.
     ///
@@ -170,7 +174,7 @@ pub struct sinew_body_def {
     /// than two triangles is refused. Exact for equilateral triangles. sinew_body_remove_spring removes the bending
     /// of the triangles that have the edge.
     pub bending_stiffness: f32,
-    /// Force law of springs, a sinew_spring_law value; default LINEAR. Springs added later are linear.
+    /// Force law of springs, a sinew_spring_law value; default LINEAR. Later springs are linear.
     pub spring_law: u32,
     /// EXPONENTIAL: above 0, at most 13.8 / spring_limit; else 0.
     pub spring_steepness: f32,
@@ -201,7 +205,7 @@ pub struct sinew_body_def {
     /// Strain at which springs and elements yield, in tension and compression; 0 (default): never.
     ///
     /// Strain beyond it is permanent. Requires SINEW_SPRING_LAW_LINEAR; springs added later do not yield.
-    /// Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so longer steps slow their flow.
+    /// Tetrahedra yield at the end of a substep (VERLET) or step (other solvers), so long steps slow it.
     pub yield_strain: f32,
     /// Maximum plastic strain, above 0 and below 1 with yield_strain; default 0.5. Elastic beyond.
     pub largest_set: f32,
@@ -229,8 +233,7 @@ pub struct sinew_body_def {
     pub meets_bodies: u32,
     /// 1: collides with itself; 0 (default): does not.
     ///
-    /// The two sides of a cut then rest against each other with no gap. The cut-boundary edges of a sheet may slide
-    /// over each other until they have separated.
+    /// The two sides of a cut then rest against each other with no gap. The cut-boundary edges of a sheet may slide over each other until separated.
     pub meets_itself: u32,
     /// Detection between bodies: SINEW_DETECTION_EXACT (default) or IMAGE_SPACE.
     ///
@@ -265,9 +268,9 @@ pub struct sinew_body_def {
     ///
     /// SINEW_STATUS_UNSUPPORTED for a body of elements without springs.
     pub tear_force: f32,
-    /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes above 0.
+    /// Maximum number of tears per step; 0 (default): the body does not tear. Needs spare_nodes.
     pub most_tears: u32,
-    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. Tears never make a smaller one.
+    /// Minimum fragment size at rest, [m^2] or for solids [m^3]; default 0. No tear goes below.
     pub smallest_piece: f32,
     /// [m/s] Speed below which a node counts as at rest, at least 0; 0 (default): never sleeps.
     ///
@@ -277,6 +280,10 @@ pub struct sinew_body_def {
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,
+    /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
+    pub element_law: u32,
+    /// MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
+    pub mooney_ratio: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -290,6 +297,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, contact_thickness),
         offset_of!(Self, spare_nodes),
         offset_of!(Self, sleep_speed),
+        offset_of!(Self, element_law),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -370,6 +378,8 @@ impl sinew_body_def {
             smallest_piece: 0.0,
             sleep_speed: Sleep::default().speed,
             sleep_time: Sleep::default().time,
+            element_law: SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF,
+            mooney_ratio: 0.0,
         }
     }
 
@@ -403,6 +413,30 @@ impl sinew_body_def {
             density: self.density,
             thickness: self.thickness,
         }))
+    }
+
+    fn element_law(&self) -> Result<ElementLaw> {
+        let law = match self.element_law {
+            SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF => ElementLaw::StVenantKirchhoff,
+            SINEW_ELEMENT_LAW_NEO_HOOKEAN => ElementLaw::NeoHookean,
+            SINEW_ELEMENT_LAW_MOONEY_RIVLIN => {
+                return Ok(ElementLaw::MooneyRivlin {
+                    ratio: self.mooney_ratio,
+                });
+            }
+            unknown => {
+                return Err(Error::invalid(format!(
+                    "element_law is {unknown}: no SINEW_ELEMENT_LAW_..."
+                )));
+            }
+        };
+        if self.mooney_ratio != 0.0 {
+            return Err(Error::invalid(format!(
+                "mooney_ratio is {} while element_law is not SINEW_ELEMENT_LAW_MOONEY_RIVLIN: must be 0",
+                self.mooney_ratio
+            )));
+        }
+        Ok(law)
     }
 
     fn contact(&self) -> Result<BodyContact> {
@@ -505,6 +539,7 @@ impl sinew_body_def {
                 home_stiffnesses: values("home_stiffnesses", self.home_stiffnesses, nodes, self.home_stiffness)?,
                 bending_stiffness: self.bending_stiffness,
                 spring_law: self.spring_law()?,
+                element_law: self.element_law()?,
                 fibre_directions: directions.unwrap_or(&[]),
                 fibre_stiffnesses: values(
                     "fibre_stiffnesses",

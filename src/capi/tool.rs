@@ -32,11 +32,14 @@ pub const SINEW_SHAPE_PLANE: u32 = 2;
 /// Closed triangle mesh.
 pub const SINEW_SHAPE_MESH: u32 = 3;
 
+/// Box along the axes about the origin, with sharp edges.
+pub const SINEW_SHAPE_BOX: u32 = 4;
+
 /// Exact distances, swept over the step.
 pub const SINEW_DETECTION_EXACT: u32 = 0;
 /// Rays cast through depth images.
 pub const SINEW_DETECTION_IMAGE_SPACE: u32 = 1;
-/// Sampled signed distance; only for mesh tools.
+/// Sampled signed distance; only for mesh and box tools.
 pub const SINEW_DETECTION_DISTANCE_FIELD: u32 = 2;
 
 /// Shape and settings of a rigid tool.
@@ -75,7 +78,7 @@ pub struct sinew_tool_def {
     pub orientation: [f32; 4],
     /// Reserved; must be 0.
     pub reserved: u32,
-    /// [m] Mesh: pixel size of the images or cell size of the distance field; 0 (default): automatic.
+    /// [m] Mesh, box: pixel size of the images or cell size of the distance field; 0 (default): automatic.
     ///
     /// Automatic is 1/256 (image) or 1/96 (field) of the longest extent, or 1/4 of the shortest if less. Refused
     /// above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory: about 24 bytes per pixel of 3
@@ -91,11 +94,19 @@ pub struct sinew_tool_def {
     pub collision_category: u32,
     /// Bits of the categories that this tool collides with; default 0xffffffff.
     pub collision_mask: u32,
+    /// [m] Box: distance from the center to each side, above 0, at most 1e9; no default.
+    pub half_extents: [f32; 3],
+    /// Reserved; must be 0.
+    pub reserved1: u32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
 unsafe impl Versioned for sinew_tool_def {
-    const SIZES: &'static [usize] = &[offset_of!(Self, resolution), size_of::<Self>()];
+    const SIZES: &'static [usize] = &[
+        offset_of!(Self, resolution),
+        offset_of!(Self, half_extents),
+        size_of::<Self>(),
+    ];
     const NAME: &'static str = "sinew_tool_def";
 }
 
@@ -148,6 +159,8 @@ impl sinew_tool_def {
             force_limit: f32::INFINITY,
             collision_category: CollisionFilter::default().category,
             collision_mask: CollisionFilter::default().mask,
+            half_extents: [0.0; 3],
+            reserved1: 0,
         }
     }
 
@@ -158,6 +171,7 @@ impl sinew_tool_def {
     unsafe fn definition<'a>(&self) -> Result<ToolDefinition<'a>> {
         memory::reserved("reserved0", self.reserved0)?;
         memory::reserved("reserved", self.reserved)?;
+        memory::reserved("reserved1", self.reserved1)?;
         let detection = detection("detection", self.detection)?;
         let shape = match self.shape {
             SINEW_SHAPE_SPHERE => Shape::Sphere { radius: self.radius },
@@ -166,6 +180,9 @@ impl sinew_tool_def {
                 half_length: self.half_length,
             },
             SINEW_SHAPE_PLANE => Shape::Plane,
+            SINEW_SHAPE_BOX => Shape::Box {
+                half_extents: Vec3::from_array(self.half_extents),
+            },
             SINEW_SHAPE_MESH => Shape::Mesh {
                 // SAFETY: the same contract.
                 positions: unsafe { memory::array("positions", self.positions.cast(), self.node_count) }?,
@@ -204,7 +221,7 @@ pub unsafe extern "C" fn sinew_tool_def_init(def: *mut sinew_tool_def, struct_si
 
 /// Creates a tool in a world, and copies everything that `def` points to.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD without a mesh, or IMAGE_SPACE with a plane.
+/// Errors: SINEW_STATUS_UNSUPPORTED for DISTANCE_FIELD of a round shape, or either of a plane.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `def` is NULL or a definition of the size that it states, with arrays of
@@ -240,7 +257,7 @@ pub unsafe extern "C" fn sinew_tool_destroy(world: *mut sinew_world, tool: sinew
 ///
 /// The tool moves along a straight line and rotates through the shorter arc, at constant speed. `position` [m] is 3
 /// floats, each within 1e9; `orientation` is x y z w, not zero, nullable: unchanged. If force_limit stops the tool
-/// early, the remaining motion is discarded: call again for every step.
+/// early, the rest is discarded: call again for every step.
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a haptic handle drives the tool.
 ///
@@ -296,7 +313,7 @@ pub unsafe extern "C" fn sinew_tool_set_force_limit(
 
 /// Sets the collision category and mask of a tool from the next step on.
 ///
-/// With mask 0 the tool collides with nothing. Tissue inside it is pushed out once it collides again.
+/// With mask 0 the tool collides with nothing. Tissue inside is pushed out once it collides.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.

@@ -67,8 +67,7 @@ pub struct sinew_world_def {
     pub reserved: u32,
     /// Job system that runs thread_count tasks per step; nullable (default): the world's own threads.
     ///
-    /// It must stay valid while the world lives. It is not called if thread_count is 1, or in steps too small to
-    /// share.
+    /// It must stay valid while the world lives. It is not called if thread_count is 1, or in small steps.
     pub run_tasks: sinew_run_tasks,
     /// First argument of run_tasks; nullable.
     pub tasks_context: *mut c_void,

@@ -5,6 +5,7 @@ mod candidates;
 pub(crate) mod closest;
 mod constraint;
 mod contacts;
+mod cuboid;
 mod distance;
 pub(crate) mod distance_field;
 mod edges;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 
+use super::cuboid;
 use super::limit::Reach;
 use super::mesh_solid::MeshSolid;
 use super::rounded;
@@ -29,6 +30,11 @@ pub enum Shape<'a> {
     },
     /// The plane y = 0, with free space above it and solid below.
     Plane,
+    /// A box along the axes about the origin.
+    Box {
+        /// Metres from the centre to each side, above 0, at most 1e9.
+        half_extents: Vec3,
+    },
     /// What a closed surface encloses. Corners at exactly the same place are one.
     Mesh {
         /// Metres.
@@ -201,7 +207,7 @@ impl Tool {
         let pose = definition.pose.checked()?;
         let (detection, resolution) = (definition.detection, definition.resolution);
         let is_refused = match definition.shape {
-            Shape::Mesh { .. } => false,
+            Shape::Box { .. } | Shape::Mesh { .. } => false,
             Shape::Plane => detection != Detection::Exact,
             Shape::Sphere { .. } | Shape::Capsule { .. } => detection == Detection::DistanceField,
         };
@@ -235,6 +241,13 @@ impl Tool {
                 rounded(radius, half_length)?
             }
             Shape::Plane => Form::HalfSpace,
+            Shape::Box { half_extents } => {
+                for (axis, half_extent) in half_extents.to_array().into_iter().enumerate() {
+                    positive(&format!("half_extents[{axis}]"), half_extent)?;
+                }
+                let (positions, triangles) = cuboid::surface(half_extents);
+                Form::Mesh(MeshSolid::shared(&positions, &triangles, detection, resolution)?)
+            }
             Shape::Mesh { positions, triangles } => {
                 Form::Mesh(MeshSolid::shared(positions, triangles, detection, resolution)?)
             }

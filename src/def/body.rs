@@ -3,10 +3,11 @@
 use glam::Vec3;
 
 use super::BodyContact;
+use super::ElementLaw;
 use super::Sleep;
 use super::SpringLaw;
 use super::Tearing;
-use super::{Material, Viscosity, Yielding};
+use super::{Material, Model, Viscosity, Yielding};
 use crate::base::{Error, Result, memory};
 
 /// One value for all, or one for each.
@@ -127,6 +128,9 @@ pub struct BodyDefinition<'a> {
     pub bending_stiffness: f32,
     /// How the pull of the springs grows as they are stretched.
     pub spring_law: SpringLaw,
+    /// The law of tetrahedra that are elements. Those of another than [`ElementLaw::StVenantKirchhoff`] have no viscosity and do not yield, nor do
+    /// springs beside them.
+    pub element_law: ElementLaw,
     /// For each tetrahedron the direction of its fibres at rest, 1 long, or 0: it has none. Empty: there are none at all.
     pub fibre_directions: &'a [Vec3],
     /// For each tetrahedron how stiff its fibres are, in Pa, at least 0. Fibres pull where they are longer than at rest, by this times
@@ -223,6 +227,7 @@ impl Default for BodyDefinition<'_> {
             home_stiffnesses: Values::Uniform(0.0),
             bending_stiffness: 0.0,
             spring_law: SpringLaw::Linear,
+            element_law: ElementLaw::default(),
             fibre_directions: &[],
             fibre_stiffnesses: Values::Uniform(0.0),
             viscosity: Viscosity::default(),
@@ -327,6 +332,13 @@ impl BodyDefinition<'_> {
         }
         self.viscosity.check()?;
         self.yielding.check()?;
+        let is_of_elements = |material: Material| material.model == Model::Tetrahedra;
+        let refused = [
+            ("retardation_time", self.viscosity.retardation_time),
+            ("yield_strain", self.yielding.strain),
+        ];
+        self.element_law
+            .check(self.material.is_some_and(is_of_elements), refused)?;
         self.contact.check()?;
         self.tearing.check(self)?;
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;

@@ -2,6 +2,7 @@
 
 mod body;
 mod contact;
+mod element_law;
 mod material;
 mod report;
 mod sleep;
@@ -17,6 +18,7 @@ pub(crate) use body::{
 };
 pub(crate) use contact::check_reach;
 pub use contact::{BodyContact, CollisionFilter, Detection};
+pub use element_law::ElementLaw;
 pub use material::{Material, Model};
 pub use report::{EnclosedReport, Energy, SolverReport, StorageReport};
 pub use sleep::Sleep;

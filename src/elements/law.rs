@@ -1,10 +1,13 @@
 //! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
 
 use crate::codec::saved;
+use crate::def::ElementLaw;
 use glam::{DMat3, DVec3};
 
+use super::laws::{Columns, Hyperelastic, Strained, product_of, with_hyperelastic};
+
 /// St Venant and Kirchhoff's law with a signed volume term, Pa: the energy of a tetrahedron is
-/// `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`.
+/// `V (lambda/2 (tr E)² + mu tr E² + kappa/2 (J - 1)²)`; or one of [`super::laws`] with mu, beside all of lambda as kappa.
 ///
 /// Without the last, a tetrahedron that is pressed flat turns inside out and stays so (Kikuuwe, Tabuchi, Yamamoto 2009 have the energy as
 /// one of squared lengths of edges). What the volume term takes is not in lambda, so that Young's modulus and Poisson's ratio at small
@@ -18,13 +21,15 @@ pub(crate) struct Law {
     /// and V' what it becomes: linear tetrahedra that keep their volume each can hardly move (Irving, Schroeder, Fedkiw 2007; the
     /// pressure of a tetrahedron is the mean of its nodes', Bonet, Burton 1998).
     pub rings: bool,
+    pub form: ElementLaw,
 }
 
 saved!(Law {
     lambda,
     mu,
     kappa,
-    rings
+    rings,
+    form
 });
 
 /// Poisson's ratio from which volume is kept by rings.
@@ -34,16 +39,20 @@ impl Law {
     /// That of Young's modulus, Pa, and Poisson's ratio.
     ///
     /// Inversion ends where kappa is above some (lambda + 2 mu) / 8; twice that is used, and all of lambda where it is more.
-    pub fn new(young_modulus: f32, poisson_ratio: f32) -> Self {
+    pub fn new(young_modulus: f32, poisson_ratio: f32, form: ElementLaw) -> Self {
         let (e, nu) = (f64::from(young_modulus), f64::from(poisson_ratio));
         let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
         let mu = e / (2.0 * (1.0 + nu));
-        let kappa = lambda.max(0.25 * (lambda + 2.0 * mu));
+        let kappa = match form {
+            ElementLaw::StVenantKirchhoff => lambda.max(0.25 * (lambda + 2.0 * mu)),
+            _ => lambda,
+        };
         Self {
             lambda: (lambda - kappa) as f32,
             mu: mu as f32,
             kappa: kappa as f32,
             rings: poisson_ratio >= RINGS_FROM,
+            form,
         }
     }
 
@@ -54,7 +63,13 @@ impl Law {
             mu: 0.0,
             kappa,
             rings: false,
+            form: ElementLaw::StVenantKirchhoff,
         }
+    }
+
+    /// Whether it is one of [`super::laws`], of which nothing is remembered.
+    pub fn is_hyperelastic(&self) -> bool {
+        self.form != ElementLaw::StVenantKirchhoff
     }
 
     /// So many times as stiff.
@@ -175,6 +190,9 @@ pub(crate) struct Deformed {
     mu: f64,
     /// 0 where volume is kept by rings.
     kappa: f64,
+    law: Law,
+    /// Under a hyperelastic law, without its pressure.
+    strained: Option<Strained<f64>>,
 }
 
 impl Deformed {
@@ -195,7 +213,15 @@ impl Deformed {
             lambda: f64::from(law.lambda),
             mu: f64::from(law.mu),
             kappa,
+            law,
+            strained: with_hyperelastic!(law, |of| Some(Strained::new(of, columns(&gradient), kappa)), None),
         }
+    }
+
+    /// Under a hyperelastic law, with all of its pressure.
+    fn strained(&self) -> Option<Strained<f64>> {
+        let more = self.pressure - self.kappa * self.growth;
+        self.strained.map(|strained| strained.pressed(more))
     }
 
     /// With these on top of its stresses.
@@ -245,14 +271,23 @@ impl Deformed {
 
     /// What is elastic, J.
     pub fn energy(&self) -> f64 {
-        let squares = product(&self.strain, &self.strain);
-        let elastic = 0.5 * self.lambda * self.trace().powi(2) + self.mu * squares;
-        self.volume * (elastic + 0.5 * self.kappa * self.growth.powi(2))
+        let swollen = 0.5 * self.kappa * self.growth.powi(2);
+        let density = with_hyperelastic!(self.law, |of| of.energy(self.invariants()), {
+            let squares = product(&self.strain, &self.strain);
+            0.5 * self.lambda * self.trace().powi(2) + self.mu * squares
+        });
+        self.volume * (density + swollen)
     }
 
-    /// How the energy, and beside it that of the load, change where the edges become longer by this, J, and the volume, m³, to the last digits
-    /// of the changes.
-    pub fn change(&self, rest: &Rest, more: DMat3) -> [f64; 3] {
+    /// I1, I2 and J - 1.
+    fn invariants(&self) -> [f64; 3] {
+        let squares = |matrix: &DMat3| product(matrix, matrix);
+        [squares(&self.gradient), squares(&self.cofactors), self.growth]
+    }
+
+    /// How the energy of the strain and of the volume, and beside them that of the load, change where the edges become longer by this, J, and the
+    /// volume, m³, to the last digits of the changes.
+    pub fn change(&self, rest: &Rest, more: DMat3) -> [f64; 4] {
         let more = more * rest.inverse;
         let [a, b, c] = [more.x_axis, more.y_axis, more.z_axis];
         let cofactors = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
@@ -261,20 +296,40 @@ impl Deformed {
         let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
         let growth = product(&self.cofactors, &more) + product(&self.gradient, &cofactors) + more.determinant();
         let both = self.strain * 2.0 + strain;
-        let elastic = 0.5 * self.lambda * trace * (2.0 * self.trace() + trace) + self.mu * product(&both, &strain);
-        let energy = elastic + 0.5 * self.kappa * growth * (2.0 * self.growth + growth);
+        let swollen = 0.5 * self.kappa * growth * (2.0 * self.growth + growth);
+        let [of_strain, of_volume] = with_hyperelastic!(
+            self.law,
+            |of| {
+                let areas = matrix(product_of(columns(&self.gradient), columns(&more))) + cofactors;
+                let more_i1 = 2.0 * product(&self.gradient, &more) + product(&more, &more);
+                let more_i2 = 2.0 * product(&self.cofactors, &areas) + product(&areas, &areas);
+                let [of_i1, of_i2, of_volume] = of.change(self.invariants(), [more_i1, more_i2, growth]);
+                [of_i1 + of_i2, of_volume + swollen]
+            },
+            {
+                let elastic =
+                    0.5 * self.lambda * trace * (2.0 * self.trace() + trace) + self.mu * product(&both, &strain);
+                [elastic + swollen, 0.0]
+            }
+        );
         let of_load = product(&self.load.stress, &strain) + self.load.pressure * growth;
-        [energy, of_load, growth].map(|change| self.volume * change)
+        [of_strain, of_volume, of_load, growth].map(|change| self.volume * change)
     }
 
     /// The force on a corner whose function has this gradient, N.
     pub fn force(&self, gradient: DVec3) -> DVec3 {
+        if let Some(strained) = self.strained() {
+            return -(matrix(strained.stress()) * gradient) * self.volume;
+        }
         let stress = self.gradient * self.stress() + self.cofactors * self.pressure;
         -(stress * gradient) * self.volume
     }
 
     /// How much the force on one corner lessens with the place of another, N/m, by the gradients of their functions.
     pub fn stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
+        if let Some(strained) = self.strained() {
+            return self.stiffness_of(&strained, 0.0, [a, b]);
+        }
         let v = self.gradient * a.cross(b);
         let turned = DMat3::from_cols(
             DVec3::new(0.0, -v.z, v.y),
@@ -286,6 +341,10 @@ impl Deformed {
 
     /// The same, positive semidefinite: pressure pushes nothing sideways.
     pub fn clamped_stiffness(&self, a: DVec3, b: DVec3) -> DMat3 {
+        if let Some(strained) = self.strained() {
+            let (strained, lift) = strained.positive();
+            return self.stiffness_of(&strained, lift, [a, b]);
+        }
         let stress = self.stress();
         let [x, y, z] = [stress.x_axis, stress.y_axis, stress.z_axis].map(DVec3::abs);
         // Gershgorin's bound on the lowest eigenvalue.
@@ -296,6 +355,15 @@ impl Deformed {
         ];
         let lift = lift.into_iter().fold(0.0, f64::max);
         self.stiffness_under(stress + DMat3::from_diagonal(DVec3::splat(lift)), a, b)
+    }
+
+    /// That of a hyperelastic law with this lift.
+    fn stiffness_of(&self, strained: &Strained<f64>, lift: f64, [a, b]: [DVec3; 2]) -> DMat3 {
+        let column = |axis: DVec3| {
+            let change = columns(&outer(axis, b));
+            matrix(strained.stress_change(change, lift)) * a * self.volume
+        };
+        DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))
     }
 
     fn stiffness_under(&self, stress: DMat3, a: DVec3, b: DVec3) -> DMat3 {
@@ -320,6 +388,14 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
+fn columns(matrix: &DMat3) -> Columns<f64> {
+    matrix.to_cols_array_2d()
+}
+
+fn matrix(columns: Columns<f64>) -> DMat3 {
+    DMat3::from_cols_array_2d(&columns)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -332,8 +408,13 @@ mod tests {
     #[test]
     fn forces_and_stiffnesses_are_derivatives_of_the_energy() {
         let mut random = Random(5);
-        for nu in [0.0, 0.3, 0.39] {
-            let law = Law::new(5000.0, nu);
+        let forms = [
+            ElementLaw::StVenantKirchhoff,
+            ElementLaw::NeoHookean,
+            ElementLaw::MooneyRivlin { ratio: 0.3 },
+        ];
+        for (nu, form) in [0.0, 0.3, 0.39].into_iter().flat_map(|nu| forms.map(|form| (nu, form))) {
+            let law = Law::new(5000.0, nu, form);
             for _ in 0..20 {
                 let rest = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
                 if rest.determinant().abs() < 0.1 {
@@ -350,7 +431,8 @@ mod tests {
                 let more = DMat3::from_cols(vector(&mut random), vector(&mut random), vector(&mut random));
                 let [a, b, c, d] = corners;
                 let then = [a, b + more.x_axis, c + more.y_axis, d + more.z_axis];
-                let [change, _, growth] = at(corners).change(&rest, more);
+                let [of_strain, of_volume, _, growth] = at(corners).change(&rest, more);
+                let change = of_strain + of_volume;
                 let grown = at(then).swelling() - at(corners).swelling();
                 assert!((growth - grown).abs() < 1e-12 * (1.0 + grown.abs()), "{growth} {grown}");
                 let expected = at(then).energy() - size;

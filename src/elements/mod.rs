@@ -6,6 +6,7 @@
 
 mod cut;
 mod law;
+mod laws;
 mod offsets;
 mod parts;
 mod past;
@@ -300,8 +301,13 @@ impl Elements {
         );
         team.pass(parts.len(), written, |part, (copies, energy)| {
             let part = &parts[part];
-            part.copy(positions, copies);
-            *energy = part.groups.energy(kernel, law, copies);
+            *energy = if law.is_hyperelastic() {
+                // The stress at rest is a difference, of which an f32 leaves nothing of a small energy.
+                part.exact_energy(law, positions)
+            } else {
+                part.copy(positions, copies);
+                part.groups.energy(kernel, law, copies)
+            };
         });
         let elastic = of_rings + sums.of_parts.iter().sum::<f64>();
         elastic + self.energy_of_arms(kernel, positions, team)

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::cut::{PieceOfElement, Place};
-use super::law::Rest;
+use super::law::{Deformed, Law, Rest};
 use super::tetrahedra::{GROUP, Group, Groups};
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
@@ -125,6 +125,19 @@ impl Part {
                 see(self.nodes_of(index, lane), &rest, [index, lane]);
             }
         }
+    }
+
+    /// The energy of its tetrahedra with nodes at `positions`, without that of rings, J.
+    pub fn exact_energy(&self, law: Law, positions: &[Record]) -> f64 {
+        let mut energy = 0.0;
+        self.visit(&mut |corners, rest, _| {
+            let [a, b, c, d] = corners.map(|node| {
+                let Record([x, y, z, _]) = positions[node as usize];
+                DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+            });
+            energy += Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).energy();
+        });
+        energy
     }
 
     /// The way a tetrahedron is at rest.

@@ -6,9 +6,12 @@
 //! which that inverse is upper triangular, six numbers instead of nine.
 #![allow(unsafe_code)]
 
+mod hyperelastic;
+
 use std::ops::Range;
 
 use crate::codec::saved;
+use crate::elements::laws::with_hyperelastic;
 use crate::elements::{LEAST_SHEAR, Law};
 use crate::simd::algebra::{
     Matrix, Six, add_times, cross, difference, dot, largest, scaled_matrix, scaled_six, sum, sum_six, times_lower,
@@ -170,12 +173,20 @@ impl Groups {
     ) -> f32 {
         assert!(loads.is_empty() || loads.len() == self.groups.len());
         let of = self.checked(positions, sums);
-        match (law.rings, loads) {
-            (true, []) => kernel.run_with_lanes(Forces::<true, false> { law, loads, of }),
-            (false, []) => kernel.run_with_lanes(Forces::<false, false> { law, loads, of }),
-            (true, _) => kernel.run_with_lanes(Forces::<true, true> { law, loads, of }),
-            (false, _) => kernel.run_with_lanes(Forces::<false, true> { law, loads, of }),
-        }
+        with_hyperelastic!(
+            law,
+            |form| if law.rings {
+                kernel.run_with_lanes(hyperelastic::Forces::<_, true> { law, form, of })
+            } else {
+                kernel.run_with_lanes(hyperelastic::Forces::<_, false> { law, form, of })
+            },
+            match (law.rings, loads) {
+                (true, []) => kernel.run_with_lanes(Forces::<true, false> { law, loads, of }),
+                (false, []) => kernel.run_with_lanes(Forces::<false, false> { law, loads, of }),
+                (true, _) => kernel.run_with_lanes(Forces::<true, true> { law, loads, of }),
+                (false, _) => kernel.run_with_lanes(Forces::<false, true> { law, loads, of }),
+            }
+        )
     }
 
     /// Adds how these forces change where nodes go these ways, to first order, N.
@@ -191,12 +202,20 @@ impl Groups {
         assert!(loads.is_empty() || loads.len() == self.groups.len());
         let ways = ways.as_ptr();
         let of = self.checked(positions, sums);
-        match (law.rings, loads) {
-            (true, []) => kernel.run_with_lanes(Changes::<true, false> { law, loads, ways, of }),
-            (false, []) => kernel.run_with_lanes(Changes::<false, false> { law, loads, ways, of }),
-            (true, _) => kernel.run_with_lanes(Changes::<true, true> { law, loads, ways, of }),
-            (false, _) => kernel.run_with_lanes(Changes::<false, true> { law, loads, ways, of }),
-        }
+        with_hyperelastic!(
+            law,
+            |form| if law.rings {
+                kernel.run_with_lanes(hyperelastic::Changes::<_, true> { law, form, ways, of });
+            } else {
+                kernel.run_with_lanes(hyperelastic::Changes::<_, false> { law, form, ways, of });
+            },
+            match (law.rings, loads) {
+                (true, []) => kernel.run_with_lanes(Changes::<true, false> { law, loads, ways, of }),
+                (false, []) => kernel.run_with_lanes(Changes::<false, false> { law, loads, ways, of }),
+                (true, _) => kernel.run_with_lanes(Changes::<true, true> { law, loads, ways, of }),
+                (false, _) => kernel.run_with_lanes(Changes::<false, true> { law, loads, ways, of }),
+            }
+        );
     }
 
     /// Writes the stresses of the tetrahedra, without pressures where those are of rings.

@@ -55,7 +55,14 @@ impl Made {
         material.check_poisson_ratio(&elements)?;
         let (springs, law) = match material.model {
             Model::Springs => (Some(springs::of(&elements, material.young_modulus, definition)?), None),
-            Model::Tetrahedra => (None, Some(Law::new(material.young_modulus, material.poisson_ratio))),
+            Model::Tetrahedra => (
+                None,
+                Some(Law::new(
+                    material.young_modulus,
+                    material.poisson_ratio,
+                    definition.element_law,
+                )),
+            ),
         };
         let masses = match material.density {
             0.0 => None,

@@ -118,6 +118,11 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
+    unsafe fn divide(self, other: Self) -> Self {
+        Self(unsafe { _mm256_div_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
         Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, summand.0) })
     }

@@ -124,6 +124,11 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
+    unsafe fn divide(self, other: Self) -> Self {
+        Self(unsafe { _mm512_div_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
         Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, summand.0) })
     }

@@ -69,6 +69,8 @@ pub(crate) trait Lanes: Copy {
 
     unsafe fn multiply(self, other: Self) -> Self;
 
+    unsafe fn divide(self, other: Self) -> Self;
+
     /// `self * factor + summand`
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self;
 

@@ -13,12 +13,14 @@ mod neon;
 mod portable;
 mod prefetch;
 mod range;
+mod real;
 
 pub(crate) use lanes::Lanes;
 pub(crate) use link_batches::{EightLinks, Eights, Sight, WithEights};
 pub(crate) use prefetch::prefetch;
 pub(crate) use range::Range;
 use range::Ranges;
+pub(crate) use real::{InLanes, Real};
 
 use crate::base::{Error, Result};
 

@@ -111,6 +111,11 @@ impl Lanes for NeonLanes {
     }
 
     #[inline(always)]
+    unsafe fn divide(self, other: Self) -> Self {
+        Self(unsafe { vdivq_f32(self.0, other.0) })
+    }
+
+    #[inline(always)]
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
         Self(unsafe { vfmaq_f32(summand.0, self.0, factor.0) })
     }

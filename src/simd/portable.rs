@@ -91,6 +91,11 @@ impl Lanes for PortableLanes {
     }
 
     #[inline(always)]
+    unsafe fn divide(self, other: Self) -> Self {
+        Self(from_fn(|lane| self.0[lane] / other.0[lane]))
+    }
+
+    #[inline(always)]
     unsafe fn multiply_add(self, factor: Self, summand: Self) -> Self {
         Self(from_fn(|lane| self.0[lane] * factor.0[lane] + summand.0[lane]))
     }

@@ -447,6 +447,7 @@ static sinew_tool_def good_tool(uint32_t shape)
     def.shape = shape;
     def.radius = 0.1f;
     def.half_length = 0.2f;
+    def.half_extents[0] = def.half_extents[1] = def.half_extents[2] = 0.1f;
     if (shape == SINEW_SHAPE_PLANE)
         def.radius = def.half_length = 0.0f;
     if (shape == SINEW_SHAPE_MESH) {
@@ -467,13 +468,14 @@ static sinew_tool_def good_tool(uint32_t shape)
 
 static void tool_definitions_unspoiled(void)
 {
-    static const uint32_t shapes[] = {SINEW_SHAPE_SPHERE, SINEW_SHAPE_CAPSULE, SINEW_SHAPE_PLANE, SINEW_SHAPE_MESH};
+    static const uint32_t shapes[] = {SINEW_SHAPE_SPHERE, SINEW_SHAPE_CAPSULE, SINEW_SHAPE_PLANE, SINEW_SHAPE_MESH,
+                                      SINEW_SHAPE_BOX};
     const sinew_world_def world_def = good_world();
     sinew_world *world = NULL;
     sinew_tool_id tool;
     int i;
     MUST(sinew_world_create(&world_def, &world));
-    for (i = 0; i < 4; i++) {
+    for (i = 0; i < 5; i++) {
         const sinew_tool_def def = good_tool(shapes[i]);
         MUST(sinew_tool_create(world, &def, &tool));
     }
@@ -494,7 +496,11 @@ static void tool_definitions(void)
                   sinew_tool_create(the.world, &def, &out.tool));
     TOOL(SPHERE, INVALID, "reserved0", def.reserved0 = 1);
     TOOL(SPHERE, INVALID, "reserved", def.reserved = 1);
-    TOOL(SPHERE, INVALID, "shape", def.shape = 4);
+    TOOL(BOX, INVALID, "reserved1", def.reserved1 = 1);
+    TOOL(BOX, INVALID, "half_extents[0] is 0", def.half_extents[0] = 0.0f);
+    TOOL(BOX, INVALID, "half_extents[1] is -1", def.half_extents[1] = -1.0f);
+    TOOL(BOX, INVALID, "half_extents[2] is 10000000000", def.half_extents[2] = 1e10f);
+    TOOL(SPHERE, INVALID, "shape", def.shape = 5);
     TOOL(SPHERE, INVALID, "shape", def.shape = UINT32_MAX);
     TOOL(SPHERE, INVALID, "detection", def.detection = 3);
     TOOL(SPHERE, INVALID, "detection", def.detection = UINT32_MAX);

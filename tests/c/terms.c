@@ -162,6 +162,14 @@ static void what_is_wrong_is_named(void)
     refused(def, "spring_steepness is 3");
     def = a_tetrahedron(), def.spring_law = SINEW_SPRING_LAW_EXPONENTIAL, def.spring_cubic = 1.0f;
     refused(def, "spring_cubic is 1");
+    def = a_tetrahedron(), def.element_law = 3;
+    refused(def, "element_law is 3");
+    def = a_tetrahedron(), def.element_law = SINEW_ELEMENT_LAW_NEO_HOOKEAN;
+    refused(def, "element_law is SINEW_ELEMENT_LAW_NEO_HOOKEAN");
+    def = a_tetrahedron(), def.mooney_ratio = 0.25f;
+    refused(def, "mooney_ratio is 0.25");
+    def = a_tetrahedron(), def.element_law = SINEW_ELEMENT_LAW_MOONEY_RIVLIN, def.mooney_ratio = 1.25f;
+    refused(def, "mooney_ratio is 1.25");
     def = a_tetrahedron(), def.fibre_directions = too_long;
     refused(def, "fibre_directions[0]");
     def = a_tetrahedron(), def.fibre_stiffness = 5.0f;

@@ -2,7 +2,8 @@
 
 use crate::support::tissue::*;
 use glam::{Quat, Vec3};
-use sinew::Shape;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model, Shape, Solver};
 
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 const SIZE: f32 = 0.2;
@@ -133,6 +134,59 @@ fn capsules_lie_in_the_cloth() {
             press(dt, cells, shape, radius, lying, Vec3::new(0.011, 0.0, -0.007), 0.03);
         }
     }
+}
+
+#[test]
+fn a_box_on_a_block_feels_what_theory_gives_at_rest() {
+    const SIDE: f32 = 0.04;
+    const STRAIN: f32 = 2e-3;
+    let mesh = Mesh::block([SIDE; 3], [4; 3]).expect("a block");
+    let definition = BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(Material {
+            model: Model::Tetrahedra,
+            young_modulus: 5000.0,
+            poisson_ratio: 0.3,
+            density: 1000.0,
+            ..Material::default()
+        }),
+        solver: Solver::Newton,
+        ..BodyDefinition::default()
+    };
+    let mut world = world(Vec3::ZERO);
+    let block = world.create_body(&definition).expect("a body");
+    // Held so that it may get wider: along y at its lower side, along x and z at one side each.
+    for (node, rest) in (0..).zip(&mesh.positions) {
+        let held = rest.to_array().map(|at| at < -0.499 * SIDE);
+        if held.contains(&true) {
+            world
+                .body_mut(block)
+                .expect("the body")
+                .pin_axes(node, held)
+                .expect("a node");
+        }
+    }
+    let half_extents = Vec3::new(0.05, 0.01, 0.06);
+    let above = Vec3::Y * (0.5 * SIDE + 0.01);
+    let tip = tool(
+        &mut world,
+        Shape::Box { half_extents },
+        0.0,
+        above + Vec3::Y * 1e-4,
+        Quat::IDENTITY,
+    );
+    world
+        .set_pose(tip, above - Vec3::Y * STRAIN * SIDE, None)
+        .expect("a pose");
+    for _ in 0..100 {
+        world.step(0.1).expect("a step");
+    }
+    let (force, torque) = world.wrench(tip).expect("a tool");
+    let expected = 5000.0 * STRAIN * SIDE * SIDE;
+    assert!((force.y / expected - 1.0).abs() < 0.01, "{force}, {expected} of theory");
+    assert!(force.x.abs() + force.z.abs() < 1e-3 * expected, "{force}");
+    assert!(torque.length() < 1e-2 * expected * SIDE, "{torque}");
 }
 
 #[test]

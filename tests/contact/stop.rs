@@ -98,6 +98,12 @@ fn what_a_tool_stops_short_of_stays_at_rest() {
     let tips = [
         exact(Shape::Sphere { radius: 0.02 }, 0.02),
         exact(capsule, 0.03),
+        exact(
+            Shape::Box {
+                half_extents: Vec3::new(0.015, 0.011, 0.02),
+            },
+            0.011,
+        ),
         exact(mesh(&round), -lowest),
         exact(mesh(&block), 0.01),
         sampled(Detection::DistanceField),

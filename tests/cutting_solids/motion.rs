@@ -6,8 +6,8 @@ use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::mesh::boundary;
 use sinew::{
-    BladeDefinition, Body, BodyDefinition, BodyId, Material, Model, Solver, Storage, Values, Viscosity, World,
-    WorldDefinition,
+    BladeDefinition, Body, BodyDefinition, BodyId, ElementLaw, Material, Model, Solver, Storage, Values, Viscosity,
+    World, WorldDefinition,
 };
 
 use super::block::{Mesh, Random, shaken, upright};
@@ -24,9 +24,11 @@ pub enum Matter {
     ViscousRings,
     /// Elements with fibres, and a skin that bends.
     Fibres,
+    NeoHookean,
+    MooneyRivlinRings,
 }
 
-const MATTER: [Matter; 7] = [
+const MATTER: [Matter; 9] = [
     Matter::Springs,
     Matter::Elements,
     Matter::Viscous,
@@ -34,6 +36,8 @@ const MATTER: [Matter; 7] = [
     Matter::Rings,
     Matter::ViscousRings,
     Matter::Fibres,
+    Matter::NeoHookean,
+    Matter::MooneyRivlinRings,
 ];
 
 pub const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
@@ -71,7 +75,7 @@ fn made(matter: Matter, solver: Solver, storage: Storage, gravity: Vec3) -> (Wor
         young_modulus: 3000.0,
         poisson_ratio: match matter {
             Matter::Rings => 0.49,
-            Matter::ViscousRings => 0.45,
+            Matter::ViscousRings | Matter::MooneyRivlinRings => 0.45,
             _ => 0.3,
         },
         ..Default::default()
@@ -94,6 +98,16 @@ fn made(matter: Matter, solver: Solver, storage: Storage, gravity: Vec3) -> (Wor
         },
         Matter::Elements | Matter::Rings => BodyDefinition {
             material: Some(elements),
+            ..definition
+        },
+        Matter::NeoHookean => BodyDefinition {
+            material: Some(elements),
+            element_law: ElementLaw::NeoHookean,
+            ..definition
+        },
+        Matter::MooneyRivlinRings => BodyDefinition {
+            material: Some(elements),
+            element_law: ElementLaw::MooneyRivlin { ratio: 0.3 },
             ..definition
         },
         Matter::Viscous | Matter::ViscousRings => BodyDefinition {

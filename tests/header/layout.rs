@@ -10,7 +10,7 @@ const LAYOUT: &str = include_str!("layout.txt");
 const OVERVIEW: &str = include_str!("overview.txt");
 
 /// Constants that C has as an enumeration: its name, the prefix of its constants and its comment.
-const ENUMS: [(&str, &str, &str); 12] = [
+const ENUMS: [(&str, &str, &str); 13] = [
     (
         "sinew_status_code",
         "SINEW_STATUS_",
@@ -36,6 +36,11 @@ const ENUMS: [(&str, &str, &str); 12] = [
         "sinew_spring_law",
         "SINEW_SPRING_LAW_",
         "Force law of springs under a strain e.",
+    ),
+    (
+        "sinew_element_law",
+        "SINEW_ELEMENT_LAW_",
+        "Hyperelastic law of finite elements.",
     ),
     (
         "sinew_preset",

@@ -4,6 +4,7 @@
 mod support;
 
 mod enclosed;
+mod laws;
 mod meshes;
 mod recovery;
 mod region;

@@ -4,8 +4,8 @@ use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, Detection, Material, Model, Shape, Sleep, Solver, SpringLaw, Storage, Tearing,
-    ToolDefinition, ToolId, Values, Viscosity, World, WorldDefinition, Yielding,
+    BodyContact, BodyDefinition, BodyId, Detection, ElementLaw, Material, Model, Shape, Sleep, Solver, SpringLaw,
+    Storage, Tearing, ToolDefinition, ToolId, Values, Viscosity, World, WorldDefinition, Yielding,
 };
 
 /// A block of tissue or a sheet, held at some nodes, and a tool that comes down on it.
@@ -34,7 +34,7 @@ const FIBRES: [Vec3; 300] = [Vec3::X; 300];
 type Change = fn(&mut BodyDefinition);
 
 /// What a block has beside springs.
-const OF_BLOCKS: [(&str, Change); 15] = [
+const OF_BLOCKS: [(&str, Change); 17] = [
     ("PACKED", |_| ()),
     ("EFFICIENT", |body| body.storage = Storage::Efficient),
     ("FAST_LINK", |body| {
@@ -51,6 +51,17 @@ const OF_BLOCKS: [(&str, Change); 15] = [
             poisson_ratio: 0.45,
             ..ELEMENTS
         })
+    }),
+    ("neo-Hookean elements", |body| {
+        body.material = Some(ELEMENTS);
+        body.element_law = ElementLaw::NeoHookean;
+    }),
+    ("elements of Mooney and Rivlin", |body| {
+        body.material = Some(Material {
+            poisson_ratio: 0.45,
+            ..ELEMENTS
+        });
+        body.element_law = ElementLaw::MooneyRivlin { ratio: 0.3 };
     }),
     ("elements that creep", |body| {
         body.material = Some(ELEMENTS);

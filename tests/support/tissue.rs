@@ -334,6 +334,7 @@ pub fn penetration(body: &Body, shape: Shape, pose: Pose) -> f64 {
                 .fold(f64::INFINITY, f64::min);
             return -lowest;
         }
+        Shape::Box { half_extents } => return penetration_of_box(body, half_extents.as_dvec3(), pose),
         Shape::Mesh { .. } => unreachable!("the tests of meshes look for themselves"),
     };
     let nodes = body
@@ -349,6 +350,24 @@ pub fn penetration(body: &Body, shape: Shape, pose: Pose) -> f64 {
         }
     });
     f64::from(radius) - nodes.chain(faces).fold(f64::INFINITY, f64::min)
+}
+
+/// How deep points of the surface of a body, eight along each side of a triangle, lie in a box; negative where they are clear.
+fn penetration_of_box(body: &Body, half_extents: DVec3, pose: Pose) -> f64 {
+    const SAMPLES: u32 = 8;
+    let turned = pose.orientation.as_dquat().inverse();
+    let mut deepest = f64::NEG_INFINITY;
+    for &triangle in body.surface() {
+        let [a, b, c] = corners(body, triangle).map(|corner| turned * (corner - pose.position.as_dvec3()));
+        for i in 0..=SAMPLES {
+            for j in 0..=SAMPLES - i {
+                let [u, v] = [i, j].map(|part| f64::from(part) / f64::from(SAMPLES));
+                let point = a + (b - a) * u + (c - a) * v;
+                deepest = deepest.max((half_extents - point.abs()).min_element());
+            }
+        }
+    }
+    deepest
 }
 
 /// How deep a body lies in a tool of a world.

@@ -67,6 +67,8 @@ public unsafe struct BodyDef
     public float toughness, tear_strain, tear_force;
     public uint most_tears;
     public float smallest_piece, sleep_speed, sleep_time;
+    public uint element_law;
+    public float mooney_ratio;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -93,6 +95,8 @@ public unsafe struct ToolDef
     public uint reserved;
     public float resolution, force_limit;
     public uint collision_category, collision_mask;
+    public fixed float half_extents[3];
+    public uint reserved1;
 }
 
 [StructLayout(LayoutKind.Sequential)]

@@ -189,8 +189,9 @@ impl Equation {
         for element in network.tetrahedra() {
             let tetrahedron = element.of;
             let more = edges(&tetrahedron.corners, |node| corrections[node] * part);
-            let [elastic, of_load, _] = self.deformed(&element).change(&tetrahedron.rest, more);
-            add(elastic);
+            let [of_strain, of_volume, of_load, _] = self.deformed(&element).change(&tetrahedron.rest, more);
+            add(of_strain);
+            add(of_volume);
             add(of_load);
         }
         for node in 0..network.ring_count() {
@@ -200,7 +201,7 @@ impl Equation {
                 let deformed = self.deformed(&element);
                 growth += 0.25 * deformed.swelling();
                 let longer = edges(&tetrahedron.corners, |node| corrections[node] * part);
-                more += 0.25 * deformed.change(&tetrahedron.rest, longer)[2];
+                more += 0.25 * deformed.change(&tetrahedron.rest, longer)[3];
             }
             let volume = network.volumes[node];
             if volume > 0.0 {

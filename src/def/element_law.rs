@@ -1,0 +1,60 @@
+//! The law of tetrahedra that are elements.
+
+use crate::base::{Error, Result};
+use crate::codec::saved_enum;
+
+/// The hyperelastic law of tetrahedra that are elements. All have the Young's modulus and Poisson's ratio of the material at small strains.
+///
+/// Of F, the deformation, energies have `I1 = |F|²`, `I2 = |cof F|²` and `J = det F`. All have `lambda/2 (J - 1)²` beside what is given here, of all
+/// tetrahedra at a node together from a Poisson's ratio of 0.4 on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum ElementLaw {
+    /// St Venant and Kirchhoff's law with a signed volume term: the fastest. It stiffens as it is stretched.
+    #[default]
+    StVenantKirchhoff,
+    /// The stable neo-Hookean law (Smith, de Goes, Kim 2018): `2/3 mu (I1 - 3 - ln((I1 + 1)/4)) - mu (J - 1) + 5/12 mu (J - 1)²`.
+    NeoHookean,
+    /// Mooney and Rivlin's law for any J: `c1 (I1 - 3) + c2 (I2 - 3) - (2 c1 + 4 c2)(J - 1) + c1 (J - 1)²`, with `c1 + c2 = mu/2`.
+    MooneyRivlin {
+        /// `c2 / (c1 + c2)`, from 0 to 1.
+        ratio: f32,
+    },
+}
+
+saved_enum!(ElementLaw { 0 => StVenantKirchhoff, 1 => NeoHookean, 2 => MooneyRivlin { ratio } });
+
+impl ElementLaw {
+    /// Its name in C.
+    fn name(self) -> &'static str {
+        match self {
+            Self::StVenantKirchhoff => "SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF",
+            Self::NeoHookean => "SINEW_ELEMENT_LAW_NEO_HOOKEAN",
+            Self::MooneyRivlin { .. } => "SINEW_ELEMENT_LAW_MOONEY_RIVLIN",
+        }
+    }
+
+    /// Refuses a number out of its range, and what only the default law can have: what else a body has is told by name and value.
+    pub(crate) fn check(self, is_of_elements: bool, refused: [(&str, f32); 2]) -> Result<()> {
+        if let Self::MooneyRivlin { ratio } = self
+            && !(0.0..=1.0).contains(&ratio)
+        {
+            return Err(Error::invalid(format!("mooney_ratio is {ratio}: must be from 0 to 1")));
+        }
+        if self == Self::default() {
+            return Ok(());
+        }
+        let name = self.name();
+        if !is_of_elements {
+            return Err(Error::invalid(format!(
+                "element_law is {name}, and material is not SINEW_MATERIAL_TETRAHEDRA: there are no elements"
+            )));
+        }
+        match refused.into_iter().find(|(_, value)| *value != 0.0) {
+            None => Ok(()),
+            Some((other, value)) => Err(Error::invalid(format!(
+                "{other} is {value} while element_law is {name}: must be 0, only elements of {} have it",
+                Self::default().name()
+            ))),
+        }
+    }
+}

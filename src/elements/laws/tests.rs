@@ -1,0 +1,123 @@
+use super::*;
+use crate::random::Random;
+
+fn matrix(random: &mut Random, size: f64) -> Columns<f64> {
+    [[0; 3]; 3].map(|column| column.map(|_| size * (2.0 * f64::from(random.unit()) - 1.0)))
+}
+
+fn sum(a: Columns<f64>, b: Columns<f64>, factor: f64) -> Columns<f64> {
+    std::array::from_fn(|column| std::array::from_fn(|row| a[column][row] + factor * b[column][row]))
+}
+
+const IDENTITY: Columns<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Near rest, large deformations, flat ones, and what is inverted.
+fn deformations(random: &mut Random) -> Vec<Columns<f64>> {
+    let mut all = Vec::new();
+    for size in [0.0, 1e-3, 0.1, 0.5, 1.0, 2.0] {
+        for _ in 0..100 {
+            all.push(sum(IDENTITY, matrix(random, size), 1.0));
+            let mut other = sum(IDENTITY, matrix(random, 0.3 * size), 1.0);
+            let factor = f64::from(random.unit()) * 2.0 - 1.0;
+            other[2] = other[2].map(|entry| entry * factor);
+            all.push(other);
+        }
+    }
+    all
+}
+
+fn invariants(gradient: Columns<f64>) -> [f64; 3] {
+    let strained = Strained::new(NeoHookean::new(1.0), gradient, 0.0);
+    let i2 = inner(strained.cofactors, strained.cofactors);
+    [strained.i1, i2, strained.growth]
+}
+
+fn density(law: impl Hyperelastic, gradient: Columns<f64>, kappa: f64) -> f64 {
+    let [i1, i2, growth] = invariants(gradient);
+    law.energy([i1, i2, growth]) + 0.5 * kappa * growth * growth
+}
+
+/// A law, and its mu.
+fn check(law: impl Hyperelastic) {
+    const STEP: f64 = 1e-5;
+    let mut random = Random(3);
+    for kappa in [0.0, 1.5, 30.0] {
+        let (least, most) = (1.0 / (kappa + 2.0 / 3.0), 1.0 / (kappa + 2.0));
+        let rest = Strained::new(law, IDENTITY, kappa);
+        // Nothing is lifted at rest, and the bound is near what it bounds there.
+        let (at_rest, lift) = rest.positive();
+        let lost = sum(at_rest.stress(), rest.stress(), -1.0);
+        assert!(lift < 1e-12 && inner(lost, lost) < 1e-12, "{lift} {lost:?}");
+        let stiffening = rest.stiffening(least, most);
+        assert!((1.0..1.3).contains(&stiffening), "{stiffening}");
+        for gradient in deformations(&mut random) {
+            let at = Strained::new(law, gradient, kappa);
+            let size = 1.0 + kappa + inner(at.stress(), at.stress()).sqrt();
+            let size = size * (1.0 + at.i1);
+            let change = matrix(&mut random, 1.0);
+            let moved = |by: f64| sum(gradient, change, by);
+            let slope = (density(law, moved(STEP), kappa) - density(law, moved(-STEP), kappa)) / (2.0 * STEP);
+            assert!((inner(at.stress(), change) - slope).abs() < 1e-7 * size);
+            let [more, less] = [STEP, -STEP].map(|by| Strained::new(law, moved(by), kappa).stress());
+            let slope = sum(more, less, -1.0);
+            let tangent = at.stress_change(change, 0.0);
+            let error = sum(tangent, slope, -0.5 / STEP);
+            assert!(inner(error, error).sqrt() < 1e-7 * size, "{error:?}");
+            // Nothing of it is negative with the lift, and rotations at rest cost nothing.
+            let (positive, lift) = at.positive();
+            for _ in 0..20 {
+                let change = matrix(&mut random, 1.0);
+                let form = inner(positive.stress_change(change, lift), change);
+                assert!(form > -1e-9 * size, "{form} {lift} {gradient:?}");
+            }
+            // No corner of a regular tetrahedron or of a needle is stiffer than the bound.
+            let stiffening = at.stiffening(least, most);
+            for shear in [1.0 / 3.0, 1.0] {
+                for _ in 0..20 {
+                    check_bound(&at, &mut random, stiffening * (kappa + 2.0 * shear), shear);
+                }
+            }
+        }
+    }
+}
+
+/// The form of any ways of corners is at most c sum |g|² |u|² / p, with the gradients of a tetrahedron of which shear counts as this part.
+fn check_bound(at: &Strained<f64>, random: &mut Random, most: f64, shear: f64) {
+    let regular = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+    let needle = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]];
+    let gradients: [[f64; 3]; 4] = if shear < 0.5 { regular } else { needle };
+    let sizes = gradients.map(|gradient| gradient.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let all: f64 = sizes.iter().sum();
+    let (mut change, mut bound) = ([[0.0; 3]; 3], 0.0);
+    for (gradient, size) in gradients.into_iter().zip(sizes) {
+        let [way, ..] = matrix(random, 1.0);
+        for (column, along) in change.iter_mut().zip(gradient) {
+            for (entry, way) in column.iter_mut().zip(way) {
+                *entry += way * along;
+            }
+        }
+        bound += most * size * all * way.iter().map(|x| x * x).sum::<f64>();
+    }
+    let form = inner(at.stress_change(change, 0.0), change);
+    assert!(form <= bound * (1.0 + 1e-9), "{form} {bound} {:?}", at.gradient);
+}
+
+#[test]
+fn stresses_and_tangents_are_derivatives_and_their_bounds_hold() {
+    check(NeoHookean::new(1.0));
+    for ratio in [0.0, 0.3, 1.0] {
+        check(MooneyRivlin::new(1.0, ratio));
+    }
+}
+
+#[test]
+fn small_strains_are_those_of_the_shear_modulus_alone() {
+    fn check(law: impl Hyperelastic) {
+        let strain = [[2e-5, 1e-5, -3e-5], [1e-5, -1e-5, 2e-5], [-3e-5, 2e-5, 4e-5]];
+        let stress = Strained::new(law, sum(IDENTITY, strain, 1.0), 0.0).stress();
+        let error = sum(stress, strain, -2.0);
+        assert!(inner(error, error).sqrt() < 2e-8, "{error:?}");
+    }
+    check(NeoHookean::new(1.0));
+    check(MooneyRivlin::new(1.0, 0.4));
+}
