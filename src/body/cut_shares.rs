@@ -68,13 +68,20 @@ mod tests {
 
     #[test]
     fn pieces_get_what_they_need_and_keep_what_all_have() {
-        let piece = |part| PieceOfNode { node: 0, source: 0, part };
+        let piece = |part| PieceOfNode {
+            node: 0,
+            source: 0,
+            part,
+        };
         let mut pieces = [0.01, 0.5, 0.49].map(piece);
         share(&mut pieces, &[0.2, 0.3, 0.4]);
         let parts = pieces.map(|piece| piece.part);
         assert!((parts.iter().sum::<f64>() - 1.0).abs() < 1e-15, "{parts:?}");
         assert_eq!(parts[0], 0.2);
-        assert!(parts[1] >= 0.3 && parts[1] < 0.5 && parts[2] >= 0.4 && parts[2] < 0.49, "{parts:?}");
+        assert!(
+            parts[1] >= 0.3 && parts[1] < 0.5 && parts[2] >= 0.4 && parts[2] < 0.49,
+            "{parts:?}"
+        );
         let mut pieces = [0.3, 0.7].map(piece);
         share(&mut pieces, &[0.2, 0.3]);
         assert_eq!(pieces.map(|piece| piece.part), [0.3, 0.7]);
