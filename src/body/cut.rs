@@ -92,8 +92,9 @@ impl Body {
             ..Limits::NONE
         };
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
-        let changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
-        let room = cuttable.stroke.reserve(cuttable.material.most_ends(&changes, &near));
+        let mut changes = cuttable.material.cut(&sweep, self.positions(), &near, limits)?;
+        let shared = self.share_by_stiffness(&cuttable.material, &mut changes);
+        let room = shared.and_then(|()| cuttable.stroke.reserve(cuttable.material.most_ends(&changes, &near)));
         let applied = room.and_then(|()| self.apply(cuttable, skin, (&sweep, &near), &changes, counts));
         match applied {
             Ok(_) => self.stop(cuttable, &sweep, &near, &changes),

@@ -9,6 +9,7 @@ mod change_log;
 mod coarse;
 mod cut;
 mod cut_masses;
+mod cut_shares;
 mod cut_springs;
 mod cuttable;
 mod damping;

@@ -71,7 +71,7 @@ impl Body {
         memory::sort_once(&mut nodes);
         let positions = self.positions();
         let way = solid.way_of(vertex, load, positions)?;
-        let Some(changes) = solid.tear(vertex, load, positions, limits)? else {
+        let Some(mut changes) = solid.tear(vertex, load, positions, limits)? else {
             return Ok(Torn::Not(Withheld::NoWay));
         };
         let least = self.tears.as_ref().map_or(0.0, |tears| tears.smallest_piece());
@@ -81,7 +81,9 @@ impl Body {
             Ok(false)
         };
         let applied = match is_less {
-            Ok(false) => self.apply(cuttable, skin, (&way, &near), &changes, counts),
+            Ok(false) => self
+                .share_by_stiffness(&cuttable.material, &mut changes)
+                .and_then(|()| self.apply(cuttable, skin, (&way, &near), &changes, counts)),
             Ok(true) => {
                 cuttable.material.undo();
                 return Ok(Torn::Not(Withheld::SmallPiece));

@@ -239,6 +239,19 @@ impl Elements {
         }
     }
 
+    /// What a node carries of a tetrahedron at rest, N/m, and the highest bound on the squares of frequencies of its corners, if that is known.
+    pub fn carried_by(&self, cell: u32, node: u32, inverse_masses: &[f32]) -> (f64, f64) {
+        let Some((corners, rest, _)) = self.cell(cell) else {
+            return (0.0, 0.0);
+        };
+        let free = corners.map(|corner| inverse_masses[corner as usize] > 0.0);
+        let carried = super::rates::carried(self.law, &rest, free);
+        let of_node = corners.iter().zip(carried).find(|(corner, _)| **corner == node);
+        let known = corners.iter().filter(|_| self.rates_known);
+        let highest = known.fold(0.0, |most: f32, &corner| most.max(self.carried[corner as usize]));
+        (of_node.map_or(0.0, |(_, carried)| carried), f64::from(highest))
+    }
+
     /// The nodes of a tetrahedron, what it is like at rest, and where it is; `None` where it is none any more.
     pub(super) fn cell(&self, cell: u32) -> Option<([u32; 4], Rest, Place)> {
         let place = *self.cells.as_ref()?.places.get(cell as usize)?;

@@ -32,6 +32,9 @@ const BORDER: f32 = 0.05;
 /// What was behind a face at first, within so many times that depth, belongs to it.
 const BELONGS: f32 = 4.0;
 
+/// Two that were further apart at first than this part of the least thickness were not parted by a cut: what lies between is tissue.
+const APART: f32 = 0.1;
+
 /// How deep behind a face is nothing yet, as a part of the least thickness.
 const NOTHING: f32 = 0.01;
 
@@ -261,7 +264,10 @@ impl Search<'_> {
                     let looks = |along: Vec3| normal.dot(along.normalize_or_zero());
                     let is_behind = looks(out) > SQUARELY && looks(away) < -SQUARELY;
                     let is_deeper = |most: f32, known: [u32; 2]| depth > most || depth == most && other < known;
-                    if is_behind && deepest.is_none_or(|(most, known, ..)| is_deeper(most, known)) {
+                    if is_behind
+                        && deepest.is_none_or(|(most, known, ..)| is_deeper(most, known))
+                        && !skin.were_apart(edge, other, normal)
+                    {
                         deepest = Some((depth, other, found, normal));
                     }
                 }
@@ -291,6 +297,25 @@ impl Skin {
         BORDER * self.short
     }
 
+    /// Whether two edges of the same body were apart at first along a direction from the one to the other: the tissue between them is their own, as
+    /// in a thin wedge between two cuts.
+    fn were_apart(&self, edge: [u32; 2], other: [u32; 2], along: Vec3) -> bool {
+        self.firsts.as_ref().is_some_and(|firsts| {
+            let at = |number: u32| firsts.get(number as usize);
+            let segment = Segment {
+                ends: edge.map(at),
+                steps: [Vec3::ZERO; 2],
+                radius: 0.0,
+            };
+            let corners = Corners {
+                points: [at(other[0]), at(other[1]), Vec3::ZERO],
+                steps: [Vec3::ZERO; 3],
+                count: 2,
+            };
+            corners.separation(&segment, 0.0).offset.dot(along) > APART * self.least_thickness()
+        })
+    }
+
     /// Whether a number was behind a triangle of the same body at first, as near as this, m: the tissue behind it is its own.
     fn was_behind(&self, number: u32, triangle: [u32; 3], near: f32) -> bool {
         self.firsts.as_ref().is_some_and(|firsts| {
@@ -299,7 +324,7 @@ impl Skin {
             let normal = normal(places).normalize_or_zero();
             let from = at(number) - places[0];
             let separation = separation(at(number), places);
-            from.dot(normal) < -self.least_thickness() && separation.0.length_squared() < near * near
+            from.dot(normal) < -APART * self.least_thickness() && separation.0.length_squared() < near * near
         })
     }
 }
