@@ -4,7 +4,7 @@ use glam::{BVec3, DVec3, Vec3, Vec3A};
 
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
-use super::impulses::{LEVERAGE, PUSHED_OUT};
+use super::impulses::{LEVERAGE, pushed_out};
 use super::press::Press;
 use super::supports::{MOST, Supports};
 use crate::body::Mobility;
@@ -257,7 +257,7 @@ impl Constraint {
         let way: Vec3 = nodes
             .map(|((&node, start), share)| (positions.get(node as usize) - start) * share)
             .sum();
-        self.least_speed * duration + PUSHED_OUT * self.depth.max(0.0) - way.dot(self.normal)
+        self.least_speed * duration + pushed_out(duration) * self.depth.max(0.0) - way.dot(self.normal)
     }
 
     fn velocity(&self, velocities: &Vectors) -> Vec3 {

@@ -10,7 +10,7 @@ use super::candidates::{Candidates, met, zone_bit};
 use super::constraint::Constraint;
 use super::features::{Feature, Features};
 use super::holds::Holds;
-use super::impulses::{PUSHED_OUT, SWEEPS};
+use super::impulses::{SWEEPS, pushed_out};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded};
 use super::node_contacts::{NodeContact, NodeContacts, NodeLook};
 use super::path::{Motion, Solid, ToolPath};
@@ -822,7 +822,7 @@ impl Contacts {
         if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
-                    constraint.push_out(meeting.next_positions, PUSHED_OUT * constraint.depth);
+                    constraint.push_out(meeting.next_positions, pushed_out(meeting.substep) * constraint.depth);
                 }
             }
             // What an equation that was not solved to the end has let in.
@@ -844,7 +844,7 @@ impl Contacts {
         }
         if meeting.drifts {
             for contact in self.nodes.iter().filter(|contact| contact.depth > 0.0) {
-                contact.push_out(meeting.next_positions, PUSHED_OUT * contact.depth);
+                contact.push_out(meeting.next_positions, pushed_out(meeting.substep) * contact.depth);
             }
         }
     }

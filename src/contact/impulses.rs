@@ -6,8 +6,17 @@ pub(super) const SWEEPS: u32 = 128;
 /// What a sweep changes is nothing, as a part of what the first one did.
 const CONVERGED: f32 = 1e-5;
 
-/// The part of how deep something began inside that it is moved out by in a substep.
+/// The part of how deep something began inside that it is moved out by in a substep, at most.
 pub(super) const PUSHED_OUT: f32 = 0.2;
+
+/// s: in substeps so short that this is longer than a fifth of it, what is inside is moved out with a speed of its depth over this time. A part of the
+/// depth in each would be the faster the shorter they are, and viscous tissue would ask for ever shorter ones.
+const PUSH_TIME: f32 = 1e-3;
+
+/// The part of how deep something began inside a tool that it is moved out by in a substep of so many seconds.
+pub(super) fn pushed_out(substep: f32) -> f32 {
+    (substep / PUSH_TIME).min(PUSHED_OUT)
+}
 
 /// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
 /// need more, and cannot be had: where nothing gives way, the tool goes in.

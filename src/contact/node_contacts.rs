@@ -9,7 +9,7 @@ use super::candidates::NearestPlane;
 use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
-use super::impulses::{LEVERAGE, PUSHED_OUT, Sweep, relax};
+use super::impulses::{LEVERAGE, Sweep, pushed_out, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
 use super::path::{Motion, Solid};
 use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
@@ -300,7 +300,7 @@ impl NodeContact {
     /// How much further the node is to go to end the slice of `duration` seconds outside of the tool, or less deep within it, m.
     pub fn lacks(&self, positions: &Vectors, duration: f32) -> f32 {
         let way = (positions.get(self.node as usize) - self.start).dot(self.normal);
-        self.least_speed * duration + PUSHED_OUT * self.depth.max(0.0) - way
+        self.least_speed * duration + pushed_out(duration) * self.depth.max(0.0) - way
     }
 
     /// Gives the node's velocity what is missing, or takes back what was too much: how much that changed, m/s.

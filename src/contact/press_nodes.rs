@@ -6,7 +6,7 @@
 use glam::{DVec3, Mat3, Quat, Vec3};
 
 use super::candidates::NearestPlane;
-use super::impulses::PUSHED_OUT;
+use super::impulses::pushed_out;
 use super::path::Placement;
 use super::sweep::{Segment, TOUCHING};
 use crate::body::NodeDamping;
@@ -140,6 +140,7 @@ impl PressNodes<'_> {
     #[inline(always)]
     fn take(&mut self, first: usize, chunk: &[u32], pressed: &mut Pressed) {
         let substep = self.substep;
+        let part_out = pushed_out(substep);
         let mut nodes = [chunk[0] as usize; LANES];
         for (node, &of_chunk) in nodes.iter_mut().zip(chunk) {
             *node = of_chunk as usize;
@@ -231,7 +232,7 @@ impl PressNodes<'_> {
                     let is_given = gives(lane);
                     after[lane] = if is_given { velocity } else { after[lane] };
                     let moved = if is_given { moved } else { next[lane] };
-                    let out = normal[k][lane] * (PUSHED_OUT * depth[lane]);
+                    let out = normal[k][lane] * (part_out * depth[lane]);
                     next[lane] = if depth[lane] > 0.0 { moved + out } else { moved };
                     least[lane] = if is_given { velocity } else { least[lane] };
                     most[lane] = if is_given { velocity } else { most[lane] };
@@ -260,7 +261,7 @@ impl PressNodes<'_> {
                     self.next_positions[k][node] = positions[k][lane] + velocity[k] * substep;
                 }
                 if depth[lane] > 0.0 {
-                    self.next_positions[k][node] += normal[k][lane] * (PUSHED_OUT * depth[lane]);
+                    self.next_positions[k][node] += normal[k][lane] * (part_out * depth[lane]);
                 }
             }
             if is_given {
