@@ -121,3 +121,19 @@ fn small_strains_are_those_of_the_shear_modulus_alone() {
     check(NeoHookean::new(1.0));
     check(MooneyRivlin::new(1.0, 0.4));
 }
+
+/// Lanes that no tetrahedron fills have F = 0, and are added up with the others.
+#[test]
+fn lanes_without_a_tetrahedron_have_numbers() {
+    fn check(law: impl Hyperelastic, kappa: f64) {
+        let at = Strained::new(law, [[0.0; 3]; 3], kappa);
+        let (positive, lift) = at.positive();
+        let changed = positive.stress_change([[0.0; 3]; 3], lift);
+        assert!(lift.is_finite() && inner(changed, IDENTITY).is_finite());
+        assert!(at.stiffening(1.0, 1.0).is_finite() && inner(at.stress(), IDENTITY).is_finite());
+    }
+    for kappa in [0.0, 3.0] {
+        check(NeoHookean::new(1.0), kappa);
+        check(MooneyRivlin::new(1.0, 0.3), kappa);
+    }
+}
