@@ -104,7 +104,10 @@ impl Elements {
             let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
             let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).loaded(load);
             let pressure = if law.rings {
-                0.25 * corners.map(|node| f64::from(of_rings[node as usize])).iter().sum::<f64>()
+                0.25 * corners
+                    .map(|node| f64::from(of_rings[node as usize]))
+                    .iter()
+                    .sum::<f64>()
             } else {
                 deformed.pressure()
             };

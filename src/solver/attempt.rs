@@ -23,6 +23,9 @@ const RESERVE_ANYWHERE: f32 = 0.9;
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 4;
 
+/// How often masses are made within a step for elements that its motion made stiff.
+const RELIEFS: u32 = 8;
+
 /// Near tools and other tissue a step of IMPLICIT or NEWTON is cut into as many parts as this, whatever is allowed otherwise: 4 s of them.
 const MOST_PARTS: u32 = 1 << 12;
 
@@ -259,7 +262,8 @@ fn run_stably(
 ) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = first_substep(body, &start, beside_springs);
     let mut beside_springs = beside_springs;
-    for attempt in 0..=ATTEMPTS {
+    let (mut attempt, mut reliefs, mut was_tried) = (0, 0, false);
+    while attempt <= ATTEMPTS {
         if attempt == ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
             // Where elements, terms and cavities go there is no end to how stiff they may be.
@@ -282,15 +286,17 @@ fn run_stably(
             None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
         };
         if substeps > request.max_substeps || substeps == u32::MAX {
-            match relieve(body, request, attempt > 0, team) {
-                Some(limit) if attempt < ATTEMPTS => {
-                    beside_springs = limit;
+            reliefs += 1;
+            match relieve(body, request, was_tried, team) {
+                Some(limit) if reliefs <= RELIEFS => {
+                    (attempt, beside_springs) = (0, limit);
                     stable_substep = first_substep(body, &start, limit);
                     continue;
                 }
                 _ => break,
             }
         }
+        (attempt, was_tried) = (attempt + 1, true);
         let substeps = refined(substeps, &start, request);
         match verlet::run(body, request, substeps, middle(substeps), start, masses_for, team) {
             Ok(taken) => return Ok((substeps, taken)),

@@ -33,7 +33,7 @@ const MARGIN: f32 = 1.3;
 const RESCUE: f64 = 10.0;
 
 /// After so long, s, masses are those for elements at rest again.
-const RELIEF: f32 = 1.0;
+const RELIEF: f32 = 0.25;
 
 /// So many nodes are asked for what they need before the sum is looked at.
 const TOGETHER: usize = 256;
@@ -258,11 +258,11 @@ impl MassScaling {
     }
 
     /// How many substeps a step of `dt` seconds takes at rest with masses as they are; where elements have become so stiff that it would be
-    /// refused, any number that is `allowed` is worth its mass.
+    /// refused, as many as are `allowed`.
     pub fn needed_at_rest(&self, dt: f32, allowed: u32) -> f64 {
         match self.relief {
             None => (f64::from(dt) / (self.reserve * self.unscaled)).ceil(),
-            Some(_) => (f64::from(allowed) / WORTH_ADDING).ceil(),
+            Some(_) => f64::from(allowed),
         }
     }
 
@@ -286,7 +286,10 @@ impl MassScaling {
         let mut next = 0;
         for (node, &mass) in masses.iter().enumerate() {
             let growth = MARGIN * self.growths[node];
-            if let Some(sliver) = self.slivers[..listed].get_mut(next).filter(|sliver| sliver.node as usize == node) {
+            if let Some(sliver) = self.slivers[..listed]
+                .get_mut(next)
+                .filter(|sliver| sliver.node as usize == node)
+            {
                 sliver.growth = sliver.growth.max(growth);
                 next += 1;
             } else if mass > 0.0 && self.slivers.len() < self.slivers.capacity() {
@@ -357,6 +360,12 @@ impl MassScaling {
             step <= self.complete_to && self.has_mass_for(step, most, masses, inverse_masses)
         };
         let fits = |substeps: u32| fits_in(substeps, self.most);
+        if self.relief.is_some() {
+            // Only as much as is needed for as many as are allowed.
+            let allowed = needed.min(f64::from(u32::MAX)) as u32;
+            let fits = allowed > 0 && fits_in(allowed, RESCUE * self.most);
+            return fits.then(|| (allowed, (longest / f64::from(allowed)) as f32));
+        }
         let worth = (WORTH_ADDING * needed).floor().min(f64::from(u32::MAX)) as u32;
         // Most steps are as the one before.
         let known = (longest / f64::from(self.step)).round().min(f64::from(u32::MAX)) as u32;
@@ -364,9 +373,7 @@ impl MassScaling {
             return Some((known, (longest / f64::from(known)) as f32));
         }
         if worth == 0 || !fits(worth) {
-            // Only as much as is needed.
-            let rescues = worth > 0 && self.relief.is_some() && fits_in(worth, RESCUE * self.most);
-            return rescues.then(|| (worth, (longest / f64::from(worth)) as f32));
+            return None;
         }
         let (mut too_few, mut enough) = (0, worth);
         while enough - too_few > 1 {

@@ -1,7 +1,7 @@
 //! Mass for elements that motion has made stiff, so that no step is refused because of a few of them.
 //!
 //! Where a step would take more substeps than are allowed, each node is asked for the mass that it needs with its elements as they are
-//! deformed, and masses are made for the fewest substeps that the bound on added mass allows. They stay so for a while. Nodes keep
+//! deformed, and masses are made for as many substeps as are allowed, with more mass than otherwise if need be. They stay so for a while. Nodes keep
 //! their velocities but for what the added mass would add to the kinetic energy of the deformation, which is taken off all of it.
 
 use super::attempt::{StepRequest, fewer_substeps};
@@ -44,4 +44,50 @@ pub(super) fn relieve(body: &mut Body, request: &StepRequest, was_tried: bool, t
     body.scale_masses(masses_for);
     verlet::begin(body, request);
     Some(body.limit_beside_springs(team))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use crate::def::{BodyDefinition, Material, Model};
+    use crate::mesh::Mesh;
+    use crate::random::Random;
+    use crate::threads::Team;
+    use crate::world::{World, WorldDefinition};
+
+    #[test]
+    fn elements_one_by_one_give_the_bound_that_kernels_find() {
+        let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
+        for poisson_ratio in [0.3, 0.45] {
+            let mut world = World::new(WorldDefinition::default()).expect("a world");
+            let id = world.create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                tetrahedra: &mesh.tetrahedra,
+                material: Some(Material {
+                    model: Model::Tetrahedra,
+                    poisson_ratio,
+                    ..Material::default()
+                }),
+                ..BodyDefinition::default()
+            });
+            let mut random = Random(7);
+            let body = world.body_mut(id.expect("a body")).expect("a body");
+            let moved = mesh.positions.iter().map(|&place| place + 2e-3 * random.vector());
+            let moved: Vec<Vec3> = moved.collect();
+            body.set_positions(&moved).expect("positions");
+            let limit = f64::from(body.limit_beside_springs(&Team::alone()));
+            let elements = body.elements.as_deref().expect("elements");
+            let mut stiffest = 0.0_f64;
+            elements.stiffenings(body.state.positions(), &mut |corners, stiffening| {
+                for node in corners {
+                    let inverse_mass = body.inverse_masses[node as usize];
+                    let carried = elements.carried_at_rest(node as usize, inverse_mass);
+                    stiffest = stiffest.max(2.0 * stiffening * f64::from(carried.stiffness * inverse_mass));
+                }
+            });
+            let found = 2.0 / stiffest.sqrt();
+            assert!((found / limit - 1.0).abs() < 1e-4, "{found:e} s, {limit:e} s");
+        }
+    }
 }
