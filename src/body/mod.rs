@@ -339,8 +339,9 @@ impl Body {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let beside = body.carried_beside_springs()?;
             let (springs, part) = (&*body.springs, definition.mass_scaling);
-            let has_elements = body.elements.is_some();
-            let scaling = MassScaling::new(springs, &beside, &body.masses, uniform, damping, has_elements, part)?;
+            let room = body.node_count() + definition.spare_nodes as usize;
+            let room = body.elements.as_ref().map_or(0, |_| room);
+            let scaling = MassScaling::new(springs, &beside, &body.masses, uniform, damping, room, part)?;
             body.scaling = scaling.map(memory::boxed).transpose()?;
         }
         if needs.tools > 0 {

@@ -167,14 +167,14 @@ saved!(MassScaling {
 impl MassScaling {
     /// Finds the nodes of a body that are to be made heavier where it takes the longest substeps that `fraction` of its mass
     /// can make stable; `None`: that is no gain. `beside` is what nodes carry beside their springs, of no nodes where that is nothing. Where
-    /// there are elements, any node may have to be made heavier later.
+    /// there are elements, any of as many nodes as there is `room` for may have to be made heavier later.
     pub fn new(
         springs: &dyn Springs,
         beside: &[Carried],
         masses: &[f32],
         uniform_inverse_mass: Option<f32>,
         damping: Option<&NodeDamping>,
-        has_elements: bool,
+        room: usize,
         fraction: f32,
     ) -> Result<Option<Self>> {
         let total: f64 = masses.iter().map(|&mass| f64::from(mass)).sum();
@@ -209,13 +209,12 @@ impl MassScaling {
             count += 1;
         }
         if count == 0 || !(complete_to >= WORTH_KEEPING * first) {
-            if !has_elements {
+            if room == 0 {
                 return Ok(None);
             }
             (count, complete_to) = (0, first);
         }
-        let nodes_with_elements = if has_elements { masses.len() } else { 0 };
-        let mut slivers = memory::reserved(count.max(nodes_with_elements))?;
+        let mut slivers = memory::reserved(count.max(room))?;
         slivers.extend(nodes[..count].iter().map(|&(_, sliver)| sliver));
         slivers.sort_unstable_by_key(|sliver| sliver.node);
         Ok(Some(Self {
@@ -230,7 +229,7 @@ impl MassScaling {
             slivers,
             complete_to,
             step: 0.0,
-            growths: memory::filled(0.0, nodes_with_elements)?,
+            growths: memory::filled(0.0, room)?,
             relief: None,
             settled_relief: None,
             changed: false,
@@ -285,7 +284,7 @@ impl MassScaling {
         let listed = self.slivers.len();
         let mut next = 0;
         for (node, &mass) in masses.iter().enumerate() {
-            let growth = MARGIN * self.growths[node];
+            let growth = MARGIN * self.growths.get(node).copied().unwrap_or(0.0);
             if let Some(sliver) = self.slivers[..listed]
                 .get_mut(next)
                 .filter(|sliver| sliver.node as usize == node)

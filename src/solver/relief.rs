@@ -27,8 +27,9 @@ pub(super) fn relieve(body: &mut Body, request: &StepRequest, was_tried: bool, t
     };
     elements.stiffenings(positions, &mut |corners, stiffening| {
         for node in corners {
-            let growth = &mut growths[node as usize];
-            *growth = growth.max(stiffening as f32);
+            if let Some(growth) = growths.get_mut(node as usize) {
+                *growth = growth.max(stiffening as f32);
+            }
         }
     });
     let in_use = Masses {
