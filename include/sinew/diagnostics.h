@@ -15,7 +15,7 @@ extern "C" {
 /// Energy of a body [J] at the time of the positions.
 typedef struct sinew_energy {
   size_t struct_size;    ///< Set to sizeof(sinew_energy) before the call.
-  /// [J] Kinetic energy of the free nodes, with the mass that mass_scaling adds.
+  /// [J] Kinetic energy of the free nodes, without the mass that mass_scaling adds.
   double kinetic;
   /// [J] Energy of springs, elements and other internal terms, minus the work of a constant
   /// pressure.

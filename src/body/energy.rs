@@ -10,16 +10,13 @@ impl Energy {
         let mut energy = Self::default();
         let (positions, velocities) = (body.state.positions(), body.velocities());
         let gravity = gravity.as_dvec3();
-        let mut heavier = body.scaling.iter().flat_map(|scaling| scaling.heavier()).peekable();
         for node in 0..body.node_count() {
             let mass = f64::from(body.masses[node]);
             let position = positions.get(node).as_dvec3();
-            let added = heavier.next_if(|sliver| sliver.node as usize == node);
             if body.inverse_masses[node] > 0.0 {
-                let inertia = mass + added.map_or(0.0, |sliver| f64::from(sliver.added));
                 let held = body.pins.partial_axes_of(node as u32);
                 let velocity = Vec3::select(held, Vec3::ZERO, velocities[body.callers(node)]);
-                energy.kinetic += 0.5 * inertia * velocity.as_dvec3().length_squared();
+                energy.kinetic += 0.5 * mass * velocity.as_dvec3().length_squared();
             }
             energy.gravitational -= mass * gravity.dot(position + body.origin);
             body.springs.visit(node, &mut |link| {

@@ -340,7 +340,9 @@ impl Body {
             let (uniform, damping) = (body.uniform_inverse_mass, body.damping.as_ref());
             let beside = body.carried_beside_springs()?;
             let (springs, part) = (&*body.springs, definition.mass_scaling);
-            let scaling = MassScaling::new(springs, &beside, &body.masses, uniform, damping, part)?;
+            let room = body.node_count() + definition.spare_nodes as usize;
+            let room = body.elements.as_ref().map_or(0, |_| room);
+            let scaling = MassScaling::new(springs, &beside, &body.masses, uniform, damping, room, part)?;
             body.scaling = scaling.map(memory::boxed).transpose()?;
         }
         if needs.tools > 0 {
@@ -722,8 +724,8 @@ impl Body {
         self.forget_motion();
     }
 
-    /// Makes the step in progress, of `substeps` substeps, the current state.
-    pub(crate) fn commit(&mut self, substeps: u32, carry: Carry, tools: &[ToolPath], team: &Team) {
+    /// Makes the step in progress, of `substeps` substeps and `dt` seconds, the current state.
+    pub(crate) fn commit(&mut self, (substeps, dt): (u32, f32), carry: Carry, tools: &[ToolPath], team: &Team) {
         self.state.commit();
         self.carry = carry;
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
@@ -737,6 +739,9 @@ impl Body {
             enclosed.settle();
         }
         self.keep();
+        if let Some(scaling) = &mut self.scaling {
+            scaling.settle(dt);
+        }
         if let Some(implicit) = &mut self.implicit {
             implicit.commit();
         }
@@ -762,6 +767,9 @@ impl Body {
             implicit.put_back();
         }
         self.recall();
+        if self.scaling.as_mut().is_some_and(|scaling| scaling.unsettle()) {
+            self.scale_masses(self.carry.masses_for);
+        }
         self.use_masses_for(self.carry.masses_for);
         if let (Some(damping), Some(closing)) = (&mut self.damping, &self.carry.closing) {
             damping.prepare(closing.substep);

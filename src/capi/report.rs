@@ -13,7 +13,7 @@ use super::status::sinew_status;
 pub struct sinew_energy {
     /// Set to sizeof(sinew_energy) before the call.
     pub struct_size: usize,
-    /// [J] Kinetic energy of the free nodes, with the mass that mass_scaling adds.
+    /// [J] Kinetic energy of the free nodes, without the mass that mass_scaling adds.
     pub kinetic: f64,
     /// [J] Energy of springs, elements and other internal terms, minus the work of a constant pressure.
     pub elastic: f64,

@@ -184,7 +184,8 @@ pub struct BodyDefinition<'a> {
     /// [`Solver::Verlet`]: what part of the body's mass may be added, in all, to the nodes whose springs or elements would make
     /// substeps short, as those of slivers are; from 0 to 1; 0: none.
     ///
-    /// Mass is added where that saves a quarter of the substeps or more, and no more than they need; never where the
+    /// Mass is added where that saves a quarter of the substeps or more, and no more than they need; where motion makes elements so stiff that a
+    /// step would be refused, up to ten times this part for a quarter of a second. Never where the
     /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay
     /// as they are. See [`SolverReport::added_mass`](crate::SolverReport::added_mass).
     pub mass_scaling: f32,

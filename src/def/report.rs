@@ -69,7 +69,8 @@ impl SolverReport {
 /// Energy in joules, at the time of the positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
-    /// Of the nodes that are free to move, along the axes along which they are, with what mass scaling adds to them.
+    /// Of the nodes that are free to move, along the axes along which they are. What mass scaling adds to them does not count: it has no weight
+    /// either, and comes and goes.
     pub kinetic: f64,
     /// Of the springs, of tetrahedra that are elements, and of every other term; less the work that a constant pressure has done.
     pub elastic: f64,

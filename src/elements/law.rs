@@ -1,5 +1,6 @@
 //! The law of a tetrahedron, one at a time and in `f64`: what kernels work out for many, and second derivatives.
 
+use super::rates::LEAST_SHEAR;
 use crate::codec::saved;
 use crate::def::ElementLaw;
 use glam::{DMat3, DVec3};
@@ -316,6 +317,27 @@ impl Deformed {
         [of_strain, of_volume, of_load, growth].map(|change| self.volume * change)
     }
 
+    /// How many times as stiff as at rest it is at most, where its volume is kept by this pressure: what `Groups::forces` bounds frequencies
+    /// with, one at a time.
+    pub fn stiffening(&self, law: Law, pressure: f64) -> f64 {
+        let [lambda, mu, kappa] = [law.lambda, law.mu, law.kappa].map(f64::from);
+        let stretch = 1.0 + largest_row(&(self.strain * 2.0), |entry| entry).max(0.0);
+        let size = |matrix: &DMat3| largest_row(matrix, f64::abs);
+        let tension = (lambda * self.trace() + mu * (stretch - 1.0)).max(0.0) + size(&self.load.stress);
+        let root = [(0.5, 0.5), (1.5, 1.0 / 6.0), (4.5, 1.0 / 18.0)];
+        let root = root.map(|(start, slope)| start + slope * stretch);
+        let pressed = pressure.abs() * root.into_iter().fold(f64::INFINITY, f64::min);
+        let area = size(&(self.cofactors.transpose() * self.cofactors)).max(stretch);
+        let along = lambda.max(0.0) + 2.0 * mu * f64::from(LEAST_SHEAR);
+        (along * stretch + pressed + kappa * area) / f64::from(law.stiffest(LEAST_SHEAR))
+            + tension / f64::from(law.stiffest(1.0))
+    }
+
+    /// The pressure that keeps its volume, Pa, without that of rings.
+    pub fn pressure(&self) -> f64 {
+        self.pressure
+    }
+
     /// The force on a corner whose function has this gradient, N.
     pub fn force(&self, gradient: DVec3) -> DVec3 {
         if let Some(strained) = self.strained() {
@@ -382,6 +404,17 @@ impl Deformed {
 /// The sum of the products of entries.
 fn product(a: &DMat3, b: &DMat3) -> f64 {
     a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
+}
+
+/// The largest sum of a row of a symmetric matrix: its diagonal entry by `on`, the others by their sizes (Gershgorin).
+fn largest_row(matrix: &DMat3, on: impl Fn(f64) -> f64) -> f64 {
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+    let rows = [
+        on(x.x) + x.y.abs() + x.z.abs(),
+        on(y.y) + x.y.abs() + y.z.abs(),
+        on(z.z) + x.z.abs() + y.z.abs(),
+    ];
+    rows.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
 fn outer(a: DVec3, b: DVec3) -> DMat3 {

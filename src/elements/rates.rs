@@ -8,11 +8,11 @@
 //! keeps volume: `Groups::forces` has what c becomes of that, and of stress. What a node and its springs carry over its mass bounds the squares
 //! of frequencies. No pinned corner goes any way: it is left out.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::{Elements, Law, Rest};
+use super::{Deformed, Elements, Law, Rest};
 use crate::def::Carried;
-use crate::soa::{Masses, Rates};
+use crate::soa::{Masses, Rates, Vectors};
 use crate::springs::{Springs, rates_anywhere};
 
 /// The least that shear counts for: a third of the sum of three eigenvalues, which is 1.
@@ -82,6 +82,36 @@ impl Elements {
         let viscosity = self.memory.as_ref().map(|memory| memory.viscosity);
         self.add_carried(masses, |node, more| {
             all[node].add(more as f32, viscosity.unwrap_or_default());
+        });
+    }
+
+    /// What a node carries at rest with its springs, given its inverse mass, where bounds at rest are known.
+    pub fn carried_at_rest(&self, node: usize, inverse_mass: f32) -> Carried {
+        let mut carried = Carried::default();
+        if inverse_mass > 0.0 {
+            let viscosity = self.memory.as_ref().map(|memory| memory.viscosity);
+            carried.add(self.carried[node] / inverse_mass, viscosity.unwrap_or_default());
+        }
+        carried
+    }
+
+    /// Shows the nodes of each tetrahedron, and how many times as stiff it is as at rest with nodes at `positions`, at most: with what
+    /// [`Self::carried_at_rest`] of a node, that gives the bound of [`Self::rates`].
+    pub fn stiffenings(&self, positions: &Vectors, see: &mut dyn FnMut([u32; 4], f64)) {
+        let law = self.stiffened();
+        let of_rings = &self.forces.pressures.of_nodes;
+        self.visit_loaded(&mut |corners, rest, load| {
+            let [a, b, c, d] = corners.map(|node| positions.get(node as usize).as_dvec3());
+            let deformed = Deformed::new(law, rest, DMat3::from_cols(b - a, c - a, d - a)).loaded(load);
+            let pressure = if law.rings {
+                0.25 * corners
+                    .map(|node| f64::from(of_rings[node as usize]))
+                    .iter()
+                    .sum::<f64>()
+            } else {
+                deformed.pressure()
+            };
+            see(corners, deformed.stiffening(law, pressure));
         });
     }
 

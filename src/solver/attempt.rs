@@ -6,6 +6,7 @@ use super::closing::ClosingKick;
 use super::energy_monitor::EnergyAccount;
 use super::gravity::GravityKicks;
 use super::implicit;
+use super::relief::relieve;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
@@ -21,6 +22,9 @@ const RESERVE_ANYWHERE: f32 = 0.9;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
 const ATTEMPTS: u32 = 4;
+
+/// How often masses are made within a step for elements that its motion made stiff.
+const RELIEFS: u32 = 8;
 
 /// Near tools and other tissue a step of IMPLICIT or NEWTON is cut into as many parts as this, whatever is allowed otherwise: 4 s of them.
 const MOST_PARTS: u32 = 1 << 12;
@@ -141,10 +145,17 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
 fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) {
     if body.has_more_than_springs() {
         // What else there is asks for substeps by the masses that the step is taken with.
-        let scaled = fewer_substeps(body, request, 0.0);
-        body.use_masses_for(scaled.map_or(0.0, |(_, masses_for)| masses_for));
+        let ends = body.scaling.as_mut().is_some_and(|scaling| scaling.end_relief());
+        let masses_for = fewer_substeps(body, request, 0.0).map_or(0.0, |(_, masses_for)| masses_for);
+        if ends {
+            body.scale_masses(masses_for);
+        }
+        body.use_masses_for(masses_for);
     }
-    let beside_springs = body.limit_beside_springs(team);
+    let mut beside_springs = body.limit_beside_springs(team);
+    if substeps_needed(request, beside_springs) > f64::from(request.max_substeps) {
+        beside_springs = relieve(body, request, false, team).unwrap_or(beside_springs);
+    }
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
     let is_worth_estimating = || {
@@ -253,7 +264,8 @@ fn run_stably(
 ) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = first_substep(body, &start, beside_springs);
     let mut beside_springs = beside_springs;
-    for attempt in 0..=ATTEMPTS {
+    let (mut attempt, mut reliefs, mut was_tried) = (0, 0, false);
+    while attempt <= ATTEMPTS {
         if attempt == ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
             // Where elements, terms and cavities go there is no end to how stiff they may be.
@@ -276,8 +288,17 @@ fn run_stably(
             None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
         };
         if substeps > request.max_substeps || substeps == u32::MAX {
-            break;
+            reliefs += 1;
+            match relieve(body, request, was_tried, team) {
+                Some(limit) if reliefs <= RELIEFS => {
+                    (attempt, beside_springs) = (0, limit);
+                    stable_substep = first_substep(body, &start, limit);
+                    continue;
+                }
+                _ => break,
+            }
         }
+        (attempt, was_tried) = (attempt + 1, true);
         let substeps = refined(substeps, &start, request);
         match verlet::run(body, request, substeps, middle(substeps), start, masses_for, team) {
             Ok(taken) => return Ok((substeps, taken)),
@@ -334,7 +355,7 @@ pub(super) fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64
 
 /// In how few substeps the step can be taken with some mass added, and for what substep, s; `None`: it is not to be, or saves
 /// too little.
-fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
+pub(super) fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
     // What a tolerance is about would not show what added mass changes.
     if request.substeps > 0 || request.tolerance > 0.0 {
         return None;
@@ -342,7 +363,7 @@ fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Op
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let scaling = body.scaling.as_ref()?;
     let needed = if body.has_more_than_springs() {
-        scaling.needed_at_rest(request.dt)
+        scaling.needed_at_rest(request.dt, request.max_substeps)
     } else {
         substeps_needed(request, stable_substep)
     };

@@ -121,6 +121,14 @@ impl EnergyAccount {
         self.start_over();
     }
 
+    /// So much energy is gone with mass that was taken away, J, or unknown.
+    fn lose(&mut self, energy: Option<f64>) {
+        match energy {
+            Some(energy) => self.work -= energy,
+            None => self.forget(),
+        }
+    }
+
     fn start_over(&mut self) {
         (self.work, self.substeps, self.time) = (0.0, 0, 0.0);
     }
@@ -547,6 +555,27 @@ fn slow_down(body: &mut Body, held: BVec3, energy: f64) -> f64 {
         velocities.set(node, Vec3::select(held, velocity, slower.as_vec3()));
     }
     energy.min(own)
+}
+
+/// Sees that motion has no more kinetic energy after masses have changed than before, as a step begins with velocities at the time of its
+/// positions. The motion as a whole of a body that nothing holds stays as it is.
+pub(super) fn keep_energy(body: &mut Body, account: &mut EnergyAccount) {
+    let state = body.state.substep();
+    state.velocities.copy_from(state.first_velocities);
+    let held = body.held_axes();
+    let rigid = RigidMotion::of(body, held);
+    let state = body.state.substep();
+    let mut added = 0.0;
+    for sliver in body.scaling.iter().flat_map(|scaling| scaling.slivers()) {
+        let node = sliver.node as usize;
+        let held = body.pins.partial_axes_of(sliver.node);
+        let velocity = state.velocities.get(node).as_dvec3() - rigid.at(state.positions.get(node));
+        added += 0.5 * f64::from(sliver.change()) * DVec3::select(held, DVec3::ZERO, velocity).length_squared();
+    }
+    if added > 0.0 {
+        slow_down(body, held, added);
+    }
+    account.lose((held == BVec3::TRUE).then_some((-added).max(0.0)));
 }
 
 /// How a body moves as a whole; not at all where something holds it.

@@ -6,7 +6,8 @@
 //! wherever the nodes are, so that nothing has to be estimated on the way. Inertia grows and weight does not.
 //!
 //! Elements, terms and cavities have such sums too, but at rest alone: masses are made for those, and how short substeps have to be with these
-//! masses is found as it is with any others.
+//! masses is found as it is with any others. Where motion makes elements so stiff that a step would be refused, the sums of their nodes are
+//! made again for how they are deformed (`relief.rs`), within the same bound on the mass.
 
 use super::attempt::RESERVE as RESERVE_AT_REST;
 use crate::base::{Result, memory};
@@ -25,6 +26,15 @@ const RESERVE: f64 = 0.9;
 /// Bodies that could not take steps so many times as long are not prepared for it.
 const WORTH_KEEPING: f64 = 1.125;
 
+/// How many times as stiff elements may become as they are where masses are made for that, before it is done again.
+const MARGIN: f32 = 1.3;
+
+/// How many times as much mass may be added as otherwise where a step would be refused without.
+const RESCUE: f64 = 10.0;
+
+/// After so long, s, masses are those for elements at rest again.
+const RELIEF: f32 = 0.25;
+
 /// So many nodes are asked for what they need before the sum is looked at.
 const TOGETHER: usize = 256;
 
@@ -38,10 +48,16 @@ pub(crate) struct Sliver {
     stiffness: f32,
     /// N s/m, along them.
     damping: f32,
+    /// How many times as stiff the elements at it are taken to be as at rest.
+    growth: f32,
+    /// The same as the last step ended; `None`: it was not in the list.
+    settled_growth: Option<f32>,
     /// Its damping over its mass as it is, 1/s.
     rate: f32,
     /// By how much it is heavier now, kg.
     pub added: f32,
+    /// The same as the last step ended, kg.
+    settled: f32,
 }
 
 saved!(Sliver {
@@ -49,14 +65,37 @@ saved!(Sliver {
     beside,
     stiffness,
     damping,
+    growth,
+    settled_growth,
     rate,
-    added
+    added,
+    settled
 });
 
 impl Sliver {
+    /// A node as it is, with nothing but what it carries beside its springs.
+    fn new(node: u32, beside: Carried, rate: f32) -> Self {
+        Self {
+            node,
+            beside,
+            stiffness: beside.stiffness,
+            damping: beside.damping,
+            growth: 1.0,
+            settled_growth: Some(1.0),
+            rate,
+            added: 0.0,
+            settled: 0.0,
+        }
+    }
+
     /// The mass that makes a substep of `step` seconds stable, kg.
     fn needs(&self, step: f64) -> f64 {
-        step * (0.5 * step * f64::from(self.stiffness) + f64::from(self.damping))
+        step * (0.5 * step * f64::from(self.stiffness) * f64::from(self.growth) + f64::from(self.damping))
+    }
+
+    /// By how much it is heavier than as the last step ended, kg.
+    pub fn change(&self) -> f32 {
+        self.added - self.settled
     }
 
     /// The longest substep that is stable with this mass, s.
@@ -101,6 +140,14 @@ pub(crate) struct MassScaling {
     complete_to: f64,
     /// The substep that masses are made for, s; 0: they are as they are.
     step: f32,
+    /// How many times as stiff as at rest the elements at each node are; of no nodes where masses are not made for that.
+    growths: Vec<f32>,
+    /// For how long masses have been made for that, s.
+    relief: Option<f32>,
+    /// The same as the last step ended.
+    settled_relief: Option<f32>,
+    /// Whether the step in progress has changed for what masses are made.
+    changed: bool,
 }
 
 saved!(MassScaling {
@@ -110,32 +157,33 @@ saved!(MassScaling {
     uniform_inverse_mass,
     slivers,
     complete_to,
-    step
+    step,
+    growths,
+    relief,
+    settled_relief,
+    changed
 });
 
 impl MassScaling {
     /// Finds the nodes of a body that are to be made heavier where it takes the longest substeps that `fraction` of its mass
-    /// can make stable; `None`: that is no gain. `beside` is what nodes carry beside their springs, of no nodes where that is nothing.
+    /// can make stable; `None`: that is no gain. `beside` is what nodes carry beside their springs, of no nodes where that is nothing. Where
+    /// there are elements, any of as many nodes as there is `room` for may have to be made heavier later.
     pub fn new(
         springs: &dyn Springs,
         beside: &[Carried],
         masses: &[f32],
         uniform_inverse_mass: Option<f32>,
         damping: Option<&NodeDamping>,
+        room: usize,
         fraction: f32,
     ) -> Result<Option<Self>> {
         let total: f64 = masses.iter().map(|&mass| f64::from(mass)).sum();
         let most = f64::from(fraction) * total;
         let mut nodes = memory::reserved(masses.len())?;
         for (node, &mass) in (0..).zip(masses) {
-            let mut sliver = Sliver {
-                node,
-                beside: beside.get(node as usize).copied().unwrap_or_default(),
-                stiffness: 0.0,
-                damping: 0.0,
-                rate: damping.map_or(0.0, |damping| damping.rates()[node as usize]),
-                added: 0.0,
-            };
+            let beside = beside.get(node as usize).copied().unwrap_or_default();
+            let rate = damping.map_or(0.0, |damping| damping.rates()[node as usize]);
+            let mut sliver = Sliver::new(node, beside, rate);
             if mass > 0.0 {
                 sliver.add_up(springs);
                 nodes.push((sliver.longest_step(f64::from(mass)), sliver));
@@ -161,9 +209,12 @@ impl MassScaling {
             count += 1;
         }
         if count == 0 || !(complete_to >= WORTH_KEEPING * first) {
-            return Ok(None);
+            if room == 0 {
+                return Ok(None);
+            }
+            (count, complete_to) = (0, first);
         }
-        let mut slivers = memory::reserved(count)?;
+        let mut slivers = memory::reserved(count.max(room))?;
         slivers.extend(nodes[..count].iter().map(|&(_, sliver)| sliver));
         slivers.sort_unstable_by_key(|sliver| sliver.node);
         Ok(Some(Self {
@@ -178,6 +229,10 @@ impl MassScaling {
             slivers,
             complete_to,
             step: 0.0,
+            growths: memory::filled(0.0, room)?,
+            relief: None,
+            settled_relief: None,
+            changed: false,
         }))
     }
 
@@ -201,19 +256,115 @@ impl MassScaling {
         if self.step > 0.0 { &self.slivers } else { &[] }
     }
 
-    /// How many substeps a step of `dt` seconds takes at rest with masses as they are.
-    pub fn needed_at_rest(&self, dt: f32) -> f64 {
-        (f64::from(dt) / (self.reserve * self.unscaled)).ceil()
+    /// How many substeps a step of `dt` seconds takes at rest with masses as they are; where elements have become so stiff that it would be
+    /// refused, as many as are `allowed`.
+    pub fn needed_at_rest(&self, dt: f32, allowed: u32) -> f64 {
+        match self.relief {
+            None => (f64::from(dt) / (self.reserve * self.unscaled)).ceil(),
+            Some(_) => f64::from(allowed),
+        }
+    }
+
+    /// Lets masses be made for how stiff elements are where they are deformed: to be filled in for each node, given 0. `None`: there are no
+    /// elements.
+    pub fn begin_relief(&mut self) -> Option<&mut [f32]> {
+        if self.growths.is_empty() {
+            return None;
+        }
+        if !self.changed {
+            self.rest();
+        }
+        self.relief = Some(0.0);
+        self.growths.fill(0.0);
+        Some(&mut self.growths)
+    }
+
+    /// Takes in what was filled in, with what each node carries at rest. Masses are made for it when they are made next.
+    pub fn relieve(&mut self, masses: &[f32], rates: Option<&[f32]>, at_rest: impl Fn(usize) -> Carried) {
+        let listed = self.slivers.len();
+        let mut next = 0;
+        for (node, &mass) in masses.iter().enumerate() {
+            let growth = MARGIN * self.growths.get(node).copied().unwrap_or(0.0);
+            if let Some(sliver) = self.slivers[..listed]
+                .get_mut(next)
+                .filter(|sliver| sliver.node as usize == node)
+            {
+                sliver.growth = sliver.growth.max(growth);
+                next += 1;
+            } else if mass > 0.0 && self.slivers.len() < self.slivers.capacity() {
+                let rate = rates.map_or(0.0, |rates| rates[node]);
+                let sliver = Sliver {
+                    growth,
+                    settled_growth: None,
+                    ..Sliver::new(node as u32, at_rest(node), rate)
+                };
+                if sliver.needs(self.complete_to) > f64::from(mass) {
+                    self.slivers.push(sliver);
+                }
+            }
+        }
+        self.slivers.sort_unstable_by_key(|sliver| sliver.node);
+    }
+
+    /// Makes masses for elements at rest again, after a while: whether that has to be done.
+    pub fn end_relief(&mut self) -> bool {
+        let ends = self.relief.is_some_and(|age| age > RELIEF);
+        if ends {
+            self.rest();
+        }
+        ends
+    }
+
+    fn rest(&mut self) {
+        self.slivers.iter_mut().for_each(|sliver| sliver.growth = 1.0);
+        self.relief = None;
+        self.changed = true;
+    }
+
+    /// Whether the step in progress has changed for what masses are made.
+    pub fn has_changed(&self) -> bool {
+        self.changed
+    }
+
+    /// Keeps what masses are made for, after a step of `dt` seconds.
+    pub fn settle(&mut self, dt: f32) {
+        if let Some(age) = &mut self.relief {
+            *age += dt;
+        }
+        self.settled_relief = self.relief;
+        self.changed = false;
+        for sliver in &mut self.slivers {
+            (sliver.settled_growth, sliver.settled) = (Some(sliver.growth), sliver.added);
+        }
+    }
+
+    /// Makes masses for what they were made for as the last step ended: whether that differs.
+    pub fn unsettle(&mut self) -> bool {
+        self.relief = self.settled_relief;
+        if self.changed {
+            self.slivers.retain(|sliver| sliver.settled_growth.is_some());
+            for sliver in &mut self.slivers {
+                sliver.growth = sliver.settled_growth.unwrap_or(1.0);
+            }
+        }
+        std::mem::take(&mut self.changed)
     }
 
     /// In how few substeps a step of `dt` seconds can be taken, and for what substep masses are to be made; `None`: that
     /// saves too little of the `needed` ones.
     pub fn fewer_substeps(&self, dt: f32, needed: f64, masses: &[f32], inverse_masses: &[f32]) -> Option<(u32, f32)> {
         let longest = f64::from(dt) / self.reserve;
-        let fits = |substeps: u32| {
+        let fits_in = |substeps: u32, most: f64| {
             let step = longest / f64::from(substeps);
-            step <= self.complete_to && self.has_mass_for(step, masses, inverse_masses)
+            step <= self.complete_to && self.has_mass_for(step, most, masses, inverse_masses)
         };
+        let fits = |substeps: u32| fits_in(substeps, self.most);
+        if self.relief.is_some() {
+            // Only as much as is needed for as many as are allowed.
+            let allowed = needed.min(f64::from(u32::MAX)) as u32;
+            let fits = allowed > 0 && fits_in(allowed, RESCUE * self.most);
+            return fits.then(|| (allowed, (longest / f64::from(allowed)) as f32));
+        }
         let worth = (WORTH_ADDING * needed).floor().min(f64::from(u32::MAX)) as u32;
         // Most steps are as the one before.
         let known = (longest / f64::from(self.step)).round().min(f64::from(u32::MAX)) as u32;
@@ -235,8 +386,8 @@ impl MassScaling {
         Some((enough, (longest / f64::from(enough)) as f32))
     }
 
-    /// Whether what would be added for this substep is no more than may be.
-    fn has_mass_for(&self, step: f64, masses: &[f32], inverse_masses: &[f32]) -> bool {
+    /// Whether what would be added for this substep is no more than may be, kg.
+    fn has_mass_for(&self, step: f64, most: f64, masses: &[f32], inverse_masses: &[f32]) -> bool {
         let mut added = 0.0;
         self.slivers.chunks(TOGETHER).all(|slivers| {
             let adds = slivers.iter().map(|sliver| {
@@ -249,7 +400,7 @@ impl MassScaling {
                 }
             });
             added += adds.sum::<f64>();
-            added <= self.most
+            added <= most
         })
     }
 
@@ -293,14 +444,8 @@ impl MassScaling {
         match self.find(node) {
             Ok(place) => self.slivers[place].add_up(springs),
             Err(place) => {
-                let mut sliver = Sliver {
-                    node,
-                    beside: Carried::default(),
-                    stiffness: 0.0,
-                    damping: 0.0,
-                    rate: rates.map_or(0.0, |rates| rates[node as usize]),
-                    added: 0.0,
-                };
+                let rate = rates.map_or(0.0, |rates| rates[node as usize]);
+                let mut sliver = Sliver::new(node, Carried::default(), rate);
                 sliver.add_up(springs);
                 let mass = f64::from(masses[node as usize]);
                 if mass > 0.0 && sliver.longest_step(mass) < self.complete_to {

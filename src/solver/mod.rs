@@ -11,6 +11,7 @@ mod lockstep;
 mod mass_scaling;
 mod newton;
 mod pipeline;
+mod relief;
 mod stability;
 mod subnormal;
 mod substep;

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
-use super::energy_monitor::{Account, Sums};
+use super::energy_monitor::{Account, Sums, keep_energy};
 use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
@@ -241,6 +241,10 @@ impl<'a> Step<'a> {
         }
         body.use_masses_for(self.masses_for);
         carry.masses_for = self.masses_for;
+        if body.scaling.as_ref().is_some_and(|scaling| scaling.has_changed()) {
+            keep_energy(body, &mut carry.energy);
+            part.before = Before::Closed;
+        }
         part.fall = carry.gravity.next(change);
         part
     }

@@ -337,7 +337,7 @@ fn commit_bodies(
             Some(Outcome::Done { substeps, carry, .. }) => {
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
-                body.commit(substeps, carry, tools, team);
+                body.commit((substeps, dt), carry, tools, team);
                 body.fade(dt, team);
                 body.doze(dt, (tools, gravity), team);
                 body.find_tears(team);

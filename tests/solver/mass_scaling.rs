@@ -604,6 +604,74 @@ fn a_step_of_elements_meets_its_tolerance() {
     assert!(error <= f64::from(TOLERANCE), "{error:e} m, {report:?}");
 }
 
+/// Where an organ swings down, a few of its elements become so stiff that they ask for more substeps than are allowed.
+#[test]
+fn motion_that_makes_a_few_elements_stiff_refuses_no_step() {
+    const PART: f32 = 0.01;
+    const STEPS: u32 = 90;
+    let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
+    let run = |mass_scaling: f32, max_substeps: u32| {
+        let mut world = World::new(WorldDefinition {
+            max_substeps,
+            ..gravity()
+        })
+        .expect("a world");
+        let body = world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                young_modulus: 3000.0,
+                density: 1060.0,
+                ..Material::default()
+            }),
+            mass_scaling,
+            ..BodyDefinition::default()
+        });
+        let body = body.expect("a body");
+        let held = mesh.positions.iter().map(|place| place.x).fold(f32::INFINITY, f32::min) + 0.015;
+        for (node, place) in (0..).zip(&mesh.positions) {
+            if place.x < held {
+                world.body_mut(body).expect("the body").pin(node).expect("a node");
+            }
+        }
+        let mass: f64 = (0..mesh.positions.len() as u32)
+            .map(|node| f64::from(world.body(body).expect("the body").node_mass(node).expect("a node")))
+            .sum();
+        let energy = |world: &World| {
+            let energy = world.body(body).expect("the body").energy(Vec3::NEG_Y * G);
+            energy.kinetic + energy.elastic + energy.gravitational
+        };
+        let start = energy(&world);
+        let (mut most, mut added, mut lowest) = (0, 0.0_f64, 0.0_f64);
+        for _ in 0..STEPS {
+            let hash = world.state_hash();
+            let Ok(report) = world.step(FRAME) else {
+                assert_eq!(world.state_hash(), hash);
+                return None;
+            };
+            let now = world.body(body).expect("the body");
+            added = added.max(now.solver_report().added_mass / mass);
+            most = most.max(report.substeps);
+            lowest = lowest.min(now.energy(Vec3::NEG_Y * G).gravitational - start);
+            // Leapfrog's own energy differs by the squares of what is fast.
+            assert!(
+                energy(&world) - start < -2e-2 * lowest,
+                "{} of {lowest} J",
+                energy(&world) - start
+            );
+        }
+        Some((most, added))
+    };
+    let (most, _) = run(0.0, 10_000).expect("enough substeps");
+    // As many as half of what it takes.
+    let allowed = most / 2;
+    assert_eq!(run(0.0, allowed), None);
+    let (taken, added) = run(PART, allowed).expect("no step is refused");
+    assert!(taken <= allowed, "{taken} of {allowed}");
+    assert!(added > 0.0 && added <= 10.0 * f64::from(PART), "{added}");
+}
+
 #[test]
 fn a_refused_step_of_elements_changes_nothing() {
     let mut scenes = [0, 1].map(|_| Tissue::new(Tissue::PART, 0.3, 0.0, gravity()));

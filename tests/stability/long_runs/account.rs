@@ -1,6 +1,7 @@
 //! The balance of energy and momentum of a body.
 //!
-//! **Energy.** `E` is the kinetic, elastic and gravitational energy of the body together. It begins with `E0`, and its static equilibrium has
+//! **Energy.** `E` is the kinetic, elastic and gravitational energy of the body together, with the nodal masses: what mass scaling adds is no
+//! energy of the body, and only takes some of it for a while. It begins with `E0`, and its static equilibrium has
 //! `E_rest`. The work `W` is a sum over the steps: the mean force of a moved pin times the pin's displacement, an applied force times the
 //! displacement of its node, and the force of a tool times the tool's displacement. The energy put in is `E0 - E_rest + W`: this much can
 //! become motion. Only work raises `E`, and damping lowers it, so `E <= E0 + W`. The excess `E - E0 - W`, a mean over one simulated second, may

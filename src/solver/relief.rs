@@ -1,0 +1,94 @@
+//! Mass for elements that motion has made stiff, so that no step is refused because of a few of them.
+//!
+//! Where a step would take more substeps than are allowed, each node is asked for the mass that it needs with its elements as they are
+//! deformed, and masses are made for as many substeps as are allowed, with more mass than otherwise if need be. They stay so for a while. Nodes keep
+//! their velocities but for what the added mass would add to the kinetic energy of the deformation, which is taken off all of it.
+
+use super::attempt::{StepRequest, fewer_substeps};
+use super::verlet;
+use crate::body::Body;
+use crate::soa::Masses;
+use crate::threads::Team;
+
+/// Makes masses for elements as they are deformed: at the current state, or where a step that `was_tried` has come to. The longest stable
+/// substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for that.
+pub(super) fn relieve(body: &mut Body, request: &StepRequest, was_tried: bool, team: &Team) -> Option<f32> {
+    if request.substeps > 0 || request.tolerance > 0.0 {
+        return None;
+    }
+    let (Some(scaling), Some(elements)) = (&mut body.scaling, &body.elements) else {
+        return None;
+    };
+    let growths = scaling.begin_relief()?;
+    let positions = if was_tried {
+        body.state.newest().0
+    } else {
+        body.state.positions()
+    };
+    elements.stiffenings(positions, &mut |corners, stiffening| {
+        for node in corners {
+            if let Some(growth) = growths.get_mut(node as usize) {
+                *growth = growth.max(stiffening as f32);
+            }
+        }
+    });
+    let in_use = Masses {
+        masses: &body.masses,
+        inverse_masses: &body.inverse_masses,
+        are_heavier: scaling.step() > 0.0,
+    };
+    let rates = body.damping.as_ref().map(|damping| damping.rates());
+    scaling.relieve(&body.masses, rates, |node| {
+        elements.carried_at_rest(node, in_use.inverse(node))
+    });
+    let (_, masses_for) = fewer_substeps(body, request, 0.0)?;
+    body.scale_masses(masses_for);
+    verlet::begin(body, request);
+    Some(body.limit_beside_springs(team))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use crate::def::{BodyDefinition, Material, Model};
+    use crate::mesh::Mesh;
+    use crate::random::Random;
+    use crate::threads::Team;
+    use crate::world::{World, WorldDefinition};
+
+    #[test]
+    fn elements_one_by_one_give_the_bound_that_kernels_find() {
+        let mesh = Mesh::organ(0.15, 0.15 / 8.0).expect("a mesh");
+        for poisson_ratio in [0.3, 0.45] {
+            let mut world = World::new(WorldDefinition::default()).expect("a world");
+            let id = world.create_body(&BodyDefinition {
+                positions: &mesh.positions,
+                tetrahedra: &mesh.tetrahedra,
+                material: Some(Material {
+                    model: Model::Tetrahedra,
+                    poisson_ratio,
+                    ..Material::default()
+                }),
+                ..BodyDefinition::default()
+            });
+            let mut random = Random(7);
+            let body = world.body_mut(id.expect("a body")).expect("a body");
+            let moved = mesh.positions.iter().map(|&place| place + 2e-3 * random.vector());
+            let moved: Vec<Vec3> = moved.collect();
+            body.set_positions(&moved).expect("positions");
+            let limit = f64::from(body.limit_beside_springs(&Team::alone()));
+            let elements = body.elements.as_deref().expect("elements");
+            let mut stiffest = 0.0_f64;
+            elements.stiffenings(body.state.positions(), &mut |corners, stiffening| {
+                for node in corners {
+                    let inverse_mass = body.inverse_masses[node as usize];
+                    let carried = elements.carried_at_rest(node as usize, inverse_mass);
+                    stiffest = stiffest.max(2.0 * stiffening * f64::from(carried.stiffness * inverse_mass));
+                }
+            });
+            let found = 2.0 / stiffest.sqrt();
+            assert!((found / limit - 1.0).abs() < 1e-4, "{found:e} s, {limit:e} s");
+        }
+    }
+}
