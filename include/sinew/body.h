@@ -245,6 +245,12 @@ typedef struct sinew_body_def {
   /// sinew_body_get_awake_share.
   float sleep_speed;
   float sleep_time;                ///< [s] Time at rest before sleep, above 0; default 0.5.
+  /// [m] Translation of all positions, after the rotation; default 0 0 0.
+  float position[3];
+  /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
+  float orientation[4];
+  /// Factor of the world's gravity on this body, finite; default 1.
+  float gravity_scale;
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).

@@ -277,6 +277,12 @@ pub struct sinew_body_def {
     pub sleep_speed: f32,
     /// [s] Time at rest before sleep, above 0; default 0.5.
     pub sleep_time: f32,
+    /// [m] Translation of all positions, after the rotation; default 0 0 0.
+    pub position: [f32; 3],
+    /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
+    pub orientation: [f32; 4],
+    /// Factor of the world's gravity on this body, finite; default 1.
+    pub gravity_scale: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -290,6 +296,7 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, contact_thickness),
         offset_of!(Self, spare_nodes),
         offset_of!(Self, sleep_speed),
+        offset_of!(Self, position),
         size_of::<Self>(),
     ];
     const NAME: &'static str = "sinew_body_def";
@@ -370,6 +377,9 @@ impl sinew_body_def {
             smallest_piece: 0.0,
             sleep_speed: Sleep::default().speed,
             sleep_time: Sleep::default().time,
+            position: [0.0; 3],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            gravity_scale: 1.0,
         }
     }
 
