@@ -7,9 +7,8 @@ use super::blade::sinew_blade_id;
 use super::body::{sinew_body_id, with_body};
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
-use super::status::{SINEW_STATUS_OK, sinew_status};
+use super::status::sinew_status;
 use super::tool::sinew_tool_id;
-use crate::base::Error;
 use crate::def::CollisionFilter;
 use crate::query::RayHit;
 
@@ -23,11 +22,12 @@ use crate::query::RayHit;
 pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: sinew_body_id) -> u32 {
     // SAFETY: the same contract.
     unsafe {
-        let status = with_world(world, |world| match world.has_body(body.id()) {
-            true => Ok(()),
-            false => Err(Error::invalid("body is no id of the world")),
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_body(body.id());
+            Ok(())
         });
-        u32::from(status == SINEW_STATUS_OK)
+        u32::from(is_there)
     }
 }
 
@@ -41,11 +41,12 @@ pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: si
 pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: sinew_tool_id) -> u32 {
     // SAFETY: the same contract.
     unsafe {
-        let status = with_world(world, |world| match world.has_tool(tool.id()) {
-            true => Ok(()),
-            false => Err(Error::invalid("tool is no id of the world")),
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_tool(tool.id());
+            Ok(())
         });
-        u32::from(status == SINEW_STATUS_OK)
+        u32::from(is_there)
     }
 }
 
@@ -59,11 +60,12 @@ pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: si
 pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: sinew_blade_id) -> u32 {
     // SAFETY: the same contract.
     unsafe {
-        let status = with_world(world, |world| match world.has_blade(blade.id()) {
-            true => Ok(()),
-            false => Err(Error::invalid("blade is no id of the world")),
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_blade(blade.id());
+            Ok(())
         });
-        u32::from(status == SINEW_STATUS_OK)
+        u32::from(is_there)
     }
 }
 
@@ -77,11 +79,12 @@ pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: 
 pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, attachment: sinew_attachment_id) -> u32 {
     // SAFETY: the same contract.
     unsafe {
-        let status = with_world(world, |world| match world.has_attachment(attachment.id()) {
-            true => Ok(()),
-            false => Err(Error::invalid("attachment is no id of the world")),
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_attachment(attachment.id());
+            Ok(())
         });
-        u32::from(status == SINEW_STATUS_OK)
+        u32::from(is_there)
     }
 }
 

@@ -40,7 +40,7 @@ impl sinew_body_def {
             return make(&definition);
         }
         let turn = pose.orientation.as_dquat().normalize();
-        let moved = |vectors: &[Vec3], by: Vec3| {
+        let moved = |vectors: &[Vec3], by: Vec3| -> Result<Vec<Vec3>> {
             let mut moved = memory::reserved(vectors.len())?;
             moved.extend(
                 vectors
