@@ -37,6 +37,7 @@
 #include "sinew/haptics.h"
 #include "sinew/render.h"
 #include "sinew/query.h"
+#include "sinew/more.h"
 #include "sinew/snapshot.h"
 #include "sinew/diagnostics.h"
 

@@ -149,6 +149,13 @@ struct pose {
   vec3 position;
   quat orientation;
 };
+// Collision bits.
+struct filter {
+  std::uint32_t category, mask;
+};
+struct box {
+  vec3 min, max; // m
+};
 
 class mesh : public owner<sinew_mesh, sinew_mesh_destroy> {
 public:
@@ -168,6 +175,19 @@ public:
   static mesh organ(float length, float spacing) {
     return made([&](auto out) { return sinew_mesh_create_organ(length, spacing, out); });
   }
+  // From memory, welded and cleaned.
+  static mesh create(span<const float> positions, span<const std::uint32_t> triangles, span<const std::uint32_t> tetrahedra = {}) {
+    return made([&](auto out) {
+      return sinew_mesh_create(positions.data(), positions.size() / 3, triangles.data(), triangles.size() / 3, tetrahedra.data(),
+                               tetrahedra.size() / 4, out);
+    });
+  }
+  // Of tetrahedra that fill the closed surface of this mesh.
+  mesh filled(float spacing) const {
+    return made([&](auto out) { return sinew_mesh_create_filled(get(), spacing, out); });
+  }
+  // Gives a definition the nodes and elements of this mesh, which must outlive its use.
+  void set(body_def &def) const { check(sinew_body_def_set_mesh(&def, get())); }
   sinew_mesh_view view() const {
     auto out = sized<sinew_mesh_view>();
     return check(sinew_mesh_get_view(get(), &out)), out;
@@ -184,6 +204,7 @@ class attachment : public part<sinew_attachment_id> {
 public:
   using part::part;
   void release() { check(sinew_attachment_release(world(), id)); }
+  bool is_valid() const { return sinew_attachment_is_valid(world(), id) != 0; }
   vec3 force() const {
     vec3 out{};
     return check(sinew_attachment_get_force(world(), id, out.data())), out;
@@ -200,6 +221,24 @@ class tool : public part<sinew_tool_id> {
 public:
   using part::part;
   void destroy() { check(sinew_tool_destroy(world(), id)); }
+  bool is_valid() const { return sinew_tool_is_valid(world(), id) != 0; }
+  void set_user_data(void *data) { check(sinew_tool_set_user_data(world(), id, data)); }
+  void *user_data() const {
+    void *out = nullptr;
+    return check(sinew_tool_get_user_data(world(), id, &out)), out;
+  }
+  float friction() const {
+    float out = 0;
+    return check(sinew_tool_get_friction(world(), id, &out)), out;
+  }
+  float force_limit() const {
+    float out = 0;
+    return check(sinew_tool_get_force_limit(world(), id, &out)), out;
+  }
+  filter collision() const {
+    filter out{};
+    return check(sinew_tool_get_collision(world(), id, &out.category, &out.mask)), out;
+  }
   void set_position(vec3 position) { check(sinew_tool_set_pose(world(), id, position.data(), nullptr)); }
   void set_pose(vec3 position, quat orientation) {
     check(sinew_tool_set_pose(world(), id, position.data(), orientation.data()));
@@ -231,6 +270,11 @@ class blade : public part<sinew_blade_id> {
 public:
   using part::part;
   void destroy() { check(sinew_blade_destroy(world(), id)); }
+  bool is_valid() const { return sinew_blade_is_valid(world(), id) != 0; }
+  sinew::pose pose() const {
+    sinew::pose out{};
+    return check(sinew_blade_get_pose(world(), id, out.position.data(), out.orientation.data())), out;
+  }
   void set_pose(vec3 position, quat orientation) {
     check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
   }
@@ -246,6 +290,50 @@ public:
   using nodes = span<const std::uint32_t>;
   using floats = span<const float>;
   void destroy() { check(sinew_body_destroy(world(), id)); }
+  bool is_valid() const { return sinew_body_is_valid(world(), id) != 0; }
+  void set_user_data(void *data) { check(sinew_body_set_user_data(world(), id, data)); }
+  void *user_data() const { return viewed<void *>(sinew_body_get_user_data); }
+
+  // Turned about the pivot, then moved; without a pivot about the middle of its box.
+  void transform(vec3 translation, quat rotation = {0, 0, 0, 1}, const vec3 *pivot = nullptr) {
+    check(sinew_body_transform(world(), id, translation.data(), rotation.data(), pivot ? pivot->data() : nullptr));
+  }
+  box bounds() const {
+    box out{};
+    return check(sinew_body_get_bounds(world(), id, out.min.data(), out.max.data())), out;
+  }
+  // Into 3 floats for each node.
+  void normals(span<float> into) const {
+    expect(into.size() % 3 == 0, "3 floats for each node");
+    check(sinew_body_get_normals(world(), id, into.data(), into.size() / 3));
+  }
+  void masses(span<float> into) const { check(sinew_body_get_masses(world(), id, into.data(), into.size())); }
+  void apply_impulses(nodes at, floats impulses) {
+    expect(impulses.size() == 3 * at.size(), "impulses: 3 floats for each node");
+    check(sinew_body_apply_impulses(world(), id, at.data(), impulses.data(), at.size()));
+  }
+  void set_gravity_scale(float scale) { check(sinew_body_set_gravity_scale(world(), id, scale)); }
+  float gravity_scale() const { return viewed<float>(sinew_body_get_gravity_scale); }
+  float pressure() const { return viewed<float>(sinew_body_get_pressure); }
+  filter collision() const {
+    filter out{};
+    return check(sinew_body_get_collision(world(), id, &out.category, &out.mask)), out;
+  }
+  void pin(nodes held) { check(sinew_body_pin_nodes(world(), id, held.data(), held.size())); }
+  void unpin(nodes held) { check(sinew_body_unpin_nodes(world(), id, held.data(), held.size())); }
+  std::size_t pin_box(vec3 min, vec3 max) { // how many nodes are pinned there
+    std::size_t count = 0;
+    return check(sinew_body_pin_box(world(), id, min.data(), max.data(), &count)), count;
+  }
+  std::size_t unpin_box(vec3 min, vec3 max) {
+    std::size_t count = 0;
+    return check(sinew_body_unpin_box(world(), id, min.data(), max.data(), &count)), count;
+  }
+  // Into 3 floats for each node.
+  void pin_forces(span<float> into) const {
+    expect(into.size() % 3 == 0, "3 floats for each node");
+    check(sinew_body_get_pin_forces(world(), id, into.data(), into.size() / 3));
+  }
 
   vec3_view positions() const { return viewed<vec3_view>(sinew_body_get_positions); }
   vec3_view velocities() const { return viewed<vec3_view>(sinew_body_get_velocities); }
@@ -464,6 +552,28 @@ public:
     return check(sinew_world_step(get(), dt, &out)), out;
   }
   void set_gravity(vec3 gravity) { check(sinew_world_set_gravity(get(), gravity.data())); }
+  vec3 gravity() const {
+    vec3 out{};
+    return check(sinew_world_get_gravity(get(), out.data())), out;
+  }
+  double time() const {
+    double out = 0;
+    return check(sinew_world_get_time(get(), &out, nullptr)), out;
+  }
+  std::uint64_t step_count() const {
+    std::uint64_t out = 0;
+    return check(sinew_world_get_time(get(), nullptr, &out)), out;
+  }
+  void set_user_data(void *data) { check(sinew_world_set_user_data(get(), data)); }
+  void *user_data() const {
+    void *out = nullptr;
+    return check(sinew_world_get_user_data(get(), &out)), out;
+  }
+  sinew_ray_hit cast_ray(vec3 origin, vec3 direction, float max_distance, filter of) const { // of bodies and tools
+    auto out = sized<sinew_ray_hit>();
+    check(sinew_world_cast_ray_filtered(get(), origin.data(), direction.data(), max_distance, of.category, of.mask, &out));
+    return out;
+  }
   std::uint64_t state_hash() const {
     std::uint64_t out = 0;
     return check(sinew_world_get_state_hash(get(), &out)), out;

@@ -43,7 +43,7 @@ pub use def::{
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
 pub use picture::{BodyValues, PictureDefinition};
-pub use query::SurfaceHit;
+pub use query::{RayHit, SurfaceHit};
 pub use readers::{BodyReader, Frame};
 pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};

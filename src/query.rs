@@ -1,14 +1,16 @@
 //! What of the bodies of a world a ray meets, or is nearest to a point: for a hand that is to grasp it.
 
+mod tools;
+
 use glam::{DVec3, Vec3};
 
 use crate::base::{Error, Result};
 use crate::body::Body;
-use crate::def::finite_vector;
+use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
 use crate::geometry::predicates::pierce;
-use crate::world::{BodyId, World};
+use crate::world::{BodyId, ToolId, World};
 
 /// A point of a body's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +29,63 @@ pub struct SurfaceHit {
     pub distance: f32,
 }
 
+/// What a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RayHit {
+    /// The surface of a body.
+    Body(SurfaceHit),
+    /// The surface of a tool.
+    Tool {
+        /// The tool.
+        tool: ToolId,
+        /// Where it is met, m.
+        position: Vec3,
+        /// Outward, of unit length.
+        normal: Vec3,
+        /// From the origin of the ray, m.
+        distance: f32,
+    },
+}
+
 impl World {
+    /// As [`World::cast_ray`], of the bodies and tools that meet this filter: as if the ray were a thing with its
+    /// category and mask.
+    ///
+    /// # Errors
+    /// As [`World::cast_ray`].
+    pub fn cast_ray_at(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        max_distance: f32,
+        filter: CollisionFilter,
+    ) -> Result<Option<RayHit>> {
+        let hit = self.cast_ray_where(origin, direction, max_distance, |body| {
+            body.collision_filter().meets(filter)
+        })?;
+        let (start, way) = (origin.as_dvec3(), direction.as_dvec3().normalize_or_zero());
+        let mut nearest = hit.map_or(f64::INFINITY, |hit| f64::from(hit.distance));
+        let mut found = hit.map(RayHit::Body);
+        for (id, tool) in self.tool_ids().zip(self.tools()) {
+            if !tool.filter.meets(filter) {
+                continue;
+            }
+            if let Some((distance, normal)) = tools::meet(tool, start, way)
+                && distance < nearest
+                && distance as f32 <= max_distance
+            {
+                nearest = distance;
+                found = Some(RayHit::Tool {
+                    tool: id,
+                    position: (start + way * distance).as_vec3(),
+                    normal: normal.as_vec3(),
+                    distance: distance as f32,
+                });
+            }
+        }
+        Ok(found)
+    }
+
     /// The first point that a ray from `origin` (m) along `direction` (of any length) meets on the surface of a body within
     /// `max_distance` (m, may be infinite), at the nodes' current places; `None` where there is none. Fronts and backs of triangles count;
     /// what lies along a triangle does not meet it.
@@ -36,6 +94,17 @@ impl World {
     /// [`Error::InvalidArgument`]: a number is not finite, the direction is zero, or `max_distance` is negative or not a number.
     /// [`Error::OutOfMemory`]: there is none for a tree over a body's surface.
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, max_distance: f32) -> Result<Option<SurfaceHit>> {
+        self.cast_ray_where(origin, direction, max_distance, |_| true)
+    }
+
+    /// The same of some bodies.
+    fn cast_ray_where(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        max_distance: f32,
+        is_met: impl Fn(&Body) -> bool,
+    ) -> Result<Option<SurfaceHit>> {
         finite_vector("origin", origin)?;
         finite_vector("direction", direction)?;
         check_distance(max_distance)?;
@@ -45,7 +114,7 @@ impl World {
         }
         let start = origin.as_dvec3();
         let mut found: Option<(f64, SurfaceHit)> = None;
-        for (id, body) in self.bodies_by_id() {
+        for (id, body) in self.bodies_by_id().filter(|(_, body)| is_met(body)) {
             let bounds = body.published_bounds();
             let furthest = start
                 .abs()

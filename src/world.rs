@@ -6,6 +6,7 @@ mod blade;
 mod blades;
 mod haptics;
 mod holds;
+mod looks;
 mod push;
 mod readers;
 mod resistance;
@@ -111,6 +112,8 @@ pub struct World {
     haptics: Vec<haptics::Link>,
     /// The steps that were taken.
     clock: Clock,
+    /// What the caller keeps with it.
+    user_data: usize,
 }
 
 impl World {
@@ -144,6 +147,7 @@ impl World {
             holds_made: 0,
             haptics: Vec::new(),
             clock: Clock::default(),
+            user_data: 0,
         })
     }
 
@@ -345,7 +349,9 @@ impl World {
     pub fn rest_state(&mut self, body: BodyId, definition: &RestStateDefinition) -> Result<RestStateReport> {
         self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
-        rest_state(self.bodies.get_mut(body.0)?, gravity, definition)
+        let body = self.bodies.get_mut(body.0)?;
+        let gravity = gravity * body.gravity_scale;
+        rest_state(body, gravity, definition)
     }
 
     /// All bodies.
@@ -465,7 +471,7 @@ impl World {
         self.wake_near(tool)
     }
 
-    /// Has this force, N, at least 0 or infinity, be the largest that moves a tool, from the next step on.
+    /// Has this force, N, at least 0, where 0 and infinity mean no limit, be the largest that moves a tool, from the next step on.
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: it is below 0 or not a number.

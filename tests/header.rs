@@ -2,9 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::OnceLock;
 
+#[path = "header/bindings.rs"]
+mod bindings;
 #[path = "header/layout.rs"]
 mod layout;
 
@@ -289,4 +293,78 @@ fn the_documents_list_every_function_beside_its_counterpart_in_rust() {
         .filter_map(|line| Some(line.split_once('(')?.0.rsplit([' ', '*']).next()?.to_owned()))
         .collect();
     assert_eq!(listed, in_modules, "in the order of the modules");
+}
+
+/// A program that is installed, run in a folder of its own; what it says where it fails.
+fn failure(program: &str, arguments: &[&str]) -> Option<String> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(env!("CARGO_TARGET_TMPDIR"))
+        .output()
+        .expect("a program that is installed runs");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (!output.status.success()).then_some(said)
+}
+
+/// Says past the harness's capture, so that it is seen, what was not tested.
+fn skip(what: &str) {
+    let _ = std::io::stderr().write_all(format!("SKIPPED: {what}\n").as_bytes());
+}
+
+#[test]
+fn the_bindings_are_those_of_the_header() {
+    let bindings = [
+        ("bindings/python/sinew_cffi.h", bindings::cffi(committed())),
+        ("bindings/csharp/Sinew.cs", bindings::csharp(committed())),
+    ];
+    for (path, text) in &bindings {
+        let path = root().join(path);
+        if std::env::var_os("SINEW_WRITE_HEADER").is_some() {
+            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder can be made");
+            fs::write(&path, text).expect("a binding can be written");
+        }
+        let there = fs::read_to_string(&path).unwrap_or_default();
+        assert!(
+            there == *text,
+            "{}: SINEW_WRITE_HEADER=1 cargo test --test header",
+            path.display()
+        );
+    }
+    let functions = functions(committed());
+    for (_, declaration) in &functions {
+        let name = declaration.split('(').next().unwrap_or_default();
+        let name = name.rsplit([' ', '*']).next().unwrap_or_default();
+        for (path, text) in &bindings {
+            assert!(text.contains(&format!("{name}(")), "{name} is not in {path}");
+        }
+    }
+}
+
+#[test]
+fn python_reads_its_declarations() {
+    let program = "import cffi, sys; f = cffi.FFI(); f.cdef(open(sys.argv[1]).read()); \
+        print(f.sizeof('sinew_body_def'), f.sizeof('sinew_ray_hit'))";
+    if !Command::new("python3")
+        .args(["-c", "import cffi"])
+        .output()
+        .is_ok_and(|output| output.status.success())
+    {
+        return skip("the declarations for Python: cffi is not installed");
+    }
+    let path = root().join("bindings/python/sinew_cffi.h");
+    let said = failure("python3", &["-c", program, &path.to_string_lossy()]);
+    assert_eq!(said, None);
+}
+
+#[test]
+fn csharp_compiles_its_binding() {
+    if Command::new("mcs").arg("--version").output().is_err() {
+        return skip("the binding for C#: mcs is not installed");
+    }
+    let path = root().join("bindings/csharp/Sinew.cs");
+    let said = failure(
+        "mcs",
+        &["-unsafe", "-target:library", "-out:Sinew.dll", &path.to_string_lossy()],
+    );
+    assert_eq!(said, None);
 }

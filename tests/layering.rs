@@ -41,7 +41,7 @@ const MAY_IMPORT: &[Row] = &[
         "readers", "solver", "body"]),
     ("haptics", &["base", "handover", "def", "contact", "world"]),
     ("embedding", &["base", "geometry", "mesh", "def", "cutting", "body", "world"]),
-    ("query", &["base", "geometry", "def", "body", "world"]),
+    ("query", &["base", "geometry", "def", "contact", "body", "world"]),
     ("detection", &["contact"]),
     ("picture", &["base", "mesh", "def", "raster", "contact", "body", "world"]),
     ("capi", &["base", "simd", "ids", "threads", "mesh", "def", "strain", "raster", "material", "cutting", "contact",

@@ -115,8 +115,8 @@ typedef struct sinew_body_def {
   uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
   /// 1; ten times that where a step would be refused. Default 0.001; 0 is off. Mass is added only
-  /// if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance. It adds
-  /// inertia but no weight. See sinew_solver_report.
+  /// if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance. It
+  /// adds inertia but no weight. See sinew_solver_report.
   float mass_scaling;
   uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
@@ -246,6 +246,12 @@ typedef struct sinew_body_def {
   /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
   uint32_t element_law;
   float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
+  /// [m] Translation of all positions, after the rotation; default 0 0 0.
+  float position[3];
+  /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
+  float orientation[4];
+  /// Factor of the world's gravity on this body, finite; default 1.
+  float gravity_scale;
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).

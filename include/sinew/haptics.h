@@ -25,14 +25,14 @@ typedef struct sinew_haptic_def {
   /// device_mass.
   float damping_ratio;
   float device_mass;        ///< [kg] Effective mass of the device, above 0; default 0.05.
-  /// [N] Largest force on the device, above 0 (0 is refused); infinity (default): unlimited.
+  /// [N] Largest force on the device, at least 0; infinity (default) or 0: unlimited.
   float force_limit;
-  /// [N m] Largest torque on the device, above 0 (0 is refused); infinity (default): unlimited.
+  /// [N m] Largest torque on the device, at least 0; infinity (default) or 0: unlimited.
   float torque_limit;
-  /// [N/s] Largest rate of change of the force, above 0; infinity (default): unlimited. The
+  /// [N/s] Largest rate of change of the force, at least 0; infinity (default) or 0: unlimited. The
   /// coupling is passive only while this limit is not reached.
   float force_rate_limit;
-  /// [N m/s] Largest rate of change of the torque, above 0; infinity (default): unlimited.
+  /// [N m/s] Largest rate of change of the torque, at least 0; infinity (default) or 0: unlimited.
   float torque_rate_limit;
   /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
   float stale_after;

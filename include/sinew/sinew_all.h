@@ -14,6 +14,7 @@
 #define SINEW_HAPTICS_H
 #define SINEW_RENDER_H
 #define SINEW_QUERY_H
+#define SINEW_MORE_H
 #define SINEW_SNAPSHOT_H
 #define SINEW_DIAGNOSTICS_H
 
@@ -453,8 +454,8 @@ typedef struct sinew_body_def {
   uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
   /// 1; ten times that where a step would be refused. Default 0.001; 0 is off. Mass is added only
-  /// if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance. It adds
-  /// inertia but no weight. See sinew_solver_report.
+  /// if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance. It
+  /// adds inertia but no weight. See sinew_solver_report.
   float mass_scaling;
   uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,
@@ -584,6 +585,12 @@ typedef struct sinew_body_def {
   /// Law of TETRAHEDRA, a sinew_element_law value; if not 0, no viscosity and no yield_strain.
   uint32_t element_law;
   float mooney_ratio;              ///< MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
+  /// [m] Translation of all positions, after the rotation; default 0 0 0.
+  float position[3];
+  /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
+  float orientation[4];
+  /// Factor of the world's gravity on this body, finite; default 1.
+  float gravity_scale;
 } sinew_body_def;
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
@@ -743,8 +750,8 @@ typedef struct sinew_tool_def {
   /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
   /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
   float resolution;
-  /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue
-  /// stops it. Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
+  /// [N] Largest force that moves the tool, at least 0; infinity (default) or 0: unlimited. Beyond
+  /// it the tool stops short of its pose; see sinew_tool_get_pose.
   float force_limit;
   /// Bits of the categories that this tool belongs to; default 1. Two objects collide if each has a
   /// category in the mask of the other.
@@ -783,18 +790,11 @@ sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const f
 sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
                                  float *orientation);
 
-/// Writes the pose that the last step moved a tool to, before the force_limit.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-/// Replaying these poses with sinew_tool_set_pose reproduces the steps, also those that a haptic
-/// handle drove.
-sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
-                                   float *orientation);
-
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
 
 /// Sets the largest force [N] that moves a tool, from the next step on.
-/// It is at least 0; infinity: unlimited; 0: tissue stops the tool. See sinew_tool_def.
+/// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
 /// Sets the collision category and mask of a tool from the next step on.
@@ -805,15 +805,10 @@ sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, ui
 // ---- Forces and contacts ------------------------------------------------------------------------
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
-/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each.
+/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are
+/// nullable.
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
                                    float *torque);
-
-/// Writes the total force and torque on several tools, averaged over the last step, in world axes.
-/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m],
-/// about `point`, receive 3 floats each.
-sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
-                                    size_t count, const float *point, float *force, float *torque);
 
 /// Contact between a tool and a body at the end of the last step.
 typedef struct sinew_contact {
@@ -832,21 +827,6 @@ typedef struct sinew_contact {
 /// `contacts` receives at most `capacity` entries, `count` the number that exist.
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
                                      sinew_contact *contacts, size_t capacity, size_t *count);
-
-/// Contact between a tool and a body that began or ended in the last step.
-typedef struct sinew_contact_change {
-  sinew_tool_id tool;  ///< Tool of the contact.
-  sinew_body_id body;  ///< Body of the contact.
-  uint32_t begun;      ///< 1: the contact began; 0: it ended.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
-} sinew_contact_change;
-
-/// Writes the contacts that began or ended in the last step.
-/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool
-/// or body does not report an end.
-sinew_status sinew_world_get_contact_changes(const sinew_world *world,
-                                             sinew_contact_change *changes, size_t capacity,
-                                             size_t *count);
 
 // sinew/material.h: tissue values, springs, pressure and static equilibrium.
 
@@ -1304,14 +1284,14 @@ typedef struct sinew_haptic_def {
   /// device_mass.
   float damping_ratio;
   float device_mass;        ///< [kg] Effective mass of the device, above 0; default 0.05.
-  /// [N] Largest force on the device, above 0 (0 is refused); infinity (default): unlimited.
+  /// [N] Largest force on the device, at least 0; infinity (default) or 0: unlimited.
   float force_limit;
-  /// [N m] Largest torque on the device, above 0 (0 is refused); infinity (default): unlimited.
+  /// [N m] Largest torque on the device, at least 0; infinity (default) or 0: unlimited.
   float torque_limit;
-  /// [N/s] Largest rate of change of the force, above 0; infinity (default): unlimited. The
+  /// [N/s] Largest rate of change of the force, at least 0; infinity (default) or 0: unlimited. The
   /// coupling is passive only while this limit is not reached.
   float force_rate_limit;
-  /// [N m/s] Largest rate of change of the torque, above 0; infinity (default): unlimited.
+  /// [N m/s] Largest rate of change of the torque, at least 0; infinity (default) or 0: unlimited.
   float torque_rate_limit;
   /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
   float stale_after;
@@ -1659,6 +1639,219 @@ sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t s
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
 sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
                                          sinew_dvec3_view *out);
+
+// sinew/more.h: whole bodies, several nodes, filtered rays, settings and user data.
+
+// ---- Meshes -------------------------------------------------------------------------------------
+
+/// Creates a mesh from arrays and cleans it like sinew_mesh_load.
+/// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 *
+/// tetrahedron_count node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those
+/// of the mesh.
+sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
+                               size_t triangle_count, const uint32_t *tetrahedra,
+                               size_t tetrahedron_count, sinew_mesh **out);
+
+/// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
+/// `spacing` [m] is the mean edge length. Nodes and tetrahedra are those of the body that
+/// sinew_body_create_from_surface makes of the same surface, with the rest positions.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine
+/// or too coarse.
+sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
+
+/// Sets the nodes and elements of a body definition to those of a mesh.
+/// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist
+/// until the body is created.
+sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
+
+// ---- Whole bodies -------------------------------------------------------------------------------
+
+/// Rotates a body about a pivot and then translates it, with its pins and velocities.
+/// `translation` [m] is 3 floats, `rotation` x y z w, not zero, and `pivot` [m] 3 floats; all are
+/// nullable: none, none, and the center of the bounding box. Nothing is swept; otherwise like
+/// sinew_body_set_positions.
+sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
+                                  const float *rotation, const float *pivot);
+
+/// Writes the bounding box of the nodes of a body.
+/// `out_min` [m] and `out_max` [m] receive 3 floats each.
+sinew_status sinew_body_get_bounds(const sinew_world *world, sinew_body_id body, float *out_min,
+                                   float *out_max);
+
+/// Writes the unit normals of the surface of a body at its nodes.
+/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3
+/// * node_count floats; `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body, float *normals,
+                                    size_t node_count);
+
+/// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
+/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *masses,
+                                   size_t node_count);
+
+/// Changes the velocities of nodes at once by impulses.
+/// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They
+/// have no effect on a pinned or attached node, nor along a pinned axis. On failure no velocity
+/// changes.
+sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
+                                       const uint32_t *nodes, const float *impulses, size_t count);
+
+/// Sets the factor of the world's gravity on a body, from the next step on.
+/// `scale` is finite: 0 means no gravity.
+sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body, float scale);
+
+/// Writes the factor of the world's gravity on a body.
+sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_id body, float *out);
+
+// ---- Several pins -------------------------------------------------------------------------------
+
+/// Pins nodes at their current positions; see sinew_body_pin.
+/// `nodes` holds `count` indices. On failure no node changes.
+sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                  size_t count);
+
+/// Unpins nodes along all axes; see sinew_body_unpin.
+/// `nodes` holds `count` indices. On failure no node changes.
+sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                    size_t count);
+
+/// Pins all nodes in a box, and writes how many nodes of the box are pinned.
+/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
+sinew_status sinew_body_pin_box(sinew_world *world, sinew_body_id body, const float *min,
+                                const float *max, size_t *out_count);
+
+/// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
+/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
+sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const float *min,
+                                  const float *max, size_t *out_count);
+
+/// Writes the reaction forces on all nodes, averaged over the last step.
+/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool
+/// holds. `node_count` must be the body's number of nodes.
+sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body, float *forces,
+                                       size_t node_count);
+
+// ---- Tools --------------------------------------------------------------------------------------
+
+/// Writes the pose that the last step moved a tool to, before the force_limit.
+/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+/// Replaying these poses with sinew_tool_set_pose reproduces the steps, also those that a haptic
+/// handle drove.
+sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
+                                   float *orientation);
+
+/// Writes the total force and torque on several tools, averaged over the last step, in world axes.
+/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m],
+/// about `point`, receive 3 floats each; both are nullable.
+sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
+                                    size_t count, const float *point, float *force, float *torque);
+
+/// Contact between a tool and a body that began or ended in the last step.
+typedef struct sinew_contact_change {
+  sinew_tool_id tool;  ///< Tool of the contact.
+  sinew_body_id body;  ///< Body of the contact.
+  uint32_t begun;      ///< 1: the contact began; 0: it ended.
+  uint32_t reserved;   ///< Reserved; set to 0 by the library.
+} sinew_contact_change;
+
+/// Writes the contacts that began or ended in the last step.
+/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool
+/// or body does not report an end.
+sinew_status sinew_world_get_contact_changes(const sinew_world *world,
+                                             sinew_contact_change *changes, size_t capacity,
+                                             size_t *count);
+
+/// First body or tool that a ray hits.
+typedef struct sinew_ray_hit {
+  size_t struct_size;  ///< Set to sizeof(sinew_ray_hit) before the call.
+  sinew_body_id body;  ///< Body that is hit; all zero if none.
+  sinew_tool_id tool;  ///< Tool that is hit; all zero if none.
+  uint32_t triangle;   ///< Index of the triangle in the body's surface; 0 for a tool.
+  float weights[3];    ///< Weights of the triangle's corners, with sum 1; 0 for a tool.
+  float position[3];   ///< [m] Position of the hit.
+  float normal[3];     ///< Outward unit normal at the hit.
+  float distance;      ///< [m] Distance from the origin.
+  uint32_t reserved;   ///< Reserved; set to 0 by the library.
+} sinew_ray_hit;
+
+/// Finds the first body or tool that a ray with a collision filter hits.
+/// The ray meets bodies and tools as if it had this category and mask. Otherwise like
+/// sinew_world_cast_ray; without a hit both ids are all zero.
+sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
+                                           const float *direction, float max_distance,
+                                           uint32_t category, uint32_t mask, sinew_ray_hit *out);
+
+// ---- Settings -----------------------------------------------------------------------------------
+
+/// Writes the time [s] that a world has been stepped, and the number of steps.
+/// Both outputs are nullable.
+sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
+
+/// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
+sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
+
+/// Writes the collision category and mask of a body.
+sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
+                                      uint32_t *out_category, uint32_t *out_mask);
+
+/// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
+sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
+
+/// Writes the friction coefficient of a tool.
+sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
+
+/// Writes the largest force [N] that moves a tool; infinity: unlimited.
+sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
+
+/// Writes the collision category and mask of a tool.
+sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
+                                      uint32_t *out_category, uint32_t *out_mask);
+
+/// Writes the current pose of a blade.
+/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
+                                  float *orientation);
+
+// ---- Ids and user data --------------------------------------------------------------------------
+
+/// Returns 1 if a body with this id exists in the world, else 0.
+/// It returns 0 for a NULL world and a null id.
+uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
+
+/// Returns 1 if a tool with this id exists in the world, else 0.
+/// It returns 0 for a NULL world and a null id.
+uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);
+
+/// Returns 1 if a blade with this id exists in the world, else 0.
+/// It returns 0 for a NULL world and a null id.
+uint32_t sinew_blade_is_valid(const sinew_world *world, sinew_blade_id blade);
+
+/// Returns 1 if an attachment with this id exists in the world, else 0.
+/// It returns 0 for a NULL world and a null id.
+uint32_t sinew_attachment_is_valid(const sinew_world *world, sinew_attachment_id attachment);
+
+/// Stores a pointer of the caller with a world; snapshots do not hold it.
+/// `user_data` is nullable.
+sinew_status sinew_world_set_user_data(sinew_world *world, void *user_data);
+
+/// Writes the pointer that is stored with a world; NULL by default.
+sinew_status sinew_world_get_user_data(const sinew_world *world, void **out);
+
+/// Stores a pointer of the caller with a body; snapshots do not hold it.
+/// `user_data` is nullable.
+sinew_status sinew_body_set_user_data(sinew_world *world, sinew_body_id body, void *user_data);
+
+/// Writes the pointer that is stored with a body; NULL by default.
+sinew_status sinew_body_get_user_data(const sinew_world *world, sinew_body_id body, void **out);
+
+/// Stores a pointer of the caller with a tool; snapshots do not hold it.
+/// `user_data` is nullable.
+sinew_status sinew_tool_set_user_data(sinew_world *world, sinew_tool_id tool, void *user_data);
+
+/// Writes the pointer that is stored with a tool; NULL by default.
+sinew_status sinew_tool_get_user_data(const sinew_world *world, sinew_tool_id tool, void **out);
 
 // sinew/snapshot.h: a world as bytes.
 

@@ -52,8 +52,8 @@ typedef struct sinew_tool_def {
   /// shortest if less. Refused above 2^24 pixels or samples, or if no ray or sample would lie
   /// inside. Memory: about 24 bytes per pixel of 3 images, 4 bytes per sample.
   float resolution;
-  /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue
-  /// stops it. Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
+  /// [N] Largest force that moves the tool, at least 0; infinity (default) or 0: unlimited. Beyond
+  /// it the tool stops short of its pose; see sinew_tool_get_pose.
   float force_limit;
   /// Bits of the categories that this tool belongs to; default 1. Two objects collide if each has a
   /// category in the mask of the other.
@@ -92,18 +92,11 @@ sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const f
 sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
                                  float *orientation);
 
-/// Writes the pose that the last step moved a tool to, before the force_limit.
-/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
-/// Replaying these poses with sinew_tool_set_pose reproduces the steps, also those that a haptic
-/// handle drove.
-sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
-                                   float *orientation);
-
 /// Sets the friction coefficient of a tool, at least 0, from the next step on.
 sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
 
 /// Sets the largest force [N] that moves a tool, from the next step on.
-/// It is at least 0; infinity: unlimited; 0: tissue stops the tool. See sinew_tool_def.
+/// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
 sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
 
 /// Sets the collision category and mask of a tool from the next step on.
@@ -114,15 +107,10 @@ sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, ui
 // ---- Forces and contacts ------------------------------------------------------------------------
 
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
-/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each.
+/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are
+/// nullable.
 sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
                                    float *torque);
-
-/// Writes the total force and torque on several tools, averaged over the last step, in world axes.
-/// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m],
-/// about `point`, receive 3 floats each.
-sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
-                                    size_t count, const float *point, float *force, float *torque);
 
 /// Contact between a tool and a body at the end of the last step.
 typedef struct sinew_contact {
@@ -141,21 +129,6 @@ typedef struct sinew_contact {
 /// `contacts` receives at most `capacity` entries, `count` the number that exist.
 sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
                                      sinew_contact *contacts, size_t capacity, size_t *count);
-
-/// Contact between a tool and a body that began or ended in the last step.
-typedef struct sinew_contact_change {
-  sinew_tool_id tool;  ///< Tool of the contact.
-  sinew_body_id body;  ///< Body of the contact.
-  uint32_t begun;      ///< 1: the contact began; 0: it ended.
-  uint32_t reserved;   ///< Reserved; set to 0 by the library.
-} sinew_contact_change;
-
-/// Writes the contacts that began or ended in the last step.
-/// `changes` receives at most `capacity` entries, `count` the number that exist. Destroying a tool
-/// or body does not report an end.
-sinew_status sinew_world_get_contact_changes(const sinew_world *world,
-                                             sinew_contact_change *changes, size_t capacity,
-                                             size_t *count);
 
 #ifdef __cplusplus
 }

@@ -467,7 +467,7 @@ impl Body {
     }
 
     /// The mass of a node that is to move, kg.
-    fn mass_of_unpinned(&self, node: u32) -> Result<f32> {
+    pub(super) fn mass_of_unpinned(&self, node: u32) -> Result<f32> {
         let mass = self.masses[self.order.own(node) as usize];
         if mass == 0.0 {
             return Err(Error::invalid(format!(
@@ -477,7 +477,7 @@ impl Body {
         Ok(mass)
     }
 
-    fn set_velocity(&mut self, node: u32, velocity: Vec3) {
+    pub(super) fn set_velocity(&mut self, node: u32, velocity: Vec3) {
         let own = self.order.own(node) as usize;
         self.state.velocities_mut().set(own, velocity);
         self.published.forget_velocities();
@@ -499,7 +499,7 @@ impl Body {
     }
 
     /// Refuses a point that is bound to nodes: nothing holds or pulls it but those.
-    fn check_not_bound(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
+    pub(super) fn check_not_bound(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
         let bindings = self.bindings.as_ref();
         if bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some()) {
             return Err(Error::invalid(format!(

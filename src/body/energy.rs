@@ -9,7 +9,7 @@ impl Energy {
     pub(crate) fn of(body: &Body, gravity: Vec3) -> Self {
         let mut energy = Self::default();
         let (positions, velocities) = (body.state.positions(), body.velocities());
-        let gravity = gravity.as_dvec3();
+        let gravity = (gravity * body.gravity_scale).as_dvec3();
         for node in 0..body.node_count() {
             let mass = f64::from(body.masses[node]);
             let position = positions.get(node).as_dvec3();

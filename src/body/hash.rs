@@ -24,6 +24,7 @@ impl Body {
                 hasher.write_floats(&vector.to_array());
             }
         }
+        hasher.write_floats(&[self.gravity_scale]);
         hasher.write_floats(&self.masses);
         hasher.write_floats(&self.inverse_masses);
         if let Some(damping) = &self.damping {

@@ -27,6 +27,7 @@ mod pins;
 mod published;
 mod query_tree;
 mod region;
+mod several;
 mod shown;
 mod sleep;
 mod sound;
@@ -39,6 +40,7 @@ mod tear_solid;
 mod tears;
 mod tissue;
 mod tune;
+mod whole;
 
 use glam::{BVec3, DVec3, Vec3};
 
@@ -160,9 +162,13 @@ pub struct Body {
     query_tree: QueryTree,
     /// For bodies that sleep.
     pub(crate) sleeper: Option<Box<Sleeper>>,
+    /// The part of the world's gravity that acts on it.
+    pub(crate) gravity_scale: f32,
+    /// What the caller keeps with it.
+    user_data: usize,
 }
 
-saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper } leaves { shown: None, query_tree: QueryTree::default() } where Self::is_sound);
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper, gravity_scale } leaves { user_data: 0, shown: None, query_tree: QueryTree::default() } where Self::is_sound);
 
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]
@@ -307,6 +313,8 @@ impl Body {
             shown: None,
             query_tree: QueryTree::default(),
             sleeper: None,
+            gravity_scale: 1.0,
+            user_data: 0,
         };
         body.place(definition.positions);
         let BodyDefinition {

@@ -32,6 +32,7 @@ impl Body {
                 .chain(&self.inverse_masses)
                 .all(|&mass| (0.0..f32::INFINITY).contains(&mass))
             && self.origin.is_finite()
+            && self.gravity_scale.is_finite()
     }
 
     fn springs_lead_to(&self, node: usize, count: usize) -> bool {

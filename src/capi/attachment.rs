@@ -1,12 +1,10 @@
 //! Attachments: what tools hold of bodies and bodies of each other, and the force on several tools together.
 
-use glam::Vec3;
-
 use super::body::sinew_body_id;
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
-use super::tool::sinew_tool_id;
+use super::tool::{sinew_tool_id, write_wrench};
 use crate::base::Result;
 use crate::ids::SlotId;
 use crate::world::{Anchor, AttachmentId, SurfacePoint};
@@ -353,7 +351,7 @@ pub unsafe extern "C" fn sinew_world_get_slipped(
 /// Writes the total force and torque on several tools, averaged over the last step, in world axes.
 ///
 /// `tools` holds `count` different ids. `point` [m] is 3 floats. `force` [N] and `torque` [N m], about `point`,
-/// receive 3 floats each.
+/// receive 3 floats each; both are nullable.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `tools` is NULL or as long as stated, `point` NULL or 3 floats; `force` and
@@ -375,24 +373,7 @@ pub unsafe extern "C" fn sinew_tools_get_wrench(
             let mut tools = crate::base::memory::reserved(count)?;
             tools.extend(given.iter().map(|tool| tool.id()));
             let (of_force, of_torque) = world.wrench_about(&tools, point)?;
-            write_pair([("force", force, of_force), ("torque", torque, of_torque)])
+            write_wrench([force, torque], [of_force, of_torque])
         })
     }
-}
-
-/// Writes both vectors, or none.
-///
-/// # Safety
-/// The pointers are NULL or writable for 3 floats.
-unsafe fn write_pair(pair: [(&str, *mut f32, Vec3); 2]) -> Result<()> {
-    // SAFETY: the same contract.
-    unsafe {
-        for (name, pointer, _) in pair {
-            memory::output(name, pointer.cast::<[f32; 3]>())?;
-        }
-        for (name, pointer, vector) in pair {
-            *memory::output(name, pointer.cast())? = vector.to_array();
-        }
-    }
-    Ok(())
 }

@@ -85,7 +85,7 @@ unsafe impl Versioned for sinew_blade_report {
 }
 
 impl sinew_blade_id {
-    fn id(self) -> BladeId {
+    pub(super) fn id(self) -> BladeId {
         BladeId(SlotId {
             index1: self.index1,
             generation: self.generation,

@@ -115,11 +115,9 @@ pub unsafe extern "C" fn sinew_body_create(
         with_world_mut(world, |world| {
             let out = memory::output("out", out)?;
             let def = memory::definition("def", def, sinew_body_def::defaults())?;
-            let BodyId(id) = world.create_body(&def.definition()?)?;
-            *out = sinew_body_id {
-                index1: id.index1,
-                generation: id.generation,
-            };
+            let body = def.placed(|definition| world.create_body(definition))?;
+            world.body_mut(body)?.set_gravity_scale(def.gravity_scale)?;
+            *out = body.into();
             Ok(())
         })
     }

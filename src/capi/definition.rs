@@ -285,6 +285,12 @@ pub struct sinew_body_def {
     pub element_law: u32,
     /// MOONEY_RIVLIN: c2 / (c1 + c2), 0 to 1.
     pub mooney_ratio: f32,
+    /// [m] Translation of all positions, after the rotation; default 0 0 0.
+    pub position: [f32; 3],
+    /// Rotation of all positions and fibers about the origin, x y z w, not zero; default 0 0 0 1.
+    pub orientation: [f32; 4],
+    /// Factor of the world's gravity on this body, finite; default 1.
+    pub gravity_scale: f32,
 }
 
 // SAFETY: repr(C), begins with struct_size; numbers and pointers, which any bits are.
@@ -381,6 +387,9 @@ impl sinew_body_def {
             sleep_time: Sleep::default().time,
             element_law: SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF,
             mooney_ratio: 0.0,
+            position: [0.0; 3],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            gravity_scale: 1.0,
         }
     }
 

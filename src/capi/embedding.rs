@@ -277,7 +277,8 @@ pub unsafe extern "C" fn sinew_body_create_from_surface(
             let def = memory::definition("def", def, sinew_body_def::defaults())?;
             // Nothing may fail once there is a body.
             let place = crate::base::memory::boxed(MaybeUninit::uninit())?;
-            let (body, embedding) = world.create_body_from_surface(&def.definition()?, spacing)?;
+            let (body, embedding) = def.placed(|definition| world.create_body_from_surface(definition, spacing))?;
+            world.body_mut(body)?.set_gravity_scale(def.gravity_scale)?;
             *out_body = body.into();
             if let Some(out) = out_embedding {
                 *out = Box::into_raw(Box::write(place, sinew_embedding { embedding }));

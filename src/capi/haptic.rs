@@ -43,15 +43,15 @@ pub struct sinew_haptic_def {
     pub damping_ratio: f32,
     /// [kg] Effective mass of the device, above 0; default 0.05.
     pub device_mass: f32,
-    /// [N] Largest force on the device, above 0 (0 is refused); infinity (default): unlimited.
+    /// [N] Largest force on the device, at least 0; infinity (default) or 0: unlimited.
     pub force_limit: f32,
-    /// [N m] Largest torque on the device, above 0 (0 is refused); infinity (default): unlimited.
+    /// [N m] Largest torque on the device, at least 0; infinity (default) or 0: unlimited.
     pub torque_limit: f32,
-    /// [N/s] Largest rate of change of the force, above 0; infinity (default): unlimited.
+    /// [N/s] Largest rate of change of the force, at least 0; infinity (default) or 0: unlimited.
     ///
     /// The coupling is passive only while this limit is not reached.
     pub force_rate_limit: f32,
-    /// [N m/s] Largest rate of change of the torque, above 0; infinity (default): unlimited.
+    /// [N m/s] Largest rate of change of the torque, at least 0; infinity (default) or 0: unlimited.
     pub torque_rate_limit: f32,
     /// [s] Age at which the model is stale and the force fades to 0, above 0; default 0.1.
     pub stale_after: f32,

@@ -91,8 +91,19 @@ unsafe impl Versioned for sinew_mesh_view {
     const NAME: &'static str = "sinew_mesh_view";
 }
 
+impl sinew_mesh {
+    /// Its surface as a mesh of its own.
+    pub(super) fn drawn(&self) -> Result<Mesh> {
+        Ok(Mesh {
+            positions: crate::base::memory::copied(&self.loaded.mesh.positions)?,
+            triangles: crate::base::memory::copied(&self.surface)?,
+            ..Mesh::default()
+        })
+    }
+}
+
 impl sinew_mesh_view {
-    fn of(mesh: &sinew_mesh) -> Self {
+    pub(super) fn of(mesh: &sinew_mesh) -> Self {
         let sinew_mesh {
             loaded,
             surface,
@@ -128,7 +139,7 @@ impl sinew_mesh_view {
 ///
 /// # Safety
 /// `out` is NULL or writable.
-unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Result<LoadedMesh>) -> sinew_status {
+pub(super) unsafe fn create(out: *mut *mut sinew_mesh, make: impl FnOnce() -> Result<LoadedMesh>) -> sinew_status {
     guard(|| {
         // SAFETY: the same contract.
         let out = unsafe { memory::output("out", out) }?;

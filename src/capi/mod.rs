@@ -87,3 +87,14 @@ pub mod embedding;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod snapshot;
+
+mod placed;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod whole;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod several;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod looks;

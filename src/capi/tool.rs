@@ -84,7 +84,7 @@ pub struct sinew_tool_def {
     /// above 2^24 pixels or samples, or if no ray or sample would lie inside. Memory: about 24 bytes per pixel of 3
     /// images, 4 bytes per sample.
     pub resolution: f32,
-    /// [N] Largest force that moves the tool, at least 0; infinity (default): unlimited; 0: tissue stops it.
+    /// [N] Largest force that moves the tool, at least 0; infinity (default) or 0: unlimited.
     ///
     /// Beyond it the tool stops short of its pose; see sinew_tool_get_pose.
     pub force_limit: f32,
@@ -297,7 +297,7 @@ pub unsafe extern "C" fn sinew_tool_set_friction(
 
 /// Sets the largest force [N] that moves a tool, from the next step on.
 ///
-/// It is at least 0; infinity: unlimited; 0: tissue stops the tool. See sinew_tool_def.
+/// It is at least 0; 0 or infinity: unlimited. See sinew_tool_def.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses.
@@ -394,9 +394,26 @@ pub unsafe extern "C" fn sinew_tool_get_target(
     }
 }
 
+/// Writes a force and a torque where they are wanted.
+///
+/// # Safety
+/// Each place is NULL or writable for 3 floats.
+pub(super) unsafe fn write_wrench([force, torque]: [*mut f32; 2], wrench: [Vec3; 2]) -> Result<()> {
+    // SAFETY: the same contract.
+    let force = unsafe { memory::optional_output_array("force", force.cast::<[f32; 3]>(), 1) }?;
+    // SAFETY: the same contract.
+    let torque = unsafe { memory::optional_output_array("torque", torque.cast::<[f32; 3]>(), 1) }?;
+    for (place, value) in [force, torque].into_iter().zip(wrench) {
+        if let Some(place) = place {
+            place[0] = value.to_array();
+        }
+    }
+    Ok(())
+}
+
 /// Writes the force and torque on a tool, averaged over the last step, in world axes.
 ///
-/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each.
+/// `force` [N] and `torque` [N m], about the tool's position, receive 3 floats each; both are nullable.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody changes; `force` and `torque` are NULL or writable for 3 floats.
@@ -411,12 +428,7 @@ pub unsafe extern "C" fn sinew_tool_get_wrench(
     unsafe {
         with_world(world, |world| {
             let (of_force, of_torque) = world.wrench(tool.id())?;
-            // Both are looked at before either is written.
-            memory::output("force", force.cast::<[f32; 3]>())?;
-            memory::output("torque", torque.cast::<[f32; 3]>())?;
-            *memory::output("force", force.cast())? = of_force.to_array();
-            *memory::output("torque", torque.cast())? = of_torque.to_array();
-            Ok(())
+            write_wrench([force, torque], [of_force, of_torque])
         })
     }
 }

@@ -103,6 +103,11 @@ const ACROSS: f32 = 0.2;
 const ROUNDING: f32 = 1e-6;
 
 impl MeshSolid {
+    /// What it is enclosed by.
+    pub fn surface(&self) -> &ClosedSurface {
+        &self.surface
+    }
+
     /// What this surface encloses, to be found in this way; `resolution` as in a tool's definition.
     pub fn shared(
         positions: &[Vec3],

@@ -120,7 +120,7 @@ pub struct ToolDefinition<'a> {
     pub resolution: f32,
     /// The Coulomb coefficient of friction, at least 0.
     pub friction: f32,
-    /// The largest force that moves it, N, at least 0; infinite: it goes wherever it is sent. Where tissue resists with more it stops short of
+    /// The largest force that moves it, N, at least 0; 0 or infinite: it goes wherever it is sent. Where tissue resists with more it stops short of
     /// its pose: see [`World::pose`](crate::World::pose).
     pub force_limit: f32,
     /// Which bodies it meets.
@@ -175,6 +175,8 @@ pub(crate) struct Tool {
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
     pub torque: Vec3,
+    /// What the caller keeps with it.
+    pub user_data: usize,
 }
 
 saved!(Tool {
@@ -188,7 +190,7 @@ saved!(Tool {
     reach,
     force,
     torque
-});
+} leaves { user_data: 0 });
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
 const SLENDEREST: f32 = 1e4;
@@ -203,7 +205,7 @@ impl Tool {
         };
         not_negative("friction", definition.friction)?;
         not_negative("resolution", definition.resolution)?;
-        check_force_limit(definition.force_limit)?;
+        let force_limit = force_limit(definition.force_limit)?;
         let pose = definition.pose.checked()?;
         let (detection, resolution) = (definition.detection, definition.resolution);
         let is_refused = match definition.shape {
@@ -255,7 +257,7 @@ impl Tool {
         Ok(Self {
             form,
             friction: definition.friction,
-            force_limit: definition.force_limit,
+            force_limit,
             filter: definition.filter,
             pose,
             target: None,
@@ -263,14 +265,15 @@ impl Tool {
             reach: None,
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
+            user_data: 0,
         })
     }
 }
 
-/// Refuses a limit of force that is none.
-fn check_force_limit(limit: f32) -> Result<()> {
+/// The limit of force that a number means: 0 is unlimited, like infinity.
+fn force_limit(limit: f32) -> Result<f32> {
     if limit >= 0.0 {
-        return Ok(());
+        return Ok(if limit == 0.0 { f32::INFINITY } else { limit });
     }
     Err(Error::invalid(format!("force_limit is {limit}: must be at least 0")))
 }
@@ -285,8 +288,7 @@ impl Tool {
 
     /// Has this force, N, be the largest that moves it from the next step on.
     pub fn set_force_limit(&mut self, limit: f32) -> Result<()> {
-        check_force_limit(limit)?;
-        self.force_limit = limit;
+        self.force_limit = force_limit(limit)?;
         Ok(())
     }
 

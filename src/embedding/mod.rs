@@ -10,6 +10,7 @@ use crate::base::{Error, Result, memory};
 use crate::body::Body;
 use crate::cutting::CutMaterial;
 use crate::def::{BodyDefinition, Values};
+use crate::geometry::vertex_normals;
 use crate::mesh::Mesh;
 use crate::world::{BodyId, World};
 
@@ -166,7 +167,7 @@ impl Embedding {
     /// The first call after an update works them out; the list stays in its place.
     pub fn normals(&mut self) -> &[Vec3] {
         if !self.are_normals_new && !self.normals.is_empty() {
-            read::normals(&self.positions, &self.triangles, self.scale, &mut self.normals);
+            vertex_normals(&self.positions, &self.triangles, self.scale, &mut self.normals);
         }
         self.are_normals_new = true;
         &self.normals

@@ -1,4 +1,4 @@
-//! Where the vertices of a fine surface are, and their normals.
+//! Where the vertices of a fine surface are.
 
 use glam::{Vec3, Vec3A};
 
@@ -26,20 +26,5 @@ impl Binding {
                 }
             }
         }
-    }
-}
-
-/// Writes the normal of each vertex: that of its triangles, each as much as it has area. With `scale` edges are some 1 long.
-pub(super) fn normals(vertices: &[Vec3], triangles: &[[u32; 3]], scale: f32, normals: &mut [Vec3]) {
-    normals.fill(Vec3::ZERO);
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| Vec3A::from(vertices[vertex as usize]));
-        let area = Vec3::from(((b - a) * scale).cross((c - a) * scale));
-        for &vertex in triangle {
-            normals[vertex as usize] += area;
-        }
-    }
-    for normal in normals {
-        *normal = normal.normalize_or_zero();
     }
 }

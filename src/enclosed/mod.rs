@@ -151,6 +151,11 @@ impl Enclosed {
         })
     }
 
+    /// The pressure of cavities that have their volume at rest, Pa.
+    pub fn pressure(&self) -> f32 {
+        self.pressure
+    }
+
     /// Makes the pressure of cavities that have their volume at rest this, Pa.
     pub fn set_pressure(&mut self, pressure: f32) {
         self.pressure = pressure;

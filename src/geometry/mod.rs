@@ -3,8 +3,10 @@
 mod bounds;
 pub(crate) mod forest;
 pub(crate) mod nearest;
+mod normals;
 pub(crate) mod predicates;
 pub(crate) mod tree;
 
 pub(crate) use bounds::Bounds;
 pub(crate) use forest::Forest;
+pub(crate) use normals::vertex_normals;

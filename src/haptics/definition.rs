@@ -24,14 +24,14 @@ pub struct HapticDefinition {
     pub damping_ratio: f32,
     /// What the hand moves of the device, kg, above 0.
     pub device_mass: f32,
-    /// The largest force, N, above 0, or infinity.
+    /// The largest force, N, at least 0; 0 or infinity: no limit.
     pub force_limit: f32,
-    /// The largest torque, N m, above 0, or infinity.
+    /// The largest torque, N m, at least 0; 0 or infinity: no limit.
     pub torque_limit: f32,
-    /// How fast the force may change, N/s, above 0, or infinity. A force that such a limit makes late gives a hand more than it took: the loop is kept
+    /// How fast the force may change, N/s, at least 0; 0 or infinity: no limit. A force that such a limit makes late gives a hand more than it took: the loop is kept
     /// passive where it is not reached.
     pub force_rate_limit: f32,
-    /// How fast the torque may change, N m/s, above 0, or infinity.
+    /// How fast the torque may change, N m/s, at least 0; 0 or infinity: no limit.
     pub torque_rate_limit: f32,
     /// A model that is older, s, above 0, is stale: force and torque go to 0 until there is a newer one.
     pub stale_after: f32,
@@ -63,9 +63,10 @@ impl HapticDefinition {
             true => Ok(f64::from(value)),
             false => Err(Error::invalid(format!("{name} is {value}: must be above 0 and finite"))),
         };
-        let limit = |name: &str, value: f32| match value > 0.0 {
-            true => Ok(f64::from(value)),
-            false => Err(Error::invalid(format!("{name} is {value}: must be above 0"))),
+        let limit = |name: &str, value: f32| match value {
+            0.0 => Ok(f64::INFINITY),
+            value if value > 0.0 => Ok(f64::from(value)),
+            _ => Err(Error::invalid(format!("{name} is {value}: must be at least 0"))),
         };
         let stiffness = positive("stiffness", self.stiffness)?;
         not_negative("angular_stiffness", self.angular_stiffness)?;

@@ -34,6 +34,7 @@ const MOST_PARTS: u32 = 1 << 12;
 const WORTH_ESTIMATING: f32 = 8.0;
 
 /// What is asked of a step.
+#[derive(Clone, Copy)]
 pub(crate) struct StepRequest<'a> {
     /// Seconds, above 0.
     pub dt: f32,
@@ -49,6 +50,14 @@ pub(crate) struct StepRequest<'a> {
 }
 
 impl StepRequest<'_> {
+    /// The same with the gravity that acts on a body.
+    pub fn of(&self, body: &Body) -> Self {
+        Self {
+            gravity: self.gravity * body.gravity_scale,
+            ..*self
+        }
+    }
+
     /// In how many parts a step is taken at most that is cut because something is near: what is longer would take as long as it
     /// liked.
     pub fn most_parts(&self) -> u32 {
@@ -120,6 +129,7 @@ impl From<TooLong> for Outcome {
 
 /// Takes a step of `body` without making it current.
 pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+    let request = &request.of(body);
     body.rouse(request.tools);
     if body.is_asleep() {
         return Outcome::Asleep;

@@ -109,7 +109,8 @@ impl Together<'_> {
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
             if let Some(body) = bodies.at_mut(place) {
-                let (begun, wanted) = Walk::of(body, self.request, self.team);
+                let request = &self.request.of(body);
+                let (begun, wanted) = Walk::of(body, request, self.team);
                 substeps = substeps.max(wanted);
                 match &mut body.implicit {
                     None => needed = needed.max(wanted),
@@ -137,16 +138,14 @@ impl Together<'_> {
             team,
         } = self;
         let (request, team) = (*request, *team);
-        let gravity = request.gravity.as_dvec3();
-        let fall = request.gravity.length() * request.dt;
         let request = &StepRequest {
-            neighbor_speed: Some(tissue.fastest(island, bodies) + fall),
+            neighbor_speed: Some(tissue.fastest(island, bodies, request.gravity.length() * request.dt)),
             ..*request
         };
         let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
-        let step = |walk: &Walk| Step::of(request, substeps, walk.masses_for, team);
         tissue.bonds.begin(request.dt);
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
+            let request = &request.of(body);
             walk.carry = walk.start;
             if body.implicit.is_some() {
                 begin_parts(body, request, substeps);
@@ -156,7 +155,7 @@ impl Together<'_> {
                 check(&walk.start.stability, substep)?;
             }
             begin(body, request);
-            walk.part = step(walk).opening(body, &mut walk.carry);
+            walk.part = Step::of(request, substeps, walk.masses_for, team).opening(body, &mut walk.carry);
             if let Some(damping) = &mut body.damping {
                 damping.prepare(substep);
             }
@@ -171,6 +170,7 @@ impl Together<'_> {
             moment.begins = index == 0;
             tissue.bonds.load(bodies);
             each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
+                let request = &request.of(body);
                 if body.implicit.is_some() {
                     // There may be no more parts to try it in.
                     let is_last = is_last || substeps >= PARTS;
@@ -181,7 +181,8 @@ impl Together<'_> {
                     return if is_fine { Ok(()) } else { Err(shorter) };
                 }
                 if index > 0 {
-                    walk.part.go_on(walk.carry.gravity.next(gravity * f64::from(substep)));
+                    walk.part
+                        .go_on(walk.carry.gravity.next(request.gravity.as_dvec3() * f64::from(substep)));
                 }
                 walk.part.start = f64::from(index) / f64::from(substeps);
                 walk.part.end = f64::from(index + 1) / f64::from(substeps);
@@ -199,7 +200,8 @@ impl Together<'_> {
                 body.state.advance();
                 let velocities = tissue.velocities(place, walk.carry.gravity.velocities);
                 walk.carry.gravity.velocities = velocities;
-                if !step(walk).is_stable_after(&mut walk.carry.stability, &velocities) {
+                let step = Step::of(request, substeps, walk.masses_for, team);
+                if !step.is_stable_after(&mut walk.carry.stability, &velocities) {
                     let known = walk.carry.stability.for_short(substep);
                     walk.carry.stability = known.unwrap_or_else(|| body.estimate(body.state.newest().0));
                     check(&walk.carry.stability, substep)?;
@@ -214,7 +216,8 @@ impl Together<'_> {
             if body.implicit.is_some() {
                 return Ok(());
             }
-            let fall = gravity * f64::from(0.5 * substep);
+            let request = &request.of(body);
+            let fall = request.gravity.as_dvec3() * f64::from(0.5 * substep);
             walk.part.close(walk.carry.gravity.next(fall));
             pass(body, request, &walk.part, &mut walk.carry, team);
             check_beside_springs(body, substep)

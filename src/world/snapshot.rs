@@ -98,6 +98,7 @@ impl World {
             holds_made,
             haptics: _,
             clock,
+            user_data: _,
         } = self;
         begin(to, SHAPE);
         write_section(to, *b"WRLD", |to| {

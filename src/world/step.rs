@@ -339,7 +339,7 @@ fn commit_bodies(
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit((substeps, dt), carry, tools, team);
                 body.fade(dt, team);
-                body.doze(dt, (tools, gravity), team);
+                body.doze(dt, (tools, gravity * body.gravity_scale), team);
                 body.find_tears(team);
             }
             Some(Outcome::Asleep) => body.sleep_on(),

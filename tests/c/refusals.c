@@ -540,8 +540,6 @@ static void tool_calls(void)
         for (axis = 0; axis < 4; axis++)
             REFUSED(INVALID, "orientation", sinew_tool_set_pose(the.world, the.tool, fine, spoiled(upright, 4, axis, bad[i])));
     }
-    REFUSED(INVALID, "force", sinew_tool_get_wrench(the.world, the.tool, NULL, out.torque));
-    REFUSED(INVALID, "torque", sinew_tool_get_wrench(the.world, the.tool, out.force, NULL));
 }
 
 int main(void)

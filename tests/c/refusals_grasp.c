@@ -199,8 +199,6 @@ static void wrenches(void)
     REFUSED(INVALID, "world", sinew_tools_get_wrench(NULL, tools, 2, point, out.force, out.torque));
     REFUSED(INVALID, "tools", sinew_tools_get_wrench(the.world, NULL, 2, point, out.force, out.torque));
     REFUSED(INVALID, "point", sinew_tools_get_wrench(the.world, tools, 2, NULL, out.force, out.torque));
-    REFUSED(INVALID, "force", sinew_tools_get_wrench(the.world, tools, 2, point, NULL, out.torque));
-    REFUSED(INVALID, "torque", sinew_tools_get_wrench(the.world, tools, 2, point, out.force, NULL));
     for (i = 0; i < NOT_FINITE; i++)
         REFUSED(INVALID, "point", sinew_tools_get_wrench(the.world, tools, 2, spoiled(point, 3, 1, bad[i]), out.force, out.torque));
     for (i = 0; i < BAD_IDS; i++) {

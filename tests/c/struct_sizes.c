@@ -84,6 +84,7 @@ int main(void)
             far_away[i] = shape.positions[i] + (i % 3 == 0 ? 0.3f : 0);
         def.positions = far_away;
         MUST(sinew_body_create(world, &def, &other));
+        SIZES("def->struct_size", sinew_body_def, def.struct_size, sinew_body_def_set_mesh(&def, mesh));
         MUST(sinew_body_def_init(&def, sizeof def));
         def.positions = shape.positions;
         def.node_count = shape.node_count;
@@ -100,6 +101,10 @@ int main(void)
         sinew_surface_point point;
         SIZES("out->struct_size", sinew_surface_point, point.struct_size, sinew_world_cast_ray(world, from, down, 2, &point));
         SIZES("out->struct_size", sinew_surface_point, point.struct_size, sinew_world_find_nearest(world, from, 2, &point));
+    }
+    {
+        sinew_ray_hit hit;
+        SIZES("out->struct_size", sinew_ray_hit, hit.struct_size, sinew_world_cast_ray_filtered(world, from, down, 2, 1, 1, &hit));
     }
     {
         DEFINITION(embedding, def);

@@ -45,7 +45,7 @@ fn what_is_out_of_range_is_refused_by_name() {
         ("damping_ratio", |it| it.damping_ratio = f32::NAN),
         ("device_mass", |it| it.device_mass = f32::INFINITY),
         ("force_limit", |it| it.force_limit = -3.0),
-        ("torque_limit", |it| it.torque_limit = 0.0),
+        ("torque_limit", |it| it.torque_limit = -0.5),
         ("force_rate_limit", |it| it.force_rate_limit = f32::NAN),
         ("stale_after", |it| it.stale_after = 0.0),
         ("ramp", |it| it.ramp = -1.0),

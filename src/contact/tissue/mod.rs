@@ -356,13 +356,14 @@ impl Tissue {
         }
     }
 
-    /// The speed of the fastest node of an island, m/s, as far as velocities are kept.
-    pub fn fastest(&self, island: usize, bodies: &Slots<Body>) -> f32 {
+    /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
+    pub fn fastest(&self, island: usize, bodies: &Slots<Body>, fall: f32) -> f32 {
         let members = self.islands.members(island).iter();
         let members = members.filter_map(|&place| bodies.at(place as usize));
-        let speeds = members
-            .map(|body| velocities(body))
-            .map(|all| all.min.abs().max(all.max.abs()).length());
+        let speeds = members.map(|body| {
+            let all = velocities(body);
+            all.min.abs().max(all.max.abs()).length() + fall * body.gravity_scale.abs()
+        });
         speeds.fold(0.0, f32::max)
     }
 

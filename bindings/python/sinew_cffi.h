@@ -1,0 +1,820 @@
+// Generated from include/sinew; do not edit. For ffi.cdef of cffi.
+#define SINEW_VERSION_MAJOR 0
+#define SINEW_VERSION_MINOR 1
+#define SINEW_VERSION_PATCH 0
+#define SINEW_NO_NODE 4294967295
+#define SINEW_AXIS_X 1
+#define SINEW_AXIS_Y 2
+#define SINEW_AXIS_Z 4
+#define SINEW_NO_TRIANGLE 4294967295
+uint32_t sinew_version(void);
+typedef enum sinew_status_code {
+  SINEW_STATUS_OK = 0,
+  SINEW_STATUS_INVALID_ARGUMENT = 1,
+  SINEW_STATUS_STALE_ID = 2,
+  SINEW_STATUS_CAPACITY = 3,
+  SINEW_STATUS_OUT_OF_MEMORY = 4,
+  SINEW_STATUS_UNSTABLE = 5,
+  SINEW_STATUS_UNSUPPORTED = 6,
+  SINEW_STATUS_IO = 7,
+  SINEW_STATUS_INTERNAL = 8
+} sinew_status_code;
+typedef int32_t sinew_status;
+const char *sinew_status_name(sinew_status status);
+size_t sinew_last_error(char *buffer, size_t capacity);
+typedef struct sinew_world sinew_world;
+typedef struct sinew_body_id {
+  uint32_t index1;
+  uint32_t generation;
+} sinew_body_id;
+typedef struct sinew_tool_id {
+  uint32_t index1;
+  uint32_t generation;
+} sinew_tool_id;
+typedef struct sinew_blade_id {
+  uint32_t index1;
+  uint32_t generation;
+} sinew_blade_id;
+typedef struct sinew_attachment_id {
+  uint32_t index1;
+  uint32_t generation;
+} sinew_attachment_id;
+typedef struct sinew_vec3_view {
+  const float *data;
+  size_t count;
+  size_t stride;
+} sinew_vec3_view;
+typedef struct sinew_dvec3_view {
+  const double *data;
+  size_t count;
+  size_t stride;
+} sinew_dvec3_view;
+typedef struct sinew_triangle_view {
+  const uint32_t *data;
+  size_t count;
+} sinew_triangle_view;
+typedef enum sinew_detection {
+  SINEW_DETECTION_EXACT = 0,
+  SINEW_DETECTION_IMAGE_SPACE = 1,
+  SINEW_DETECTION_DISTANCE_FIELD = 2
+} sinew_detection;
+typedef void (*sinew_task)(void *task_data, uint32_t index);
+typedef void (*sinew_run_tasks)(void *context, sinew_task task, void *task_data, uint32_t count);
+typedef enum sinew_kernel {
+  SINEW_KERNEL_BEST = 0,
+  SINEW_KERNEL_PORTABLE = 1,
+  SINEW_KERNEL_AVX2 = 2,
+  SINEW_KERNEL_AVX512 = 3,
+  SINEW_KERNEL_NEON = 4
+} sinew_kernel;
+typedef struct sinew_world_def {
+  size_t struct_size;
+  float gravity[3];
+  uint32_t thread_count;
+  uint32_t substeps;
+  uint32_t max_substeps;
+  float tolerance;
+  uint32_t reserved;
+  sinew_run_tasks run_tasks;
+  void *tasks_context;
+  uint32_t kernel;
+  uint32_t reserved2;
+} sinew_world_def;
+sinew_status sinew_world_def_init(sinew_world_def *def, size_t struct_size);
+sinew_status sinew_world_create(const sinew_world_def *def, sinew_world **out);
+void sinew_world_destroy(sinew_world *world);
+typedef struct sinew_step_report {
+  size_t struct_size;
+  uint32_t substeps;
+  float stable_substep;
+  uint32_t bodies_restored;
+  float error_estimate;
+  uint32_t crossings;
+  uint32_t reserved;
+} sinew_step_report;
+sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
+sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);
+sinew_status sinew_world_get_state_hash(const sinew_world *world, uint64_t *out);
+typedef struct sinew_mesh sinew_mesh;
+typedef enum sinew_mesh_format {
+  SINEW_MESH_FORMAT_AUTO = 0,
+  SINEW_MESH_FORMAT_OBJ = 1,
+  SINEW_MESH_FORMAT_STL = 2,
+  SINEW_MESH_FORMAT_VTK = 3,
+  SINEW_MESH_FORMAT_GMSH = 4,
+  SINEW_MESH_FORMAT_TETGEN = 5
+} sinew_mesh_format;
+sinew_status sinew_mesh_load(const char *path, uint32_t format, float scale, sinew_mesh **out);
+sinew_status sinew_mesh_create_cloth(const float *size, const uint32_t *cells, sinew_mesh **out);
+sinew_status sinew_mesh_create_block(const float *size, const uint32_t *cells, sinew_mesh **out);
+sinew_status sinew_mesh_create_lattice(float edge, const uint32_t *cells, sinew_mesh **out);
+sinew_status sinew_mesh_create_organ(float length, float spacing, sinew_mesh **out);
+void sinew_mesh_destroy(sinew_mesh *mesh);
+typedef struct sinew_mesh_view {
+  size_t struct_size;
+  const float *positions;
+  size_t node_count;
+  const uint32_t *triangles;
+  size_t triangle_count;
+  const uint32_t *tetrahedra;
+  size_t tetrahedron_count;
+  const uint32_t *surface;
+  size_t surface_triangle_count;
+  const uint32_t *node_of_vertex;
+  size_t vertex_count;
+  size_t welded_vertices;
+  size_t dropped_vertices;
+  size_t dropped_triangles;
+  size_t dropped_tetrahedra;
+  size_t flipped_tetrahedra;
+  uint32_t closed;
+  uint32_t reserved;
+  const uint32_t *cells;
+  size_t cell_count;
+} sinew_mesh_view;
+sinew_status sinew_mesh_get_view(const sinew_mesh *mesh, sinew_mesh_view *out);
+typedef enum sinew_storage {
+  SINEW_STORAGE_PACKED = 0,
+  SINEW_STORAGE_EFFICIENT = 1,
+  SINEW_STORAGE_FAST_LINK = 2,
+  SINEW_STORAGE_DYNAMIC_BULK = 3
+} sinew_storage;
+typedef enum sinew_solver {
+  SINEW_SOLVER_VERLET = 0,
+  SINEW_SOLVER_IMPLICIT = 1,
+  SINEW_SOLVER_NEWTON = 2
+} sinew_solver;
+typedef enum sinew_material {
+  SINEW_MATERIAL_NONE = 0,
+  SINEW_MATERIAL_SPRINGS = 1,
+  SINEW_MATERIAL_TETRAHEDRA = 2
+} sinew_material;
+typedef enum sinew_spring_law {
+  SINEW_SPRING_LAW_LINEAR = 0,
+  SINEW_SPRING_LAW_EXPONENTIAL = 1,
+  SINEW_SPRING_LAW_CUBIC = 2
+} sinew_spring_law;
+typedef enum sinew_element_law {
+  SINEW_ELEMENT_LAW_ST_VENANT_KIRCHHOFF = 0,
+  SINEW_ELEMENT_LAW_NEO_HOOKEAN = 1,
+  SINEW_ELEMENT_LAW_MOONEY_RIVLIN = 2
+} sinew_element_law;
+typedef struct sinew_body_def {
+  size_t struct_size;
+  const float *positions;
+  const float *rest_positions;
+  size_t node_count;
+  const float *masses;
+  const float *node_dampings;
+  float node_mass;
+  float node_damping;
+  const uint32_t *springs;
+  size_t spring_count;
+  const float *stiffnesses;
+  const float *rest_lengths;
+  const float *spring_dampings;
+  float stiffness;
+  float spring_damping;
+  const uint32_t *triangles;
+  size_t triangle_count;
+  const uint32_t *tetrahedra;
+  size_t tetrahedron_count;
+  uint32_t storage;
+  uint32_t springs_per_node;
+  uint32_t solver;
+  uint32_t reserved;
+  uint32_t order;
+  uint32_t iterations;
+  float accuracy;
+  uint32_t reserved1;
+  float mass_scaling;
+  uint32_t reserved2;
+  const uint32_t *cells;
+  size_t cell_count;
+  uint32_t material;
+  float young_modulus;
+  float poisson_ratio;
+  float density;
+  float thickness;
+  float volume_stiffness;
+  const float *home_stiffnesses;
+  float home_stiffness;
+  float bending_stiffness;
+  uint32_t spring_law;
+  float spring_steepness;
+  float spring_quadratic;
+  float spring_cubic;
+  float spring_limit;
+  float fibre_stiffness;
+  const float *fibre_directions;
+  const float *fibre_stiffnesses;
+  float retardation_time;
+  float relaxation_time;
+  float yield_strain;
+  float largest_set;
+  float strain_limit;
+  float limit_stiffening;
+  float enclosed_stiffness;
+  float pressure;
+  float contact_thickness;
+  float contact_friction;
+  uint32_t meets_bodies;
+  uint32_t meets_itself;
+  uint32_t contact_detection;
+  float contact_resolution;
+  uint32_t collision_category;
+  uint32_t collision_mask;
+  uint32_t spare_nodes;
+  float toughness;
+  float tear_strain;
+  float tear_force;
+  uint32_t most_tears;
+  float smallest_piece;
+  float sleep_speed;
+  float sleep_time;
+  uint32_t element_law;
+  float mooney_ratio;
+  float position[3];
+  float orientation[4];
+  float gravity_scale;
+} sinew_body_def;
+sinew_status sinew_body_def_init(sinew_body_def *def, size_t struct_size);
+sinew_status sinew_body_create(sinew_world *world, const sinew_body_def *def, sinew_body_id *out);
+sinew_status sinew_body_destroy(sinew_world *world, sinew_body_id body);
+sinew_status sinew_body_get_positions(const sinew_world *world, sinew_body_id body,
+                                      sinew_vec3_view *out);
+sinew_status sinew_body_get_velocities(const sinew_world *world, sinew_body_id body,
+                                       sinew_vec3_view *out);
+sinew_status sinew_body_set_positions(sinew_world *world, sinew_body_id body,
+                                      const float *positions, size_t node_count);
+sinew_status sinew_body_set_velocities(sinew_world *world, sinew_body_id body,
+                                       const float *velocities, size_t node_count);
+sinew_status sinew_body_get_triangles(const sinew_world *world, sinew_body_id body,
+                                      sinew_triangle_view *out);
+sinew_status sinew_body_is_closed(const sinew_world *world, sinew_body_id body, uint32_t *out);
+sinew_status sinew_body_get_node_mass(const sinew_world *world, sinew_body_id body, uint32_t node,
+                                      float *out);
+sinew_status sinew_body_apply_force(sinew_world *world, sinew_body_id body, uint32_t node,
+                                    const float *force);
+sinew_status sinew_body_apply_forces(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                     const float *forces, size_t count);
+sinew_status sinew_body_pin(sinew_world *world, sinew_body_id body, uint32_t node);
+sinew_status sinew_body_pin_axes(sinew_world *world, sinew_body_id body, uint32_t node,
+                                 uint32_t axes);
+sinew_status sinew_body_unpin(sinew_world *world, sinew_body_id body, uint32_t node);
+sinew_status sinew_body_move_pin(sinew_world *world, sinew_body_id body, uint32_t node,
+                                 const float *position);
+sinew_status sinew_body_get_pin_force(const sinew_world *world, sinew_body_id body, uint32_t node,
+                                      float *force);
+sinew_status sinew_body_set_collision(sinew_world *world, sinew_body_id body, uint32_t category,
+                                      uint32_t mask);
+sinew_status sinew_body_wake(sinew_world *world, sinew_body_id body);
+sinew_status sinew_body_get_awake_share(const sinew_world *world, sinew_body_id body, float *out);
+typedef enum sinew_shape {
+  SINEW_SHAPE_SPHERE = 0,
+  SINEW_SHAPE_CAPSULE = 1,
+  SINEW_SHAPE_PLANE = 2,
+  SINEW_SHAPE_MESH = 3,
+  SINEW_SHAPE_BOX = 4
+} sinew_shape;
+typedef struct sinew_tool_def {
+  size_t struct_size;
+  uint32_t shape;
+  float radius;
+  float half_length;
+  uint32_t reserved0;
+  const float *positions;
+  size_t node_count;
+  const uint32_t *triangles;
+  size_t triangle_count;
+  uint32_t detection;
+  float friction;
+  float position[3];
+  float orientation[4];
+  uint32_t reserved;
+  float resolution;
+  float force_limit;
+  uint32_t collision_category;
+  uint32_t collision_mask;
+  float half_extents[3];
+  uint32_t reserved1;
+} sinew_tool_def;
+sinew_status sinew_tool_def_init(sinew_tool_def *def, size_t struct_size);
+sinew_status sinew_tool_create(sinew_world *world, const sinew_tool_def *def, sinew_tool_id *out);
+sinew_status sinew_tool_destroy(sinew_world *world, sinew_tool_id tool);
+sinew_status sinew_tool_set_pose(sinew_world *world, sinew_tool_id tool, const float *position,
+                                 const float *orientation);
+sinew_status sinew_tool_get_pose(const sinew_world *world, sinew_tool_id tool, float *position,
+                                 float *orientation);
+sinew_status sinew_tool_set_friction(sinew_world *world, sinew_tool_id tool, float friction);
+sinew_status sinew_tool_set_force_limit(sinew_world *world, sinew_tool_id tool, float force_limit);
+sinew_status sinew_tool_set_collision(sinew_world *world, sinew_tool_id tool, uint32_t category,
+                                      uint32_t mask);
+sinew_status sinew_tool_get_wrench(const sinew_world *world, sinew_tool_id tool, float *force,
+                                   float *torque);
+typedef struct sinew_contact {
+  sinew_body_id body;
+  uint32_t nodes[3];
+  float weights[3];
+  float point[3];
+  float normal[3];
+  float force[3];
+} sinew_contact;
+sinew_status sinew_tool_get_contacts(const sinew_world *world, sinew_tool_id tool,
+                                     sinew_contact *contacts, size_t capacity, size_t *count);
+typedef struct sinew_material_preset {
+  size_t struct_size;
+  const char *name;
+  const char *source;
+  float shear_modulus;
+  float young_modulus;
+  float density;
+  uint32_t reserved;
+} sinew_material_preset;
+typedef enum sinew_preset {
+  SINEW_PRESET_LIVER = 0,
+  SINEW_PRESET_FIBROTIC_LIVER = 1,
+  SINEW_PRESET_LIVER_TUMOUR = 2,
+  SINEW_PRESET_STOMACH = 3,
+  SINEW_PRESET_GALLBLADDER = 4,
+  SINEW_PRESET_BILE_DUCT = 5,
+  SINEW_PRESET_HEPATIC_ARTERY = 6
+} sinew_preset;
+sinew_status sinew_material_get_preset(uint32_t preset, sinew_material_preset *out);
+sinew_status sinew_body_add_spring(sinew_world *world, sinew_body_id body, uint32_t a, uint32_t b,
+                                   float stiffness, float rest_length);
+sinew_status sinew_body_remove_spring(sinew_world *world, sinew_body_id body, uint32_t a,
+                                      uint32_t b);
+sinew_status sinew_body_get_spring_pairs(const sinew_world *world, sinew_body_id body,
+                                         uint32_t *pairs, size_t count);
+sinew_status sinew_body_get_springs(const sinew_world *world, sinew_body_id body,
+                                    const uint32_t *pairs, size_t count, float *stiffnesses,
+                                    float *rest_lengths);
+sinew_status sinew_body_set_springs(sinew_world *world, sinew_body_id body, const uint32_t *pairs,
+                                    size_t count, const float *stiffnesses,
+                                    const float *rest_lengths);
+sinew_status sinew_body_scale_region(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                     size_t node_count, float stiffness_factor,
+                                     float length_factor);
+sinew_status sinew_body_set_pressure(sinew_world *world, sinew_body_id body, float pressure);
+typedef struct sinew_enclosed_report {
+  size_t struct_size;
+  size_t cavity_count;
+  double volume;
+  double rest_volume;
+  double pressure;
+} sinew_enclosed_report;
+sinew_status sinew_body_get_enclosed_report(const sinew_world *world, sinew_body_id body,
+                                            sinew_enclosed_report *out);
+typedef struct sinew_rest_state_def {
+  size_t struct_size;
+  float tolerance;
+  uint32_t iterations;
+} sinew_rest_state_def;
+sinew_status sinew_rest_state_def_init(sinew_rest_state_def *def, size_t struct_size);
+typedef struct sinew_rest_state_report {
+  size_t struct_size;
+  uint32_t iterations;
+  uint32_t products;
+  double residual;
+  double error;
+  double energy_before;
+  double energy_after;
+} sinew_rest_state_report;
+sinew_status sinew_body_rest_state(sinew_world *world, sinew_body_id body,
+                                   const sinew_rest_state_def *def,
+                                   sinew_rest_state_report *report);
+sinew_status sinew_body_attach_node(sinew_world *world, sinew_body_id body, uint32_t node,
+                                    sinew_tool_id tool, float force_limit,
+                                    sinew_attachment_id *out);
+sinew_status sinew_body_attach_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                     size_t count, sinew_tool_id tool, float force_limit,
+                                     sinew_attachment_id *out);
+sinew_status sinew_body_attach_points(sinew_world *world, sinew_body_id body,
+                                      const uint32_t *triangles, const float *weights, size_t count,
+                                      sinew_tool_id tool, float force_limit,
+                                      sinew_attachment_id *out);
+sinew_status sinew_body_attach_nodes_to_nodes(sinew_world *world, sinew_body_id body,
+                                              const uint32_t *nodes, size_t count,
+                                              sinew_body_id other, const uint32_t *other_nodes,
+                                              float force_limit, sinew_attachment_id *out);
+sinew_status sinew_body_attach_nodes_to_points(sinew_world *world, sinew_body_id body,
+                                               const uint32_t *nodes, size_t count,
+                                               sinew_body_id other, const uint32_t *other_triangles,
+                                               const float *other_weights, float force_limit,
+                                               sinew_attachment_id *out);
+sinew_status sinew_body_attach_points_to_points(sinew_world *world, sinew_body_id body,
+                                                const uint32_t *triangles, const float *weights,
+                                                size_t count, sinew_body_id other,
+                                                const uint32_t *other_triangles,
+                                                const float *other_weights, float force_limit,
+                                                sinew_attachment_id *out);
+typedef struct sinew_suture_def {
+  size_t struct_size;
+  float length;
+  float stiffness;
+  float force_limit;
+  uint32_t reserved0;
+} sinew_suture_def;
+sinew_status sinew_suture_def_init(sinew_suture_def *def, size_t struct_size);
+sinew_status sinew_body_suture_points(sinew_world *world, sinew_body_id body, uint32_t triangle,
+                                      const float *weights, sinew_body_id other,
+                                      uint32_t other_triangle, const float *other_weights,
+                                      const sinew_suture_def *def, sinew_attachment_id *out);
+sinew_status sinew_suture_set_length(sinew_world *world, sinew_attachment_id suture, float length);
+typedef struct sinew_suture_report {
+  size_t struct_size;
+  float length;
+  float distance;
+  double energy;
+} sinew_suture_report;
+sinew_status sinew_suture_get_report(const sinew_world *world, sinew_attachment_id suture,
+                                     sinew_suture_report *report);
+sinew_status sinew_attachment_release(sinew_world *world, sinew_attachment_id attachment);
+sinew_status sinew_attachment_get_force(const sinew_world *world, sinew_attachment_id attachment,
+                                        float *force);
+sinew_status sinew_world_get_slipped(const sinew_world *world, sinew_attachment_id *out,
+                                     size_t capacity, size_t *count);
+typedef struct sinew_cut_report {
+  size_t struct_size;
+  uint32_t new_nodes;
+  uint32_t new_triangles;
+  uint32_t springs_removed;
+  uint32_t pieces_parted;
+  double length;
+  double area;
+} sinew_cut_report;
+sinew_status sinew_body_cut(sinew_world *world, sinew_body_id body, const float *start,
+                            const float *end, sinew_cut_report *report);
+typedef struct sinew_new_node {
+  uint32_t node;
+  uint32_t sources[3];
+  float weights[3];
+} sinew_new_node;
+typedef struct sinew_rim_edge {
+  uint32_t nodes[2];
+  uint32_t triangle;
+} sinew_rim_edge;
+typedef struct sinew_topology_changes {
+  size_t struct_size;
+  uint64_t version;
+  const sinew_new_node *nodes;
+  size_t node_count;
+  const uint32_t *triangles;
+  size_t triangle_count;
+  const uint32_t *removed_springs;
+  size_t removed_spring_count;
+  const sinew_rim_edge *rim;
+  size_t rim_count;
+} sinew_topology_changes;
+sinew_status sinew_body_get_topology_changes(const sinew_world *world, sinew_body_id body,
+                                             uint64_t since_version, sinew_topology_changes *out);
+sinew_status sinew_body_get_pieces(const sinew_world *world, sinew_body_id body, uint32_t *pieces,
+                                   size_t count, uint32_t *piece_count);
+typedef struct sinew_blade_def {
+  size_t struct_size;
+  float edge[6];
+  float stiffness;
+  uint32_t collision_category;
+  uint32_t collision_mask;
+  float position[3];
+  float orientation[4];
+} sinew_blade_def;
+sinew_status sinew_blade_def_init(sinew_blade_def *def, size_t struct_size);
+sinew_status sinew_blade_create(sinew_world *world, const sinew_blade_def *def,
+                                sinew_blade_id *out);
+sinew_status sinew_blade_destroy(sinew_world *world, sinew_blade_id blade);
+sinew_status sinew_blade_set_pose(sinew_world *world, sinew_blade_id blade, const float *position,
+                                  const float *orientation);
+typedef struct sinew_blade_report {
+  size_t struct_size;
+  float force[3];
+  float torque[3];
+  double work;
+  double length;
+  double lag;
+  sinew_status status;
+  uint32_t reserved0;
+  double area;
+} sinew_blade_report;
+sinew_status sinew_blade_get_report(const sinew_world *world, sinew_blade_id blade,
+                                    sinew_blade_report *out);
+sinew_status sinew_body_set_tear_limits(sinew_world *world, sinew_body_id body,
+                                        const uint32_t *pairs, size_t count, const float *strains,
+                                        const float *forces);
+typedef struct sinew_tear_report {
+  size_t struct_size;
+  uint32_t tears;
+  uint32_t pieces_parted;
+  uint32_t waiting;
+  uint32_t small_pieces;
+  uint32_t no_room;
+  uint32_t reserved;
+} sinew_tear_report;
+sinew_status sinew_body_get_tear_report(const sinew_world *world, sinew_body_id body,
+                                        sinew_tear_report *out);
+typedef struct sinew_haptic_def {
+  size_t struct_size;
+  sinew_tool_id tool;
+  float stiffness;
+  float angular_stiffness;
+  float damping_ratio;
+  float device_mass;
+  float force_limit;
+  float torque_limit;
+  float force_rate_limit;
+  float torque_rate_limit;
+  float stale_after;
+  float ramp;
+} sinew_haptic_def;
+sinew_status sinew_haptic_def_init(sinew_haptic_def *def, size_t struct_size);
+typedef struct sinew_haptic sinew_haptic;
+sinew_status sinew_haptic_create(sinew_world *world, const sinew_haptic_def *def,
+                                 sinew_haptic **out);
+void sinew_haptic_destroy(sinew_haptic *haptic);
+typedef struct sinew_haptic_result {
+  size_t struct_size;
+  float force[3];
+  float torque[3];
+  float proxy_position[3];
+  float proxy_orientation[4];
+  uint32_t contact_count;
+  float age;
+  uint64_t version;
+  float gain;
+  uint32_t is_over;
+  double lost;
+} sinew_haptic_result;
+sinew_status sinew_haptic_tick(sinew_haptic *haptic, const float *position,
+                               const float *orientation, const float *velocity,
+                               const float *angular_velocity, float dt, sinew_haptic_result *out);
+typedef struct sinew_haptic_contact {
+  sinew_body_id body;
+  float point[3];
+  float normal[3];
+  float velocity[3];
+  float force[3];
+} sinew_haptic_contact;
+sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
+                                       size_t capacity, size_t *count);
+typedef struct sinew_embedding_def {
+  size_t struct_size;
+  const float *vertices;
+  size_t vertex_count;
+  const uint32_t *triangles;
+  size_t triangle_count;
+  const uint32_t *tetrahedra;
+  size_t tetrahedron_count;
+} sinew_embedding_def;
+sinew_status sinew_embedding_def_init(sinew_embedding_def *def, size_t struct_size);
+typedef struct sinew_embedding sinew_embedding;
+sinew_status sinew_embedding_create(const sinew_world *world, sinew_body_id body,
+                                    const sinew_embedding_def *def, sinew_embedding **out);
+void sinew_embedding_destroy(sinew_embedding *embedding);
+sinew_status sinew_embedding_update(sinew_embedding *embedding, const sinew_world *world);
+sinew_status sinew_embedding_update_from(sinew_embedding *embedding, const float *positions,
+                                         size_t node_count);
+sinew_status sinew_embedding_get_positions(const sinew_embedding *embedding, sinew_vec3_view *out);
+sinew_status sinew_embedding_get_triangles(const sinew_embedding *embedding,
+                                           sinew_triangle_view *out);
+sinew_status sinew_embedding_get_normals(sinew_embedding *embedding, sinew_vec3_view *out);
+sinew_status sinew_body_create_from_surface(sinew_world *world, const sinew_body_def *def,
+                                            float spacing, sinew_body_id *out_body,
+                                            sinew_embedding **out_embedding);
+typedef struct sinew_reader sinew_reader;
+sinew_status sinew_reader_create(sinew_world *world, sinew_body_id body, sinew_reader **out);
+void sinew_reader_destroy(sinew_reader *reader);
+typedef struct sinew_frame {
+  size_t struct_size;
+  sinew_vec3_view positions;
+  sinew_triangle_view triangles;
+  uint64_t version;
+  uint64_t topology_version;
+  uint64_t step;
+  double time;
+  uint32_t is_new;
+  uint32_t is_over;
+} sinew_frame;
+sinew_status sinew_reader_read(sinew_reader *reader, sinew_frame *out);
+typedef struct sinew_surface_point {
+  size_t struct_size;
+  sinew_body_id body;
+  uint32_t triangle;
+  float weights[3];
+  float position[3];
+  float normal[3];
+  float distance;
+  uint32_t reserved;
+} sinew_surface_point;
+sinew_status sinew_world_cast_ray(const sinew_world *world, const float *origin,
+                                  const float *direction, float max_distance,
+                                  sinew_surface_point *out);
+sinew_status sinew_world_find_nearest(const sinew_world *world, const float *point,
+                                      float max_distance, sinew_surface_point *out);
+typedef enum sinew_image_form {
+  SINEW_IMAGE_FORM_INTERVALS = 0,
+  SINEW_IMAGE_FORM_COUNTED = 1
+} sinew_image_form;
+typedef struct sinew_detector_def {
+  size_t struct_size;
+  sinew_body_id bodies[2];
+  uint32_t detection;
+  uint32_t form;
+  float pixel;
+  float direction[3];
+  uint32_t pixels;
+  uint32_t crossings;
+  float thickness[2];
+} sinew_detector_def;
+sinew_status sinew_detector_def_init(sinew_detector_def *def, size_t struct_size);
+typedef struct sinew_detector sinew_detector;
+sinew_status sinew_detector_create(const sinew_world *world, const sinew_detector_def *def,
+                                   sinew_detector **out);
+void sinew_detector_destroy(sinew_detector *detector);
+typedef struct sinew_detector_report {
+  size_t struct_size;
+  double volume;
+  float normal[3];
+  float depth;
+  float pixel;
+  uint32_t point_counts[2];
+  uint32_t edge_counts[2];
+  uint32_t unlisted[2];
+  uint32_t closed[2];
+  uint32_t reserved;
+} sinew_detector_report;
+sinew_status sinew_detector_find(sinew_detector *detector, const sinew_world *world,
+                                 sinew_detector_report *report);
+typedef struct sinew_point_inside {
+  uint32_t node;
+  uint32_t triangle;
+  float depth;
+  float normal[3];
+} sinew_point_inside;
+sinew_status sinew_detector_get_points(const sinew_detector *detector, uint32_t side,
+                                       const sinew_point_inside **points, size_t *count);
+typedef struct sinew_edge_inside {
+  uint32_t nodes[2];
+  float entry;
+  float exit;
+  float depth;
+} sinew_edge_inside;
+sinew_status sinew_detector_get_edges(const sinew_detector *detector, uint32_t side,
+                                      const sinew_edge_inside **edges, size_t *count);
+sinew_status sinew_detector_get_gradient(const sinew_detector *detector, uint32_t side,
+                                         sinew_dvec3_view *out);
+sinew_status sinew_mesh_create(const float *positions, size_t node_count, const uint32_t *triangles,
+                               size_t triangle_count, const uint32_t *tetrahedra,
+                               size_t tetrahedron_count, sinew_mesh **out);
+sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, sinew_mesh **out);
+sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
+sinew_status sinew_body_transform(sinew_world *world, sinew_body_id body, const float *translation,
+                                  const float *rotation, const float *pivot);
+sinew_status sinew_body_get_bounds(const sinew_world *world, sinew_body_id body, float *out_min,
+                                   float *out_max);
+sinew_status sinew_body_get_normals(const sinew_world *world, sinew_body_id body, float *normals,
+                                    size_t node_count);
+sinew_status sinew_body_get_masses(const sinew_world *world, sinew_body_id body, float *masses,
+                                   size_t node_count);
+sinew_status sinew_body_apply_impulses(sinew_world *world, sinew_body_id body,
+                                       const uint32_t *nodes, const float *impulses, size_t count);
+sinew_status sinew_body_set_gravity_scale(sinew_world *world, sinew_body_id body, float scale);
+sinew_status sinew_body_get_gravity_scale(const sinew_world *world, sinew_body_id body, float *out);
+sinew_status sinew_body_pin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                  size_t count);
+sinew_status sinew_body_unpin_nodes(sinew_world *world, sinew_body_id body, const uint32_t *nodes,
+                                    size_t count);
+sinew_status sinew_body_pin_box(sinew_world *world, sinew_body_id body, const float *min,
+                                const float *max, size_t *out_count);
+sinew_status sinew_body_unpin_box(sinew_world *world, sinew_body_id body, const float *min,
+                                  const float *max, size_t *out_count);
+sinew_status sinew_body_get_pin_forces(const sinew_world *world, sinew_body_id body, float *forces,
+                                       size_t node_count);
+sinew_status sinew_tool_get_target(const sinew_world *world, sinew_tool_id tool, float *position,
+                                   float *orientation);
+sinew_status sinew_tools_get_wrench(const sinew_world *world, const sinew_tool_id *tools,
+                                    size_t count, const float *point, float *force, float *torque);
+typedef struct sinew_contact_change {
+  sinew_tool_id tool;
+  sinew_body_id body;
+  uint32_t begun;
+  uint32_t reserved;
+} sinew_contact_change;
+sinew_status sinew_world_get_contact_changes(const sinew_world *world,
+                                             sinew_contact_change *changes, size_t capacity,
+                                             size_t *count);
+typedef struct sinew_ray_hit {
+  size_t struct_size;
+  sinew_body_id body;
+  sinew_tool_id tool;
+  uint32_t triangle;
+  float weights[3];
+  float position[3];
+  float normal[3];
+  float distance;
+  uint32_t reserved;
+} sinew_ray_hit;
+sinew_status sinew_world_cast_ray_filtered(const sinew_world *world, const float *origin,
+                                           const float *direction, float max_distance,
+                                           uint32_t category, uint32_t mask, sinew_ray_hit *out);
+sinew_status sinew_world_get_time(const sinew_world *world, double *out_time, uint64_t *out_steps);
+sinew_status sinew_world_get_gravity(const sinew_world *world, float *out_gravity);
+sinew_status sinew_body_get_collision(const sinew_world *world, sinew_body_id body,
+                                      uint32_t *out_category, uint32_t *out_mask);
+sinew_status sinew_body_get_pressure(const sinew_world *world, sinew_body_id body, float *out);
+sinew_status sinew_tool_get_friction(const sinew_world *world, sinew_tool_id tool, float *out);
+sinew_status sinew_tool_get_force_limit(const sinew_world *world, sinew_tool_id tool, float *out);
+sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id tool,
+                                      uint32_t *out_category, uint32_t *out_mask);
+sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
+                                  float *orientation);
+uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
+uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);
+uint32_t sinew_blade_is_valid(const sinew_world *world, sinew_blade_id blade);
+uint32_t sinew_attachment_is_valid(const sinew_world *world, sinew_attachment_id attachment);
+sinew_status sinew_world_set_user_data(sinew_world *world, void *user_data);
+sinew_status sinew_world_get_user_data(const sinew_world *world, void **out);
+sinew_status sinew_body_set_user_data(sinew_world *world, sinew_body_id body, void *user_data);
+sinew_status sinew_body_get_user_data(const sinew_world *world, sinew_body_id body, void **out);
+sinew_status sinew_tool_set_user_data(sinew_world *world, sinew_tool_id tool, void *user_data);
+sinew_status sinew_tool_get_user_data(const sinew_world *world, sinew_tool_id tool, void **out);
+sinew_status sinew_world_get_snapshot_size(const sinew_world *world, size_t *out);
+sinew_status sinew_world_save_snapshot(const sinew_world *world, uint8_t *bytes, size_t size);
+sinew_status sinew_world_load_snapshot(const uint8_t *bytes, size_t size, uint32_t thread_count,
+                                       sinew_run_tasks run_tasks, void *tasks_context,
+                                       sinew_world **out);
+typedef struct sinew_energy {
+  size_t struct_size;
+  double kinetic;
+  double elastic;
+  double gravitational;
+} sinew_energy;
+sinew_status sinew_body_get_energy(const sinew_world *world, sinew_body_id body, sinew_energy *out);
+typedef struct sinew_solver_report {
+  size_t struct_size;
+  uint32_t iterations;
+  float error;
+  double added_mass;
+  uint32_t solves;
+  uint32_t converged;
+} sinew_solver_report;
+sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
+                                          sinew_solver_report *out);
+typedef struct sinew_storage_report {
+  size_t struct_size;
+  size_t node_count;
+  size_t spring_count;
+  size_t bytes_used;
+  size_t bytes_reserved;
+} sinew_storage_report;
+sinew_status sinew_body_get_storage_report(const sinew_world *world, sinew_body_id body,
+                                           sinew_storage_report *out);
+sinew_status sinew_body_get_spring_strains(const sinew_world *world, sinew_body_id body,
+                                           const uint32_t *pairs, const float *rest_lengths,
+                                           size_t count, float *strains);
+typedef struct sinew_strain {
+  float largest;
+  float smallest;
+  float growth;
+} sinew_strain;
+sinew_status sinew_body_get_triangle_strains(const sinew_world *world, sinew_body_id body,
+                                             const float *rest_positions, size_t node_count,
+                                             const uint32_t *triangles, size_t triangle_count,
+                                             sinew_strain *strains);
+sinew_status sinew_body_get_tetrahedron_strains(const sinew_world *world, sinew_body_id body,
+                                                const float *rest_positions, size_t node_count,
+                                                const uint32_t *tetrahedra,
+                                                size_t tetrahedron_count, sinew_strain *strains);
+sinew_status sinew_mean_at_nodes(const uint32_t *elements, uint32_t corners, const float *values,
+                                 size_t element_count, float *means, size_t node_count);
+typedef struct sinew_picture_def {
+  size_t struct_size;
+  uint32_t width;
+  uint32_t height;
+  float eye[3];
+  float target[3];
+  float up[3];
+  float direction[3];
+  float field_of_view;
+  uint32_t show_contacts;
+} sinew_picture_def;
+sinew_status sinew_picture_def_init(sinew_picture_def *def, size_t struct_size);
+sinew_status sinew_world_save_picture(const sinew_world *world, const sinew_picture_def *def,
+                                      const char *path);
+typedef enum sinew_colours {
+  SINEW_COLOURS_DIVERGING = 0,
+  SINEW_COLOURS_SEQUENTIAL = 1
+} sinew_colours;
+typedef struct sinew_body_values {
+  sinew_body_id body;
+  const float *values;
+  size_t node_count;
+  float low;
+  float high;
+  uint32_t colours;
+  uint32_t reserved;
+} sinew_body_values;
+sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
+                                                const sinew_picture_def *def,
+                                                const sinew_body_values *coloured, size_t count,
+                                                const char *path);

@@ -1,0 +1,106 @@
+//! Pins of several nodes at once: all of them, or none where a call is refused.
+
+use glam::Vec3;
+
+use super::Body;
+use crate::base::{Error, Result, memory};
+use crate::def::finite_vector;
+
+impl Body {
+    /// Holds nodes where they are, from now on, as [`Body::pin`] holds one.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it is a point that is bound to nodes.
+    /// [`Error::OutOfMemory`]. Then no node has changed.
+    pub fn pin_nodes(&mut self, nodes: &[u32]) -> Result<()> {
+        self.check_free_to_pin(nodes)?;
+        self.pins.reserve(nodes.len(), self.node_count())?;
+        nodes.iter().try_for_each(|&node| self.pin(node))
+    }
+
+    /// Lets go of nodes along all axes, as [`Body::unpin`] does of one.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: there is no such node, a tool holds it, or it has no mass. Then no node has changed.
+    pub fn unpin_nodes(&mut self, nodes: &[u32]) -> Result<()> {
+        self.check_free_to_pin(nodes)?;
+        for &node in nodes {
+            self.mass_of_unpinned(node)?;
+        }
+        nodes.iter().try_for_each(|&node| self.unpin(node))
+    }
+
+    /// Holds all nodes in a box, m, its sides included, where they are. Returns how many nodes of the box are held
+    /// then. Points that are bound to nodes do not count.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: a corner is not finite, `low` is above `high` along an axis, or a tool holds a node
+    /// of the box. [`Error::OutOfMemory`]. Then no node has changed.
+    pub fn pin_box(&mut self, low: Vec3, high: Vec3) -> Result<usize> {
+        let nodes = self.nodes_in(low, high)?;
+        self.pin_nodes(&nodes)?;
+        Ok(nodes.len())
+    }
+
+    /// Lets go of all pinned nodes in a box, m, its sides included, but of those without mass. Returns how many.
+    ///
+    /// # Errors
+    /// As [`Body::pin_box`].
+    pub fn unpin_box(&mut self, low: Vec3, high: Vec3) -> Result<usize> {
+        let mut nodes = self.nodes_in(low, high)?;
+        nodes.retain(|&node| {
+            let own = self.order.own(node);
+            self.pins.get(own).is_some() && self.masses[own as usize] > 0.0
+        });
+        self.unpin_nodes(&nodes)?;
+        Ok(nodes.len())
+    }
+
+    /// What holds each node against its springs and its weight, N, mean over the last step: as [`Body::pin_force`],
+    /// and 0 of nodes that are not pinned or that a tool holds.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: not one place for each node.
+    pub fn pin_forces(&self, forces: &mut [Vec3]) -> Result<()> {
+        crate::def::expect_count("forces", forces.len(), self.node_count())?;
+        forces.fill(Vec3::ZERO);
+        for pin in self.pins.iter().filter(|pin| !self.is_held_by_tool(pin.node)) {
+            let node = self.order.caller(pin.node);
+            forces[node as usize] = self.pin_force(node)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses nodes that are none, that a tool holds, or that are bound to others.
+    fn check_free_to_pin(&self, nodes: &[u32]) -> Result<()> {
+        for (index, &node) in nodes.iter().enumerate() {
+            let name = format_args!("nodes[{index}]");
+            self.check_node(&name, node)?;
+            self.check_not_bound(&name, node)?;
+            self.check_not_held(&name, node)?;
+        }
+        Ok(())
+    }
+
+    /// The nodes in a box that a pin can hold.
+    fn nodes_in(&self, low: Vec3, high: Vec3) -> Result<Vec<u32>> {
+        finite_vector("low", low)?;
+        finite_vector("high", high)?;
+        if !low.cmple(high).all() {
+            return Err(Error::invalid(format!(
+                "low is {low}: must be at most high, which is {high}, along each axis"
+            )));
+        }
+        let bound = |node: u32| {
+            let bindings = self.bindings.as_ref();
+            bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some())
+        };
+        let mut nodes = Vec::new();
+        for (node, position) in (0..).zip(self.positions()) {
+            if low.cmple(*position).all() && position.cmple(high).all() && !bound(node) {
+                memory::push(&mut nodes, node)?;
+            }
+        }
+        Ok(nodes)
+    }
+}

@@ -1,0 +1,150 @@
+//! A body as a whole: where it lies, what it weighs, and where it is moved.
+
+use glam::{DVec3, Quat, Vec3};
+
+use super::Body;
+use crate::base::{Error, Result, memory};
+use crate::def::{CollisionFilter, expect_count, finite, finite_vector};
+use crate::geometry::{Bounds, vertex_normals};
+use crate::solver::{GravityKicks, close};
+
+impl Body {
+    /// The box about its nodes, m: the lowest and the highest coordinates.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let bounds = Bounds::of(self.positions().iter().copied());
+        [bounds.min, bounds.max]
+    }
+
+    /// Writes the mass of each node, kg: as [`Body::node_mass`].
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: not one place for each node.
+    pub fn node_masses(&self, masses: &mut [f32]) -> Result<()> {
+        expect_count("masses", masses.len(), self.node_count())?;
+        for (node, mass) in (0..).zip(masses) {
+            *mass = self.masses[self.order.own(node) as usize];
+        }
+        Ok(())
+    }
+
+    /// Writes the unit normal of its surface at each node, outward: the mean of the triangles' by area; 0 of a node
+    /// without a triangle.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: not one place for each node.
+    pub fn normals(&self, normals: &mut [Vec3]) -> Result<()> {
+        expect_count("normals", normals.len(), self.node_count())?;
+        let [low, high] = self.bounds();
+        let scale = 1.0 / (high - low).max_element();
+        vertex_normals(self.positions(), &self.surface, scale, normals);
+        Ok(())
+    }
+
+    /// Turns it about `pivot`, m, and then shifts it by `translation`, m; `None`: about the middle of its box. Pins
+    /// and velocities go with it, nothing is swept, and what is viscous relaxes, as in [`Body::set_positions`].
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: a number is not finite, the rotation is zero, or a node would be at infinity.
+    /// [`Error::OutOfMemory`]. Then nothing has changed.
+    pub fn transform(&mut self, translation: Vec3, rotation: Quat, pivot: Option<Vec3>) -> Result<()> {
+        finite_vector("translation", translation)?;
+        finite_vector("pivot", pivot.unwrap_or_default())?;
+        let rotation = rotation.as_dquat();
+        let length = rotation.length();
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(Error::invalid(format!(
+                "rotation is {rotation}: must be finite and not zero"
+            )));
+        }
+        let rotation = rotation / length;
+        let [low, high] = self.bounds().map(|corner| corner.as_dvec3());
+        let pivot = pivot.map_or((low + high) * 0.5, |pivot| pivot.as_dvec3());
+        let place = |position: &Vec3| rotation * (position.as_dvec3() - pivot) + pivot + translation.as_dvec3();
+        let mut positions = memory::reserved(self.node_count())?;
+        positions.extend(self.positions().iter().map(|position| place(position).as_vec3()));
+        if let Some(node) = positions.iter().position(|position: &Vec3| !position.is_finite()) {
+            return Err(Error::invalid(format!(
+                "translation is {translation}: node {node} would be at infinity"
+            )));
+        }
+        let mut velocities = memory::reserved(self.node_count())?;
+        let turned = |velocity: &Vec3| (rotation * velocity.as_dvec3()).as_vec3();
+        velocities.extend(self.velocities().iter().map(turned));
+        self.set_positions(&positions)?;
+        if rotation.xyz() == DVec3::ZERO {
+            return Ok(());
+        }
+        self.set_velocities(&velocities)
+    }
+
+    /// Changes the velocity of nodes at once by an impulse on each, N s; nothing of a pinned node or one that a tool
+    /// holds, nor along an axis along which a node is held. A point that is bound to nodes hands it on to those.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: not one impulse for each node, no such node, or an impulse is not finite. Then
+    /// nothing has changed.
+    pub fn apply_impulses(&mut self, nodes: &[u32], impulses: &[Vec3]) -> Result<()> {
+        expect_count("impulses", impulses.len(), nodes.len())?;
+        for (index, (&node, impulse)) in nodes.iter().zip(impulses).enumerate() {
+            self.check_node(&format_args!("nodes[{index}]"), node)?;
+            if !impulse.is_finite() {
+                return Err(Error::invalid(format!(
+                    "impulses[{index}] is {impulse}: must be finite"
+                )));
+            }
+        }
+        close(self);
+        for (&node, &impulse) in nodes.iter().zip(impulses) {
+            for (own, weight) in self.movers(self.order.own(node)) {
+                let change = impulse * (weight * self.inverse_masses[own as usize]);
+                let change = Vec3::select(self.pins.partial_axes_of(own), Vec3::ZERO, change);
+                let velocity = self.state.velocities().get(own as usize);
+                let velocity = (velocity + change).clamp(Vec3::MIN, Vec3::MAX);
+                self.wake_at(own);
+                self.set_velocity(self.order.caller(own), velocity);
+            }
+        }
+        self.follow_nodes();
+        self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+        }
+        Ok(())
+    }
+
+    /// The part of the world's gravity that acts on it: 1 unless it was set.
+    pub fn gravity_scale(&self) -> f32 {
+        self.gravity_scale
+    }
+
+    /// Lets this part of the world's gravity act on it from the next step on: 0 none, -1 upward.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: it is not finite.
+    pub fn set_gravity_scale(&mut self, scale: f32) -> Result<()> {
+        finite("gravity_scale", scale)?;
+        self.gravity_scale = scale;
+        self.wake();
+        Ok(())
+    }
+
+    /// What it meets.
+    pub fn collision_filter(&self) -> CollisionFilter {
+        self.contact.filter
+    }
+
+    /// The pressure of its cavities at their volumes at rest, Pa: as it was made or set; 0 without cavities.
+    pub fn pressure(&self) -> f32 {
+        self.enclosed.as_ref().map_or(0.0, |enclosed| enclosed.pressure())
+    }
+
+    /// What the caller keeps with it: 0 unless it was set, and after a snapshot.
+    pub fn user_data(&self) -> usize {
+        self.user_data
+    }
+
+    /// Keeps a number or a pointer of the caller's with it; it changes no motion.
+    pub fn set_user_data(&mut self, data: usize) {
+        self.user_data = data;
+    }
+}

@@ -1,0 +1,442 @@
+//! Settings that were made, what the caller keeps with things, whether ids are valid, and rays that meet tools.
+
+use libc::c_void;
+
+use super::attachment::sinew_attachment_id;
+use super::blade::sinew_blade_id;
+use super::body::{sinew_body_id, with_body};
+use super::guard::{sinew_world, with_world, with_world_mut};
+use super::memory::{self, Versioned};
+use super::status::sinew_status;
+use super::tool::sinew_tool_id;
+use crate::def::CollisionFilter;
+use crate::query::RayHit;
+
+/// Returns 1 if a body with this id exists in the world, else 0.
+///
+/// It returns 0 for a NULL world and a null id.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: sinew_body_id) -> u32 {
+    // SAFETY: the same contract.
+    unsafe {
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_body(body.id());
+            Ok(())
+        });
+        u32::from(is_there)
+    }
+}
+
+/// Returns 1 if a tool with this id exists in the world, else 0.
+///
+/// It returns 0 for a NULL world and a null id.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: sinew_tool_id) -> u32 {
+    // SAFETY: the same contract.
+    unsafe {
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_tool(tool.id());
+            Ok(())
+        });
+        u32::from(is_there)
+    }
+}
+
+/// Returns 1 if a blade with this id exists in the world, else 0.
+///
+/// It returns 0 for a NULL world and a null id.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: sinew_blade_id) -> u32 {
+    // SAFETY: the same contract.
+    unsafe {
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_blade(blade.id());
+            Ok(())
+        });
+        u32::from(is_there)
+    }
+}
+
+/// Returns 1 if an attachment with this id exists in the world, else 0.
+///
+/// It returns 0 for a NULL world and a null id.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, attachment: sinew_attachment_id) -> u32 {
+    // SAFETY: the same contract.
+    unsafe {
+        let mut is_there = false;
+        with_world(world, |world| {
+            is_there = world.has_attachment(attachment.id());
+            Ok(())
+        });
+        u32::from(is_there)
+    }
+}
+
+/// Stores a pointer of the caller with a world; snapshots do not hold it.
+///
+/// `user_data` is nullable.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_set_user_data(world: *mut sinew_world, user_data: *mut c_void) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            world.set_user_data(user_data as usize);
+            Ok(())
+        })
+    }
+}
+
+/// Writes the pointer that is stored with a world; NULL by default.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_get_user_data(world: *const sinew_world, out: *mut *mut c_void) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            *memory::output("out", out)? = world.user_data() as *mut c_void;
+            Ok(())
+        })
+    }
+}
+
+/// Stores a pointer of the caller with a tool; snapshots do not hold it.
+///
+/// `user_data` is nullable.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_set_user_data(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    user_data: *mut c_void,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_world_mut(world, |world| world.set_tool_user_data(tool.id(), user_data as usize)) }
+}
+
+/// Writes the pointer that is stored with a tool; NULL by default.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_user_data(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out: *mut *mut c_void,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            *memory::output("out", out)? = world.tool_user_data(tool.id())? as *mut c_void;
+            Ok(())
+        })
+    }
+}
+
+/// Writes the time [s] that a world has been stepped, and the number of steps.
+///
+/// Both outputs are nullable.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_get_time(
+    world: *const sinew_world,
+    out_time: *mut f64,
+    out_steps: *mut u64,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let time = memory::optional_output_array("out_time", out_time, 1)?;
+            let steps = memory::optional_output_array("out_steps", out_steps, 1)?;
+            if let Some(time) = time {
+                time[0] = world.time();
+            }
+            if let Some(steps) = steps {
+                steps[0] = world.step_count();
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Writes the gravitational acceleration [m/s^2] of a world, 3 floats.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_get_gravity(world: *const sinew_world, out_gravity: *mut f32) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            *memory::output("out_gravity", out_gravity.cast())? = world.gravity().to_array();
+            Ok(())
+        })
+    }
+}
+
+/// Writes the friction coefficient of a tool.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_friction(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            *memory::output("out", out)? = world.friction(tool.id())?;
+            Ok(())
+        })
+    }
+}
+
+/// Writes the largest force [N] that moves a tool; infinity: unlimited.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_force_limit(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            *memory::output("out", out)? = world.force_limit(tool.id())?;
+            Ok(())
+        })
+    }
+}
+
+/// Writes the collision category and mask of a tool.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_collision(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out_category: *mut u32,
+    out_mask: *mut u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let filter = world.collision_filter(tool.id())?;
+            let (category, mask) = (
+                memory::output("out_category", out_category)?,
+                memory::output("out_mask", out_mask)?,
+            );
+            (*category, *mask) = (filter.category, filter.mask);
+            Ok(())
+        })
+    }
+}
+
+/// Writes the collision category and mask of a body.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_collision(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out_category: *mut u32,
+    out_mask: *mut u32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let filter = body.collision_filter();
+            let (category, mask) = (
+                memory::output("out_category", out_category)?,
+                memory::output("out_mask", out_mask)?,
+            );
+            (*category, *mask) = (filter.category, filter.mask);
+            Ok(())
+        })
+    }
+}
+
+/// Writes the overpressure [Pa] of the cavities of a body at rest volume; 0 without cavities.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_pressure(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = body.pressure();
+            Ok(())
+        })
+    }
+}
+
+/// Writes the current pose of a blade.
+///
+/// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_blade_get_pose(
+    world: *const sinew_world,
+    blade: sinew_blade_id,
+    position: *mut f32,
+    orientation: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let pose = world.blade_pose(blade.id())?;
+            let position = memory::optional_output_array("position", position.cast(), 1)?;
+            let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
+            if let Some(place) = position {
+                place[0] = pose.position.to_array();
+            }
+            if let Some(place) = orientation {
+                place[0] = pose.orientation.to_array();
+            }
+            Ok(())
+        })
+    }
+}
+
+/// First body or tool that a ray hits.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_ray_hit {
+    /// Set to sizeof(sinew_ray_hit) before the call.
+    pub struct_size: usize,
+    /// Body that is hit; all zero if none.
+    pub body: sinew_body_id,
+    /// Tool that is hit; all zero if none.
+    pub tool: sinew_tool_id,
+    /// Index of the triangle in the body's surface; 0 for a tool.
+    pub triangle: u32,
+    /// Weights of the triangle's corners, with sum 1; 0 for a tool.
+    pub weights: [f32; 3],
+    /// [m] Position of the hit.
+    pub position: [f32; 3],
+    /// Outward unit normal at the hit.
+    pub normal: [f32; 3],
+    /// [m] Distance from the origin.
+    pub distance: f32,
+    /// Reserved; set to 0 by the library.
+    pub reserved: u32,
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_ray_hit {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_ray_hit";
+}
+
+impl From<Option<RayHit>> for sinew_ray_hit {
+    fn from(hit: Option<RayHit>) -> Self {
+        let nothing = Self {
+            struct_size: size_of::<Self>(),
+            body: sinew_body_id {
+                index1: 0,
+                generation: 0,
+            },
+            tool: sinew_tool_id {
+                index1: 0,
+                generation: 0,
+            },
+            triangle: 0,
+            weights: [0.0; 3],
+            position: [0.0; 3],
+            normal: [0.0; 3],
+            distance: 0.0,
+            reserved: 0,
+        };
+        match hit {
+            None => nothing,
+            Some(RayHit::Body(hit)) => Self {
+                body: hit.body.into(),
+                triangle: hit.triangle,
+                weights: hit.weights,
+                position: hit.position.to_array(),
+                normal: hit.normal.to_array(),
+                distance: hit.distance,
+                ..nothing
+            },
+            Some(RayHit::Tool {
+                tool,
+                position,
+                normal,
+                distance,
+            }) => Self {
+                tool: tool.into(),
+                position: position.to_array(),
+                normal: normal.to_array(),
+                distance,
+                ..nothing
+            },
+        }
+    }
+}
+
+/// Finds the first body or tool that a ray with a collision filter hits.
+///
+/// The ray meets bodies and tools as if it had this category and mask. Otherwise like sinew_world_cast_ray; without a hit
+/// both ids are all zero.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_cast_ray_filtered(
+    world: *const sinew_world,
+    origin: *const f32,
+    direction: *const f32,
+    max_distance: f32,
+    category: u32,
+    mask: u32,
+    out: *mut sinew_ray_hit,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let out = memory::report("out", out)?;
+            let origin = memory::vector("origin", origin)?;
+            let direction = memory::vector("direction", direction)?;
+            let filter = CollisionFilter { category, mask };
+            out.fill(world.cast_ray_at(origin, direction, max_distance, filter)?.into());
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,130 @@
+//! Pins of several nodes at once.
+
+use super::body::{sinew_body_id, with_body, with_body_mut};
+use super::guard::sinew_world;
+use super::memory;
+use super::status::sinew_status;
+
+/// Pins nodes at their current positions; see sinew_body_pin.
+///
+/// `nodes` holds `count` indices. On failure no node changes.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_pin_nodes(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.pin_nodes(memory::array("nodes", nodes, count)?)
+        })
+    }
+}
+
+/// Unpins nodes along all axes; see sinew_body_unpin.
+///
+/// `nodes` holds `count` indices. On failure no node changes.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_unpin_nodes(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.unpin_nodes(memory::array("nodes", nodes, count)?)
+        })
+    }
+}
+
+/// Pins all nodes in a box, and writes how many nodes of the box are pinned.
+///
+/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_pin_box(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    min: *const f32,
+    max: *const f32,
+    out_count: *mut usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
+            let place = memory::optional_output_array("out_count", out_count, 1)?;
+            let count = body.pin_box(low, high)?;
+            if let Some(place) = place {
+                place[0] = count;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Unpins the pinned nodes in a box, except those of mass 0, and writes how many.
+///
+/// `min` [m] and `max` [m] are 3 floats each. `out_count` is nullable. On failure no node changes.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if a tool holds a node in the box.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_unpin_box(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    min: *const f32,
+    max: *const f32,
+    out_count: *mut usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            let (low, high) = (memory::vector("min", min)?, memory::vector("max", max)?);
+            let place = memory::optional_output_array("out_count", out_count, 1)?;
+            let count = body.unpin_box(low, high)?;
+            if let Some(place) = place {
+                place[0] = count;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Writes the reaction forces on all nodes, averaged over the last step.
+///
+/// `forces` [N] receives 3 * node_count floats, 0 for a node that is not pinned or that a tool holds. `node_count` must
+/// be the body's number of nodes.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_pin_forces(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    forces: *mut f32,
+    node_count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            body.pin_forces(memory::output_array("forces", forces.cast(), node_count)?)
+        })
+    }
+}

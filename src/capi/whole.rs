@@ -1,0 +1,283 @@
+//! A body as a whole: meshes into definitions, where it lies, and where it is moved.
+
+use glam::{Quat, Vec3};
+use libc::c_void;
+
+use super::body::{sinew_body_id, with_body, with_body_mut};
+use super::definition::sinew_body_def;
+use super::guard::{guard, sinew_world};
+use super::memory;
+use super::mesh::{create, sinew_mesh, sinew_mesh_view};
+use super::status::sinew_status;
+use crate::base::memory::copied;
+use crate::mesh::{LoadedMesh, Mesh, tidy};
+
+/// Creates a mesh from arrays and cleans it like sinew_mesh_load.
+///
+/// `positions` [m] holds 3 * node_count floats, `triangles` 3 * triangle_count and `tetrahedra` 4 * tetrahedron_count
+/// node indices. node_of_vertex of sinew_mesh_view maps the given nodes to those of the mesh.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_mesh_create(
+    positions: *const f32,
+    node_count: usize,
+    triangles: *const u32,
+    triangle_count: usize,
+    tetrahedra: *const u32,
+    tetrahedron_count: usize,
+    out: *mut *mut sinew_mesh,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        create(out, || {
+            tidy(&Mesh {
+                positions: copied(memory::array("positions", positions.cast::<Vec3>(), node_count)?)?,
+                triangles: copied(memory::array("triangles", triangles.cast(), triangle_count)?)?,
+                tetrahedra: copied(memory::array("tetrahedra", tetrahedra.cast(), tetrahedron_count)?)?,
+                ..Mesh::default()
+            })
+        })
+    }
+}
+
+/// Creates a mesh of tetrahedra that fills the closed surface of a mesh.
+///
+/// `spacing` [m] is the mean edge length. Nodes and tetrahedra are those of the body that
+/// sinew_body_create_from_surface makes of the same surface, with the rest positions.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the surface is open or inverted, or `spacing` too fine or too coarse.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_mesh_create_filled(
+    surface: *const sinew_mesh,
+    spacing: f32,
+    out: *mut *mut sinew_mesh,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        create(out, || {
+            let surface = memory::reference("surface", surface)?;
+            LoadedMesh::unchanged(Mesh::filled(&surface.drawn()?, spacing)?)
+        })
+    }
+}
+
+/// Sets the nodes and elements of a body definition to those of a mesh.
+///
+/// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist until the body is
+/// created.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh: *const sinew_mesh) -> sinew_status {
+    // SAFETY: the same contract.
+    guard(|| unsafe {
+        let mut changed = memory::definition("def", def, sinew_body_def::defaults())?;
+        let view = sinew_mesh_view::of(memory::reference("mesh", mesh)?);
+        changed.take_mesh(&view);
+        memory::report("def", def)?.fill(changed);
+        Ok(())
+    })
+}
+
+/// Rotates a body about a pivot and then translates it, with its pins and velocities.
+///
+/// `translation` [m] is 3 floats, `rotation` x y z w, not zero, and `pivot` [m] 3 floats; all are nullable: none, none,
+/// and the center of the bounding box. Nothing is swept; otherwise like sinew_body_set_positions.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_transform(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    translation: *const f32,
+    rotation: *const f32,
+    pivot: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            let translation = memory::optional_array("translation", translation.cast::<Vec3>(), 1)?;
+            let rotation = memory::optional_array("rotation", rotation.cast::<[f32; 4]>(), 1)?;
+            let pivot = memory::optional_array("pivot", pivot.cast::<Vec3>(), 1)?;
+            let rotation = rotation.map_or(Quat::IDENTITY, |rotation| Quat::from_array(rotation[0]));
+            let translation = translation.map_or(Vec3::ZERO, |translation| translation[0]);
+            body.transform(translation, rotation, pivot.map(|pivot| pivot[0]))
+        })
+    }
+}
+
+/// Writes the bounding box of the nodes of a body.
+///
+/// `out_min` [m] and `out_max` [m] receive 3 floats each.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_bounds(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out_min: *mut f32,
+    out_max: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            let bounds = body.bounds().map(|corner| corner.to_array());
+            let (low, high) = (
+                memory::output("out_min", out_min.cast())?,
+                memory::output("out_max", out_max.cast())?,
+            );
+            (*low, *high) = (bounds[0], bounds[1]);
+            Ok(())
+        })
+    }
+}
+
+/// Writes the unit normals of the surface of a body at its nodes.
+///
+/// They are area-weighted and point outward; 0 for a node without a triangle. `normals` receives 3 * node_count floats;
+/// `node_count` must be the body's number of nodes.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_normals(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    normals: *mut f32,
+    node_count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            body.normals(memory::output_array("normals", normals.cast(), node_count)?)
+        })
+    }
+}
+
+/// Writes the masses [kg] of all nodes of a body; see sinew_body_get_node_mass.
+///
+/// `masses` receives `node_count` floats; `node_count` must be the body's number of nodes.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_masses(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    masses: *mut f32,
+    node_count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            body.node_masses(memory::output_array("masses", masses, node_count)?)
+        })
+    }
+}
+
+/// Changes the velocities of nodes at once by impulses.
+///
+/// `nodes` holds `count` indices, which may repeat; `impulses` [N s] holds 3 * count floats. They have no effect on a
+/// pinned or attached node, nor along a pinned axis. On failure no velocity changes.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_apply_impulses(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    nodes: *const u32,
+    impulses: *const f32,
+    count: usize,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            let nodes = memory::array("nodes", nodes, count)?;
+            body.apply_impulses(nodes, memory::array("impulses", impulses.cast(), count)?)
+        })
+    }
+}
+
+/// Sets the factor of the world's gravity on a body, from the next step on.
+///
+/// `scale` is finite: 0 means no gravity.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_gravity_scale(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    scale: f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { with_body_mut(world, body, |body| body.set_gravity_scale(scale)) }
+}
+
+/// Writes the factor of the world's gravity on a body.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_gravity_scale(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = body.gravity_scale();
+            Ok(())
+        })
+    }
+}
+
+/// Stores a pointer of the caller with a body; snapshots do not hold it.
+///
+/// `user_data` is nullable.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_set_user_data(
+    world: *mut sinew_world,
+    body: sinew_body_id,
+    user_data: *mut c_void,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body_mut(world, body, |body| {
+            body.set_user_data(user_data as usize);
+            Ok(())
+        })
+    }
+}
+
+/// Writes the pointer that is stored with a body; NULL by default.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_body_get_user_data(
+    world: *const sinew_world,
+    body: sinew_body_id,
+    out: *mut *mut c_void,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_body(world, body, |body| {
+            *memory::output("out", out)? = body.user_data() as *mut c_void;
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,342 @@
+/* Whole bodies, several pins, filtered rays, settings that are read back, ids and user data: what they do, and what they refuse. */
+#include "scene.h"
+
+#define REFUSED(word, call)                                                    \
+    do {                                                                       \
+        char message_[512] = "";                                               \
+        const sinew_status status_ = (call);                                   \
+        sinew_last_error(message_, sizeof message_);                           \
+        CHECK(status_ == SINEW_STATUS_INVALID_ARGUMENT);                       \
+        if (strstr(message_, word) == NULL) {                                  \
+            failures++;                                                        \
+            fprintf(stderr, "%s:%d: \"%s\" does not name %s\n", __FILE__, __LINE__, message_, word); \
+        }                                                                      \
+    } while (0)
+
+static const float not_a_number[4] = {NAN, 0, 0, 1}, zero[4] = {0, 0, 0, 0};
+/* A quarter about z: x becomes y. */
+static const float quarter[4] = {0, 0, 0.70710678f, 0.70710678f};
+
+static sinew_mesh *a_block(void)
+{
+    static const float size[3] = {0.2f, 0.1f, 0.1f};
+    static const uint32_t cells[3] = {4, 2, 2};
+    sinew_mesh *mesh = NULL;
+    MUST(sinew_mesh_create_block(size, cells, &mesh));
+    return mesh;
+}
+
+static sinew_body_def of_mesh(const sinew_mesh *mesh)
+{
+    sinew_body_def def;
+    MUST(sinew_body_def_init(&def, sizeof def));
+    MUST(sinew_body_def_set_mesh(&def, mesh));
+    def.node_mass = 0.01f;
+    def.stiffness = 100;
+    return def;
+}
+
+/* A square of two triangles that share no vertex, a triangle without area, and a vertex that nothing uses. */
+static void meshes_from_memory(void)
+{
+    static const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 5, 5, 5};
+    static const uint32_t triangles[] = {0, 1, 2, 3, 4, 5, 1, 3, 2};
+    static const uint32_t outside[] = {0, 1, 7};
+    sinew_mesh *mesh = NULL;
+    sinew_mesh_view view;
+    view.struct_size = sizeof view;
+    MUST(sinew_mesh_create(positions, 7, triangles, 3, NULL, 0, &mesh));
+    MUST(sinew_mesh_get_view(mesh, &view));
+    CHECK(view.node_count == 4 && view.triangle_count == 2 && view.vertex_count == 7);
+    CHECK(view.welded_vertices == 2 && view.dropped_vertices == 1 && view.dropped_triangles == 1);
+    CHECK(view.node_of_vertex[3] == view.node_of_vertex[1] && view.node_of_vertex[6] == SINEW_NO_NODE);
+    sinew_mesh_destroy(mesh);
+    mesh = NULL;
+    REFUSED("positions", sinew_mesh_create(NULL, 7, triangles, 3, NULL, 0, &mesh));
+    REFUSED("triangle", sinew_mesh_create(positions, 7, outside, 1, NULL, 0, &mesh));
+    REFUSED("out", sinew_mesh_create(positions, 7, triangles, 3, NULL, 0, NULL));
+    CHECK(mesh == NULL);
+}
+
+/* The tetrahedra of a body made from a surface, and its rest positions. */
+static void a_filled_mesh_is_what_a_surface_becomes(void)
+{
+    sinew_mesh *block = a_block(), *filled = NULL;
+    sinew_world *world = a_world(0);
+    sinew_mesh_view surface, view;
+    sinew_vec3_view nodes;
+    sinew_body_def def;
+    sinew_body_id body;
+    size_t i, axis;
+    surface.struct_size = view.struct_size = sizeof view;
+    MUST(sinew_mesh_get_view(block, &surface));
+    MUST(sinew_mesh_create_filled(block, 0.04f, &filled));
+    MUST(sinew_mesh_get_view(filled, &view));
+    MUST(sinew_body_def_init(&def, sizeof def));
+    def.positions = surface.positions;
+    def.node_count = surface.node_count;
+    def.triangles = surface.surface;
+    def.triangle_count = surface.surface_triangle_count;
+    def.node_mass = 0.01f;
+    def.stiffness = 100;
+    MUST(sinew_body_create_from_surface(world, &def, 0.04f, &body, NULL));
+    MUST(sinew_body_get_positions(world, body, &nodes));
+    CHECK(view.tetrahedron_count > 0 && view.node_count == nodes.count);
+    for (i = 0; i < nodes.count && i < view.node_count; i++)
+        for (axis = 0; axis < 3; axis++)
+            CHECK(node_of(nodes, i)[axis] == view.positions[3 * i + axis]);
+    REFUSED("surface", sinew_mesh_create_filled(NULL, 0.04f, &filled));
+    REFUSED("spacing", sinew_mesh_create_filled(block, 0, &filled));
+    sinew_mesh_destroy(filled);
+    sinew_mesh_destroy(block);
+    sinew_world_destroy(world);
+}
+
+static void a_definition_places_a_body(void)
+{
+    sinew_mesh *mesh = a_block();
+    sinew_world *world = a_world(0);
+    sinew_body_def def = of_mesh(mesh);
+    sinew_body_id body = {0, 0};
+    float low[3], high[3], before[2];
+    CHECK(def.gravity_scale == 1 && def.orientation[3] == 1 && def.tetrahedron_count > 0 && def.triangles == NULL);
+    def.position[0] = 1;
+    memcpy(def.orientation, quarter, sizeof quarter);
+    def.home_stiffness = 10;
+    MUST(sinew_body_create(world, &def, &body));
+    MUST(sinew_body_get_bounds(world, body, low, high));
+    CHECK_NEAR(low[0], 0.95, 1e-6);
+    CHECK_NEAR(high[0], 1.05, 1e-6);
+    CHECK_NEAR(low[1], -0.1, 1e-6);
+    CHECK_NEAR(high[1], 0.1, 1e-6);
+    /* It is at rest there, by its anchor springs too. */
+    before[0] = low[0];
+    before[1] = high[1];
+    steps(world, 0.01f, 20);
+    MUST(sinew_body_get_bounds(world, body, low, high));
+    CHECK_NEAR(low[0], before[0], 1e-6);
+    CHECK_NEAR(high[1], before[1], 1e-6);
+    memcpy(def.orientation, zero, sizeof zero);
+    REFUSED("orientation", sinew_body_create(world, &def, &body));
+    def.orientation[3] = 1;
+    def.position[1] = NAN;
+    REFUSED("position", sinew_body_create(world, &def, &body));
+    def.position[1] = 0;
+    def.gravity_scale = INFINITY;
+    REFUSED("gravity_scale", sinew_body_create(world, &def, &body));
+    REFUSED("mesh", sinew_body_def_set_mesh(&def, NULL));
+    REFUSED("def", sinew_body_def_set_mesh(NULL, mesh));
+    sinew_mesh_destroy(mesh);
+    sinew_world_destroy(world);
+}
+
+static void a_body_is_turned_and_moved(void)
+{
+    static const float speeds[6] = {2, 0, 0, 2, 0, 0}, up[3] = {0, 0, 5}, origin[3] = {0, 0, 0};
+    sinew_world *world = a_world(0);
+    const sinew_body_id body = loose_nodes(world, 2);
+    uint64_t before = 0, after = 0;
+    MUST(sinew_body_set_velocities(world, body, speeds, 2));
+    MUST(sinew_body_transform(world, body, up, quarter, origin));
+    CHECK_NEAR(position(world, body, 1, 0), 0, 1e-6);
+    CHECK_NEAR(position(world, body, 1, 1), 1, 1e-6);
+    CHECK_NEAR(position(world, body, 1, 2), 5, 1e-6);
+    CHECK_NEAR(velocity(world, body, 1, 1), 2, 1e-6);
+    /* About its middle, which stays: 0 0.5 5. */
+    MUST(sinew_body_transform(world, body, NULL, quarter, NULL));
+    CHECK_NEAR(position(world, body, 1, 0), -0.5, 1e-6);
+    CHECK_NEAR(position(world, body, 1, 1), 0.5, 1e-6);
+    MUST(sinew_world_get_state_hash(world, &before));
+    REFUSED("translation", sinew_body_transform(world, body, not_a_number, NULL, NULL));
+    REFUSED("rotation", sinew_body_transform(world, body, NULL, zero, NULL));
+    REFUSED("rotation", sinew_body_transform(world, body, NULL, not_a_number, NULL));
+    REFUSED("pivot", sinew_body_transform(world, body, NULL, NULL, not_a_number));
+    MUST(sinew_world_get_state_hash(world, &after));
+    CHECK(before == after);
+    sinew_world_destroy(world);
+}
+
+static void pins_of_many(void)
+{
+    static const uint32_t first[2] = {0, 1}, wrong[2] = {2, CLOTH_NODES};
+    static const float low[3] = {-0.1f, -0.1f, -0.041f}, high[3] = {0.1f, 0.1f, -0.039f};
+    sinew_world *world = a_world(-10);
+    const sinew_body_id cloth = a_cloth(world, STIFF);
+    float forces[3 * CLOTH_NODES], force[3], masses[CLOTH_NODES], normals[3 * CLOTH_NODES], mass = 0, held = 0;
+    uint64_t before = 0, after = 0;
+    size_t count = 0;
+    uint32_t i;
+    MUST(sinew_body_get_normals(world, cloth, normals, CLOTH_NODES));
+    MUST(sinew_body_get_masses(world, cloth, masses, CLOTH_NODES));
+    for (i = 0; i < CLOTH_NODES; i++) {
+        CHECK_NEAR(normals[3 * i + 1], 1, 1e-6);
+        mass += masses[i];
+    }
+    CHECK_NEAR(mass, CLOTH_NODES * 1e-3, 1e-6);
+    MUST(sinew_world_get_state_hash(world, &before));
+    REFUSED("nodes[1]", sinew_body_pin_nodes(world, cloth, wrong, 2));
+    REFUSED("nodes[1]", sinew_body_unpin_nodes(world, cloth, wrong, 2));
+    REFUSED("low", sinew_body_pin_box(world, cloth, high, low, &count));
+    REFUSED("min", sinew_body_pin_box(world, cloth, NULL, high, &count));
+    REFUSED("high", sinew_body_unpin_box(world, cloth, low, not_a_number, &count));
+    REFUSED("forces", sinew_body_get_pin_forces(world, cloth, forces, CLOTH_NODES - 1));
+    REFUSED("masses", sinew_body_get_masses(world, cloth, masses, 1));
+    REFUSED("normals", sinew_body_get_normals(world, cloth, NULL, CLOTH_NODES));
+    MUST(sinew_world_get_state_hash(world, &after));
+    CHECK(before == after && count == 0);
+    /* One edge of the cloth. */
+    MUST(sinew_body_pin_box(world, cloth, low, high, &count));
+    CHECK(count == SIDE);
+    steps(world, 0.01f, 300);
+    MUST(sinew_body_get_pin_forces(world, cloth, forces, CLOTH_NODES));
+    for (i = 0; i < CLOTH_NODES; i++) {
+        held += forces[3 * i + 1];
+        if (i >= SIDE) {
+            CHECK(forces[3 * i + 1] == 0);
+            continue;
+        }
+        MUST(sinew_body_get_pin_force(world, cloth, i, force));
+        CHECK(force[1] == forces[3 * i + 1]);
+    }
+    CHECK_NEAR(held, mass * 10, 0.05 * mass * 10); /* they carry it */
+    MUST(sinew_body_unpin_nodes(world, cloth, first, 2));
+    MUST(sinew_body_unpin_box(world, cloth, low, high, &count));
+    CHECK(count == SIDE - 2);
+    MUST(sinew_body_pin_nodes(world, cloth, first, 2));
+    MUST(sinew_body_unpin_box(world, cloth, low, high, NULL));
+    sinew_world_destroy(world);
+}
+
+static void impulses_and_gravity(void)
+{
+    static const uint32_t nodes[2] = {1, 1};
+    static const float impulses[6] = {0, 1, 0, 0, 1, 0}, bad[6] = {0, 1, 0, 0, NAN, 0};
+    sinew_world *world = a_world(-10);
+    const sinew_body_id body = loose_nodes(world, 2);
+    float scale = 0, gravity[3];
+    double time = 0;
+    uint64_t count = 0;
+    REFUSED("impulses[1]", sinew_body_apply_impulses(world, body, nodes, bad, 2));
+    REFUSED("nodes", sinew_body_apply_impulses(world, body, NULL, impulses, 2));
+    MUST(sinew_body_pin(world, body, 0));
+    MUST(sinew_body_apply_impulses(world, body, nodes, impulses, 2));
+    CHECK_NEAR(velocity(world, body, 1, 1), 2 / 0.5, 1e-5); /* twice 1 N s on 0.5 kg */
+    CHECK(velocity(world, body, 0, 1) == 0);
+    MUST(sinew_body_get_gravity_scale(world, body, &scale));
+    CHECK(scale == 1);
+    MUST(sinew_body_set_gravity_scale(world, body, 0.5f));
+    REFUSED("gravity_scale", sinew_body_set_gravity_scale(world, body, NAN));
+    MUST(sinew_body_get_gravity_scale(world, body, &scale));
+    CHECK(scale == 0.5f);
+    steps(world, 0.01f, 10);
+    CHECK_NEAR(velocity(world, body, 1, 1), 4 - 0.5 * 10 * 0.1, 1e-5);
+    CHECK_NEAR(position(world, body, 1, 1), 4 * 0.1 - 0.5 * 0.5 * 10 * 0.01, 1e-5);
+    MUST(sinew_world_get_time(world, &time, &count));
+    CHECK_NEAR(time, 0.1, 1e-7);
+    CHECK(count == 10);
+    MUST(sinew_world_get_time(world, NULL, NULL));
+    MUST(sinew_world_get_gravity(world, gravity));
+    CHECK(gravity[1] == -10);
+    sinew_world_destroy(world);
+}
+
+static void rays_settings_and_ids(void)
+{
+    static const float from[3] = {0.003f, 1, 0.002f}, down[3] = {0, -2, 0};
+    static int anything;
+    sinew_world *world = a_world(0);
+    const sinew_body_id cloth = a_cloth(world, SOFT), no_body = {0, 0};
+    sinew_tool_id ball = {0, 0};
+    sinew_tool_def def;
+    sinew_ray_hit hit;
+    float number = 0, force[3], torque[3];
+    uint32_t category = 0, mask = 0;
+    void *data = &anything;
+    hit.struct_size = sizeof hit;
+    MUST(sinew_tool_def_init(&def, sizeof def));
+    def.radius = 0.1f;
+    def.position[1] = 0.5f;
+    def.collision_category = 4;
+    def.friction = 0.25f;
+    def.force_limit = 0;
+    MUST(sinew_tool_create(world, &def, &ball));
+    MUST(sinew_world_cast_ray_filtered(world, from, down, 2, 1, UINT32_MAX, &hit));
+    CHECK(hit.tool.index1 == ball.index1 && hit.body.index1 == 0);
+    CHECK_NEAR(hit.distance, 1 - 0.5 - 0.1, 1e-3);
+    CHECK_NEAR(hit.normal[1], 1, 1e-2);
+    MUST(sinew_world_cast_ray_filtered(world, from, down, 2, 1, 1, &hit));
+    CHECK(hit.tool.index1 == 0 && hit.body.index1 == cloth.index1);
+    CHECK_NEAR(hit.distance, 1, 1e-6);
+    MUST(sinew_world_cast_ray_filtered(world, from, down, 2, 1, 2, &hit));
+    CHECK(hit.tool.index1 == 0 && hit.body.index1 == 0);
+    REFUSED("direction", sinew_world_cast_ray_filtered(world, from, zero, 2, 1, 1, &hit));
+    REFUSED("max_distance", sinew_world_cast_ray_filtered(world, from, down, NAN, 1, 1, &hit));
+    REFUSED("origin", sinew_world_cast_ray_filtered(world, NULL, down, 2, 1, 1, &hit));
+    /* 0 is no limit, wherever there is one. */
+    MUST(sinew_tool_get_force_limit(world, ball, &number));
+    CHECK(isinf(number));
+    MUST(sinew_tool_set_force_limit(world, ball, 3));
+    MUST(sinew_tool_get_force_limit(world, ball, &number));
+    CHECK(number == 3);
+    MUST(sinew_tool_get_friction(world, ball, &number));
+    CHECK(number == 0.25f);
+    MUST(sinew_tool_get_collision(world, ball, &category, &mask));
+    CHECK(category == 4 && mask == UINT32_MAX);
+    MUST(sinew_body_get_collision(world, cloth, &category, &mask));
+    CHECK(category == 1);
+    MUST(sinew_body_get_pressure(world, cloth, &number));
+    CHECK(number == 0);
+    MUST(sinew_tool_get_wrench(world, ball, NULL, torque));
+    MUST(sinew_tool_get_wrench(world, ball, force, NULL));
+    REFUSED("out_mask", sinew_tool_get_collision(world, ball, &category, NULL));
+
+    CHECK(sinew_body_is_valid(world, cloth) == 1 && sinew_body_is_valid(world, no_body) == 0);
+    CHECK(sinew_body_is_valid(NULL, cloth) == 0 && sinew_tool_is_valid(world, ball) == 1);
+    MUST(sinew_body_get_user_data(world, cloth, &data));
+    CHECK(data == NULL);
+    MUST(sinew_body_set_user_data(world, cloth, &anything));
+    MUST(sinew_tool_set_user_data(world, ball, &anything));
+    MUST(sinew_world_set_user_data(world, &anything));
+    MUST(sinew_body_get_user_data(world, cloth, &data));
+    CHECK(data == &anything);
+    MUST(sinew_tool_get_user_data(world, ball, &data));
+    CHECK(data == &anything);
+    MUST(sinew_world_get_user_data(world, &data));
+    CHECK(data == &anything);
+    MUST(sinew_tool_destroy(world, ball));
+    CHECK(sinew_tool_is_valid(world, ball) == 0);
+    CHECK(sinew_tool_get_user_data(world, ball, &data) == SINEW_STATUS_STALE_ID);
+    sinew_world_destroy(world);
+}
+
+static void blades_and_attachments(void)
+{
+    static const float place[3] = {1, 2, 3};
+    const sinew_attachment_id nothing = {1, 1};
+    sinew_world *world = a_world(0);
+    sinew_blade_def def;
+    sinew_blade_id blade = {0, 0};
+    float at[3];
+    CHECK(sinew_blade_is_valid(world, blade) == 0 && sinew_attachment_is_valid(world, nothing) == 0);
+    MUST(sinew_blade_def_init(&def, sizeof def));
+    def.edge[0] = 0.1f;
+    memcpy(def.position, place, sizeof place);
+    MUST(sinew_blade_create(world, &def, &blade));
+    CHECK(sinew_blade_is_valid(world, blade) == 1);
+    MUST(sinew_blade_get_pose(world, blade, at, NULL));
+    CHECK(memcmp(at, place, sizeof place) == 0);
+    sinew_world_destroy(world);
+}
+
+int main(void)
+{
+    meshes_from_memory();
+    a_filled_mesh_is_what_a_surface_becomes();
+    a_definition_places_a_body();
+    a_body_is_turned_and_moved();
+    pins_of_many();
+    impulses_and_gravity();
+    rays_settings_and_ids();
+    blades_and_attachments();
+    return checked("whole bodies, several pins, rays, settings and user data");
+}
