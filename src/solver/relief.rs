@@ -68,6 +68,8 @@ mod tests {
                 material: Some(Material {
                     model: Model::Tetrahedra,
                     poisson_ratio,
+                    young_modulus: 5000.0,
+                    density: 1060.0,
                     ..Material::default()
                 }),
                 ..BodyDefinition::default()
