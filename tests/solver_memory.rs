@@ -57,12 +57,16 @@ fn held(solver: Solver, storage: Storage, node_count: usize) -> usize {
     HELD.load(Ordering::Relaxed) - before
 }
 
-/// What each node of a body takes beyond what it takes with VERLET, bytes.
+/// What each node of a body takes beyond what it takes with VERLET, bytes: the middle of three counts, since the threads of other tests may take
+/// memory meanwhile.
 fn beyond_verlet(solver: Solver, storage: Storage) -> usize {
-    let [few, many] =
-        [1 << 14, 1 << 15].map(|count| held(solver, storage, count) - held(Solver::Verlet, storage, count));
-    // The test's own thread may take or give back some hundred bytes meanwhile.
-    (many - few + (1 << 13)) >> 14
+    let mut counts = [0; 3].map(|_: usize| {
+        let [few, many] =
+            [1 << 14, 1 << 15].map(|count| held(solver, storage, count) - held(Solver::Verlet, storage, count));
+        (many - few + (1 << 13)) >> 14
+    });
+    counts.sort_unstable();
+    counts[1]
 }
 
 #[test]

@@ -27,6 +27,7 @@ mod pins;
 mod published;
 mod query_tree;
 mod region;
+mod relief;
 mod several;
 mod shown;
 mod sleep;

@@ -6,7 +6,6 @@ use super::closing::ClosingKick;
 use super::energy_monitor::EnergyAccount;
 use super::gravity::GravityKicks;
 use super::implicit;
-use super::relief::relieve;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::body::Body;
@@ -164,7 +163,7 @@ fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) 
     }
     let mut beside_springs = body.limit_beside_springs(team);
     if substeps_needed(request, beside_springs) > f64::from(request.max_substeps) {
-        beside_springs = relieve(body, request, false, team).unwrap_or(beside_springs);
+        beside_springs = body.relieve(request, false, team).unwrap_or(beside_springs);
     }
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
@@ -299,7 +298,7 @@ fn run_stably(
         };
         if substeps > request.max_substeps || substeps == u32::MAX {
             reliefs += 1;
-            match relieve(body, request, was_tried, team) {
+            match body.relieve(request, was_tried, team) {
                 Some(limit) if reliefs <= RELIEFS => {
                     (attempt, beside_springs) = (0, limit);
                     stable_substep = first_substep(body, &start, limit);
@@ -365,7 +364,7 @@ pub(super) fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64
 
 /// In how few substeps the step can be taken with some mass added, and for what substep, s; `None`: it is not to be, or saves
 /// too little.
-pub(super) fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
+pub(crate) fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
     // What a tolerance is about would not show what added mass changes.
     if request.substeps > 0 || request.tolerance > 0.0 {
         return None;

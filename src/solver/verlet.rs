@@ -319,7 +319,7 @@ pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &
 }
 
 /// Starts the step over, from what is current.
-pub(super) fn begin(body: &mut Body, request: &StepRequest) {
+pub(crate) fn begin(body: &mut Body, request: &StepRequest) {
     body.state.begin();
     body.recall();
     for pin in body.pins.iter_mut() {

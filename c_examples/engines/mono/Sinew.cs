@@ -69,6 +69,9 @@ public unsafe struct BodyDef
     public float smallest_piece, sleep_speed, sleep_time;
     public uint element_law;
     public float mooney_ratio;
+    public float position_x, position_y, position_z;
+    public float orientation_x, orientation_y, orientation_z, orientation_w;
+    public float gravity_scale;
 }
 
 [StructLayout(LayoutKind.Sequential)]

@@ -4,47 +4,48 @@
 //! deformed, and masses are made for as many substeps as are allowed, with more mass than otherwise if need be. They stay so for a while. Nodes keep
 //! their velocities but for what the added mass would add to the kinetic energy of the deformation, which is taken off all of it.
 
-use super::attempt::{StepRequest, fewer_substeps};
-use super::verlet;
-use crate::body::Body;
+use super::Body;
 use crate::soa::Masses;
+use crate::solver::{StepRequest, begin, fewer_substeps};
 use crate::threads::Team;
 
-/// Makes masses for elements as they are deformed: at the current state, or where a step that `was_tried` has come to. The longest stable
-/// substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for that.
-pub(super) fn relieve(body: &mut Body, request: &StepRequest, was_tried: bool, team: &Team) -> Option<f32> {
-    if request.substeps > 0 || request.tolerance > 0.0 {
-        return None;
-    }
-    let (Some(scaling), Some(elements)) = (&mut body.scaling, &body.elements) else {
-        return None;
-    };
-    let growths = scaling.begin_relief()?;
-    let positions = if was_tried {
-        body.state.newest().0
-    } else {
-        body.state.positions()
-    };
-    elements.stiffenings(positions, &mut |corners, stiffening| {
-        for node in corners {
-            if let Some(growth) = growths.get_mut(node as usize) {
-                *growth = growth.max(stiffening as f32);
-            }
+impl Body {
+    /// Makes masses for elements as they are deformed: at the current state, or where a step that `was_tried` has come to. The longest stable
+    /// substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for that.
+    pub(crate) fn relieve(&mut self, request: &StepRequest, was_tried: bool, team: &Team) -> Option<f32> {
+        if request.substeps > 0 || request.tolerance > 0.0 {
+            return None;
         }
-    });
-    let in_use = Masses {
-        masses: &body.masses,
-        inverse_masses: &body.inverse_masses,
-        are_heavier: scaling.step() > 0.0,
-    };
-    let rates = body.damping.as_ref().map(|damping| damping.rates());
-    scaling.relieve(&body.masses, rates, |node| {
-        elements.carried_at_rest(node, in_use.inverse(node))
-    });
-    let (_, masses_for) = fewer_substeps(body, request, 0.0)?;
-    body.scale_masses(masses_for);
-    verlet::begin(body, request);
-    Some(body.limit_beside_springs(team))
+        let (Some(scaling), Some(elements)) = (&mut self.scaling, &self.elements) else {
+            return None;
+        };
+        let growths = scaling.begin_relief()?;
+        let positions = if was_tried {
+            self.state.newest().0
+        } else {
+            self.state.positions()
+        };
+        elements.stiffenings(positions, &mut |corners, stiffening| {
+            for node in corners {
+                if let Some(growth) = growths.get_mut(node as usize) {
+                    *growth = growth.max(stiffening as f32);
+                }
+            }
+        });
+        let in_use = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+            are_heavier: scaling.step() > 0.0,
+        };
+        let rates = self.damping.as_ref().map(|damping| damping.rates());
+        scaling.relieve(&self.masses, rates, |node| {
+            elements.carried_at_rest(node, in_use.inverse(node))
+        });
+        let (_, masses_for) = fewer_substeps(self, request, 0.0)?;
+        self.scale_masses(masses_for);
+        begin(self, request);
+        Some(self.limit_beside_springs(team))
+    }
 }
 
 #[cfg(test)]
