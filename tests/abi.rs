@@ -51,6 +51,8 @@ fn library(name: &str, header: &str) -> PathBuf {
     succeed(
         Command::new("cc")
             .args(["-w", "-g", "-O0", "-fPIC", "-shared"])
+            // The description is the same wherever the project lies.
+            .arg(format!("-ffile-prefix-map={}=.", folder.display()))
             .arg(&file)
             .arg("-o")
             .arg(&library),
