@@ -4,8 +4,8 @@ use crate::support::tissue::moved;
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, ToolId, Values, World,
-    WorldDefinition,
+    BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, ToolId, Values, Viscosity,
+    World, WorldDefinition,
 };
 
 const GRAVITY: f32 = 9.81;
@@ -159,4 +159,40 @@ fn a_sheet_that_meets_itself_stays_off_a_plane() {
         }
         assert!(is_down, "{solver:?}: nothing fell");
     }
+}
+
+/// Viscous tissue that is made within what a plane keeps off is moved out. What is moved out faster the shorter substeps are looks like a strain
+/// rate, which asks for shorter substeps: every step was refused.
+#[test]
+fn viscous_tissue_is_moved_out_of_a_tools_reach() {
+    const THICKNESS: f32 = 0.03;
+    let (mut world, _) = world_with_plane(0.0);
+    let mesh = moved(Mesh::block([1.0; 3], [3; 3]).expect("a block"), Vec3::Y * 0.5);
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                young_modulus: 1e4,
+                poisson_ratio: 0.4,
+                density: 6.4,
+                ..Material::default()
+            }),
+            viscosity: Viscosity {
+                retardation_time: 0.01,
+                ..Viscosity::default()
+            },
+            contact: BodyContact {
+                thickness: THICKNESS,
+                ..BodyContact::NOTHING
+            },
+            ..Default::default()
+        })
+        .expect("a cube");
+    for _ in 0..60 {
+        world.step(1.0 / 60.0).expect("a step");
+    }
+    let low = lowest(&world, &[body]);
+    assert!((low - THICKNESS).abs() < 0.01 * THICKNESS, "{low} m");
 }
