@@ -32,7 +32,7 @@ samples: viewer
 
 # mono-mcs, mono-runtime
 mono: engine_folders
-	mcs -unsafe -warnaserror -out:$(ENGINE_BUILD)/sinew.exe engines/mono/*.cs
+	mcs -unsafe -warnaserror -out:$(ENGINE_BUILD)/sinew.exe engines/mono/Program.cs ../bindings/csharp/Sinew.cs
 	LD_LIBRARY_PATH=$(abspath $(TARGET))/release mono $(ENGINE_BUILD)/sinew.exe $(PICTURES)/mono.png
 
 # libbullet-dev, pkg-config

@@ -1,70 +1,87 @@
 // A ball is pressed into a soft block on a floor, frame by frame as a MonoBehaviour's FixedUpdate would: C# calls the library by
 // P/Invoke, and the collector runs in between. Leaves the picture that it is given the name of.
+//
+// For Unity put bindings/csharp/Sinew.cs and libsinew.so (sinew.dll) into Assets/Plugins of a project that allows unsafe code. Every
+// struct is blittable: nothing is copied or converted, and what the library lends is read through its pointer.
 using System;
 using System.Text;
+using static Sinew;
+
+public class SinewException : Exception
+{
+    public readonly sinew_status_code Status;
+    public SinewException(sinew_status_code status, string message) : base(message) { Status = status; }
+}
 
 public sealed unsafe class SoftBlock : IDisposable
 {
     const float Edge = 0.01f, Radius = 0.03f, Density = 1000;
-    readonly WorldHandle world;
-    readonly BodyId block;
-    readonly ToolId ball, floor;
+    readonly IntPtr world;
+    readonly sinew_body_id block;
+    readonly sinew_tool_id ball, floor;
     public float Top, Weight;
+
+    // Throws what a call that was refused says.
+    static void Check(int status)
+    {
+        if (status == (int)sinew_status_code.SINEW_STATUS_OK) return;
+        var buffer = new byte[512];
+        fixed (byte* start = buffer) sinew_last_error(start, (UIntPtr)buffer.Length);
+        var message = Encoding.UTF8.GetString(buffer, 0, Array.IndexOf(buffer, (byte)0));
+        throw new SinewException((sinew_status_code)status, message);
+    }
 
     public SoftBlock()
     {
-        WorldDef worldDef;
-        Sinew.Check(Sinew.sinew_world_def_init(&worldDef, (UIntPtr)sizeof(WorldDef)));
-        Sinew.Check(Sinew.sinew_world_create(&worldDef, out world));
+        sinew_world_def worldDef;
+        Check(sinew_world_def_init(&worldDef, (UIntPtr)sizeof(sinew_world_def)));
+        fixed (IntPtr* made = &world) Check(sinew_world_create(&worldDef, made));
 
-                MeshHandle mesh;
-        Sinew.Check(Sinew.sinew_mesh_create_lattice(Edge, new uint[] { 16, 7, 12 }, out mesh));
-        using (mesh)
-        {
-            var shape = new MeshView { struct_size = (UIntPtr)sizeof(MeshView) };
-            Sinew.Check(Sinew.sinew_mesh_get_view(mesh, &shape));
-            BodyDef def;
-            Sinew.Check(Sinew.sinew_body_def_init(&def, (UIntPtr)sizeof(BodyDef)));
-            def.positions = shape.positions;
-            def.node_count = shape.node_count;
-            def.cells = shape.cells;
-            def.cell_count = shape.cell_count;
-            def.material = Sinew.MaterialSprings;
-            def.young_modulus = 8000;
-            def.density = Density;
-            def.node_damping = 0.02f;
-            Sinew.Check(Sinew.sinew_body_create(world, &def, out block));
-        }
+        IntPtr mesh;
+        uint* cells = stackalloc uint[3];
+        cells[0] = 16;
+        cells[1] = 7;
+        cells[2] = 12;
+        Check(sinew_mesh_create_lattice(Edge, cells, &mesh));
+        sinew_body_def def;
+        Check(sinew_body_def_init(&def, (UIntPtr)sizeof(sinew_body_def)));
+        Check(sinew_body_def_set_mesh(&def, mesh));
+        def.material = (uint)sinew_material.SINEW_MATERIAL_SPRINGS;
+        def.young_modulus = 8000;
+        def.density = Density;
+        def.node_damping = 0.02f;
+        fixed (sinew_body_id* made = &block) Check(sinew_body_create(world, &def, made));
+        sinew_mesh_destroy(mesh);
         var low = float.PositiveInfinity;
         foreach (var height in Heights()) { Top = Math.Max(Top, height); low = Math.Min(low, height); }
-        floor = CreateTool(Sinew.ShapePlane, 0, low);
-        ball = CreateTool(Sinew.ShapeSphere, Radius, Top + 1.2f * Radius);
+        floor = CreateTool(sinew_shape.SINEW_SHAPE_PLANE, 0, low);
+        ball = CreateTool(sinew_shape.SINEW_SHAPE_SPHERE, Radius, Top + 1.2f * Radius);
         for (uint node = 0; node < Positions().count.ToUInt32(); node++)
         {
             float mass;
-            Sinew.Check(Sinew.sinew_body_get_node_mass(world, block, node, out mass));
+            Check(sinew_body_get_node_mass(world, block, node, &mass));
             Weight += 9.81f * mass;
         }
     }
 
-    ToolId CreateTool(uint shape, float radius, float height)
+    sinew_tool_id CreateTool(sinew_shape shape, float radius, float height)
     {
-        ToolDef def;
-        ToolId tool;
-        Sinew.Check(Sinew.sinew_tool_def_init(&def, (UIntPtr)sizeof(ToolDef)));
-        def.shape = shape;
+        sinew_tool_def def;
+        sinew_tool_id tool;
+        Check(sinew_tool_def_init(&def, (UIntPtr)sizeof(sinew_tool_def)));
+        def.shape = (uint)shape;
         def.radius = radius;
         def.position[1] = height;
         def.friction = 0.3f;
-        Sinew.Check(Sinew.sinew_tool_create(world, &def, out tool));
+        Check(sinew_tool_create(world, &def, &tool));
         return tool;
     }
 
     // The library's own memory: valid until the next step.
-    public Vec3View Positions()
+    public sinew_vec3_view Positions()
     {
-        Vec3View view;
-        Sinew.Check(Sinew.sinew_body_get_positions(world, block, out view));
+        sinew_vec3_view view;
+        Check(sinew_body_get_positions(world, block, &view));
         return view;
     }
 
@@ -81,16 +98,15 @@ public sealed unsafe class SoftBlock : IDisposable
         float* place = stackalloc float[3];
         place[0] = place[2] = 0;
         place[1] = Top + Radius + aboveTop;
-        Sinew.Check(Sinew.sinew_tool_set_pose(world, ball, place, null));
+        Check(sinew_tool_set_pose(world, ball, place, null));
     }
 
-    public void FixedUpdate(float dt) { Sinew.Check(Sinew.sinew_world_step(world, dt, null)); }
+    public void FixedUpdate(float dt) { Check(sinew_world_step(world, dt, null)); }
 
-    float Force(ToolId tool)
+    float Force(sinew_tool_id tool)
     {
         float* force = stackalloc float[3];
-        float* torque = stackalloc float[3];
-        Sinew.Check(Sinew.sinew_tool_get_wrench(world, tool, force, torque));
+        Check(sinew_tool_get_wrench(world, tool, force, null));
         return force[1];
     }
 
@@ -99,13 +115,13 @@ public sealed unsafe class SoftBlock : IDisposable
 
     public void SavePicture(string path)
     {
-        PictureDef def;
-        Sinew.Check(Sinew.sinew_picture_def_init(&def, (UIntPtr)sizeof(PictureDef)));
+        sinew_picture_def def;
+        Check(sinew_picture_def_init(&def, (UIntPtr)sizeof(sinew_picture_def)));
         def.show_contacts = 1;
-        Sinew.Check(Sinew.sinew_world_save_picture(world, &def, Encoding.UTF8.GetBytes(path + "\0")));
+        fixed (byte* name = Encoding.UTF8.GetBytes(path + "\0")) Check(sinew_world_save_picture(world, &def, name));
     }
 
-    public void Dispose() { world.Dispose(); }
+    public void Dispose() { sinew_world_destroy(world); }
 }
 
 public static class Program
@@ -138,7 +154,7 @@ public static class Program
             }
             catch (SinewException refused)
             {
-                Expect(refused.Status == Sinew.StatusInvalidArgument && refused.Message.Contains("dt"), "it says why: " + refused.Message);
+                Expect(refused.Status == sinew_status_code.SINEW_STATUS_INVALID_ARGUMENT && refused.Message.Contains("dt"), "it says why: " + refused.Message);
             }
             if (arguments.Length > 0) block.SavePicture(arguments[0]);
         }
