@@ -91,18 +91,8 @@ static inline sinew_mesh *cloth_mesh(float side, uint32_t cell_count) {
 /* A body definition with the nodes and elements of a mesh. Keep the mesh until the body is created. */
 static inline sinew_body_def body_from_mesh(const sinew_mesh *mesh) {
   sinew_body_def def;
-  sinew_mesh_view shape;
-  shape.struct_size = sizeof shape;
-  CHECK(sinew_mesh_get_view(mesh, &shape));
   CHECK(sinew_body_def_init(&def, sizeof def));
-  def.positions = shape.positions;
-  def.node_count = shape.node_count;
-  def.tetrahedra = shape.tetrahedra;
-  def.tetrahedron_count = shape.tetrahedron_count;
-  if (shape.tetrahedron_count == 0) {
-    def.triangles = shape.triangles;
-    def.triangle_count = shape.triangle_count;
-  }
+  CHECK(sinew_body_def_set_mesh(&def, mesh));
   return def;
 }
 

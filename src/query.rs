@@ -215,7 +215,7 @@ impl Body {
     fn published_bounds(&self) -> Bounds {
         let bounds = self.local_bounds().moved(self.origin());
         // By what rounding takes.
-        let rounding = 1e-6 * bounds.min.abs().max(bounds.max.abs()).max_element();
+        let rounding = 1e-6 * bounds.magnitudes().max_element();
         bounds.extended(rounding)
     }
 }

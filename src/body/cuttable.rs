@@ -316,7 +316,7 @@ impl Body {
     /// How far it reaches from where its coordinates begin, m.
     fn reach(&self) -> f32 {
         let bounds = self.local_bounds();
-        bounds.min.abs().max(bounds.max.abs()).max_element()
+        bounds.magnitudes().max_element()
     }
 }
 

@@ -97,12 +97,17 @@ impl Body {
                 self.set_velocity(node, Vec3::select(self.pins.partial_axes_of(own), kept, velocity));
             }
         }
+        self.follow_velocities();
+        Ok(())
+    }
+
+    /// Has what is known of velocities be that of those that were set.
+    pub(super) fn follow_velocities(&mut self) {
         self.follow_nodes();
         self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();
         }
-        Ok(())
     }
 
     /// Holds `node` where it is, from now on; nothing where it is held already.
@@ -498,10 +503,15 @@ impl Body {
         )))
     }
 
+    /// Whether it is a point that is bound to nodes.
+    pub(super) fn is_bound(&self, node: u32) -> bool {
+        let bindings = self.bindings.as_ref();
+        bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some())
+    }
+
     /// Refuses a point that is bound to nodes: nothing holds or pulls it but those.
     pub(super) fn check_not_bound(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {
-        let bindings = self.bindings.as_ref();
-        if bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some()) {
+        if self.is_bound(node) {
             return Err(Error::invalid(format!(
                 "{name} is {node}: a point of the surface that is bound to nodes, and goes where they go"
             )));

@@ -91,13 +91,9 @@ impl Body {
                 "low is {low}: must be at most high, which is {high}, along each axis"
             )));
         }
-        let bound = |node: u32| {
-            let bindings = self.bindings.as_ref();
-            bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some())
-        };
         let mut nodes = Vec::new();
         for (node, position) in (0..).zip(self.positions()) {
-            if low.cmple(*position).all() && position.cmple(high).all() && !bound(node) {
+            if low.cmple(*position).all() && position.cmple(high).all() && !self.is_bound(node) {
                 memory::push(&mut nodes, node)?;
             }
         }

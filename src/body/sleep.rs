@@ -435,7 +435,7 @@ impl Body {
         for (tile, it) in tiles.iter_mut().enumerate().filter(|&(tile, _)| !asleep[tile]) {
             let nodes = tile_nodes(tile, velocities.len());
             let bounds = Bounds::from(self.kernel.ranges(velocities.slices(nodes)));
-            let fastest = bounds.min.abs().max(bounds.max.abs()).length();
+            let fastest = bounds.magnitudes().length();
             it.quiet = if fastest < sleep.speed { it.quiet + dt } else { 0.0 };
         }
     }

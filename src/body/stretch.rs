@@ -114,7 +114,7 @@ impl Stretch {
             *drift = kernel.run(Drift { now, before });
         });
         let drift = self.drifts.iter().fold(Bounds::EMPTY, |all, drift| all.and(drift));
-        let furthest = drift.min.abs().max(drift.max.abs()).max_element();
+        let furthest = drift.magnitudes().max_element();
         // The ends of a spring have not gone further apart than this.
         let spread = (drift.max - drift.min).length() * (1.0 + ROUNDING) + furthest * ROUNDING;
         // What is no number is looked at.

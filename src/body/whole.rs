@@ -6,7 +6,7 @@ use super::Body;
 use crate::base::{Error, Result, memory};
 use crate::def::{CollisionFilter, expect_count, finite, finite_vector};
 use crate::geometry::{Bounds, vertex_normals};
-use crate::solver::{GravityKicks, close};
+use crate::solver::close;
 
 impl Body {
     /// The box about its nodes, m: the lowest and the highest coordinates.
@@ -104,11 +104,7 @@ impl Body {
                 self.set_velocity(self.order.caller(own), velocity);
             }
         }
-        self.follow_nodes();
-        self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_history();
-        }
+        self.follow_velocities();
         Ok(())
     }
 

@@ -11,6 +11,23 @@ use super::status::sinew_status;
 use super::tool::sinew_tool_id;
 use crate::def::CollisionFilter;
 use crate::query::RayHit;
+use crate::world::World;
+
+/// 1 where there is a world that has something, else 0.
+///
+/// # Safety
+/// As of what calls it.
+unsafe fn is_there(world: *const sinew_world, has: impl FnOnce(&World) -> bool) -> u32 {
+    let mut is_there = false;
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            is_there = has(world);
+            Ok(())
+        });
+    }
+    u32::from(is_there)
+}
 
 /// Returns 1 if a body with this id exists in the world, else 0.
 ///
@@ -21,14 +38,7 @@ use crate::query::RayHit;
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: sinew_body_id) -> u32 {
     // SAFETY: the same contract.
-    unsafe {
-        let mut is_there = false;
-        with_world(world, |world| {
-            is_there = world.has_body(body.id());
-            Ok(())
-        });
-        u32::from(is_there)
-    }
+    unsafe { is_there(world, |world| world.has_body(body.id())) }
 }
 
 /// Returns 1 if a tool with this id exists in the world, else 0.
@@ -40,14 +50,7 @@ pub unsafe extern "C" fn sinew_body_is_valid(world: *const sinew_world, body: si
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: sinew_tool_id) -> u32 {
     // SAFETY: the same contract.
-    unsafe {
-        let mut is_there = false;
-        with_world(world, |world| {
-            is_there = world.has_tool(tool.id());
-            Ok(())
-        });
-        u32::from(is_there)
-    }
+    unsafe { is_there(world, |world| world.has_tool(tool.id())) }
 }
 
 /// Returns 1 if a blade with this id exists in the world, else 0.
@@ -59,14 +62,7 @@ pub unsafe extern "C" fn sinew_tool_is_valid(world: *const sinew_world, tool: si
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: sinew_blade_id) -> u32 {
     // SAFETY: the same contract.
-    unsafe {
-        let mut is_there = false;
-        with_world(world, |world| {
-            is_there = world.has_blade(blade.id());
-            Ok(())
-        });
-        u32::from(is_there)
-    }
+    unsafe { is_there(world, |world| world.has_blade(blade.id())) }
 }
 
 /// Returns 1 if an attachment with this id exists in the world, else 0.
@@ -78,14 +74,7 @@ pub unsafe extern "C" fn sinew_blade_is_valid(world: *const sinew_world, blade: 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_attachment_is_valid(world: *const sinew_world, attachment: sinew_attachment_id) -> u32 {
     // SAFETY: the same contract.
-    unsafe {
-        let mut is_there = false;
-        with_world(world, |world| {
-            is_there = world.has_attachment(attachment.id());
-            Ok(())
-        });
-        u32::from(is_there)
-    }
+    unsafe { is_there(world, |world| world.has_attachment(attachment.id())) }
 }
 
 /// Stores a pointer of the caller with a world; snapshots do not hold it.

@@ -45,7 +45,7 @@ impl Contacts {
         for contact in self.nodes.iter_mut() {
             let impulse = contact.given() - contact.counted;
             if impulse != Vec3::ZERO {
-                self.loads[contact.tool].add(-impulse, contact.arm);
+                self.loads[contact.tool].add(-impulse.as_dvec3(), contact.arm);
                 given = given.with(velocities.get(contact.node as usize));
                 give(contact.node as usize, impulse);
             }
@@ -53,7 +53,7 @@ impl Contacts {
         for constraint in &self.constraints {
             let impulse = constraint.given() - constraint.counted;
             if impulse != Vec3::ZERO {
-                self.loads[constraint.tool].add(-impulse, constraint.arm);
+                self.loads[constraint.tool].add(-impulse.as_dvec3(), constraint.arm);
                 for (&node, share) in constraint.nodes().iter().zip(constraint.shares) {
                     given = given.with(velocities.get(node as usize));
                     give(node as usize, impulse * share);
@@ -61,7 +61,7 @@ impl Contacts {
             }
         }
         if given != Bounds::EMPTY {
-            let fastest = given.min.abs().max(given.max.abs()).length();
+            let fastest = given.magnitudes().length();
             self.candidates.spend(self.found_for * fastest);
         }
     }

@@ -56,8 +56,7 @@ saved!(Load {
 
 impl Load {
     /// Adds an impulse at this place, from the tool's position.
-    pub(super) fn add(&mut self, impulse: Vec3, arm: Vec3) {
-        let impulse = impulse.as_dvec3();
+    pub(super) fn add(&mut self, impulse: DVec3, arm: Vec3) {
         self.impulse += impulse;
         self.angular_impulse += arm.as_dvec3().cross(impulse);
     }
@@ -488,7 +487,7 @@ impl Contacts {
             self.solve(&mut meeting, &slice);
         }
         if self.given != Bounds::EMPTY {
-            let fastest = self.given.min.abs().max(self.given.max.abs()).length();
+            let fastest = self.given.magnitudes().length();
             self.candidates.spend(meeting.substep * fastest);
         }
     }
@@ -854,8 +853,8 @@ impl Contacts {
         if contact.given() == Vec3::ZERO {
             return;
         }
-        self.loads[contact.tool].add(-contact.given(), contact.arm);
         let received = -contact.given().as_dvec3();
+        self.loads[contact.tool].add(received, contact.arm);
         let node = contact.node as usize;
         if let Some(pin) = meeting.pins.get_mut(contact.node) {
             pin.force_sum += received / f64::from(meeting.substep);
@@ -872,8 +871,8 @@ impl Contacts {
 
     /// Adds what a contact gave to its tool's load, and moves its nodes.
     fn settle(&mut self, meeting: &mut Meeting, slice: &Slice, constraint: &Constraint, moves: bool) {
-        self.loads[constraint.tool].add(-constraint.given(), constraint.arm);
         let received = -constraint.given().as_dvec3();
+        self.loads[constraint.tool].add(received, constraint.arm);
         let supports = constraint.starts.iter().zip(constraint.shares);
         for (&node, (&start, share)) in constraint.nodes().iter().zip(supports) {
             if let Some(pin) = meeting.pins.get_mut(node) {

@@ -112,56 +112,30 @@ impl Presses {
     /// Gives the impulses of these contacts, for which there is room, in so many sweeps at most: the most that one of the first sweep
     /// changed, m/s.
     pub fn solve(&mut self, constraints: &mut [Constraint], velocities: &mut Vectors, sweeps: u32) -> f32 {
-        let Self {
-            presses,
-            nodes,
-            velocities: own,
-        } = self;
+        let Self { presses, nodes, .. } = self;
         nodes.clear();
         for constraint in &*constraints {
             nodes.extend_from_slice(constraint.nodes());
         }
         nodes.sort_unstable();
         nodes.dedup();
-        own.clear();
-        own.extend(nodes.iter().map(|&node| Vec3A::from(velocities.get(node as usize))));
         let place = |node: u32| nodes.binary_search(&node).unwrap_or_default() as u32;
         presses.clear();
         presses.extend(constraints.iter().map(|constraint| constraint.press(place)));
 
-        let first = relax(sweeps, None, |sweep| {
-            let mut largest = 0.0_f32;
-            for press in presses.iter_mut() {
-                if sweep == Sweep::All || press.presses() {
-                    largest = largest.max(press.solve(own));
-                }
-            }
-            largest
-        });
-
-        for (&node, velocity) in nodes.iter().zip(own) {
-            velocities.set(node as usize, Vec3::from(*velocity));
-        }
+        self.read(velocities);
+        let first = relax(sweeps, None, |sweep| self.sweep_own(sweep));
+        self.write(velocities);
         self.hand_over(constraints);
         first
     }
-}
 
-impl Presses {
     /// One sweep over the contacts that [`Presses::solve`] has gathered, on velocities that something else has changed since: the most that one
     /// of them changed, m/s.
     pub fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
-        for (own, &node) in self.velocities.iter_mut().zip(&self.nodes) {
-            *own = velocities.get(node as usize).into();
-        }
-        let pressing = self.presses.iter_mut();
-        let pressing = pressing.filter(|press| sweep == Sweep::All || press.presses());
-        let largest = pressing
-            .map(|press| press.solve(&mut self.velocities))
-            .fold(0.0, f32::max);
-        for (&node, &own) in self.nodes.iter().zip(&self.velocities) {
-            velocities.set(node as usize, own.into());
-        }
+        self.read(velocities);
+        let largest = self.sweep_own(sweep);
+        self.write(velocities);
         largest
     }
 
@@ -170,6 +144,31 @@ impl Presses {
         for (constraint, press) in constraints.iter_mut().zip(&self.presses) {
             constraint.take(press);
         }
+    }
+
+    fn read(&mut self, velocities: &Vectors) {
+        self.velocities.clear();
+        let of_nodes = self
+            .nodes
+            .iter()
+            .map(|&node| Vec3A::from(velocities.get(node as usize)));
+        self.velocities.extend(of_nodes);
+    }
+
+    fn write(&self, velocities: &mut Vectors) {
+        for (&node, &velocity) in self.nodes.iter().zip(&self.velocities) {
+            velocities.set(node as usize, velocity.into());
+        }
+    }
+
+    fn sweep_own(&mut self, sweep: Sweep) -> f32 {
+        let mut largest = 0.0_f32;
+        for press in &mut self.presses {
+            if sweep == Sweep::All || press.presses() {
+                largest = largest.max(press.solve(&mut self.velocities));
+            }
+        }
+        largest
     }
 }
 

@@ -25,6 +25,11 @@ impl Bounds {
         points.fold(Self::EMPTY, Self::with)
     }
 
+    /// The largest magnitude of a coordinate along each axis.
+    pub fn magnitudes(&self) -> Vec3 {
+        self.min.abs().max(self.max.abs())
+    }
+
     pub fn with(self, point: Vec3) -> Self {
         Self {
             min: self.min.min(point),

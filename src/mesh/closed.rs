@@ -339,7 +339,7 @@ impl ClosedSurface {
     fn check_crossings(&self) -> Result<()> {
         let tree = Tree::new(self.triangles.len(), |triangle| self.corners(triangle as usize))?;
         let bounds = tree.bounds();
-        let depth = CROSSING * f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
+        let depth = CROSSING * f64::from(bounds.magnitudes().max_element());
         for (index, nodes) in self.triangles.iter().enumerate() {
             let corners = self.corners(index);
             let bounds = Bounds::of(corners.into_iter());

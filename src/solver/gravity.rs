@@ -31,7 +31,7 @@ impl GravityKicks {
     /// The change of velocity to be given where gravity asks for `change`, m/s.
     pub fn next(&mut self, change: DVec3) -> Vec3 {
         let wanted = change + self.residual;
-        let fastest = self.velocities.min.abs().max(self.velocities.max.abs()).as_dvec3() + wanted.abs();
+        let fastest = self.velocities.magnitudes().as_dvec3() + wanted.abs();
         let given = DVec3::new(
             whole_units(wanted.x, fastest.x),
             whole_units(wanted.y, fastest.y),

@@ -285,7 +285,7 @@ impl<'a> Step<'a> {
 
 /// No node is faster, m/s.
 fn fastest(velocities: &Bounds) -> f32 {
-    velocities.min.abs().max(velocities.max.abs()).length()
+    velocities.magnitudes().length()
 }
 
 /// How fast two nodes may be against each other, m/s.

@@ -55,7 +55,7 @@ impl Coarse {
             cell,
             counts,
             distances: memory::reserved(count)?,
-            doubt: ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element(),
+            doubt: ROUNDING * bounds.magnitudes().max_element(),
         };
         let mut hint = 0;
         for z in 0..counts.z {

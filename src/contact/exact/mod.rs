@@ -103,7 +103,7 @@ impl ExactSolid {
 
     fn find_size(&mut self) {
         let bounds = self.tree.bounds();
-        self.size = f64::from(bounds.min.abs().max(bounds.max.abs()).max_element());
+        self.size = f64::from(bounds.magnitudes().max_element());
     }
 
     pub fn bounds(&self) -> Bounds {

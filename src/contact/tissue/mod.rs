@@ -30,6 +30,7 @@ use glam::{DVec3, Vec3};
 use crate::base::{Result, memory};
 use crate::body::Body;
 use crate::codec::saved;
+use crate::contact::Contacts;
 use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
 use crate::geometry::Bounds;
 use crate::ids::Slots;
@@ -327,8 +328,7 @@ impl Tissue {
         }
         self.bonds.follow(bodies, &self.skins, moment);
         self.draw(island, bodies, moment);
-        self.begin_with_tools(island, bodies, moment);
-        self.solve(island, bodies, moment);
+        let have_acted = self.solve(island, bodies, moment);
         for link in &self.links {
             for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
@@ -341,7 +341,9 @@ impl Tissue {
                 }
             }
         }
-        self.end_with_tools(island, bodies, moment);
+        if have_acted {
+            self.end_with_tools(island, bodies, moment);
+        }
         self.bonds.give(bodies, &self.skins, moment);
         if moment.drifts {
             self.part(bodies, moment.duration);
@@ -362,50 +364,22 @@ impl Tissue {
         let members = members.filter_map(|&place| bodies.at(place as usize));
         let speeds = members.map(|body| {
             let all = velocities(body);
-            all.min.abs().max(all.max.abs()).length() + fall * body.gravity_scale.abs()
+            all.magnitudes().length() + fall * body.gravity_scale.abs()
         });
         speeds.fold(0.0, f32::max)
     }
 
-    /// Has contacts with tools go on from what they have done in the substep.
-    fn begin_with_tools(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
-        for &place in self.islands.members(island) {
-            let place = place as usize;
-            let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place)) else {
-                continue;
-            };
-            if !moment.concerns(body) {
-                continue;
-            }
-            let Some(mut contacts) = body.contacts.take() else {
-                continue;
-            };
-            contacts.begin_sweeps(|node| skin.velocities.set(node, body.mean_velocity(node)));
-            body.contacts = Some(contacts);
-        }
-    }
-
     /// Gives nodes and tools what contacts with tools have done beside those of tissue.
     fn end_with_tools(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
-        for &place in self.islands.members(island) {
-            let place = place as usize;
-            let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place)) else {
-                continue;
-            };
-            if !moment.concerns(body) {
-                continue;
-            }
-            let Some(mut contacts) = body.contacts.take() else {
-                continue;
-            };
+        let members = self.islands.members(island);
+        each_pressed(members, &mut self.skins, bodies, moment, |skin, body, contacts| {
             let Skin { velocities, given, .. } = skin;
             contacts.end_sweeps(velocities, |node, impulse| {
                 let velocity = velocities.get(node);
                 *given = given.with(velocity);
                 body.nudge(node, velocity, impulse, moment);
             });
-            body.contacts = Some(contacts);
-        }
+        });
     }
 
     /// Draws what of each surface is near others that it is found by in images, as the substep begins.
@@ -439,8 +413,8 @@ impl Tissue {
         }
     }
 
-    /// Finds contacts and gives their impulses, until they lead to no others.
-    fn solve(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+    /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
+    fn solve(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) -> bool {
         let mut first = None;
         for _ in 0..SEARCHES {
             let known = self.links.len();
@@ -458,26 +432,24 @@ impl Tissue {
                 islands,
                 ..
             } = self;
+            let members = islands.members(island);
+            if first.is_none() {
+                // Contacts with tools go on from what they have done in the substep.
+                each_pressed(members, skins, bodies, moment, |skin, body, contacts| {
+                    contacts.begin_sweeps(|node| skin.velocities.set(node, body.mean_velocity(node)));
+                });
+            }
             first = Some(relax(SWEEPS, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
-                let changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
-                let members = islands.members(island).iter().map(|&place| place as usize);
-                members.fold(changed, |changed, place| {
-                    let (Some(Some(skin)), Some(body)) = (skins.get_mut(place), bodies.at_mut(place)) else {
-                        return changed;
-                    };
-                    let is_pressed = moment.concerns(body);
-                    let contacts = body
-                        .contacts
-                        .as_mut()
-                        .filter(|contacts| is_pressed && contacts.may_press());
-                    contacts.map_or(changed, |contacts| {
-                        changed.max(contacts.sweep(&mut skin.velocities, sweep))
-                    })
-                })
+                let mut changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
+                each_pressed(members, skins, bodies, moment, |skin, _, contacts| {
+                    changed = changed.max(contacts.sweep(&mut skin.velocities, sweep));
+                });
+                changed
             }));
         }
+        first.is_some()
     }
 
     /// Has what impulses did to nodes be seen in what is bound to them.
@@ -579,6 +551,27 @@ impl Tissue {
                     kept.settle();
                 }
             }
+        }
+    }
+}
+
+/// Does something with each of these bodies that tools press, or may press as tissue moves it, its skin and its contacts with tools.
+fn each_pressed(
+    members: &[u32],
+    skins: &mut [Option<Skin>],
+    bodies: &mut Slots<Body>,
+    moment: &Moment,
+    mut act: impl FnMut(&mut Skin, &mut Body, &mut Contacts),
+) {
+    for &place in members {
+        let place = place as usize;
+        if let (Some(Some(skin)), Some(body)) = (skins.get_mut(place), bodies.at_mut(place))
+            && moment.concerns(body)
+            // What is done with the body changes nothing of these.
+            && let Some(mut contacts) = body.contacts.take_if(|contacts| contacts.may_press())
+        {
+            act(skin, body, &mut contacts);
+            body.contacts = Some(contacts);
         }
     }
 }

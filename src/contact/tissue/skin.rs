@@ -370,7 +370,7 @@ impl Skin {
                 .iter()
                 .map(|&node| self.velocities.get(node as usize) - self.drift);
             let ways = Bounds::of(ways);
-            self.spread = self.spread.max(duration * ways.min.abs().max(ways.max.abs()).length());
+            self.spread = self.spread.max(duration * ways.magnitudes().length());
             self.know_nearby(&body.contact);
         }
     }
@@ -455,7 +455,7 @@ impl Skin {
             all = all.with(velocity);
         }
         self.drift = 0.5 * (all.min + all.max);
-        self.travel = duration * all.min.abs().max(all.max.abs()).length();
+        self.travel = duration * all.magnitudes().length();
         self.spread = 0.5 * duration * (all.max - all.min).length();
         self.is_fitted = false;
         // Where what is near itself is known, nothing else looks for anything by the trees.

@@ -118,7 +118,7 @@ impl Substep<'_> {
             slack,
             neighbor_speed,
             thickness: contacts.thickness,
-            fastest: bounds.min.abs().max(bounds.max.abs()).length(),
+            fastest: bounds.magnitudes().length(),
             mobility: Mobility {
                 inverse_masses: &body.inverse_masses,
                 damping: None,
