@@ -128,6 +128,45 @@ fn what_is_stretched_parts_freely() {
     }
 }
 
+/// A block at rest, of which nothing pulls, is cut in two, and both halves once more by a slanted cut: the pieces stay where they are.
+#[test]
+fn cuts_push_no_pieces_apart() {
+    for (young, solver) in [
+        (4000.0, Solver::Verlet),
+        (0.0, Solver::Verlet),
+        (4000.0, Solver::Implicit),
+        (0.0, Solver::Implicit),
+        (4000.0, Solver::Newton),
+    ] {
+        let matter = Matter { young, solver, ..SHUT };
+        let mut world = world(Vec3::ZERO, 1);
+        let mesh = block();
+        let body = matter.put(&mut world, &mesh);
+        world.step(4e-3).unwrap();
+        let cuts = [
+            [vec3(0.003, -0.03, 0.0), vec3(0.003, 0.03, 0.0)],
+            [vec3(-0.03, -0.008, 0.0), vec3(0.03, 0.009, 0.0)],
+        ];
+        for [from, to] in cuts {
+            let report = world.cut(body, &sweep(from, to, 0.1 * Vec3::Z)).unwrap();
+            assert!(report.pieces_parted > 0, "{report:?}");
+            for _ in 0..4 {
+                world.step(4e-3).unwrap();
+            }
+        }
+        let places = world.body(body).unwrap().positions();
+        let gone = mesh.positions.iter().zip(places).map(|(rest, at)| rest.distance(*at));
+        let gone = gone.fold(0.0, f32::max);
+        let velocities = world.body(body).unwrap().velocities().iter();
+        let speed = velocities.map(|velocity| velocity.length()).fold(0.0, f32::max);
+        // Rounding alone: some 1e-9 m and 1e-6 m/s.
+        assert!(
+            gone < 3e-8 && speed < 1e-5,
+            "{young} Pa, {solver:?}: {gone:e} m, {speed:e} m/s"
+        );
+    }
+}
+
 /// The upper half of a block that is held at its foot stays on the lower one, and weighs on it.
 #[test]
 fn what_is_cut_off_lies_on_the_rest() {
