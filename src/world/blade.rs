@@ -67,7 +67,7 @@ pub struct BladeReport {
     /// Why what it went through was not cut: [`Error::Capacity`] or [`Error::OutOfMemory`]. It is tried again with the next step.
     pub refused: Option<Error>,
     /// Of solids: how large the faces are that have opened, in the rest shape, m².
-    /// A cell in which a stroke ends holds: this can be less than what was swept and resisted.
+    /// A cell in which the end of the edge passes holds: it does not open, and does not resist.
     pub area: f64,
 }
 

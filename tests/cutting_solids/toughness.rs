@@ -181,24 +181,33 @@ fn the_work_of_a_stroke_is_toughness_times_area() {
 }
 
 #[test]
-fn a_stroke_that_ends_inside_costs_what_it_sweeps() {
+fn a_stroke_that_ends_inside_costs_what_it_opens() {
     // The softer tissue is against its toughness, the more it has stored where it slips off the end of the edge: that is lost.
-    for (toughness, lost) in [(TOUGHNESS, 0.03), (5.0 * TOUGHNESS, 0.1)] {
+    for (solver, has_elements, toughness, depth, lost) in [
+        (Solver::Verlet, true, TOUGHNESS, 0.02, 0.0),
+        (Solver::Verlet, true, TOUGHNESS, 0.014, 0.0),
+        (Solver::Verlet, true, TOUGHNESS, 0.026, 0.0),
+        (Solver::Verlet, false, TOUGHNESS, 0.02, 0.0),
+        (Solver::Implicit, true, TOUGHNESS, 0.02, 0.0),
+        (Solver::Verlet, true, 5.0 * TOUGHNESS, 0.02, 0.05),
+    ] {
         let block = Block {
             toughness,
+            solver,
+            has_elements,
             ..Block::HELD
         };
         let (mut world, body) = block.world();
         let way = [vec3(-0.01, 0.023, 0.02), vec3(0.08, 0.027, 0.02)];
-        let edge = [vec3(0.0, 0.0, -0.04), Vec3::ZERO];
+        let edge = [vec3(0.0, 0.0, -0.04), vec3(0.0, 0.0, depth - 0.02)];
         let blade = blade_at(&mut world, 500.0, way[0], edge);
         let mut stroke = Stroke::default();
-        stroke.draw(&mut world, blade, way, 500, 3.0 / 500.0);
-        // Half of the block's section.
-        let swept = 0.06 * 0.02;
-        let cost = stroke.work / (f64::from(toughness) * swept);
-        let opened = stroke.area / swept;
-        let what = format!("toughness {toughness}: {cost} of what it sweeps, {opened} of which has opened");
+        stroke.draw(&mut world, blade, way, 300, 3.0 / 300.0);
+        let cost = stroke.work / (f64::from(toughness) * stroke.area);
+        let opened = stroke.area / (0.06 * f64::from(depth));
+        let what = format!(
+            "{solver:?}, elements {has_elements}, toughness {toughness}, depth {depth}: {cost} of what has opened, {opened} of what it sweeps"
+        );
         assert!(cost > 0.97 && cost < 1.03 + lost, "{what}");
         // Cells open whole: along the end of the edge, up to one is left.
         assert!(opened > 0.5 && opened < 1.03, "{what}");

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::body::{CutSolid, Face, NONE, SNAP};
+use super::reach::Band;
 use crate::base::{Result, memory};
 use crate::cutting::cut::Sweep;
 use crate::cutting::met::Met;
@@ -33,12 +34,13 @@ impl CutSolid {
     pub(crate) fn meet(&self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], met: &mut Vec<Met>) -> Result<()> {
         met.clear();
         let times = [[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]];
+        let band = Band::of(sweep);
         for (swept, times) in sweep.triangles().into_iter().zip(times) {
             let swept = swept.map(|corner| corner.as_dvec3());
             for &cell in candidates {
                 let mut tetrahedron = self.cells[cell].first;
                 while tetrahedron != NONE {
-                    self.meet_tetrahedron(tetrahedron, swept, times, positions, met)?;
+                    self.meet_tetrahedron(tetrahedron, (swept, times, band.as_ref()), positions, met)?;
                     tetrahedron = self.tetrahedra[tetrahedron].next;
                 }
             }
@@ -53,8 +55,7 @@ impl CutSolid {
     fn meet_tetrahedron(
         &self,
         tetrahedron: u32,
-        swept: [DVec3; 3],
-        times: [f64; 3],
+        (swept, times, band): ([DVec3; 3], [f64; 3], Option<&Band>),
         positions: &[Vec3],
         met: &mut Vec<Met>,
     ) -> Result<()> {
@@ -67,6 +68,7 @@ impl CutSolid {
         if self.is_along_cut(tetrahedron, corners) {
             return Ok(());
         }
+        let opening = band.map_or(1.0, |band| band.opening(places));
         let rest = it.corners.map(|corner| self.rest_place(corner));
         let of_corners = it.corners.map(|corner| self.weights_in(corner, it.cell));
         let in_cell =
@@ -87,7 +89,7 @@ impl CutSolid {
             let along = if lengths[0] > lengths[1] { ways[0] } else { ways[1] }.normalize_or_zero();
             let high = along.cross(weighed(middles[1].weights, rest) - weighed(middles[0].weights, rest));
             let sum = lengths[0] + lengths[1];
-            let amount = 0.5 * sum * high.length();
+            let amount = opening * 0.5 * sum * high.length();
             if amount > 0.0 {
                 let part = Met {
                     item: it.cell,

@@ -26,6 +26,7 @@ mod open;
 mod parted;
 mod pieces;
 mod points;
+mod reach;
 mod sever;
 mod split;
 mod tear;
