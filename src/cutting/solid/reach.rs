@@ -72,14 +72,14 @@ impl Band {
         let heights = corners.map(|corner| self.normal.dot(corner - self.origin));
         let (mut above, mut below) = ([0; 4], [0; 4]);
         let (mut count_above, mut count_below) = (0, 0);
-        for corner in 0..4 {
-            if heights[corner] >= 0.0 {
-                above[count_above] = corner;
-                count_above += 1;
+        for (corner, height) in heights.into_iter().enumerate() {
+            let (side, count) = if height >= 0.0 {
+                (&mut above, &mut count_above)
             } else {
-                below[count_below] = corner;
-                count_below += 1;
-            }
+                (&mut below, &mut count_below)
+            };
+            side[*count] = corner;
+            *count += 1;
         }
         let mut section = [DVec3::ZERO; MOST_CORNERS];
         let mut count = 0;
