@@ -98,6 +98,9 @@ impl Carry {
     }
 }
 
+/// Tissue that resists blades takes no more than so many times the substeps that it takes at rest, as far as mass may be added.
+const SQUEEZED: f64 = 1.25;
+
 /// How an attempted step ended. Nothing is current before [`Body::commit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outcome {
@@ -162,7 +165,7 @@ fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) 
         body.use_masses_for(masses_for);
     }
     let mut beside_springs = body.limit_beside_springs(team);
-    if substeps_needed(request, beside_springs) > f64::from(request.max_substeps) {
+    if substeps_needed(request, beside_springs) > f64::from(unrelieved(body, request)) {
         beside_springs = body.relieve(request, false, team).unwrap_or(beside_springs);
     }
     let known = body.carry.stability;
@@ -372,11 +375,43 @@ pub(crate) fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep:
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let scaling = body.scaling.as_ref()?;
     let needed = if body.has_more_than_springs() {
-        scaling.needed_at_rest(request.dt, request.max_substeps)
+        scaling.needed_at_rest(request.dt, unrelieved(body, request))
     } else {
         substeps_needed(request, stable_substep)
     };
-    scaling.fewer_substeps(request.dt, needed, masses, inverse_masses)
+    scaling.fewer_substeps((request.dt, request.max_substeps), needed, masses, inverse_masses)
+}
+
+/// Makes masses for elements as a step that was tried has deformed them, if that needs more substeps than are taken without: how many it takes then, and
+/// what masses are made for.
+pub(super) fn relieve_squeezed(
+    body: &mut Body,
+    request: &StepRequest,
+    stable_substep: f32,
+    team: &Team,
+) -> Option<(u32, f32)> {
+    let is_squeezed = substeps_needed(request, stable_substep) > f64::from(unrelieved(body, request));
+    if body.implicit.is_some() || !is_squeezed {
+        return None;
+    }
+    let limit = body.relieve(request, true, team)?;
+    let (substeps, masses_for) = fewer_substeps(body, request, 0.0)?;
+    Some((substeps.max(as_count(substeps_needed(request, limit))), masses_for))
+}
+
+/// In how many substeps a step may be taken before masses are made for elements as they are deformed: in as many as are allowed, but in tissue that
+/// resists blades, which squeeze the cells about their edges, in no more than so many times as at rest. Not with springs beside the elements: those
+/// would need the mass of others.
+fn unrelieved(body: &Body, request: &StepRequest) -> u32 {
+    let resists = body.toughness().is_some_and(|toughness| toughness > 0.0);
+    match body
+        .scaling
+        .as_ref()
+        .filter(|_| resists && body.springs.spring_count() == 0)
+    {
+        Some(scaling) => as_count(SQUEEZED * scaling.unscaled_at_rest(request.dt)).min(request.max_substeps),
+        None => request.max_substeps,
+    }
 }
 
 /// The substep after which a step is looked at on its way: far from simple fractions of the step, where steps that have

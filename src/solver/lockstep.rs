@@ -3,7 +3,7 @@
 //! All take as many as the one that needs most: one of VERLET what its stability asks for, one of the other solvers substeps of 1 ms as
 //! near a tool.
 
-use super::attempt::{Carry, Outcome, StepRequest, finish, needed, substeps_needed};
+use super::attempt::{Carry, Outcome, StepRequest, finish, needed, relieve_squeezed, substeps_needed};
 use super::implicit::{begin_parts, next_part, parts_near};
 use super::substep::Part;
 use super::verlet::{Step, Taken, TooLong, begin, check, check_beside_springs, pass};
@@ -74,7 +74,11 @@ impl Together<'_> {
                 }
                 Err(found) => {
                     stable_substep = stable_substep.min(found.stable_substep);
-                    let wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
+                    let mut wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
+                    if let Some(relieved) = self.relieve(island, bodies, found.stable_substep) {
+                        wanted = relieved;
+                        stable_substep = f32::INFINITY;
+                    }
                     substeps = wanted.max(substeps.saturating_add(substeps / 4 + 1));
                     if request.substeps == 0 && substeps > request.max_substeps {
                         break;
@@ -127,6 +131,22 @@ impl Together<'_> {
             substeps = substeps.max(wished.min(self.request.max_substeps));
         }
         [substeps, needed]
+    }
+
+    /// Makes masses for elements as the step that was tried has deformed them, where that spares substeps: how many are needed then.
+    fn relieve(&mut self, island: usize, bodies: &mut Slots<Body>, stable_substep: f32) -> Option<u32> {
+        let mut relieved = None;
+        for &place in self.tissue.islands.members(island) {
+            let place = place as usize;
+            if let (Some(walk), Some(body)) = (&mut self.walks[place], bodies.at_mut(place))
+                && let Some((substeps, masses_for)) =
+                    relieve_squeezed(body, &self.request.of(body), stable_substep, self.team)
+            {
+                walk.masses_for = masses_for;
+                relieved = relieved.max(Some(substeps));
+            }
+        }
+        relieved
     }
 
     /// Takes it in so many substeps, the last time that it is tried or not.

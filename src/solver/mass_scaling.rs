@@ -260,9 +260,14 @@ impl MassScaling {
     /// refused, as many as are `allowed`.
     pub fn needed_at_rest(&self, dt: f32, allowed: u32) -> f64 {
         match self.relief {
-            None => (f64::from(dt) / (self.reserve * self.unscaled)).ceil(),
+            None => self.unscaled_at_rest(dt),
             Some(_) => f64::from(allowed),
         }
+    }
+
+    /// How many substeps a step of `dt` seconds takes at rest with masses as they are.
+    pub fn unscaled_at_rest(&self, dt: f32) -> f64 {
+        (f64::from(dt) / (self.reserve * self.unscaled)).ceil()
     }
 
     /// Lets masses be made for how stiff elements are where they are deformed: to be filled in for each node, given 0. `None`: there are no
@@ -352,7 +357,13 @@ impl MassScaling {
 
     /// In how few substeps a step of `dt` seconds can be taken, and for what substep masses are to be made; `None`: that
     /// saves too little of the `needed` ones.
-    pub fn fewer_substeps(&self, dt: f32, needed: f64, masses: &[f32], inverse_masses: &[f32]) -> Option<(u32, f32)> {
+    pub fn fewer_substeps(
+        &self,
+        (dt, max_substeps): (f32, u32),
+        needed: f64,
+        masses: &[f32],
+        inverse_masses: &[f32],
+    ) -> Option<(u32, f32)> {
         let longest = f64::from(dt) / self.reserve;
         let fits_in = |substeps: u32, most: f64| {
             let step = longest / f64::from(substeps);
@@ -360,10 +371,15 @@ impl MassScaling {
         };
         let fits = |substeps: u32| fits_in(substeps, self.most);
         if self.relief.is_some() {
-            // Only as much as is needed for as many as are allowed.
-            let allowed = needed.min(f64::from(u32::MAX)) as u32;
-            let fits = allowed > 0 && fits_in(allowed, RESCUE * self.most);
-            return fits.then(|| (allowed, (longest / f64::from(allowed)) as f32));
+            // Only as much as is needed for as many as are asked for, or where that is too much for some more.
+            let mut substeps = (needed.min(f64::from(u32::MAX)) as u32).max(1);
+            while !fits_in(substeps, RESCUE * self.most) {
+                if substeps >= max_substeps {
+                    return None;
+                }
+                substeps = substeps.saturating_add(substeps / 8 + 1).min(max_substeps);
+            }
+            return Some((substeps, (longest / f64::from(substeps)) as f32));
         }
         let worth = (WORTH_ADDING * needed).floor().min(f64::from(u32::MAX)) as u32;
         // Most steps are as the one before.
