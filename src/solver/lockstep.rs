@@ -77,7 +77,7 @@ impl Together<'_> {
                     let mut wanted = substeps_needed(request, stable_substep).min(f64::from(u32::MAX)) as u32;
                     if let Some(relieved) = self.relieve(island, bodies, found.stable_substep) {
                         wanted = relieved;
-                        stable_substep = f32::INFINITY;
+                        stable_substep = request.dt / relieved as f32;
                     }
                     substeps = wanted.max(substeps.saturating_add(substeps / 4 + 1));
                     if request.substeps == 0 && substeps > request.max_substeps {
