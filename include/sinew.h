@@ -40,5 +40,6 @@
 #include "sinew/more.h"
 #include "sinew/snapshot.h"
 #include "sinew/diagnostics.h"
+#include "sinew/debug.h"
 
 #endif

@@ -94,6 +94,7 @@ using dvec3_view = vectors<sinew_dvec3_view>;
 template <class Def, sinew_status (*Init)(Def *, std::size_t)> struct definition : Def {
   definition() : Def() { check(Init(this, sizeof(Def))); }
 };
+using debug_draw_def = definition<sinew_debug_draw, sinew_debug_draw_init>;
 using world_def = definition<sinew_world_def, sinew_world_def_init>;
 using body_def = definition<sinew_body_def, sinew_body_def_init>;
 using rest_state_def = definition<sinew_rest_state_def, sinew_rest_state_def_init>;
@@ -277,6 +278,9 @@ public:
   }
   void set_pose(vec3 position, quat orientation) {
     check(sinew_blade_set_pose(world(), id, position.data(), orientation.data()));
+  }
+  void set_collision(std::uint32_t category, std::uint32_t mask) {
+    check(sinew_blade_set_collision(world(), id, category, mask));
   }
   sinew_blade_report report() const {
     auto out = sized<sinew_blade_report>();
@@ -569,6 +573,12 @@ public:
     void *out = nullptr;
     return check(sinew_world_get_user_data(get(), &out)), out;
   }
+  void set_profiling(bool enabled) { check(sinew_world_set_profiling(get(), enabled)); }
+  sinew_profile profile() const { // of the last step, where profiling is on
+    auto out = sized<sinew_profile>();
+    return check(sinew_world_get_profile(get(), &out)), out;
+  }
+  void debug_draw(const debug_draw_def &def) const { check(sinew_world_debug_draw(get(), &def)); }
   sinew_ray_hit cast_ray(vec3 origin, vec3 direction, float max_distance, filter of) const { // of bodies and tools
     auto out = sized<sinew_ray_hit>();
     check(sinew_world_cast_ray_filtered(get(), origin.data(), direction.data(), max_distance, of.category, of.mask, &out));

@@ -6,6 +6,7 @@ pub mod capi;
 mod codec;
 mod contact;
 pub mod cutting;
+mod debug_draw;
 mod def;
 pub mod detection;
 mod elements;
@@ -36,6 +37,7 @@ mod world;
 pub use base::{Error, Result};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
 pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
+pub use debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 pub use def::{
     BodyContact, BodyDefinition, CollisionFilter, Detection, ElementLaw, EnclosedReport, Energy, Material, Model,
     Sleep, Solver, SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
@@ -49,6 +51,6 @@ pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use threads::RunTasks;
 pub use world::{
-    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepReport, SurfacePoint, SutureDefinition,
-    SutureReport, ToolId, World, WorldDefinition,
+    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepProfile, StepReport, SurfacePoint,
+    SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
 };

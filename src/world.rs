@@ -7,6 +7,7 @@ mod blades;
 mod haptics;
 mod holds;
 mod looks;
+mod profile;
 mod push;
 mod readers;
 mod resistance;
@@ -17,7 +18,7 @@ mod tear;
 
 use glam::{Quat, Vec3};
 
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Error, Profile, Result, StateHasher, memory};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Stroke};
 use crate::codec::saved;
 use crate::contact::{Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
@@ -33,6 +34,7 @@ use attachments::{Attachment, Which};
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
 pub use blades::BladeId;
+pub use profile::StepProfile;
 pub use step::StepReport;
 pub use sutures::{SutureDefinition, SutureReport};
 
@@ -114,6 +116,8 @@ pub struct World {
     clock: Clock,
     /// What the caller keeps with it.
     user_data: usize,
+    /// What the stages of the last step took, where that is asked for.
+    profile: Option<Box<Profile>>,
 }
 
 impl World {
@@ -148,6 +152,7 @@ impl World {
             haptics: Vec::new(),
             clock: Clock::default(),
             user_data: 0,
+            profile: None,
         })
     }
 

@@ -40,6 +40,7 @@ const MAKES: usize = 3;
 
 /// What goes with a body rather than in it.
 const READER: &str = "read on another thread";
+const PROFILED: &str = "stages of the step timed";
 const DRAWN: &str = "drawn: its surface, bound, with normals";
 
 /// The system's allocator, counting what is held.
@@ -143,6 +144,7 @@ impl<'a> Contender<'a> {
             DRAWN => Beside::Drawn(Box::new(world.create_embedding(body, drawn).expect("an embedding"))),
             _ => Beside::Nothing,
         };
+        world.set_profiling(name == PROFILED).expect("room");
         let bytes = HELD.load(Ordering::Relaxed) - before;
         // Every node trembles a little, so that something is worked out.
         let trembling =
@@ -393,6 +395,7 @@ fn main() -> ExitCode {
             },
         ),
         (READER, springs),
+        (PROFILED, springs),
         (DRAWN, springs),
         (
             "springs from E",

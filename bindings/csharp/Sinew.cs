@@ -954,6 +954,9 @@ public static unsafe class Sinew
     public static extern int sinew_blade_get_pose(IntPtr world, sinew_blade_id blade, float* position, float* orientation);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_blade_set_collision(IntPtr world, sinew_blade_id blade, uint category, uint mask);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern uint sinew_body_is_valid(IntPtr world, sinew_body_id body);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -1087,4 +1090,55 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_save_picture_of_values(IntPtr world, sinew_picture_def* def, sinew_body_values* coloured, UIntPtr count, byte* path);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_set_profiling(IntPtr world, uint enabled);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_profile
+    {
+        public UIntPtr struct_size;
+        public double step;
+        public double plan;
+        public double forces;
+        public double solver;
+        public double broad_phase;
+        public double narrow_phase;
+        public double contact_solver;
+        public double publish;
+        public double cutting;
+        public ulong bodies;
+        public ulong sleeping_bodies;
+        public ulong tries;
+        public ulong substeps;
+        public ulong iterations;
+        public ulong candidates;
+        public ulong tool_contacts;
+        public ulong tissue_contacts;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_profile(IntPtr world, sinew_profile* @out);
+
+    public enum sinew_draw_flags { SINEW_DRAW_CONTACTS = 1, SINEW_DRAW_NORMALS = 2, SINEW_DRAW_PINS = 4, SINEW_DRAW_ATTACHMENTS = 8, SINEW_DRAW_SPRINGS = 16, SINEW_DRAW_SLEEPING = 32, SINEW_DRAW_BOUNDS = 64 }
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_debug_draw
+    {
+        public UIntPtr struct_size;
+        public uint flags;
+        public float normal_length;
+        public float force_scale;
+        public float full_strain;
+        public void* context;
+        public IntPtr draw_line;
+        public IntPtr draw_point;
+        public IntPtr draw_triangle;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_debug_draw_init(sinew_debug_draw* def, UIntPtr struct_size);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_debug_draw(IntPtr world, sinew_debug_draw* def);
 }

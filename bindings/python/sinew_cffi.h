@@ -728,6 +728,8 @@ sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id to
                                       uint32_t *out_category, uint32_t *out_mask);
 sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
                                   float *orientation);
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+                                       uint32_t mask);
 uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
 uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);
 uint32_t sinew_blade_is_valid(const sinew_world *world, sinew_blade_id blade);
@@ -818,3 +820,48 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
                                                 const sinew_picture_def *def,
                                                 const sinew_body_values *coloured, size_t count,
                                                 const char *path);
+sinew_status sinew_world_set_profiling(sinew_world *world, uint32_t enabled);
+typedef struct sinew_profile {
+  size_t struct_size;
+  double step;
+  double plan;
+  double forces;
+  double solver;
+  double broad_phase;
+  double narrow_phase;
+  double contact_solver;
+  double publish;
+  double cutting;
+  uint64_t bodies;
+  uint64_t sleeping_bodies;
+  uint64_t tries;
+  uint64_t substeps;
+  uint64_t iterations;
+  uint64_t candidates;
+  uint64_t tool_contacts;
+  uint64_t tissue_contacts;
+} sinew_profile;
+sinew_status sinew_world_get_profile(const sinew_world *world, sinew_profile *out);
+typedef void (*sinew_draw)(void *context, const float *points, uint32_t rgba);
+typedef enum sinew_draw_flags {
+  SINEW_DRAW_CONTACTS = 1,
+  SINEW_DRAW_NORMALS = 2,
+  SINEW_DRAW_PINS = 4,
+  SINEW_DRAW_ATTACHMENTS = 8,
+  SINEW_DRAW_SPRINGS = 16,
+  SINEW_DRAW_SLEEPING = 32,
+  SINEW_DRAW_BOUNDS = 64
+} sinew_draw_flags;
+typedef struct sinew_debug_draw {
+  size_t struct_size;
+  uint32_t flags;
+  float normal_length;
+  float force_scale;
+  float full_strain;
+  void *context;
+  sinew_draw draw_line;
+  sinew_draw draw_point;
+  sinew_draw draw_triangle;
+} sinew_debug_draw;
+sinew_status sinew_debug_draw_init(sinew_debug_draw *def, size_t struct_size);
+sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_draw *def);

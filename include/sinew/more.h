@@ -32,6 +32,8 @@ sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, 
 /// Sets the nodes and elements of a body definition to those of a mesh.
 /// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist
 /// until the body is created.
+/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header without
+/// them.
 sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
 
 // ---- Whole bodies -------------------------------------------------------------------------------
@@ -183,6 +185,11 @@ sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id to
 /// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
 sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
                                   float *orientation);
+
+/// Sets the collision category and mask of a blade, from the next step on.
+/// A body that it no longer meets lets go of the blade.
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+                                       uint32_t mask);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 

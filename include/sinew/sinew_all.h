@@ -17,6 +17,7 @@
 #define SINEW_MORE_H
 #define SINEW_SNAPSHOT_H
 #define SINEW_DIAGNOSTICS_H
+#define SINEW_DEBUG_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -1662,6 +1663,8 @@ sinew_status sinew_mesh_create_filled(const sinew_mesh *surface, float spacing, 
 /// Sets the nodes and elements of a body definition to those of a mesh.
 /// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist
 /// until the body is created.
+/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header without
+/// them.
 sinew_status sinew_body_def_set_mesh(sinew_body_def *def, const sinew_mesh *mesh);
 
 // ---- Whole bodies -------------------------------------------------------------------------------
@@ -1813,6 +1816,11 @@ sinew_status sinew_tool_get_collision(const sinew_world *world, sinew_tool_id to
 /// `position` [m] receives 3 floats and `orientation` 4 floats x y z w; both are nullable.
 sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade, float *position,
                                   float *orientation);
+
+/// Sets the collision category and mask of a blade, from the next step on.
+/// A body that it no longer meets lets go of the blade.
+sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
+                                       uint32_t mask);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 
@@ -2023,6 +2031,80 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
                                                 const sinew_picture_def *def,
                                                 const sinew_body_values *coloured, size_t count,
                                                 const char *path);
+
+// sinew/debug.h: profile and debug drawing.
+
+// ---- Profile ------------------------------------------------------------------------------------
+
+/// Turns the profile of each step on (1) or off (0, the default).
+/// A step that is not profiled reads no clock. Profiling changes no result.
+sinew_status sinew_world_set_profiling(sinew_world *world, uint32_t enabled);
+
+/// Times and counts of the last step, taken or refused.
+/// Times of stages are summed over threads. Counts of contacts are summed over all substeps.
+typedef struct sinew_profile {
+  size_t struct_size;        ///< Set to sizeof(sinew_profile) before the call.
+  double step;               ///< [s] Whole step.
+  double plan;               ///< [s] Targets and paths of tools and blades.
+  /// [s] VERLET: forces and integration, which are one pass over the nodes.
+  double forces;
+  /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
+  double solver;
+  double broad_phase;        ///< [s] Search for what is near a tool or other tissue.
+  double narrow_phase;       ///< [s] Search for contacts among what is near.
+  double contact_solver;     ///< [s] Impulses of contacts, attachments and sutures.
+  double publish;            ///< [s] New state, sleep, readers and haptic handles.
+  double cutting;            ///< [s] Blades and tears.
+  uint64_t bodies;           ///< Bodies that were stepped.
+  uint64_t sleeping_bodies;  ///< Bodies that slept.
+  uint64_t tries;            ///< Attempts; above 1 if a force_limit or contact repeated the step.
+  uint64_t substeps;         ///< Substeps, summed over the bodies.
+  uint64_t iterations;       ///< Matrix-vector products of IMPLICIT and NEWTON.
+  uint64_t candidates;       ///< Nodes, edges and faces near tools.
+  uint64_t tool_contacts;    ///< Contacts with tools.
+  uint64_t tissue_contacts;  ///< Contacts between tissue and tissue.
+} sinew_profile;
+
+/// Writes the profile of the last step; 0 before the first.
+/// Errors: SINEW_STATUS_UNSUPPORTED while profiling is off.
+sinew_status sinew_world_get_profile(const sinew_world *world, sinew_profile *out);
+
+// ---- Debug drawing ------------------------------------------------------------------------------
+
+/// Callback that draws a line, point or triangle: 2, 1 or 3 vectors of 3 floats [m], color
+/// 0xRRGGBBAA.
+typedef void (*sinew_draw)(void *context, const float *points, uint32_t rgba);
+
+/// What sinew_world_debug_draw draws; flags to be added.
+typedef enum sinew_draw_flags {
+  SINEW_DRAW_CONTACTS = 1,     ///< Points where tools press bodies, and the forces on the tools.
+  SINEW_DRAW_NORMALS = 2,      ///< Normals of these contacts, away from the tool.
+  SINEW_DRAW_PINS = 4,         ///< Pinned nodes.
+  SINEW_DRAW_ATTACHMENTS = 8,  ///< Attachments and sutures.
+  SINEW_DRAW_SPRINGS = 16,     ///< Springs: blue compressed, red stretched.
+  SINEW_DRAW_SLEEPING = 32,    ///< Surface triangles that sleep.
+  SINEW_DRAW_BOUNDS = 64       ///< Bounding boxes of bodies.
+} sinew_draw_flags;
+
+/// Contents and callbacks of sinew_world_debug_draw, filled by sinew_debug_draw_init.
+typedef struct sinew_debug_draw {
+  size_t struct_size;        ///< Size of this struct; sinew_debug_draw_init sets it.
+  uint32_t flags;            ///< Sum of sinew_draw_flags; default: all.
+  float normal_length;       ///< [m] Length of a normal, at least 0; default 0.01.
+  float force_scale;         ///< [m/N] Length of a force of 1 N, at least 0; default 0.01.
+  float full_strain;         ///< Spring strain with the full color, above 0; default 0.1.
+  void *context;             ///< First argument of the callbacks; nullable.
+  sinew_draw draw_line;      ///< Draws a line; nullable: no lines.
+  sinew_draw draw_point;     ///< Draws a point; nullable: no points.
+  sinew_draw draw_triangle;  ///< Draws a triangle; nullable: no triangles.
+} sinew_debug_draw;
+
+/// Fills a debug drawing with its defaults; `struct_size` is sizeof(sinew_debug_draw).
+sinew_status sinew_debug_draw_init(sinew_debug_draw *def, size_t struct_size);
+
+/// Draws what `def` asks for through its callbacks, as the last step left it.
+/// It allocates nothing. The callbacks may use the world as a const sinew_world only.
+sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_draw *def);
 
 #ifdef __cplusplus
 }

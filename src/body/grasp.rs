@@ -191,6 +191,11 @@ impl Grasps {
         self.nodes.binary_search_by_key(&node, |held| held.node)
     }
 
+    /// The nodes that are held, in the body's own numbers, each with its holder's place among the world's tools.
+    pub fn held_nodes(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.nodes.iter().map(|held| (held.node as usize, held.tool))
+    }
+
     fn get_held(&self, node: u32) -> Option<&HeldNode> {
         self.place_of(node).ok().map(|place| &self.nodes[place])
     }

@@ -199,6 +199,24 @@ pub unsafe extern "C" fn sinew_blade_set_pose(
     }
 }
 
+/// Sets the collision category and mask of a blade, from the next step on.
+///
+/// A body that it no longer meets lets go of the blade.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_blade_set_collision(
+    world: *mut sinew_world,
+    blade: sinew_blade_id,
+    category: u32,
+    mask: u32,
+) -> sinew_status {
+    let filter = CollisionFilter { category, mask };
+    // SAFETY: the same contract.
+    unsafe { with_world_mut(world, |world| world.set_blade_collision_filter(blade.id(), filter)) }
+}
+
 /// Writes the cuts of a blade and the load on it in the last step.
 ///
 /// # Safety

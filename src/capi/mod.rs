@@ -98,3 +98,9 @@ pub mod several;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod looks;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod profile;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod debug_draw;

@@ -1,5 +1,7 @@
 //! A body as a whole: meshes into definitions, where it lies, and where it is moved.
 
+use std::mem::offset_of;
+
 use glam::{Quat, Vec3};
 use libc::c_void;
 
@@ -9,6 +11,7 @@ use super::guard::{guard, sinew_world};
 use super::memory;
 use super::mesh::{create, sinew_mesh, sinew_mesh_view};
 use super::status::sinew_status;
+use crate::base::Error;
 use crate::base::memory::copied;
 use crate::mesh::{LoadedMesh, Mesh, tidy};
 
@@ -71,6 +74,8 @@ pub unsafe extern "C" fn sinew_mesh_create_filled(
 /// It sets positions with tetrahedra, cells or triangles, and leaves the rest. The mesh must exist until the body is
 /// created.
 ///
+/// Errors: SINEW_STATUS_UNSUPPORTED for a mesh of cells if `def` is of an older header without them.
+///
 /// # Safety
 /// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
 #[unsafe(no_mangle)]
@@ -79,6 +84,12 @@ pub unsafe extern "C" fn sinew_body_def_set_mesh(def: *mut sinew_body_def, mesh:
     guard(|| unsafe {
         let mut changed = memory::definition("def", def, sinew_body_def::defaults())?;
         let view = sinew_mesh_view::of(memory::reference("mesh", mesh)?);
+        let (size, cell_count) = (changed.struct_size, view.cell_count);
+        if cell_count > 0 && size <= offset_of!(sinew_body_def, cells) {
+            return Err(Error::Unsupported(format!(
+                "mesh has {cell_count} cells: def->struct_size is {size}, of an older header that has no field for them"
+            )));
+        }
         changed.take_mesh(&view);
         memory::report("def", def)?.fill(changed);
         Ok(())

@@ -19,7 +19,7 @@ use super::press_nodes::{PressNodes, PressingSolid};
 use super::report::Touch;
 use super::supports::{MOST, Supports};
 use super::sweep::Corners;
-use crate::base::{Result, memory};
+use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
 use crate::body::{Bindings, Mobility, Pins};
 use crate::codec::saved;
 use crate::def::{BodyContact, CollisionFilter};
@@ -153,6 +153,8 @@ pub(crate) struct Meeting<'a> {
     pub pins: &'a mut Pins,
     /// Corners that are bound to nodes: their own vectors are not read.
     pub bindings: Option<&'a Bindings>,
+    /// Where the stages are timed, if they are.
+    pub profile: Option<&'a Profile>,
 }
 
 /// A part of a substep in which no tool moves further against the body than half its radius. Springs act once in a substep,
@@ -484,7 +486,9 @@ impl Contacts {
             }
             let ends = [fraction(part(index)), fraction(part(index + 1))];
             self.find(&mut meeting, &slice, ends);
+            let watch = Stopwatch::start(meeting.profile);
             self.solve(&mut meeting, &slice);
+            watch.stop(meeting.profile, Stage::ContactSolver);
         }
         if self.given != Bounds::EMPTY {
             let fastest = self.given.magnitudes().length();
@@ -515,7 +519,16 @@ impl Contacts {
     }
 
     /// Adds the contacts of a slice between these fractions of the step.
-    fn find(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
+    fn find(&mut self, meeting: &mut Meeting, slice: &Slice, ends: [f64; 2]) {
+        let watch = Stopwatch::start(meeting.profile);
+        self.find_among_candidates(meeting, slice, ends);
+        watch.stop(meeting.profile, Stage::NarrowPhase);
+        if let Some(profile) = meeting.profile {
+            profile.count(Count::ToolContacts, self.constraints.len() + self.nodes.len());
+        }
+    }
+
+    fn find_among_candidates(&mut self, meeting: &mut Meeting, slice: &Slice, [start, end]: [f64; 2]) {
         // Contacts that an equation is to know of, or has seen, are constraints all of them.
         let node_by_node = !slice.foresees && self.holds.is_empty();
         let count = self.candidates.near().len();
@@ -691,6 +704,15 @@ impl Contacts {
     }
 
     fn find_candidates(&mut self, meeting: &Meeting) {
+        let watch = Stopwatch::start(meeting.profile);
+        self.gather_candidates(meeting);
+        watch.stop(meeting.profile, Stage::BroadPhase);
+        if let Some(profile) = meeting.profile {
+            profile.count(Count::Candidates, self.candidates.near().len());
+        }
+    }
+
+    fn gather_candidates(&mut self, meeting: &Meeting) {
         let tools = met(meeting.tools, self.filter);
         let tool_speed = self.tool_speed(meeting.tools, meeting.dt);
         let fastest = meeting.fastest.max(meeting.neighbor_speed.unwrap_or(0.0));

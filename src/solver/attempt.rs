@@ -8,6 +8,7 @@ use super::gravity::GravityKicks;
 use super::implicit;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
+use crate::base::Profile;
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{Contacts, ToolPath};
@@ -46,6 +47,8 @@ pub(crate) struct StepRequest<'a> {
     pub tools: &'a [ToolPath],
     /// How fast nodes of the bodies are that take their substeps together, m/s; `None`: each body steps by itself.
     pub neighbor_speed: Option<f32>,
+    /// Where the stages are timed, if they are.
+    pub profile: Option<&'a Profile>,
 }
 
 impl StepRequest<'_> {

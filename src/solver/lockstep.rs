@@ -185,6 +185,7 @@ impl Together<'_> {
             duration: substep,
             drifts: true,
             begins: true,
+            profile: request.profile,
         };
         for index in 0..substeps {
             moment.begins = index == 0;

@@ -14,6 +14,7 @@ use super::energy_monitor::{Account, Sums, keep_energy};
 use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
+use crate::base::{Stage, Stopwatch};
 use crate::body::{Body, Lapse, Mobility};
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
@@ -154,7 +155,9 @@ impl<'a> Step<'a> {
                 account.keep_velocities(body, &part);
             }
             if let (2.., Some(plan)) = (depth, self.pipeline) {
+                let watch = Stopwatch::start(request.profile);
                 let surveys = pipeline::run(body, request, parts, plan, team);
+                watch.stop(request.profile, Stage::Forces);
                 for survey in &surveys[..depth - 1] {
                     if !self.is_stable_after(&mut carry.stability, &survey.velocities) {
                         match carry.stability.for_short(substep) {
@@ -298,7 +301,9 @@ pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &
     if part.drifts {
         body.lead_grasps(request.tools, [part.start, part.end]);
     }
+    let watch = Stopwatch::start(request.profile);
     let survey = kick_and_drift(body, request, part, team);
+    watch.stop(request.profile, Stage::Forces);
     carry.gravity.velocities = meet_tools(body, request, part, survey.velocities);
     body.feel_grasps(
         request.tools,
@@ -369,6 +374,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
         next_positions: state.next_positions,
         pins: &mut body.pins,
         bindings: body.bindings.as_ref(),
+        profile: request.profile,
     });
     contacts.velocities(velocities)
 }

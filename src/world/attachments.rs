@@ -380,6 +380,22 @@ impl World {
         Ok(grasp.map_or(Vec3::ZERO, |grasp| grasp.force))
     }
 
+    /// Shows both ends of what is attached, m: a tool and a node that it holds, or two points of tissue.
+    pub(crate) fn show_attached(&self, mut see: impl FnMut([Vec3; 2])) {
+        for (_, body) in self.bodies.iter() {
+            for (node, tool) in body.grasps.iter().flat_map(|grasps| grasps.held_nodes()) {
+                if let Some(tool) = self.tools.at(tool) {
+                    see([tool.pose.position, body.positions()[body.callers(node)]]);
+                }
+            }
+        }
+        if let Some(tissue) = &self.tissue {
+            tissue
+                .bonds
+                .show_ends(&self.bodies, |ends| see(ends.map(|end| end.as_vec3())));
+        }
+    }
+
     /// The attachments that ended with the last step, because it took more to hold them than their limit. Their ids are stale.
     pub fn slipped(&self) -> &[AttachmentId] {
         &self.slipped

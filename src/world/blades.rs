@@ -11,6 +11,7 @@ use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
 use super::{BodyId, World};
 use crate::base::Result;
 use crate::contact::{Lead, Pose};
+use crate::def::CollisionFilter;
 use crate::ids::{SlotId, Slots};
 
 /// A blade of a world.
@@ -76,6 +77,15 @@ impl World {
             orientation: orientation.unwrap_or(pose.orientation),
         };
         blade.target = Some(target.checked()?);
+        Ok(())
+    }
+
+    /// Has a blade meet what this filter says, from the next step on. A body that it no longer meets lets go of it.
+    ///
+    /// # Errors
+    /// [`Error::StaleId`](crate::Error::StaleId).
+    pub fn set_blade_collision_filter(&mut self, blade: BladeId, filter: CollisionFilter) -> Result<()> {
+        self.blades.get_mut(blade.0)?.filter = filter;
         Ok(())
     }
 

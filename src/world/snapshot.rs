@@ -99,6 +99,7 @@ impl World {
             haptics: _,
             clock,
             user_data: _,
+            profile: _,
         } = self;
         begin(to, SHAPE);
         write_section(to, *b"WRLD", |to| {

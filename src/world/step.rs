@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::World;
-use crate::base::{Error, Result};
+use crate::base::{Count, Error, Result, Stage, Stopwatch};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
@@ -52,6 +52,13 @@ impl World {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
         }
+        let watch = self.begin_profile();
+        let result = self.take_step(dt);
+        watch.stop(self.profile.as_deref(), Stage::Step);
+        result
+    }
+
+    fn take_step(&mut self, dt: f32) -> Result<StepReport> {
         let report = if is_worth_sharing(&self.bodies) {
             let mut threads = std::mem::take(&mut self.threads);
             let result = threads.lead(|team| self.step_with(dt, team));
@@ -60,21 +67,29 @@ impl World {
         } else {
             self.step_with(dt, &Team::alone())?
         };
+        let watch = Stopwatch::start(self.profile.as_deref());
         self.tear();
+        watch.stop(self.profile.as_deref(), Stage::Cutting);
+        let watch = Stopwatch::start(self.profile.as_deref());
         self.publish_to_hands(dt);
+        watch.stop(self.profile.as_deref(), Stage::Publish);
         Ok(report)
     }
 
     /// The step, with the threads that help.
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
+        let watch = Stopwatch::start(self.profile.as_deref());
         self.lead_by_hand();
         for (_, tool) in self.tools.iter_mut() {
             tool.set_out();
         }
         self.lead_blades();
+        watch.stop(self.profile.as_deref(), Stage::Plan);
         let mut left = TRIES;
         let crossings = loop {
+            let watch = Stopwatch::start(self.profile.as_deref());
             self.plan_tools();
+            watch.stop(self.profile.as_deref(), Stage::Plan);
             match self.attempt(dt, team) {
                 Ok(crossings) if left == 0 || self.are_within_limits(dt, left == 1) => break crossings,
                 Ok(_) => self.put_back(),
@@ -92,8 +107,13 @@ impl World {
             left -= 1;
         };
         let report = report(&self.bodies, &self.outcomes, crossings);
+        let watch = Stopwatch::start(self.profile.as_deref());
         self.commit(dt, team);
+        watch.stop(self.profile.as_deref(), Stage::Publish);
+        self.count_outcomes();
+        let watch = Stopwatch::start(self.profile.as_deref());
         self.move_blades(dt);
+        watch.stop(self.profile.as_deref(), Stage::Cutting);
         Ok(report)
     }
 
@@ -107,8 +127,13 @@ impl World {
             outcomes,
             tissue,
             walks,
+            profile,
             ..
         } = self;
+        let profile = profile.as_deref();
+        if let Some(profile) = profile {
+            profile.count(Count::Tries, 1);
+        }
         let request = StepRequest {
             dt,
             gravity: definition.gravity,
@@ -122,12 +147,15 @@ impl World {
             },
             tools: paths,
             neighbor_speed: None,
+            profile,
         };
         let Some(tissue) = tissue else {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);
             return reported(bodies, outcomes).map(|()| 0);
         };
+        let watch = Stopwatch::start(profile);
         tissue.plan(bodies, dt);
+        watch.stop(profile, Stage::BroadPhase);
         // What meets other tissue, or is joined to it, does not sleep.
         for (place, body) in bodies.iter_mut() {
             if tissue.islands.has(place) {
@@ -137,7 +165,9 @@ impl World {
         let islands = &tissue.islands;
         attempt_bodies(bodies, outcomes, &request, |place| !islands.has(place), team);
         loop {
+            let watch = Stopwatch::start(profile);
             tissue.find_crossings(bodies, false);
+            watch.stop(profile, Stage::NarrowPhase);
             let mut together = Together {
                 tissue,
                 walks,
@@ -150,7 +180,10 @@ impl World {
             }
         }
         reported(bodies, outcomes)?;
-        Ok(tissue.find_crossings(bodies, true))
+        let watch = Stopwatch::start(profile);
+        let crossings = tissue.find_crossings(bodies, true);
+        watch.stop(profile, Stage::NarrowPhase);
+        Ok(crossings)
     }
 
     /// Takes back what bodies have tried.

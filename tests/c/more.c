@@ -36,6 +36,24 @@ static sinew_body_def of_mesh(const sinew_mesh *mesh)
     return def;
 }
 
+/* A definition that ends before its cells keeps what it had. */
+static void older_definitions_refuse_cells(void)
+{
+    sinew_mesh *lattice = NULL;
+    sinew_body_def def;
+    const float *positions;
+    static const uint32_t cells[3] = {2, 2, 2};
+    char message[256];
+    MUST(sinew_mesh_create_lattice(1, cells, &lattice));
+    MUST(sinew_body_def_init(&def, offsetof(sinew_body_def, cells)));
+    positions = def.positions;
+    CHECK(sinew_body_def_set_mesh(&def, lattice) == SINEW_STATUS_UNSUPPORTED);
+    sinew_last_error(message, sizeof message);
+    CHECK(strstr(message, "cells") != NULL && strstr(message, "struct_size") != NULL);
+    CHECK(def.positions == positions);
+    sinew_mesh_destroy(lattice);
+}
+
 /* A square of two triangles that share no vertex, a triangle without area, and a vertex that nothing uses. */
 static void meshes_from_memory(void)
 {
@@ -126,6 +144,7 @@ static void a_definition_places_a_body(void)
     REFUSED("gravity_scale", sinew_body_create(world, &def, &body));
     REFUSED("mesh", sinew_body_def_set_mesh(&def, NULL));
     REFUSED("def", sinew_body_def_set_mesh(NULL, mesh));
+    older_definitions_refuse_cells();
     sinew_mesh_destroy(mesh);
     sinew_world_destroy(world);
 }
@@ -325,6 +344,111 @@ static void blades_and_attachments(void)
     CHECK(sinew_blade_is_valid(world, blade) == 1);
     MUST(sinew_blade_get_pose(world, blade, at, NULL));
     CHECK(memcmp(at, place, sizeof place) == 0);
+    MUST(sinew_blade_set_collision(world, blade, 2, 4));
+    MUST(sinew_blade_destroy(world, blade));
+    CHECK(sinew_blade_set_collision(world, blade, 2, 4) == SINEW_STATUS_STALE_ID);
+    REFUSED("world", sinew_blade_set_collision(NULL, blade, 2, 4));
+    sinew_world_destroy(world);
+}
+
+/* Times that are not below 0, and counts of a step of one body. */
+static void profiles(void)
+{
+    sinew_world *world = a_world(0);
+    sinew_mesh *mesh = a_block();
+    sinew_body_def def = of_mesh(mesh);
+    sinew_body_id body;
+    sinew_profile profile;
+    char message[256];
+    memset(&profile, 0x5a, sizeof profile);
+    profile.struct_size = sizeof profile;
+    MUST(sinew_body_create(world, &def, &body));
+    CHECK(sinew_world_get_profile(world, &profile) == SINEW_STATUS_UNSUPPORTED);
+    sinew_last_error(message, sizeof message);
+    CHECK(strstr(message, "sinew_world_set_profiling") != NULL);
+    REFUSED("enabled", sinew_world_set_profiling(world, 2));
+    REFUSED("world", sinew_world_set_profiling(NULL, 1));
+    MUST(sinew_world_set_profiling(world, 1));
+    MUST(sinew_world_get_profile(world, &profile));
+    CHECK(profile.step == 0 && profile.bodies == 0);
+    MUST(sinew_world_step(world, 1e-3f, NULL));
+    MUST(sinew_world_get_profile(world, &profile));
+    CHECK(profile.step > 0 && profile.forces > 0 && profile.solver == 0);
+    CHECK(profile.bodies == 1 && profile.substeps >= 1 && profile.tries == 1);
+    REFUSED("out", sinew_world_get_profile(world, NULL));
+    REFUSED("world", sinew_world_get_profile(NULL, &profile));
+    profile.struct_size = 8;
+    REFUSED("out->struct_size", sinew_world_get_profile(world, &profile));
+    sinew_mesh_destroy(mesh);
+    sinew_world_destroy(world);
+}
+
+typedef struct drawing {
+    int lines, points, triangles;
+} drawing;
+
+static void draw_line(void *context, const float *points, uint32_t rgba)
+{
+    CHECK(isfinite(points[0]) && isfinite(points[5]) && (rgba & 0xff) != 0);
+    ((drawing *)context)->lines++;
+}
+
+static void draw_point(void *context, const float *points, uint32_t rgba)
+{
+    CHECK(isfinite(points[0]) && isfinite(points[2]) && (rgba & 0xff) != 0);
+    ((drawing *)context)->points++;
+}
+
+static void draw_triangle(void *context, const float *points, uint32_t rgba)
+{
+    CHECK(isfinite(points[0]) && isfinite(points[8]) && (rgba & 0xff) != 0);
+    ((drawing *)context)->triangles++;
+}
+
+static void debug_drawing(void)
+{
+    sinew_world *world = a_world(0);
+    sinew_mesh *mesh = a_block();
+    sinew_body_def def = of_mesh(mesh);
+    sinew_body_id body;
+    sinew_debug_draw draw, good;
+    drawing drawn = {0, 0, 0};
+    sinew_storage_report report;
+    report.struct_size = sizeof report;
+    MUST(sinew_body_create(world, &def, &body));
+    MUST(sinew_body_pin(world, body, 0));
+    MUST(sinew_body_get_storage_report(world, body, &report));
+    MUST(sinew_debug_draw_init(&draw, sizeof draw));
+    MUST(sinew_world_debug_draw(world, &draw));
+    draw.context = &drawn;
+    draw.draw_line = draw_line;
+    draw.draw_point = draw_point;
+    draw.draw_triangle = draw_triangle;
+    MUST(sinew_world_debug_draw(world, &draw));
+    CHECK(drawn.points == 1 && drawn.triangles == 0);
+    CHECK(drawn.lines == (int)report.spring_count + 12);
+    good = draw;
+    draw.flags = SINEW_DRAW_BOUNDS;
+    memset(&drawn, 0, sizeof drawn);
+    MUST(sinew_world_debug_draw(world, &draw));
+    CHECK(drawn.lines == 12 && drawn.points == 0);
+    memset(&drawn, 0, sizeof drawn);
+    draw.flags = 128;
+    REFUSED("flags", sinew_world_debug_draw(world, &draw));
+    draw = good;
+    draw.full_strain = 0;
+    REFUSED("full_strain", sinew_world_debug_draw(world, &draw));
+    draw = good;
+    draw.force_scale = -1;
+    REFUSED("force_scale", sinew_world_debug_draw(world, &draw));
+    draw = good;
+    draw.normal_length = NAN;
+    REFUSED("normal_length", sinew_world_debug_draw(world, &draw));
+    REFUSED("def", sinew_world_debug_draw(world, NULL));
+    REFUSED("world", sinew_world_debug_draw(NULL, &good));
+    REFUSED("def", sinew_debug_draw_init(NULL, sizeof draw));
+    CHECK(drawn.lines == 0 && drawn.points == 0 && drawn.triangles == 0);
+    sinew_mesh_destroy(mesh);
     sinew_world_destroy(world);
 }
 
@@ -338,5 +462,7 @@ int main(void)
     impulses_and_gravity();
     rays_settings_and_ids();
     blades_and_attachments();
+    profiles();
+    debug_drawing();
     return checked("whole bodies, several pins, rays, settings and user data");
 }

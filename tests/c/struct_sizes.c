@@ -103,6 +103,17 @@ int main(void)
         SIZES("out->struct_size", sinew_surface_point, point.struct_size, sinew_world_find_nearest(world, from, 2, &point));
     }
     {
+        sinew_profile profile;
+        MUST(sinew_world_set_profiling(world, 1));
+        SIZES("out->struct_size", sinew_profile, profile.struct_size, sinew_world_get_profile(world, &profile));
+    }
+    {
+        sinew_debug_draw draw;
+        SIZES("struct_size", sinew_debug_draw, draw.struct_size, sinew_debug_draw_init(&draw, draw.struct_size));
+        MUST(sinew_debug_draw_init(&draw, sizeof draw));
+        SIZES("def->struct_size", sinew_debug_draw, draw.struct_size, sinew_world_debug_draw(world, &draw));
+    }
+    {
         sinew_ray_hit hit;
         SIZES("out->struct_size", sinew_ray_hit, hit.struct_size, sinew_world_cast_ray_filtered(world, from, down, 2, 1, 1, &hit));
     }

@@ -27,7 +27,7 @@ use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
 use glam::{DVec3, Vec3};
 
-use crate::base::{Result, memory};
+use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::Contacts;
@@ -62,16 +62,18 @@ const ROOM: usize = 1;
 
 /// What of a step is looked at.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Moment {
+pub(crate) struct Moment<'a> {
     /// Of the substep or step, s.
     pub duration: f32,
     /// Whether positions change: not with the last half kick of a step.
     pub drifts: bool,
     /// Whether it begins a step.
     pub begins: bool,
+    /// Where the stages are timed, if they are.
+    pub profile: Option<&'a Profile>,
 }
 
-impl Moment {
+impl Moment<'_> {
     /// Whether a body has a part in it: that which closes a step is VERLET's.
     fn concerns(&self, body: &Body) -> bool {
         self.drifts || body.implicit.is_none()
@@ -317,6 +319,7 @@ impl Tissue {
 
     /// Stops what meets in a substep of the bodies of an island.
     pub fn meet(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+        let watch = Stopwatch::start(moment.profile);
         self.links.clear();
         for &place in self.islands.members(island) {
             let place = place as usize;
@@ -328,6 +331,16 @@ impl Tissue {
         }
         self.bonds.follow(bodies, &self.skins, moment);
         self.draw(island, bodies, moment);
+        watch.stop(moment.profile, Stage::BroadPhase);
+        let watch = Stopwatch::start(moment.profile);
+        self.stop_what_meets(island, bodies, moment);
+        watch.stop(moment.profile, Stage::ContactSolver);
+        if let Some(profile) = moment.profile {
+            profile.count(Count::TissueContacts, self.links.len());
+        }
+    }
+
+    fn stop_what_meets(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         let have_acted = self.solve(island, bodies, moment);
         for link in &self.links {
             for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
@@ -421,7 +434,10 @@ impl Tissue {
             if first.is_some() {
                 self.go_on(island, bodies, moment);
             }
+            let watch = Stopwatch::start(moment.profile);
             self.find(island, bodies, moment, moment.begins && first.is_none());
+            watch.stop(moment.profile, Stage::NarrowPhase);
+            watch.take_off(moment.profile, Stage::ContactSolver);
             if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
                 break;
             }

@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use super::step::Substep;
 use super::{End, Implicit};
+use crate::base::{Stage, Stopwatch};
 use crate::body::{Body, Mobility};
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
@@ -96,6 +97,8 @@ impl Substep<'_> {
         velocities: &mut Vectors,
         act: impl FnOnce(&mut Contacts, Meeting, &dyn Fn(usize, f64) -> f32),
     ) {
+        let profile = self.request.profile;
+        let watch = Stopwatch::start(profile);
         let neighbor_speed = self.request.neighbor_speed;
         let slack = SLACK * body.extent() + self.step as f32 * neighbor_speed.unwrap_or(0.0);
         let Some(contacts) = &mut body.contacts else {
@@ -131,6 +134,7 @@ impl Substep<'_> {
             next_positions: state.next_positions,
             pins: &mut body.pins,
             bindings: body.bindings.as_ref(),
+            profile,
         };
         let (springs, elements, masses) = (&body.springs, &body.elements, &body.masses);
         act(contacts, meeting, &|node, per_mass| {
@@ -138,6 +142,7 @@ impl Substep<'_> {
             springs.visit(node, &mut |link| stiffness += link.stiffness);
             stiffness + elements.as_ref().map_or(0.0, |elements| elements.stiffness_of(node))
         });
+        watch.take_off(profile, Stage::Solver);
     }
 
     /// Lets tools stop the nodes that would enter them.

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::energy::Before;
 use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
+use crate::base::{Stage, Stopwatch};
 use crate::body::{Body, Lapse};
 use crate::codec::saved;
 use crate::def::SolverReport;
@@ -248,6 +249,7 @@ impl Substep<'_> {
     /// Takes it, with order 1 where that of order 2 gains energy; as a last resort, or where no product is left to try
     /// anything else, what was gained is taken off again. Then tools stop what would enter them.
     fn take_safely(self, body: &mut Body, implicit: &mut Implicit, is_last_resort: bool) -> End {
+        let watch = Stopwatch::start(self.request.profile);
         let before = self.energy_before(body, implicit);
         let SolverReport { error, converged, .. } = implicit.report;
         let mut end = self.take(body, implicit, before);
@@ -274,6 +276,7 @@ impl Substep<'_> {
                 implicit.histories[1 - implicit.settled].energy = None;
             }
         }
+        watch.stop(self.request.profile, Stage::Solver);
         end
     }
 

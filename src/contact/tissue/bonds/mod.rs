@@ -318,6 +318,22 @@ impl Bonds {
         Some(nodes.into_iter().map(place).sum::<DVec3>() / whole + body.origin)
     }
 
+    /// Shows both points of each bond between points of tissue, where they are now, m.
+    pub fn show_ends(&self, bodies: &Slots<Body>, mut see: impl FnMut([DVec3; 2])) {
+        for bond in &self.bonds {
+            let place = |point: &Bound| {
+                let body = bodies.at(point.body)?;
+                let positions = body.state.positions();
+                let of = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
+                let whole = point.weight();
+                (whole > 0.0).then(|| point.nodes.into_iter().map(of).sum::<DVec3>() / whole + body.origin)
+            };
+            if let [Some(first), Some(second)] = bond.points.each_ref().map(place) {
+                see([first, second]);
+            }
+        }
+    }
+
     /// Makes room for points of a body to be bound to others.
     pub fn reserve_rebinding(&mut self, body: usize) -> Result<()> {
         let count = self.bonds.iter().filter(|bond| bond.concerns(body)).count();

@@ -1,0 +1,120 @@
+//! What the stages of a step took.
+
+use super::guard::{sinew_world, with_world, with_world_mut};
+use super::memory::{self, Versioned};
+use super::status::sinew_status;
+use crate::base::Error;
+use crate::world::StepProfile;
+
+/// Times and counts of the last step, taken or refused.
+///
+/// Times of stages are summed over threads. Counts of contacts are summed over all substeps.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_profile {
+    /// Set to sizeof(sinew_profile) before the call.
+    pub struct_size: usize,
+    /// [s] Whole step.
+    pub step: f64,
+    /// [s] Targets and paths of tools and blades.
+    pub plan: f64,
+    /// [s] VERLET: forces and integration, which are one pass over the nodes.
+    pub forces: f64,
+    /// [s] IMPLICIT, NEWTON: equations and their solution, with the forces.
+    pub solver: f64,
+    /// [s] Search for what is near a tool or other tissue.
+    pub broad_phase: f64,
+    /// [s] Search for contacts among what is near.
+    pub narrow_phase: f64,
+    /// [s] Impulses of contacts, attachments and sutures.
+    pub contact_solver: f64,
+    /// [s] New state, sleep, readers and haptic handles.
+    pub publish: f64,
+    /// [s] Blades and tears.
+    pub cutting: f64,
+    /// Bodies that were stepped.
+    pub bodies: u64,
+    /// Bodies that slept.
+    pub sleeping_bodies: u64,
+    /// Attempts; above 1 if a force_limit or contact repeated the step.
+    pub tries: u64,
+    /// Substeps, summed over the bodies.
+    pub substeps: u64,
+    /// Matrix-vector products of IMPLICIT and NEWTON.
+    pub iterations: u64,
+    /// Nodes, edges and faces near tools.
+    pub candidates: u64,
+    /// Contacts with tools.
+    pub tool_contacts: u64,
+    /// Contacts between tissue and tissue.
+    pub tissue_contacts: u64,
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_profile {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_profile";
+}
+
+impl From<StepProfile> for sinew_profile {
+    fn from(profile: StepProfile) -> Self {
+        Self {
+            struct_size: size_of::<Self>(),
+            step: profile.step,
+            plan: profile.plan,
+            forces: profile.forces,
+            solver: profile.solver,
+            broad_phase: profile.broad_phase,
+            narrow_phase: profile.narrow_phase,
+            contact_solver: profile.contact_solver,
+            publish: profile.publish,
+            cutting: profile.cutting,
+            bodies: profile.bodies,
+            sleeping_bodies: profile.sleeping_bodies,
+            tries: profile.tries,
+            substeps: profile.substeps,
+            iterations: profile.iterations,
+            candidates: profile.candidates,
+            tool_contacts: profile.tool_contacts,
+            tissue_contacts: profile.tissue_contacts,
+        }
+    }
+}
+
+/// Turns the profile of each step on (1) or off (0, the default).
+///
+/// A step that is not profiled reads no clock. Profiling changes no result.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_set_profiling(world: *mut sinew_world, enabled: u32) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| match enabled {
+            0 | 1 => world.set_profiling(enabled == 1),
+            _ => Err(Error::invalid(format!("enabled is {enabled}: must be 0 or 1"))),
+        })
+    }
+}
+
+/// Writes the profile of the last step; 0 before the first.
+///
+/// Errors: SINEW_STATUS_UNSUPPORTED while profiling is off.
+///
+/// # Safety
+/// `world` is NULL or a world nobody changes; `out` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_get_profile(world: *const sinew_world, out: *mut sinew_profile) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let out = memory::report("out", out)?;
+            let profile = world.profile().ok_or_else(|| {
+                Error::Unsupported("the world is not profiled: call sinew_world_set_profiling first".into())
+            })?;
+            out.fill(profile.into());
+            Ok(())
+        })
+    }
+}

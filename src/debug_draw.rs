@@ -1,0 +1,192 @@
+//! Debug drawing: what contact, pins, attachments, springs and sleep are like, as lines, points and triangles for a program's own
+//! renderer.
+
+use glam::Vec3;
+
+use crate::base::{Error, Result};
+use crate::body::Body;
+use crate::def::not_negative;
+use crate::soa::{TILE, tile_count};
+use crate::world::World;
+
+/// A color, 8 bits each, from the highest: red, green, blue, opacity.
+pub type Rgba = u32;
+
+const PRESSED: Rgba = 0xff40_30ff;
+const NORMAL: Rgba = 0xffd0_20ff;
+const PINNED: Rgba = 0x4080_ffff;
+const SLIDING: Rgba = 0x40d0_ffff;
+const ATTACHED: Rgba = 0xd040_ffff;
+const ASLEEP: Rgba = 0x6070_a060;
+const BOX: Rgba = 0x8080_80ff;
+/// Springs that are as long as at rest, compressed as far as the scale goes, and stretched as far.
+const RELAXED: [f32; 3] = [0.85, 0.85, 0.85];
+const COMPRESSED: [f32; 3] = [0.1, 0.3, 1.0];
+const STRETCHED: [f32; 3] = [1.0, 0.15, 0.1];
+
+/// What draws. Places are in the world's coordinates, m.
+pub trait DebugCanvas {
+    /// A line between two points.
+    fn line(&mut self, ends: [Vec3; 2], color: Rgba);
+    /// A point.
+    fn point(&mut self, place: Vec3, color: Rgba);
+    /// A triangle.
+    fn triangle(&mut self, corners: [Vec3; 3], color: Rgba);
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DebugDrawDefinition {
+    /// A point where a tool pressed a body when the last step ended, and a line along the force on the tool.
+    pub contacts: bool,
+    /// A line along the normal of each such contact, away from the tool.
+    pub normals: bool,
+    /// A point at each pinned node; of another color where it is free along an axis.
+    pub pins: bool,
+    /// A line from a tool to each node that it holds, and between points that are attached or sutured to each other.
+    pub attachments: bool,
+    /// A line along each spring, colored by its strain: blue compressed, red stretched.
+    pub springs: bool,
+    /// The triangles of the surface whose nodes all sleep.
+    pub sleeping: bool,
+    /// The box about each body.
+    pub bounds: bool,
+    /// How long the normals are, m, at least 0.
+    pub normal_length: f32,
+    /// How long a force of 1 N is, m/N, at least 0.
+    pub force_scale: f32,
+    /// The strain at which springs have the strongest color, above 0.
+    pub full_strain: f32,
+}
+
+impl Default for DebugDrawDefinition {
+    /// Everything, with normals of 1 cm, 1 cm for each newton, and the strongest color at a strain of a tenth.
+    fn default() -> Self {
+        Self {
+            contacts: true,
+            normals: true,
+            pins: true,
+            attachments: true,
+            springs: true,
+            sleeping: true,
+            bounds: true,
+            normal_length: 0.01,
+            force_scale: 0.01,
+            full_strain: 0.1,
+        }
+    }
+}
+
+impl World {
+    /// Draws what the definition asks for, as the last step left it. It allocates nothing and changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`]: a length or the scale is out of its range. Nothing is drawn then.
+    pub fn debug_draw(&self, definition: &DebugDrawDefinition, canvas: &mut dyn DebugCanvas) -> Result<()> {
+        not_negative("normal_length", definition.normal_length)?;
+        not_negative("force_scale", definition.force_scale)?;
+        let full = definition.full_strain;
+        if !(full > 0.0 && full.is_finite()) {
+            return Err(Error::invalid(format!(
+                "full_strain is {full}: must be above 0 and finite"
+            )));
+        }
+        for body in self.bodies() {
+            if definition.sleeping {
+                draw_sleeping(body, canvas);
+            }
+            if definition.springs {
+                draw_springs(body, full, canvas);
+            }
+            if definition.pins {
+                draw_pins(body, canvas);
+            }
+            if definition.bounds && body.node_count() > 0 {
+                draw_box(body.bounds(), canvas);
+            }
+        }
+        if definition.attachments {
+            self.show_attached(|ends| canvas.line(ends, ATTACHED));
+        }
+        if definition.contacts || definition.normals {
+            self.draw_contacts(definition, canvas);
+        }
+        Ok(())
+    }
+
+    fn draw_contacts(&self, definition: &DebugDrawDefinition, canvas: &mut dyn DebugCanvas) {
+        for tool in self.tool_ids() {
+            for contact in self.contacts(tool).into_iter().flatten() {
+                let from = contact.point;
+                if definition.contacts {
+                    canvas.point(from, PRESSED);
+                    canvas.line([from, from + contact.force * definition.force_scale], PRESSED);
+                }
+                if definition.normals {
+                    canvas.line([from, from + contact.normal * definition.normal_length], NORMAL);
+                }
+            }
+        }
+    }
+}
+
+fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
+    let Some(sleeper) = body.sleeper.as_deref() else {
+        return;
+    };
+    let positions = body.positions();
+    let count = body.node_count();
+    let sleeps = |node: u32| {
+        let tile = body.own(node) as usize / TILE;
+        tile < tile_count(count) && sleeper.is_asleep(tile)
+    };
+    for triangle in body.surface() {
+        if triangle.iter().all(|&node| sleeps(node)) {
+            canvas.triangle(triangle.map(|node| positions[node as usize]), ASLEEP);
+        }
+    }
+}
+
+fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
+    let positions = body.positions();
+    for (node, &place) in positions.iter().enumerate() {
+        body.springs.visit(body.own(node as u32) as usize, &mut |link| {
+            let other = body.callers(link.neighbour as usize);
+            if other > node && link.rest_length > 0.0 {
+                let strain = place.distance(positions[other]) / link.rest_length - 1.0;
+                canvas.line([place, positions[other]], color_of(strain / full));
+            }
+        });
+    }
+}
+
+/// The color of a spring with this part of the strain that the scale goes to.
+fn color_of(part: f32) -> Rgba {
+    let part = part.clamp(-1.0, 1.0);
+    let end = if part < 0.0 { COMPRESSED } else { STRETCHED };
+    let channel = |index: usize| {
+        let value = RELAXED[index] + (end[index] - RELAXED[index]) * part.abs();
+        (value * 255.0).round() as u32
+    };
+    channel(0) << 24 | channel(1) << 16 | channel(2) << 8 | 0xff
+}
+
+fn draw_pins(body: &Body, canvas: &mut dyn DebugCanvas) {
+    for pin in body.pins.iter() {
+        let place = body.positions()[body.callers(pin.node as usize)];
+        canvas.point(place, if pin.is_partial() { SLIDING } else { PINNED });
+    }
+}
+
+/// The twelve edges of a box.
+fn draw_box([low, high]: [Vec3; 2], canvas: &mut dyn DebugCanvas) {
+    let corner = |index: usize| {
+        let of = |axis: usize| if index >> axis & 1 == 0 { low[axis] } else { high[axis] };
+        Vec3::new(of(0), of(1), of(2))
+    };
+    for index in 0..8 {
+        for axis in (0..3).filter(|axis| index >> axis & 1 == 0) {
+            canvas.line([corner(index), corner(index | 1 << axis)], BOX);
+        }
+    }
+}
