@@ -579,6 +579,11 @@ public:
     return check(sinew_world_get_profile(get(), &out)), out;
   }
   void debug_draw(const debug_draw_def &def) const { check(sinew_world_debug_draw(get(), &def)); }
+  void start_recording(const char *path) { check(sinew_world_start_recording(get(), path)); }
+  std::uint64_t stop_recording() { // how many steps were recorded
+    std::uint64_t out = 0;
+    return check(sinew_world_stop_recording(get(), &out)), out;
+  }
   sinew_ray_hit cast_ray(vec3 origin, vec3 direction, float max_distance, filter of) const { // of bodies and tools
     auto out = sized<sinew_ray_hit>();
     check(sinew_world_cast_ray_filtered(get(), origin.data(), direction.data(), max_distance, of.category, of.mask, &out));
@@ -652,6 +657,12 @@ private:
     return check(sinew_world_create(&def, &raw)), raw;
   }
 };
+
+// Replays a recording, up to the first step whose state differs.
+inline sinew_replay_report replay(const char *path, std::uint32_t thread_count = 1) {
+  auto out = sized<sinew_replay_report>();
+  return check(sinew_replay(path, thread_count, &out)), out;
+}
 
 inline sinew_material_preset material_preset(std::uint32_t preset) {
   auto out = sized<sinew_material_preset>();

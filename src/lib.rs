@@ -51,6 +51,6 @@ pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use threads::RunTasks;
 pub use world::{
-    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepProfile, StepReport, SurfacePoint,
-    SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
+    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, ReplayDifference, ReplayReport, StepProfile,
+    StepReport, SurfacePoint, SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
 };

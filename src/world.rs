@@ -10,6 +10,7 @@ mod looks;
 mod profile;
 mod push;
 mod readers;
+mod recording;
 mod resistance;
 mod snapshot;
 mod step;
@@ -35,6 +36,8 @@ use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
 pub use blades::BladeId;
 pub use profile::StepProfile;
+use recording::Recorder;
+pub use recording::{ReplayDifference, ReplayReport};
 pub use step::StepReport;
 pub use sutures::{SutureDefinition, SutureReport};
 
@@ -118,6 +121,8 @@ pub struct World {
     user_data: usize,
     /// What the stages of the last step took, where that is asked for.
     profile: Option<Box<Profile>>,
+    /// Where steps are recorded, if they are.
+    recorder: Option<Box<Recorder>>,
 }
 
 impl World {
@@ -153,6 +158,7 @@ impl World {
             clock: Clock::default(),
             user_data: 0,
             profile: None,
+            recorder: None,
         })
     }
 

@@ -1141,4 +1141,25 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_world_debug_draw(IntPtr world, sinew_debug_draw* def);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_start_recording(IntPtr world, byte* path);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_stop_recording(IntPtr world, ulong* out_steps);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_replay_report
+    {
+        public UIntPtr struct_size;
+        public ulong steps;
+        public ulong first_difference;
+        public ulong recorded_hash;
+        public ulong replayed_hash;
+        public uint cut_short;
+        public uint reserved;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_replay(byte* path, uint thread_count, sinew_replay_report* @out);
 }

@@ -865,3 +865,15 @@ typedef struct sinew_debug_draw {
 } sinew_debug_draw;
 sinew_status sinew_debug_draw_init(sinew_debug_draw *def, size_t struct_size);
 sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_draw *def);
+sinew_status sinew_world_start_recording(sinew_world *world, const char *path);
+sinew_status sinew_world_stop_recording(sinew_world *world, uint64_t *out_steps);
+typedef struct sinew_replay_report {
+  size_t struct_size;
+  uint64_t steps;
+  uint64_t first_difference;
+  uint64_t recorded_hash;
+  uint64_t replayed_hash;
+  uint32_t cut_short;
+  uint32_t reserved;
+} sinew_replay_report;
+sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);

@@ -2032,7 +2032,7 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
                                                 const sinew_body_values *coloured, size_t count,
                                                 const char *path);
 
-// sinew/debug.h: profile and debug drawing.
+// sinew/debug.h: profile, debug drawing, recording and replay.
 
 // ---- Profile ------------------------------------------------------------------------------------
 
@@ -2105,6 +2105,39 @@ sinew_status sinew_debug_draw_init(sinew_debug_draw *def, size_t struct_size);
 /// Draws what `def` asks for through its callbacks, as the last step left it.
 /// It allocates nothing. The callbacks may use the world as a const sinew_world only.
 sinew_status sinew_world_debug_draw(const sinew_world *world, const sinew_debug_draw *def);
+
+// ---- Recording ----------------------------------------------------------------------------------
+
+/// Records all steps from the next one on into a file, for sinew_replay.
+/// The file holds the snapshot at the first step, the changes before each step and a state hash
+/// after each. A file that exists is replaced. `path` is UTF-8. A recorded step writes to the file
+/// and may allocate; a full disk ends the recording, not the step.
+/// Errors: SINEW_STATUS_IO.
+sinew_status sinew_world_start_recording(sinew_world *world, const char *path);
+
+/// Stops a recording and writes the number of recorded steps.
+/// `out_steps` is nullable.
+/// Errors: SINEW_STATUS_IO or SINEW_STATUS_OUT_OF_MEMORY if the recording ended earlier; it is
+/// stopped in any case.
+sinew_status sinew_world_stop_recording(sinew_world *world, uint64_t *out_steps);
+
+/// Report of sinew_replay.
+typedef struct sinew_replay_report {
+  size_t struct_size;         ///< Set to sizeof(sinew_replay_report) before the call.
+  uint64_t steps;             ///< Number of steps that were replayed with equal state hashes.
+  uint64_t first_difference;  ///< Number of the first step that differs, from 1; 0: none.
+  uint64_t recorded_hash;     ///< State hash after that step in the recording; else 0.
+  uint64_t replayed_hash;     ///< State hash after that step in the replay; else 0.
+  uint32_t cut_short;         ///< 1 if the file ends within a step, else 0.
+  uint32_t reserved;          ///< Reserved; set to 0 by the library.
+} sinew_replay_report;
+
+/// Replays a recording and compares the state hash after each step, up to the first difference.
+/// `path` is UTF-8, `thread_count` as in sinew_world_def. Use the library version and the kernel of
+/// the recording.
+/// Errors: SINEW_STATUS_IO; SINEW_STATUS_INVALID_ARGUMENT if the file is no recording or damaged;
+/// SINEW_STATUS_UNSUPPORTED for another library version.
+sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
 
 #ifdef __cplusplus
 }

@@ -104,3 +104,6 @@ pub mod profile;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod debug_draw;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod recording;

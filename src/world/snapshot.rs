@@ -81,6 +81,23 @@ impl World {
         Ok(())
     }
 
+    /// The same in place of what is in `bytes`, also while a haptic handle leads a tool, as far as that was led.
+    pub(super) fn save_again(&self, bytes: &mut Vec<u8>) -> Result<()> {
+        let mut count = Writer::new(None);
+        self.write(&mut count);
+        if count.is_too_large() {
+            return Err(Error::Unsupported(
+                "the world keeps more room than bytes can ask for".into(),
+            ));
+        }
+        bytes.clear();
+        memory::reserve(bytes, count.size())?;
+        bytes.resize(count.size(), 0);
+        self.write(&mut Writer::new(Some(bytes)));
+        seal(bytes);
+        Ok(())
+    }
+
     fn write(&self, to: &mut Writer) {
         let Self {
             definition,
@@ -100,6 +117,7 @@ impl World {
             clock,
             user_data: _,
             profile: _,
+            recorder: _,
         } = self;
         begin(to, SHAPE);
         write_section(to, *b"WRLD", |to| {

@@ -54,6 +54,7 @@ impl World {
         }
         let watch = self.begin_profile();
         let result = self.take_step(dt);
+        self.record_end(&result);
         watch.stop(self.profile.as_deref(), Stage::Step);
         result
     }
@@ -80,6 +81,7 @@ impl World {
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
         let watch = Stopwatch::start(self.profile.as_deref());
         self.lead_by_hand();
+        self.record_begin(dt);
         for (_, tool) in self.tools.iter_mut() {
             tool.set_out();
         }

@@ -452,6 +452,51 @@ static void debug_drawing(void)
     sinew_world_destroy(world);
 }
 
+/* The program runs in a folder of its own, or may leave a small file in the one for temporary files. */
+static const char *recording_path(void)
+{
+    static char path[512];
+    const char *folder = getenv("TMPDIR");
+    snprintf(path, sizeof path, "%s/sinew_more_%p.recording", folder == NULL ? "/tmp" : folder, (void *)&path);
+    return path;
+}
+
+static void recordings(void)
+{
+    sinew_world *world = a_world(-9.81f);
+    sinew_mesh *mesh = a_block();
+    sinew_body_def def = of_mesh(mesh);
+    sinew_body_id body;
+    sinew_replay_report report;
+    const char *path = recording_path();
+    uint64_t steps = 77;
+    int i;
+    report.struct_size = sizeof report;
+    MUST(sinew_body_create(world, &def, &body));
+    REFUSED("world", sinew_world_stop_recording(world, &steps));
+    CHECK(steps == 77);
+    REFUSED("path", sinew_world_start_recording(world, NULL));
+    REFUSED("world", sinew_world_start_recording(NULL, path));
+    CHECK(sinew_world_start_recording(world, "no_such_folder/recording") == SINEW_STATUS_IO);
+    MUST(sinew_world_start_recording(world, path));
+    REFUSED("world", sinew_world_start_recording(world, path));
+    for (i = 0; i < 10; i++) {
+        MUST(sinew_body_pin(world, body, (uint32_t)i));
+        MUST(sinew_world_step(world, 1e-3f, NULL));
+    }
+    MUST(sinew_world_stop_recording(world, &steps));
+    CHECK(steps == 10);
+    MUST(sinew_replay(path, 1, &report));
+    CHECK(report.steps == 10 && report.first_difference == 0 && report.cut_short == 0 && report.reserved == 0);
+    REFUSED("path", sinew_replay(NULL, 1, &report));
+    REFUSED("out", sinew_replay(path, 1, NULL));
+    REFUSED("thread_count", sinew_replay(path, 257, &report));
+    CHECK(sinew_replay("no_such_recording", 1, &report) == SINEW_STATUS_IO);
+    remove(path);
+    sinew_mesh_destroy(mesh);
+    sinew_world_destroy(world);
+}
+
 int main(void)
 {
     meshes_from_memory();
@@ -464,5 +509,6 @@ int main(void)
     blades_and_attachments();
     profiles();
     debug_drawing();
+    recordings();
     return checked("whole bodies, several pins, rays, settings and user data");
 }

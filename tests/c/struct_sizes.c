@@ -114,6 +114,16 @@ int main(void)
         SIZES("def->struct_size", sinew_debug_draw, draw.struct_size, sinew_world_debug_draw(world, &draw));
     }
     {
+        sinew_replay_report replay;
+        const char *folder = getenv("TMPDIR");
+        char path[512];
+        snprintf(path, sizeof path, "%s/sinew_sizes_%p.recording", folder == NULL ? "/tmp" : folder, (void *)world);
+        MUST(sinew_world_start_recording(world, path));
+        MUST(sinew_world_stop_recording(world, NULL));
+        SIZES("out->struct_size", sinew_replay_report, replay.struct_size, sinew_replay(path, 1, &replay));
+        remove(path);
+    }
+    {
         sinew_ray_hit hit;
         SIZES("out->struct_size", sinew_ray_hit, hit.struct_size, sinew_world_cast_ray_filtered(world, from, down, 2, 1, 1, &hit));
     }

@@ -3,6 +3,7 @@
 
 mod acts;
 mod features;
+mod recording;
 mod refused;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,141 @@
+//! The difference of two byte strings that are alike: what is copied from the old one, and what is new.
+//!
+//! It is a list of parts: where in the old string a part is copied from, how long that is, and how many new bytes come after it, 8 bytes
+//! each, then these bytes. Snapshots differ in numbers that stay where they are, or by something inserted or left out: so the same place is
+//! looked for from the beginning, and from the end.
+
+use super::put;
+use crate::base::{Error, Result};
+
+/// A shorter copy is not worth its part.
+const WORTH_COPYING: usize = 48;
+
+/// Adds to `out` what makes `new` of `old`.
+pub(super) fn difference(old: &[u8], new: &[u8], out: &mut Vec<u8>) -> Result<()> {
+    let mut copy = (0, 0);
+    let (mut at, mut literal) = (0, 0);
+    while at < new.len() {
+        // Where it was, counted from either end.
+        let places = [Some(at), (at + old.len()).checked_sub(new.len())];
+        let runs = places.into_iter().flatten().filter_map(|place| {
+            let run = common(old.get(place..)?, &new[at..]);
+            Some((run, place))
+        });
+        let (run, place) = runs.max_by_key(|&(run, _)| run).unwrap_or((0, 0));
+        if run >= WORTH_COPYING {
+            put_part(out, copy, &new[literal..at])?;
+            copy = (place, run);
+            at += run;
+            literal = at;
+        } else {
+            // What differs ends the run.
+            at = (at + run + 1).min(new.len());
+        }
+    }
+    put_part(out, copy, &new[literal..])
+}
+
+/// Makes the new string of the old one.
+pub(super) fn applied(old: &[u8], difference: &[u8], size: usize) -> Result<Vec<u8>> {
+    let damaged = || Error::invalid("the recording is damaged: a difference is none");
+    let mut made = Vec::new();
+    let mut rest = difference;
+    while !rest.is_empty() {
+        let (numbers, behind) = rest.split_at_checked(24).ok_or_else(damaged)?;
+        let number = |index: usize| {
+            let bytes = numbers[8 * index..].first_chunk().copied();
+            bytes.and_then(|bytes| usize::try_from(u64::from_le_bytes(bytes)).ok())
+        };
+        let [Some(from), Some(length), Some(fresh)] = [0, 1, 2].map(number) else {
+            return Err(damaged());
+        };
+        let end = from.checked_add(length).ok_or_else(damaged)?;
+        let copied = old.get(from..end).ok_or_else(damaged)?;
+        let (literal, behind) = behind.split_at_checked(fresh).ok_or_else(damaged)?;
+        if copied.len() + literal.len() > size - made.len() {
+            return Err(damaged());
+        }
+        made.try_reserve(copied.len() + literal.len())?;
+        made.extend_from_slice(copied);
+        made.extend_from_slice(literal);
+        rest = behind;
+    }
+    if made.len() == size { Ok(made) } else { Err(damaged()) }
+}
+
+fn put_part(out: &mut Vec<u8>, (from, length): (usize, usize), literal: &[u8]) -> Result<()> {
+    if length + literal.len() == 0 {
+        return Ok(());
+    }
+    for number in [from, length, literal.len()] {
+        put(out, &(number as u64).to_le_bytes())?;
+    }
+    put(out, literal)
+}
+
+/// How many bytes both begin with.
+fn common(a: &[u8], b: &[u8]) -> usize {
+    const CHUNK: usize = 64;
+    let chunks = a.chunks_exact(CHUNK).zip(b.chunks_exact(CHUNK));
+    let whole = CHUNK * chunks.take_while(|(a, b)| a == b).count();
+    let rest = a[whole..].iter().zip(&b[whole..]);
+    whole + rest.take_while(|(a, b)| a == b).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(count: usize, seed: u32) -> Vec<u8> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    /// How long the difference is, which makes the one of the other.
+    fn size(old: &[u8], new: &[u8]) -> usize {
+        let mut out = Vec::new();
+        difference(old, new, &mut out).expect("memory");
+        assert_eq!(applied(old, &out, new.len()).as_deref(), Ok(new));
+        out.len()
+    }
+
+    #[test]
+    fn a_difference_makes_the_new_of_the_old_and_is_short() {
+        let old = bytes(10_000, 1);
+        assert_eq!(size(&old, &old), 24);
+        assert_eq!(size(&[], &old), 24 + old.len());
+        assert_eq!(size(&old, &[]), 0);
+        let mut changed = old.clone();
+        changed[3] ^= 1;
+        changed[7000] ^= 1;
+        changed[9999] ^= 1;
+        assert!(size(&old, &changed) < 150);
+        // A number at the front tells how long something is that was inserted.
+        let mut longer = old.clone();
+        longer[20] ^= 1;
+        longer.splice(5000..5000, bytes(300, 2));
+        assert!(size(&old, &longer) < 300 + 200);
+        assert!(size(&longer, &old) < 200);
+        assert_eq!(size(&old, &bytes(10_000, 3)), 24 + 10_000);
+    }
+
+    #[test]
+    fn what_is_no_difference_is_refused() {
+        let old = bytes(1000, 1);
+        let mut good = Vec::new();
+        difference(&old, &bytes(700, 2), &mut good).expect("memory");
+        for length in 0..40 {
+            assert!(applied(&old, &good[..length], 700).is_err(), "{length}");
+        }
+        assert!(applied(&old, &good, 699).is_err() && applied(&old, &good, 701).is_err());
+        for at in 0..24 {
+            let mut bad = good.clone();
+            bad[at] = bad[at].wrapping_add(200);
+            assert!(applied(&old, &bad, 700).is_err(), "byte {at}");
+        }
+    }
+}

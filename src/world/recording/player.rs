@@ -1,0 +1,167 @@
+//! A recording is replayed, and what comes of each step compared.
+
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read};
+use std::path::Path;
+
+use super::super::World;
+use super::difference::applied;
+use super::{BEGIN, END, MAGIC, VERSION};
+use crate::base::{Error, Result, memory};
+
+/// What came of a replay.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReplayReport {
+    /// How many steps were replayed with the states that were recorded.
+    pub steps: u64,
+    /// Where the replay was first other than the recording, and ended.
+    pub difference: Option<ReplayDifference>,
+    /// Whether the file ends within a step: the program or the disk did.
+    pub is_cut_short: bool,
+}
+
+/// The first difference of a replay from its recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReplayDifference {
+    /// Which step, counted from 1.
+    pub step: u64,
+    /// The state hash after it that was recorded, and that of the replay: the same where only one of the two was refused.
+    pub recorded: u64,
+    /// That of the replay.
+    pub replayed: u64,
+}
+
+/// The file, as far as it was read.
+struct Frames {
+    file: BufReader<File>,
+    name: String,
+    /// Bytes that are left.
+    left: u64,
+}
+
+impl Frames {
+    fn open(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        let failed = |error| Error::Io(format!("{name}: {error}"));
+        let file = File::open(path).map_err(failed)?;
+        let left = file.metadata().map_err(failed)?.len();
+        let mut frames = Self {
+            file: BufReader::new(file),
+            name: name.clone(),
+            left,
+        };
+        let (magic, version) = (frames.array::<8>()?, frames.array::<4>()?);
+        if magic != Some(MAGIC) {
+            return Err(Error::invalid(format!("{name} is no recording")));
+        }
+        match version.map(u32::from_le_bytes) {
+            Some(VERSION) => Ok(frames),
+            other => Err(Error::Unsupported(format!(
+                "{name} is a recording of version {}, this library reads {VERSION}",
+                other.unwrap_or(0)
+            ))),
+        }
+    }
+
+    /// The next bytes; `None`: the file ends before.
+    fn fill(&mut self, bytes: &mut [u8]) -> Result<Option<()>> {
+        match self.file.read_exact(bytes) {
+            Ok(()) => {
+                self.left = self.left.saturating_sub(bytes.len() as u64);
+                Ok(Some(()))
+            }
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),
+            Err(error) => Err(Error::Io(format!("{}: {error}", self.name))),
+        }
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<Option<[u8; N]>> {
+        let mut bytes = [0; N];
+        Ok(self.fill(&mut bytes)?.map(|()| bytes))
+    }
+
+    /// The kind of the next frame, which must be this one; `None`: the file ends.
+    fn frame(&mut self, kind: u8) -> Result<Option<()>> {
+        match self.array()? {
+            None => Ok(None),
+            Some([found]) if found == kind => Ok(Some(())),
+            Some([found]) => Err(Error::invalid(format!(
+                "{} is damaged: a frame of kind {found}, where {kind} was to come",
+                self.name
+            ))),
+        }
+    }
+
+    /// How the next step begins: its length, the size of its snapshot, and the difference.
+    fn begin(&mut self) -> Result<Option<(f32, usize, Vec<u8>)>> {
+        let (Some(dt), Some(size), Some(length)) = (self.array()?, self.array()?, self.array()?) else {
+            return Ok(None);
+        };
+        let [size, length] = [size, length].map(u64::from_le_bytes);
+        if length > self.left {
+            return Ok(None);
+        }
+        let too_long = |_| Error::invalid(format!("{} is damaged: a snapshot of {size} bytes", self.name));
+        let mut bytes = memory::filled(0, usize::try_from(length).map_err(too_long)?)?;
+        let size = usize::try_from(size).map_err(too_long)?;
+        Ok(self.fill(&mut bytes)?.map(|()| (f32::from_le_bytes(dt), size, bytes)))
+    }
+
+    /// How a step ended: whether it was refused, and the hash.
+    fn end(&mut self) -> Result<Option<(bool, u64)>> {
+        if self.frame(END)?.is_none() {
+            return Ok(None);
+        }
+        let (Some([refused]), Some(hash)) = (self.array()?, self.array()?) else {
+            return Ok(None);
+        };
+        Ok(Some((refused != 0, u64::from_le_bytes(hash))))
+    }
+}
+
+impl World {
+    /// Replays a recording with so many threads, as in [`WorldDefinition`](crate::WorldDefinition), and compares the state after each step
+    /// with what was recorded, until the first difference. A step whose end was not recorded is taken too.
+    ///
+    /// It is bitwise reproducible with the version of the library and the kernel that were recorded.
+    ///
+    /// # Errors
+    /// [`Error::Io`]: the file cannot be read. [`Error::InvalidArgument`]: it is no recording or damaged, or there are too many threads.
+    /// [`Error::Unsupported`]: it is of another version of the library, or this processor does not offer its kernel. [`Error::OutOfMemory`].
+    pub fn replay(path: &Path, thread_count: u32) -> Result<ReplayReport> {
+        let mut frames = Frames::open(path)?;
+        let mut report = ReplayReport::default();
+        let mut world: Option<World> = None;
+        let mut before = Vec::new();
+        while frames.frame(BEGIN)?.is_some() {
+            let Some((dt, size, difference)) = frames.begin()? else {
+                report.is_cut_short = true;
+                break;
+            };
+            let bytes = applied(&before, &difference, size)?;
+            // Where nothing was called between two steps the world goes on.
+            let mut it = match world.take() {
+                Some(it) if bytes == before => it,
+                _ => World::load(&bytes, thread_count, None)?,
+            };
+            let result = it.step(dt);
+            let Some((is_refused, recorded)) = frames.end()? else {
+                report.is_cut_short = true;
+                break;
+            };
+            let replayed = it.state_hash();
+            if replayed != recorded || result.is_err() != is_refused {
+                report.difference = Some(ReplayDifference {
+                    step: report.steps + 1,
+                    recorded,
+                    replayed,
+                });
+                break;
+            }
+            report.steps += 1;
+            it.save_again(&mut before)?;
+            world = Some(it);
+        }
+        Ok(report)
+    }
+}

@@ -1,0 +1,215 @@
+//! A recording is replayed as it was taken, and what is other is found where it is.
+
+use std::fs;
+use std::path::PathBuf;
+
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{
+    BodyDefinition, Error, HapticDefinition, Pose, ReplayReport, Shape, ToolDefinition, Values, World, WorldDefinition,
+};
+
+use super::acts::Caller;
+use super::world;
+
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.recording"))
+}
+
+/// A cloth that hangs on two of its corners.
+fn hanging() -> World {
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let mesh = Mesh::cloth([0.1; 2], [6, 6]).expect("a cloth");
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(1e-4),
+            stiffnesses: Values::Uniform(20.0),
+            node_dampings: Values::Uniform(1e-4),
+            ..BodyDefinition::default()
+        })
+        .expect("a body");
+    for node in [0, 6] {
+        world.body_mut(body).and_then(|body| body.pin(node)).expect("a pin");
+    }
+    world
+}
+
+/// The frames of a recording: where each step's `dt` and hash are in the file.
+fn frames(bytes: &[u8]) -> Vec<[usize; 2]> {
+    let mut frames = Vec::new();
+    let mut at = 12;
+    while at < bytes.len() {
+        let length = u64::from_le_bytes(bytes[at + 13..at + 21].try_into().expect("8 bytes"));
+        let end = at + 21 + length as usize;
+        frames.push([at + 1, end + 2]);
+        at = end + 10;
+    }
+    frames
+}
+
+#[test]
+fn random_calls_are_replayed_with_the_hashes_that_were_recorded() {
+    let mut recorded = 0;
+    for seed in 10..13 {
+        let path = path(&format!("calls_{seed}"));
+        let mut caller = Caller::new(seed);
+        let mut worlds = vec![world(1)];
+        for step in 0..16 {
+            for _ in 0..3 {
+                caller.act(&mut worlds);
+            }
+            if step == 3 {
+                worlds[0].start_recording(&path).expect("a file");
+            }
+            caller.step(&mut worlds);
+        }
+        let steps = worlds[0].stop_recording().expect("a recording");
+        // A replay takes the same states with another number of threads.
+        let report = World::replay(&path, 1 + seed as u32 % 2).expect("a replay");
+        let expected = ReplayReport {
+            steps,
+            difference: None,
+            is_cut_short: false,
+        };
+        assert_eq!(report, expected, "seed {seed}");
+        recorded += steps;
+        fs::remove_file(&path).expect("the file");
+    }
+    assert_eq!(recorded, 3 * 13);
+}
+
+#[test]
+fn a_recording_changes_no_state() {
+    let path = path("same");
+    let (mut plain, mut recorded) = (hanging(), hanging());
+    recorded.start_recording(&path).expect("a file");
+    for _ in 0..10 {
+        plain.step(2e-3).expect("a step");
+        recorded.step(2e-3).expect("a step");
+        assert_eq!(plain.state_hash(), recorded.state_hash());
+    }
+    assert_eq!(recorded.stop_recording(), Ok(10));
+    fs::remove_file(&path).expect("the file");
+}
+
+#[test]
+fn a_planted_difference_is_found_at_its_step() {
+    let path = path("planted");
+    let mut world = hanging();
+    world.start_recording(&path).expect("a file");
+    for _ in 0..20 {
+        world.step(2e-3).expect("a step");
+    }
+    world.stop_recording().expect("a recording");
+    let good = fs::read(&path).expect("the file");
+    let frames = frames(&good);
+    assert_eq!(frames.len(), 20);
+    for step in [1, 7, 20] {
+        let [dt, hash] = frames[step - 1];
+        // What was recorded of the state, and a step that is longer by the last bit.
+        for at in [hash, dt] {
+            let mut bytes = good.clone();
+            bytes[at] ^= 1;
+            fs::write(&path, &bytes).expect("a file");
+            let report = World::replay(&path, 1).expect("a replay");
+            let found = report.difference.expect("a difference");
+            assert_eq!((report.steps, found.step), (step as u64 - 1, step as u64));
+            assert_ne!(found.recorded, found.replayed);
+        }
+    }
+    fs::remove_file(&path).expect("the file");
+}
+
+#[test]
+fn a_file_that_ends_anywhere_is_replayed_as_far_as_it_goes() {
+    let path = path("short");
+    let mut world = hanging();
+    world.start_recording(&path).expect("a file");
+    for _ in 0..3 {
+        world.step(2e-3).expect("a step");
+    }
+    world.stop_recording().expect("a recording");
+    let good = fs::read(&path).expect("the file");
+    let ends: Vec<usize> = frames(&good).iter().map(|[_, hash]| hash + 8).collect();
+    let cuts = (12..good.len()).step_by(good.len() / 40);
+    for length in cuts.chain(ends.iter().flat_map(|end| [end - 1, *end])) {
+        fs::write(&path, &good[..length]).expect("a file");
+        let report = World::replay(&path, 1).expect("a replay");
+        let whole = ends.iter().filter(|&&end| end <= length).count() as u64;
+        assert_eq!((report.steps, report.difference), (whole, None), "{length} bytes");
+        assert_eq!(
+            report.is_cut_short,
+            length != 12 && !ends.contains(&length),
+            "{length} bytes"
+        );
+    }
+    for (bytes, is_fine) in [
+        (&good[..4], false),
+        (&b"something else"[..], false),
+        (&good[..12], true),
+    ] {
+        fs::write(&path, bytes).expect("a file");
+        assert_eq!(World::replay(&path, 1).is_ok(), is_fine);
+    }
+    fs::remove_file(&path).expect("the file");
+    assert!(matches!(World::replay(&path, 1), Err(Error::Io(_))));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_ends_the_recording_and_not_the_step() {
+    let mut world = hanging();
+    let mut plain = hanging();
+    world.start_recording(&PathBuf::from("/dev/full")).expect("a file");
+    for _ in 0..3 {
+        world.step(2e-3).expect("a step");
+        plain.step(2e-3).expect("a step");
+    }
+    assert_eq!(world.state_hash(), plain.state_hash());
+    let ended = world.stop_recording();
+    assert!(
+        matches!(&ended, Err(Error::Io(message)) if message.contains("after 0 steps")),
+        "{ended:?}"
+    );
+    assert!(matches!(world.stop_recording(), Err(Error::InvalidArgument(_))));
+}
+
+#[test]
+fn a_recording_without_steps_is_one() {
+    let path = path("empty");
+    let mut world = hanging();
+    world.start_recording(&path).expect("a file");
+    assert_eq!(world.stop_recording(), Ok(0));
+    assert_eq!(World::replay(&path, 1), Ok(ReplayReport::default()));
+    fs::remove_file(&path).expect("the file");
+    assert!(matches!(
+        world.start_recording(&path.join("no_such_folder")),
+        Err(Error::Io(_))
+    ));
+}
+
+#[test]
+fn what_a_haptic_handle_leads_is_replayed() {
+    let path = path("led");
+    let mut world = hanging();
+    let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+    ball.pose.position = Vec3::new(0.0, 0.03, 0.0);
+    let tool = world.create_tool(&ball).expect("a tool");
+    let mut handle = world.create_haptic(&HapticDefinition::new(tool)).expect("a handle");
+    world.start_recording(&path).expect("a file");
+    for step in 0..20 {
+        let device = Pose {
+            position: Vec3::new(0.0, 0.03 - 1.5e-3 * step as f32, 0.0),
+            ..Pose::IDENTITY
+        };
+        handle.tick(device, None, None, 1e-3).expect("a tick");
+        world.step(2e-3).expect("a step");
+    }
+    assert_eq!(world.stop_recording(), Ok(20));
+    assert!(world.pose(tool).expect("a tool").position.y < 0.02, "it was led");
+    let report = World::replay(&path, 1).expect("a replay");
+    assert_eq!((report.steps, report.difference), (20, None));
+    fs::remove_file(&path).expect("the file");
+}
