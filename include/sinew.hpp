@@ -658,6 +658,11 @@ private:
   }
 };
 
+// Messages up to a level, from all threads; nullptr: none.
+inline void set_log_callback(std::uint32_t level, sinew_log callback, void *context = nullptr) {
+  check(sinew_set_log_callback(level, callback, context));
+}
+
 // Replays a recording, up to the first step whose state differs.
 inline sinew_replay_report replay(const char *path, std::uint32_t thread_count = 1) {
   auto out = sized<sinew_replay_report>();

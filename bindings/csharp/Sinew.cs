@@ -1162,4 +1162,9 @@ public static unsafe class Sinew
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_replay(byte* path, uint thread_count, sinew_replay_report* @out);
+
+    public enum sinew_log_level { SINEW_LOG_OFF = 0, SINEW_LOG_FAULT = 1, SINEW_LOG_ERROR = 2, SINEW_LOG_WARNING = 3 }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_set_log_callback(uint level, IntPtr callback, void* context);
 }

@@ -877,3 +877,11 @@ typedef struct sinew_replay_report {
   uint32_t reserved;
 } sinew_replay_report;
 sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
+typedef void (*sinew_log)(void *context, uint32_t level, const char *message);
+typedef enum sinew_log_level {
+  SINEW_LOG_OFF = 0,
+  SINEW_LOG_FAULT = 1,
+  SINEW_LOG_ERROR = 2,
+  SINEW_LOG_WARNING = 3
+} sinew_log_level;
+sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);

@@ -2032,7 +2032,7 @@ sinew_status sinew_world_save_picture_of_values(const sinew_world *world,
                                                 const sinew_body_values *coloured, size_t count,
                                                 const char *path);
 
-// sinew/debug.h: profile, debug drawing, recording and replay.
+// sinew/debug.h: profile, debug drawing, recording, log.
 
 // ---- Profile ------------------------------------------------------------------------------------
 
@@ -2138,6 +2138,25 @@ typedef struct sinew_replay_report {
 /// Errors: SINEW_STATUS_IO; SINEW_STATUS_INVALID_ARGUMENT if the file is no recording or damaged;
 /// SINEW_STATUS_UNSUPPORTED for another library version.
 sinew_status sinew_replay(const char *path, uint32_t thread_count, sinew_replay_report *out);
+
+// ---- Log ----------------------------------------------------------------------------------------
+
+/// Callback that receives a message; `message` is valid during the call only.
+/// It may run on any thread that calls the library. It must not call the library.
+typedef void (*sinew_log)(void *context, uint32_t level, const char *message);
+
+/// Messages that a log callback receives.
+typedef enum sinew_log_level {
+  SINEW_LOG_OFF = 0,     ///< No messages.
+  SINEW_LOG_FAULT = 1,   ///< Faults inside the library, such as a failed assertion.
+  SINEW_LOG_ERROR = 2,   ///< Calls that were refused or failed; the text of sinew_last_error.
+  SINEW_LOG_WARNING = 3  ///< Steps that rolled bodies back.
+} sinew_log_level;
+
+/// Sets the callback that receives messages up to a level, for the whole process.
+/// `level` is a sinew_log_level value. `callback` and `context` are nullable; without a callback
+/// there are no messages. Other threads may still be in the callback that it replaces.
+sinew_status sinew_set_log_callback(uint32_t level, sinew_log callback, void *context);
 
 #ifdef __cplusplus
 }

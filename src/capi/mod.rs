@@ -107,3 +107,6 @@ pub mod debug_draw;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod recording;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod log;

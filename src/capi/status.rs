@@ -5,6 +5,7 @@ use std::fmt::{self, Write};
 
 use libc::c_char;
 
+use super::log;
 use crate::base::Error;
 
 /// Result of every function that can fail: a sinew_status_code value.
@@ -47,6 +48,7 @@ thread_local! {
 /// Keeps `error` as this thread's last failure: its status.
 pub(super) fn fail(error: Error) -> sinew_status {
     let status = status_of(&error);
+    log::failed(&error);
     let is_out_of_memory = matches!(error, Error::OutOfMemory);
     OUT_OF_MEMORY.set(is_out_of_memory);
     if !is_out_of_memory {

@@ -6,6 +6,7 @@ use glam::Vec3;
 use libc::c_void;
 
 use super::guard::{guard, with_world, with_world_mut};
+use super::log::{self, SINEW_LOG_WARNING};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::base::{Error, Result};
@@ -243,6 +244,17 @@ pub unsafe extern "C" fn sinew_world_step(
         if let (Some(report), Ok(value) | Err(Error::Unstable { report: value, .. })) = (report, &result) {
             // SAFETY: still there, by the same contract.
             unsafe { report.fill((*value).into()) };
+        }
+        if let Ok(StepReport {
+            bodies_restored: count @ 1..,
+            ..
+        }) = &result
+        {
+            let time = world.time();
+            log::log(
+                SINEW_LOG_WARNING,
+                format_args!("the step to {time} s restored {count} bodies"),
+            );
         }
         result.map(drop)
     };

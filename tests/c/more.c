@@ -497,6 +497,42 @@ static void recordings(void)
     sinew_world_destroy(world);
 }
 
+typedef struct heard {
+    int count;
+    uint32_t level;
+    char message[512];
+} heard;
+
+static void hear(void *context, uint32_t level, const char *message)
+{
+    heard *it = (heard *)context;
+    it->count++;
+    it->level = level;
+    snprintf(it->message, sizeof it->message, "%s", message);
+}
+
+/* A failed call is told of with the words of sinew_last_error, if its level was asked for. */
+static void messages(void)
+{
+    sinew_world *world = a_world(0);
+    heard it = {0, 0, ""};
+    const float gravity[3] = {NAN, 0, 0};
+    char last[512];
+    REFUSED("level", sinew_set_log_callback(4, hear, &it));
+    CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT && it.count == 0);
+    MUST(sinew_set_log_callback(SINEW_LOG_WARNING, hear, &it));
+    MUST(sinew_world_step(world, 1e-3f, NULL));
+    CHECK(it.count == 0);
+    CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT);
+    sinew_last_error(last, sizeof last);
+    CHECK(it.count == 1 && it.level == SINEW_LOG_ERROR && strcmp(it.message, last) == 0);
+    MUST(sinew_set_log_callback(SINEW_LOG_FAULT, hear, &it));
+    CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT && it.count == 1);
+    MUST(sinew_set_log_callback(SINEW_LOG_WARNING, NULL, NULL));
+    CHECK(sinew_world_set_gravity(world, gravity) == SINEW_STATUS_INVALID_ARGUMENT && it.count == 1);
+    sinew_world_destroy(world);
+}
+
 int main(void)
 {
     meshes_from_memory();
@@ -510,5 +546,6 @@ int main(void)
     profiles();
     debug_drawing();
     recordings();
+    messages();
     return checked("whole bodies, several pins, rays, settings and user data");
 }

@@ -82,7 +82,7 @@ fn typed<'a>(declared: &'a str, opaque: &BTreeMap<String, ()>) -> (String, &'a s
         "int32_t" | "sinew_status" => ("int", stars),
         "uint64_t" => ("ulong", stars),
         "uint8_t" | "char" => ("byte", stars),
-        "sinew_run_tasks" | "sinew_task" | "sinew_draw" => ("IntPtr", stars),
+        "sinew_run_tasks" | "sinew_task" | "sinew_draw" | "sinew_log" => ("IntPtr", stars),
         base if opaque.contains_key(base) => ("IntPtr", stars.saturating_sub(1)),
         base => (base, stars),
     };

@@ -10,7 +10,7 @@ const LAYOUT: &str = include_str!("layout.txt");
 const OVERVIEW: &str = include_str!("overview.txt");
 
 /// Constants that C has as an enumeration: its name, the prefix of its constants and its comment.
-const ENUMS: [(&str, &str, &str); 14] = [
+const ENUMS: [(&str, &str, &str); 15] = [
     (
         "sinew_status_code",
         "SINEW_STATUS_",
@@ -59,6 +59,11 @@ const ENUMS: [(&str, &str, &str); 14] = [
         "sinew_image_form",
         "SINEW_IMAGE_FORM_",
         "Contents of the images of a detector.",
+    ),
+    (
+        "sinew_log_level",
+        "SINEW_LOG_",
+        "Messages that a log callback receives.",
     ),
     (
         "sinew_draw_flags",

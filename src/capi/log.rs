@@ -1,0 +1,104 @@
+//! Messages to a callback of the program.
+
+use std::fmt::{self, Display, Write};
+use std::sync::RwLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use libc::{c_char, c_void};
+
+use super::guard::guard;
+use super::status::sinew_status;
+use crate::base::Error;
+
+/// No messages.
+pub const SINEW_LOG_OFF: u32 = 0;
+/// Faults inside the library, such as a failed assertion.
+pub const SINEW_LOG_FAULT: u32 = 1;
+/// Calls that were refused or failed; the text of sinew_last_error.
+pub const SINEW_LOG_ERROR: u32 = 2;
+/// Steps that rolled bodies back.
+pub const SINEW_LOG_WARNING: u32 = 3;
+
+/// Callback that receives a message; `message` is valid during the call only.
+///
+/// It may run on any thread that calls the library. It must not call the library.
+pub type sinew_log = Option<unsafe extern "C" fn(context: *mut c_void, level: u32, message: *const c_char)>;
+
+/// A longer message is cut.
+const LONGEST: usize = 512;
+
+/// The level, looked at first: without a callback no lock is taken.
+static LEVEL: AtomicU32 = AtomicU32::new(SINEW_LOG_OFF);
+static CALLBACK: RwLock<(sinew_log, usize)> = RwLock::new((None, 0));
+
+/// Text on the stack, that ends with NUL: what failed may have been memory.
+struct Text {
+    bytes: [u8; LONGEST],
+    length: usize,
+}
+
+impl Write for Text {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        let mut fits = text.len().min(LONGEST - 1 - self.length);
+        while !text.is_char_boundary(fits) {
+            fits -= 1;
+        }
+        self.bytes[self.length..self.length + fits].copy_from_slice(&text.as_bytes()[..fits]);
+        self.length += fits;
+        // What comes behind a cut is left out too.
+        if fits < text.len() { Err(fmt::Error) } else { Ok(()) }
+    }
+}
+
+/// Tells the callback, if it is to hear of this level.
+pub(super) fn log(level: u32, message: impl Display) {
+    if level > LEVEL.load(Ordering::Acquire) {
+        return;
+    }
+    let (callback, context) = match CALLBACK.read() {
+        Ok(callback) => *callback,
+        Err(poisoned) => *poisoned.into_inner(),
+    };
+    let Some(callback) = callback else { return };
+    let mut text = Text {
+        bytes: [0; LONGEST],
+        length: 0,
+    };
+    // A message that is cut is one.
+    let _ = write!(text, "{message}");
+    // SAFETY: who set the callback vouches for it and its context; the text ends with NUL.
+    unsafe { callback(context as *mut c_void, level, text.bytes.as_ptr().cast()) };
+}
+
+/// A call has failed.
+pub(super) fn failed(error: &Error) {
+    let level = match error {
+        Error::Internal(_) => SINEW_LOG_FAULT,
+        _ => SINEW_LOG_ERROR,
+    };
+    log(level, error);
+}
+
+/// Sets the callback that receives messages up to a level, for the whole process.
+///
+/// `level` is a sinew_log_level value. `callback` and `context` are nullable; without a callback there are no messages. Other
+/// threads may still be in the callback that it replaces.
+///
+/// # Safety
+/// `callback` is NULL or a function that may be called from any thread with `context` until another is set.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_set_log_callback(level: u32, callback: sinew_log, context: *mut c_void) -> sinew_status {
+    guard(|| {
+        if level > SINEW_LOG_WARNING {
+            return Err(Error::invalid(format!("level is {level}: no SINEW_LOG_...")));
+        }
+        let mut place = match CALLBACK.write() {
+            Ok(place) => place,
+            Err(poisoned) => poisoned.into_inner(),
+        };
+        *place = (callback, context as usize);
+        let level = if callback.is_some() { level } else { SINEW_LOG_OFF };
+        LEVEL.store(level, Ordering::Release);
+        Ok(())
+    })
+}
