@@ -19,8 +19,9 @@ use sinew::capi::world::{sinew_world_create, sinew_world_def_init, sinew_world_d
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
-    BladeDefinition, BodyContact, BodyDefinition, Detection, Error, HapticDefinition, Material, Model, Pose, Shape,
-    Solver, Storage, Tearing, ToolDefinition, Values, Viscosity, World, WorldDefinition, Yielding,
+    BladeDefinition, BodyContact, BodyDefinition, DebugCanvas, DebugDrawDefinition, Detection, Error, HapticDefinition,
+    Material, Model, Pose, Rgba, Shape, Solver, Storage, Tearing, ToolDefinition, Values, Viscosity, World,
+    WorldDefinition, Yielding,
 };
 
 thread_local! {
@@ -91,6 +92,7 @@ fn a_blade_that_cuts_nothing_allocates_nothing() {
         };
         let body = world.create_body(&cloth).expect("a body");
         let mut feels = 0;
+        world.set_profiling(true).expect("room");
         for step in 0..40 {
             // From beside the cloth against its border, and away.
             let part = (1.0 - (step as f32 / 20.0 - 1.0).abs()) * 0.0205;
@@ -137,6 +139,8 @@ fn tissue_against_tissue_allocates_nothing() {
                 world.body_mut(cloth).and_then(|body| body.pin(node)).expect("a node");
             }
         }
+        // A step that is timed allocates nothing either.
+        world.set_profiling(detection == Detection::Exact).expect("room");
         for step in 0..40 {
             assert_eq!(asked(|| drop(world.step(0.002))), 0, "{detection:?}, step {step}");
         }
@@ -144,6 +148,40 @@ fn tissue_against_tissue_allocates_nothing() {
         let places = world.body(first.expect("a body")).expect("a body").positions();
         assert!(places.iter().all(|place| place.y > 0.001), "{detection:?}");
     }
+}
+
+/// Draws on nothing.
+struct Nowhere;
+
+impl DebugCanvas for Nowhere {
+    fn line(&mut self, _: [Vec3; 2], _: Rgba) {}
+    fn point(&mut self, _: Vec3, _: Rgba) {}
+    fn triangle(&mut self, _: [Vec3; 3], _: Rgba) {}
+}
+
+#[test]
+fn debug_drawing_allocates_nothing() {
+    let mesh = Mesh::cloth([0.1, 0.1], [9, 9]).expect("a cloth");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let cloth = BodyDefinition {
+        positions: &mesh.positions,
+        triangles: &mesh.triangles,
+        masses: Values::Uniform(2e-4),
+        stiffnesses: Values::Uniform(50.0),
+        ..BodyDefinition::default()
+    };
+    let cloth = world.create_body(&cloth).expect("a body");
+    world.body_mut(cloth).and_then(|body| body.pin(0)).expect("a node");
+    let mut ball = ToolDefinition::new(Shape::Sphere { radius: 0.01 });
+    ball.pose.position = Vec3::new(0.0, -0.01, 0.0);
+    let ball = world.create_tool(&ball).expect("a tool");
+    world.attach_node(cloth, 1, ball, 0.0).expect("an attachment");
+    for _ in 0..5 {
+        world.step(0.002).expect("a step");
+    }
+    assert!(world.contacts(ball).expect("a tool").next().is_some());
+    let draw = || world.debug_draw(&DebugDrawDefinition::default(), &mut Nowhere);
+    assert_eq!(asked(|| draw().expect("a drawing")), 0);
 }
 
 #[test]

@@ -54,8 +54,8 @@ impl World {
         }
         let watch = self.begin_profile();
         let result = self.take_step(dt);
-        self.record_end(&result);
         watch.stop(self.profile.as_deref(), Stage::Step);
+        self.record_end(&result);
         result
     }
 
@@ -79,9 +79,9 @@ impl World {
 
     /// The step, with the threads that help.
     fn step_with(&mut self, dt: f32, team: &Team) -> Result<StepReport> {
-        let watch = Stopwatch::start(self.profile.as_deref());
         self.lead_by_hand();
         self.record_begin(dt);
+        let watch = Stopwatch::start(self.profile.as_deref());
         for (_, tool) in self.tools.iter_mut() {
             tool.set_out();
         }
