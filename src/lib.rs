@@ -37,8 +37,9 @@ pub use base::{Error, Result};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
 pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
 pub use def::{
-    BodyContact, BodyDefinition, CollisionFilter, Detection, ElementLaw, EnclosedReport, Energy, Material, Model,
-    Sleep, Solver, SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
+    BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw, EnclosedReport,
+    Energy, LimitKind, Material, Model, Sleep, Solver, SolverChoice, SolverReport, SpringLaw, Storage, StorageReport,
+    SubstepLimit, TearReport, Tearing, Values, Viscosity, Yielding,
 };
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
@@ -49,6 +50,6 @@ pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use threads::RunTasks;
 pub use world::{
-    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, StepReport, SurfacePoint, SutureDefinition,
-    SutureReport, ToolId, World, WorldDefinition,
+    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, BudgetReport, StepLimit, StepReport,
+    SurfacePoint, SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
 };

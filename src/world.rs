@@ -4,12 +4,14 @@ mod approach;
 mod attachments;
 mod blade;
 mod blades;
+mod budget;
 mod haptics;
 mod holds;
 mod looks;
 mod push;
 mod readers;
 mod resistance;
+mod settings;
 mod snapshot;
 mod step;
 mod sutures;
@@ -18,7 +20,7 @@ mod tear;
 use glam::{Quat, Vec3};
 
 use crate::base::{Error, Result, StateHasher, memory};
-use crate::body::{Body, CutReport, MaterialPoint, Needs, Stroke};
+use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::codec::saved;
 use crate::contact::{Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
@@ -33,8 +35,13 @@ use attachments::{Attachment, Which};
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
 pub use blades::BladeId;
-pub use step::StepReport;
+pub use budget::BudgetReport;
+use budget::Pace;
+pub use step::{StepLimit, StepReport};
 pub use sutures::{SutureDefinition, SutureReport};
+
+/// How long the steps of a world are taken to be before the first, s.
+const FRAME: f32 = 1.0 / 60.0;
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,6 +119,12 @@ pub struct World {
     haptics: Vec<haptics::Link>,
     /// The steps that were taken.
     clock: Clock,
+    /// The most substeps of the step in progress, whatever the definition allows.
+    work: u32,
+    /// What steps with a budget have not simulated yet, s.
+    lag: f64,
+    /// How fast this machine works.
+    pace: Pace,
     /// What the caller keeps with it.
     user_data: usize,
 }
@@ -147,6 +160,9 @@ impl World {
             holds_made: 0,
             haptics: Vec::new(),
             clock: Clock::default(),
+            work: u32::MAX,
+            lag: 0.0,
+            pace: Pace::default(),
             user_data: 0,
         })
     }
@@ -177,6 +193,11 @@ impl World {
             tolerance: self.definition.tolerance > 0.0 && self.definition.substeps == 0,
             tools: self.tool_places(),
             kernel: self.kernel,
+            steps: Steps {
+                length: self.clock.mean_step().unwrap_or(FRAME),
+                substeps: self.definition.substeps,
+                max_substeps: self.definition.max_substeps,
+            },
         };
         let body = Body::new(definition, needs)?;
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
@@ -564,6 +585,9 @@ impl World {
         hasher.write_floats(&[definition.tolerance]);
         for count in [definition.substeps, definition.max_substeps] {
             hasher.write_u64(u64::from(count));
+        }
+        if self.lag > 0.0 {
+            hasher.write_u64(self.lag.to_bits());
         }
         for (place, body) in self.bodies.iter() {
             hasher.write_u64(place as u64);

@@ -44,6 +44,9 @@ pub mod sleep;
 pub mod report;
 
 #[allow(rustdoc::broken_intra_doc_links)]
+pub mod limit;
+
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod material;
 
 #[allow(rustdoc::broken_intra_doc_links)]
@@ -98,3 +101,9 @@ pub mod several;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod looks;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod settings;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod budget;
