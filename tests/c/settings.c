@@ -12,8 +12,6 @@
             fprintf(stderr, "%s:%d: \"%s\" does not name %s\n", __FILE__, __LINE__, message_, word); \
         }                                                                      \
     } while (0)
-#define INVALID INVALID_ARGUMENT
-#define STALE STALE_ID
 
 static void settings_are_read_back(void)
 {
@@ -31,25 +29,25 @@ static void settings_are_read_back(void)
 #define BAD(field, given, word)                                                \
     bad = settings;                                                            \
     bad.field = (given);                                                       \
-    REFUSED(INVALID, word, sinew_body_set_settings(world, body, &bad))
+    REFUSED(INVALID_ARGUMENT, word, sinew_body_set_settings(world, body, &bad))
     BAD(contact_thickness, -1, "contact_thickness is -1");
     BAD(contact_friction, NAN, "contact_friction");
     BAD(meets_bodies, 2, "meets_bodies is 2");
     BAD(meets_itself, 3, "meets_itself is 3");
     BAD(sleep_speed, -1, "sleep_speed is -1");
     BAD(sleep_time, 0, "sleep_time is 0");
-    REFUSED(INVALID, "max_substeps is 0", sinew_world_set_substeps(world, 0, 0));
-    REFUSED(INVALID, "node_damping is -1", sinew_body_set_node_damping(world, body, -1));
-    REFUSED(INVALID, "node", sinew_body_get_node_damping(world, body, CLOTH_NODES, &value));
-    REFUSED(INVALID, "world", sinew_world_set_substeps(NULL, 0, 1));
-    REFUSED(INVALID, "world", sinew_world_get_substeps(NULL, &first, &second));
-    REFUSED(INVALID, "settings", sinew_body_set_settings(world, body, NULL));
-    REFUSED(INVALID, "out", sinew_body_get_settings(world, body, NULL));
-    REFUSED(INVALID, "out", sinew_body_get_node_damping(world, body, 0, NULL));
-    REFUSED(STALE, "body", sinew_body_set_settings(world, none, &settings));
-    REFUSED(STALE, "body", sinew_body_get_settings(world, none, &settings));
-    REFUSED(STALE, "body", sinew_body_set_node_damping(world, none, 1));
-    REFUSED(STALE, "body", sinew_body_get_node_damping(world, none, 0, &value));
+    REFUSED(INVALID_ARGUMENT, "max_substeps is 0", sinew_world_set_substeps(world, 0, 0));
+    REFUSED(INVALID_ARGUMENT, "node_damping is -1", sinew_body_set_node_damping(world, body, -1));
+    REFUSED(INVALID_ARGUMENT, "node", sinew_body_get_node_damping(world, body, CLOTH_NODES, &value));
+    REFUSED(INVALID_ARGUMENT, "world", sinew_world_set_substeps(NULL, 0, 1));
+    REFUSED(INVALID_ARGUMENT, "world", sinew_world_get_substeps(NULL, &first, &second));
+    REFUSED(INVALID_ARGUMENT, "settings", sinew_body_set_settings(world, body, NULL));
+    REFUSED(INVALID_ARGUMENT, "out", sinew_body_get_settings(world, body, NULL));
+    REFUSED(INVALID_ARGUMENT, "out", sinew_body_get_node_damping(world, body, 0, NULL));
+    REFUSED(STALE_ID, "body", sinew_body_set_settings(world, none, &settings));
+    REFUSED(STALE_ID, "body", sinew_body_get_settings(world, none, &settings));
+    REFUSED(STALE_ID, "body", sinew_body_set_node_damping(world, none, 1));
+    REFUSED(STALE_ID, "body", sinew_body_get_node_damping(world, none, 0, &value));
     CHECK(hash_of(world) == before && first == 9 && second == 9 && value == -1);
 
     MUST(sinew_world_set_substeps(world, 50, 60));
@@ -108,12 +106,12 @@ static void work_is_bounded(void)
     a_cloth(world, 5000);
     report.struct_size = sizeof report;
     before = hash_of(world);
-    REFUSED(INVALID, "work is 0", sinew_world_step_with_budget(world, 0.1f, 0, NULL));
-    REFUSED(INVALID, "dt is 0", sinew_world_step_with_budget(world, 0, 1, NULL));
-    REFUSED(INVALID, "seconds is -1", sinew_world_step_within(world, 0.1f, -1, NULL));
-    REFUSED(INVALID, "dt", sinew_world_step_within(world, NAN, 1, NULL));
-    REFUSED(INVALID, "world", sinew_world_step_with_budget(NULL, 0.1f, 1, NULL));
-    REFUSED(INVALID, "world", sinew_world_step_within(NULL, 0.1f, 1, NULL));
+    REFUSED(INVALID_ARGUMENT, "work is 0", sinew_world_step_with_budget(world, 0.1f, 0, NULL));
+    REFUSED(INVALID_ARGUMENT, "dt is 0", sinew_world_step_with_budget(world, 0, 1, NULL));
+    REFUSED(INVALID_ARGUMENT, "seconds is -1", sinew_world_step_within(world, 0.1f, -1, NULL));
+    REFUSED(INVALID_ARGUMENT, "dt", sinew_world_step_within(world, NAN, 1, NULL));
+    REFUSED(INVALID_ARGUMENT, "world", sinew_world_step_with_budget(NULL, 0.1f, 1, NULL));
+    REFUSED(INVALID_ARGUMENT, "world", sinew_world_step_within(NULL, 0.1f, 1, NULL));
     MUST(sinew_world_set_substeps(world, 9, 9));
     REFUSED(UNSUPPORTED, "fixed substeps", sinew_world_step_with_budget(world, 0.1f, 1, NULL));
     MUST(sinew_world_set_substeps(world, 0, 1000));
