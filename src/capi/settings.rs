@@ -100,7 +100,7 @@ impl From<BodySettings> for sinew_body_settings {
 ///
 /// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
 ///
-/// Errors: SINEW_STATUS_UNSUPPORTED if a body that was cut starts to collide with tissue.
+/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both to 0.
 ///
 /// # Safety
 /// `world` is NULL or a world nobody else uses; `settings` is NULL or of the size that it states.

@@ -42,8 +42,8 @@ impl World {
     /// tissue that it is to meet counts as crossings, and is led out where that is closed. What sleeps wakes.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: the body was cut, and is to meet
-    /// what it did not. [`Error::OutOfMemory`]. Nothing has changed then.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is out of its range. [`Error::Unsupported`]: the body was cut, and what it is
+    /// to meet changes, other than to nothing. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn set_body_settings(&mut self, body: BodyId, settings: BodySettings) -> Result<()> {
         let it = self.bodies.get(body.0)?;
         let before = it.contact;
@@ -85,11 +85,10 @@ impl World {
         if (before.with_bodies, before.with_itself) == (with_bodies, with_itself) {
             return Ok(());
         }
-        let is_more = with_bodies && !before.with_bodies || with_itself && !before.with_itself;
-        if is_more && it.topology_version() > 0 {
+        // A surface that is taken anew would not know which sides were parted.
+        if (with_bodies || with_itself) && it.topology_version() > 0 {
             return Err(Error::Unsupported(
-                "meets_bodies or meets_itself is 1 for a body that was cut or torn and did not collide so before"
-                    .into(),
+                "meets_bodies and meets_itself of a body that was cut or torn can only both become 0".into(),
             ));
         }
         it.contact = BodyContact {
