@@ -23,7 +23,8 @@ impl Body {
         let substeps = body.substeps_for(&needs);
         let allowed = match needs.steps.substeps {
             0 => FEW_SUBSTEPS.min(needs.steps.max_substeps),
-            fixed => fixed,
+            // Who fixes substeps has chosen them for VERLET; how long the steps will be is not known.
+            _ => u32::MAX,
         };
         let (solver, reason) = if substeps <= allowed {
             (Solver::Verlet, ChoiceReason::FewSubsteps)

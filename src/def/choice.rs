@@ -9,7 +9,7 @@ pub enum ChoiceReason {
     /// The definition names it.
     #[default]
     Given,
-    /// [`Solver::Auto`]: explicit substeps are few enough to cost less than the solution of an equation.
+    /// [`Solver::Auto`]: explicit substeps are few enough to cost less than the solution of an equation, or the world's are fixed.
     FewSubsteps,
     /// [`Solver::Auto`]: explicit substeps would be too many.
     ManySubsteps,
