@@ -319,6 +319,13 @@ public:
   void set_gravity_scale(float scale) { check(sinew_body_set_gravity_scale(world(), id, scale)); }
   float gravity_scale() const { return viewed<float>(sinew_body_get_gravity_scale); }
   float pressure() const { return viewed<float>(sinew_body_get_pressure); }
+  void set(const sinew_body_settings &settings) { check(sinew_body_set_settings(world(), id, &settings)); }
+  sinew_body_settings settings() const { return reported<sinew_body_settings>(sinew_body_get_settings); }
+  void set_node_damping(float damping) { check(sinew_body_set_node_damping(world(), id, damping)); }
+  float node_damping(std::uint32_t node) const {
+    float out = 0;
+    return check(sinew_body_get_node_damping(world(), id, node, &out)), out;
+  }
   filter collision() const {
     filter out{};
     return check(sinew_body_get_collision(world(), id, &out.category, &out.mask)), out;
@@ -554,6 +561,19 @@ public:
   sinew_step_report step(float dt) {
     auto out = sized<sinew_step_report>();
     return check(sinew_world_step(get(), dt, &out)), out;
+  }
+  sinew_step_report step_with_budget(float dt, std::uint32_t work) {
+    auto out = sized<sinew_step_report>();
+    return check(sinew_world_step_with_budget(get(), dt, work, &out)), out;
+  }
+  sinew_step_report step_within(float dt, double seconds) {
+    auto out = sized<sinew_step_report>();
+    return check(sinew_world_step_within(get(), dt, seconds, &out)), out;
+  }
+  void set_substeps(std::uint32_t substeps, std::uint32_t most) { check(sinew_world_set_substeps(get(), substeps, most)); }
+  std::array<std::uint32_t, 2> substeps() const {
+    std::array<std::uint32_t, 2> out{};
+    return check(sinew_world_get_substeps(get(), &out[0], &out[1])), out;
   }
   void set_gravity(vec3 gravity) { check(sinew_world_set_gravity(get(), gravity.data())); }
   vec3 gravity() const {

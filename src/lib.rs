@@ -39,8 +39,9 @@ pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, 
 pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
 pub use debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 pub use def::{
-    BodyContact, BodyDefinition, CollisionFilter, Detection, ElementLaw, EnclosedReport, Energy, Material, Model,
-    Sleep, Solver, SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,
+    BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw, EnclosedReport,
+    Energy, LimitKind, Material, Model, Sleep, Solver, SolverChoice, SolverReport, SpringLaw, Storage, StorageReport,
+    SubstepLimit, TearReport, Tearing, Values, Viscosity, Yielding,
 };
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
@@ -51,6 +52,6 @@ pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use threads::RunTasks;
 pub use world::{
-    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, ReplayDifference, ReplayReport, StepProfile,
-    StepReport, SurfacePoint, SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
+    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, BudgetReport, ReplayDifference, ReplayReport,
+    StepLimit, StepProfile, StepReport, SurfacePoint, SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
 };

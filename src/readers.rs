@@ -81,6 +81,11 @@ impl Clock {
         self.step += 1;
         self.time += f64::from(dt);
     }
+
+    /// The mean length of the steps that were taken, s; `None` before the first.
+    pub fn mean_step(&self) -> Option<f32> {
+        (self.step > 0).then(|| (self.time / self.step as f64) as f32)
+    }
 }
 
 /// A buffer of a reader's.

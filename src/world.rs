@@ -4,6 +4,7 @@ mod approach;
 mod attachments;
 mod blade;
 mod blades;
+mod budget;
 mod haptics;
 mod holds;
 mod looks;
@@ -12,6 +13,7 @@ mod push;
 mod readers;
 mod recording;
 mod resistance;
+mod settings;
 mod snapshot;
 mod step;
 mod sutures;
@@ -20,7 +22,7 @@ mod tear;
 use glam::{Quat, Vec3};
 
 use crate::base::{Error, Profile, Result, StateHasher, memory};
-use crate::body::{Body, CutReport, MaterialPoint, Needs, Stroke};
+use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::codec::saved;
 use crate::contact::{Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
@@ -35,11 +37,16 @@ use attachments::{Attachment, Which};
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
 pub use blades::BladeId;
+pub use budget::BudgetReport;
+use budget::Pace;
 pub use profile::StepProfile;
 use recording::Recorder;
 pub use recording::{ReplayDifference, ReplayReport};
-pub use step::StepReport;
+pub use step::{StepLimit, StepReport};
 pub use sutures::{SutureDefinition, SutureReport};
+
+/// How long the steps of a world are taken to be before the first, s.
+const FRAME: f32 = 1.0 / 60.0;
 
 /// How a world steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,6 +124,12 @@ pub struct World {
     haptics: Vec<haptics::Link>,
     /// The steps that were taken.
     clock: Clock,
+    /// The most substeps of the step in progress, whatever the definition allows.
+    work: u32,
+    /// What steps with a budget have not simulated yet, s.
+    lag: f64,
+    /// How fast this machine works.
+    pace: Pace,
     /// What the caller keeps with it.
     user_data: usize,
     /// What the stages of the last step took, where that is asked for.
@@ -156,6 +169,9 @@ impl World {
             holds_made: 0,
             haptics: Vec::new(),
             clock: Clock::default(),
+            work: u32::MAX,
+            lag: 0.0,
+            pace: Pace::default(),
             user_data: 0,
             profile: None,
             recorder: None,
@@ -188,6 +204,11 @@ impl World {
             tolerance: self.definition.tolerance > 0.0 && self.definition.substeps == 0,
             tools: self.tool_places(),
             kernel: self.kernel,
+            steps: Steps {
+                length: self.clock.mean_step().unwrap_or(FRAME),
+                substeps: self.definition.substeps,
+                max_substeps: self.definition.max_substeps,
+            },
         };
         let body = Body::new(definition, needs)?;
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
@@ -575,6 +596,9 @@ impl World {
         hasher.write_floats(&[definition.tolerance]);
         for count in [definition.substeps, definition.max_substeps] {
             hasher.write_u64(u64::from(count));
+        }
+        if self.lag > 0.0 {
+            hasher.write_u64(self.lag.to_bits());
         }
         for (place, body) in self.bodies.iter() {
             hasher.write_u64(place as u64);

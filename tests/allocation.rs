@@ -410,7 +410,7 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
         let body = world.body_mut(cloth).expect("a body");
         body.apply_force(5, Vec3::Y * 0.01).expect("a force");
         let steps = match solver {
-            Solver::Verlet => 40,
+            Solver::Verlet | Solver::Auto => 40,
             Solver::Implicit => 8,
             Solver::Newton => 3,
         };

@@ -115,7 +115,14 @@ public static unsafe class Sinew
         public uint bodies_restored;
         public float error_estimate;
         public uint crossings;
-        public uint reserved;
+        public uint limit;
+        public sinew_body_id limit_body;
+        public fixed uint limit_nodes[4];
+        public uint limit_substeps;
+        public uint work;
+        public uint work_done;
+        public float residual;
+        public double lag;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -177,7 +184,7 @@ public static unsafe class Sinew
 
     public enum sinew_storage { SINEW_STORAGE_PACKED = 0, SINEW_STORAGE_EFFICIENT = 1, SINEW_STORAGE_FAST_LINK = 2, SINEW_STORAGE_DYNAMIC_BULK = 3 }
 
-    public enum sinew_solver { SINEW_SOLVER_VERLET = 0, SINEW_SOLVER_IMPLICIT = 1, SINEW_SOLVER_NEWTON = 2 }
+    public enum sinew_solver { SINEW_SOLVER_VERLET = 0, SINEW_SOLVER_IMPLICIT = 1, SINEW_SOLVER_NEWTON = 2, SINEW_SOLVER_AUTO = 3 }
 
     public enum sinew_material { SINEW_MATERIAL_NONE = 0, SINEW_MATERIAL_SPRINGS = 1, SINEW_MATERIAL_TETRAHEDRA = 2 }
 
@@ -957,6 +964,42 @@ public static unsafe class Sinew
     public static extern int sinew_blade_set_collision(IntPtr world, sinew_blade_id blade, uint category, uint mask);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_set_substeps(IntPtr world, uint substeps, uint max_substeps);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_get_substeps(IntPtr world, uint* out_substeps, uint* out_max_substeps);
+
+    [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_body_settings
+    {
+        public UIntPtr struct_size;
+        public float contact_thickness;
+        public float contact_friction;
+        public uint meets_bodies;
+        public uint meets_itself;
+        public float sleep_speed;
+        public float sleep_time;
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_set_settings(IntPtr world, sinew_body_id body, sinew_body_settings* settings);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_settings(IntPtr world, sinew_body_id body, sinew_body_settings* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_set_node_damping(IntPtr world, sinew_body_id body, float node_damping);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_body_get_node_damping(IntPtr world, sinew_body_id body, uint node, float* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_step_with_budget(IntPtr world, float dt, uint work, sinew_step_report* report);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_world_step_within(IntPtr world, float dt, double seconds, sinew_step_report* report);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern uint sinew_body_is_valid(IntPtr world, sinew_body_id body);
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
@@ -1016,10 +1059,16 @@ public static unsafe class Sinew
         public double added_mass;
         public uint solves;
         public uint converged;
+        public uint solver;
+        public uint auto_substeps;
+        public float auto_step;
+        public uint reserved;
     }
 
     [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
     public static extern int sinew_body_get_solver_report(IntPtr world, sinew_body_id body, sinew_solver_report* @out);
+
+    public enum sinew_limit { SINEW_LIMIT_NONE = 0, SINEW_LIMIT_SPRING = 1, SINEW_LIMIT_ELEMENT = 2, SINEW_LIMIT_TERM = 3, SINEW_LIMIT_CAVITY = 4, SINEW_LIMIT_PARTS = 5, SINEW_LIMIT_TOLERANCE = 6 }
 
     [StructLayout(LayoutKind.Sequential)]
     public struct sinew_storage_report

@@ -90,7 +90,14 @@ typedef struct sinew_step_report {
   uint32_t bodies_restored;
   float error_estimate;
   uint32_t crossings;
-  uint32_t reserved;
+  uint32_t limit;
+  sinew_body_id limit_body;
+  uint32_t limit_nodes[4];
+  uint32_t limit_substeps;
+  uint32_t work;
+  uint32_t work_done;
+  float residual;
+  double lag;
 } sinew_step_report;
 sinew_status sinew_world_step(sinew_world *world, float dt, sinew_step_report *report);
 sinew_status sinew_world_set_gravity(sinew_world *world, const float *gravity);
@@ -142,7 +149,8 @@ typedef enum sinew_storage {
 typedef enum sinew_solver {
   SINEW_SOLVER_VERLET = 0,
   SINEW_SOLVER_IMPLICIT = 1,
-  SINEW_SOLVER_NEWTON = 2
+  SINEW_SOLVER_NEWTON = 2,
+  SINEW_SOLVER_AUTO = 3
 } sinew_solver;
 typedef enum sinew_material {
   SINEW_MATERIAL_NONE = 0,
@@ -730,6 +738,30 @@ sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade
                                   float *orientation);
 sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
                                        uint32_t mask);
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+                                      uint32_t *out_max_substeps);
+typedef struct sinew_body_settings {
+  size_t struct_size;
+  float contact_thickness;
+  float contact_friction;
+  uint32_t meets_bodies;
+  uint32_t meets_itself;
+  float sleep_speed;
+  float sleep_time;
+} sinew_body_settings;
+sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
+                                     const sinew_body_settings *settings);
+sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
+                                     sinew_body_settings *out);
+sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
+                                         float node_damping);
+sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
+                                         uint32_t node, float *out);
+sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
+                                          sinew_step_report *report);
+sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
+                                     sinew_step_report *report);
 uint32_t sinew_body_is_valid(const sinew_world *world, sinew_body_id body);
 uint32_t sinew_tool_is_valid(const sinew_world *world, sinew_tool_id tool);
 uint32_t sinew_blade_is_valid(const sinew_world *world, sinew_blade_id blade);
@@ -759,9 +791,22 @@ typedef struct sinew_solver_report {
   double added_mass;
   uint32_t solves;
   uint32_t converged;
+  uint32_t solver;
+  uint32_t auto_substeps;
+  float auto_step;
+  uint32_t reserved;
 } sinew_solver_report;
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
                                           sinew_solver_report *out);
+typedef enum sinew_limit {
+  SINEW_LIMIT_NONE = 0,
+  SINEW_LIMIT_SPRING = 1,
+  SINEW_LIMIT_ELEMENT = 2,
+  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_CAVITY = 4,
+  SINEW_LIMIT_PARTS = 5,
+  SINEW_LIMIT_TOLERANCE = 6
+} sinew_limit;
 typedef struct sinew_storage_report {
   size_t struct_size;
   size_t node_count;

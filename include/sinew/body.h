@@ -27,10 +27,12 @@ typedef enum sinew_storage {
 
 /// Time integrator of a body.
 typedef enum sinew_solver {
-  SINEW_SOLVER_VERLET = 0,    ///< Explicit; takes as many substeps as stability needs. Default.
+  SINEW_SOLVER_VERLET = 0,    ///< Explicit; takes as many substeps as stability needs.
   SINEW_SOLVER_IMPLICIT = 1,  ///< Implicit; stable at any step size.
   /// Reference solver: the equations of IMPLICIT solved to double precision; slow.
-  SINEW_SOLVER_NEWTON = 2
+  SINEW_SOLVER_NEWTON = 2,
+  /// VERLET or IMPLICIT, chosen on creation; see sinew_solver_report. Default.
+  SINEW_SOLVER_AUTO = 3
 } sinew_solver;
 
 /// Source of the forces between the nodes of elements.

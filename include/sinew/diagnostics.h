@@ -5,6 +5,7 @@
 #define SINEW_DIAGNOSTICS_H
 
 #include "base.h"
+#include "body.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -28,21 +29,41 @@ sinew_status sinew_body_get_energy(const sinew_world *world, sinew_body_id body,
 
 /// Report of the solver of a body for its last successful step.
 typedef struct sinew_solver_report {
-  size_t struct_size;   ///< Set to sizeof(sinew_solver_report) before the call.
-  uint32_t iterations;  ///< IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
+  size_t struct_size;      ///< Set to sizeof(sinew_solver_report) before the call.
+  uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
   /// [m] Remaining error of the solved equations; 0 for VERLET. IMPLICIT: mass-weighted root mean
   /// square. NEWTON: largest displacement of the last correction; about 1/100 of it remains. It
   /// does not include the time discretization error.
   float error;
-  double added_mass;    ///< [kg] VERLET: total mass that mass_scaling adds.
-  uint32_t solves;      ///< IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
+  double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
+  uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
   /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
   uint32_t converged;
+  uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
+  /// AUTO took IMPLICIT if VERLET needs more than 150 substeps; this is their number on creation,
+  /// else 0.
+  uint32_t auto_substeps;
+  /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
+  float auto_step;
+  uint32_t reserved;       ///< Reserved; set to 0 by the library.
 } sinew_solver_report;
 
 /// Writes how the solver of a body took the last step.
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
                                           sinew_solver_report *out);
+
+/// Limit of the substep of a step that was refused.
+typedef enum sinew_limit {
+  SINEW_LIMIT_NONE = 0,      ///< The step was not refused.
+  SINEW_LIMIT_SPRING = 1,    ///< Springs of a node; the nodes are the stiffest spring.
+  SINEW_LIMIT_ELEMENT = 2,   ///< Elements of a node; the nodes are the stiffest tetrahedron.
+  /// Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
+  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_CAVITY = 4,    ///< Pressure in a cavity.
+  /// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
+  SINEW_LIMIT_PARTS = 5,
+  SINEW_LIMIT_TOLERANCE = 6  ///< Tolerance of the world.
+} sinew_limit;
 
 /// Memory use of the springs of a body.
 typedef struct sinew_storage_report {

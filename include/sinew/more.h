@@ -7,6 +7,7 @@
 #include "base.h"
 #include "body.h"
 #include "mesh.h"
+#include "world.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -190,6 +191,59 @@ sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade
 /// A body that it no longer meets lets go of the blade.
 sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
                                        uint32_t mask);
+
+/// Sets the number of substeps per step and its limit, from the next step on.
+/// See sinew_world_def.
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+
+/// Writes the number of substeps per step and its limit; both outputs are nullable.
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+                                      uint32_t *out_max_substeps);
+
+/// Settings of a body that can change after creation; see sinew_body_def.
+typedef struct sinew_body_settings {
+  size_t struct_size;       ///< Set to sizeof(sinew_body_settings) before the call.
+  float contact_thickness;  ///< [m] Distance kept from the surface.
+  float contact_friction;   ///< Friction coefficient for tissue contact.
+  uint32_t meets_bodies;    ///< 1: collides with other bodies that have 1.
+  uint32_t meets_itself;    ///< 1: collides with itself.
+  float sleep_speed;        ///< [m/s] Speed of sleep; 0: never.
+  float sleep_time;         ///< [s] Time at rest before sleep.
+} sinew_body_settings;
+
+/// Changes the settings of a body from the next step on; start from sinew_body_get_settings.
+/// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
+/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both
+/// to 0.
+sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
+                                     const sinew_body_settings *settings);
+
+/// Writes the settings of a body that can change.
+sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
+                                     sinew_body_settings *out);
+
+/// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
+sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
+                                         float node_damping);
+
+/// Writes the drag [N s/m] on a node.
+sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
+                                         uint32_t node, float *out);
+
+/// Advances the world by at most `work` units of work.
+/// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The
+/// step covers `dt` [s] plus the lag, or as much as VERLET reaches in `work` substeps; the rest is
+/// the new lag. Other solvers stop after `work` products and continue in the next step. Tools, pins
+/// and blades complete their motion; forces act on the simulated time. `report` is nullable.
+/// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
+sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
+                                          sinew_step_report *report);
+
+/// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
+/// The first calls do little work and measure. A step can be late if the machine or the scene
+/// became slower. For a bitwise replay record `work` of `report`.
+sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
+                                     sinew_step_report *report);
 
 // ---- Ids and user data --------------------------------------------------------------------------
 

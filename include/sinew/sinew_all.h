@@ -241,7 +241,14 @@ typedef struct sinew_step_report {
   /// inside other tissue, and inside their own body where that collides with itself. Contact pushes
   /// edges of another body out of a closed one in later steps.
   uint32_t crossings;
-  uint32_t reserved;         ///< Reserved; set to 0 by the library.
+  uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
+  sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
+  uint32_t limit_nodes[4];   ///< Nodes of what limits it; the last is repeated.
+  uint32_t limit_substeps;   ///< UNSTABLE: substeps that the step needs.
+  uint32_t work;             ///< Budget: units of work allowed.
+  uint32_t work_done;        ///< Budget: units of work done.
+  float residual;            ///< [m] Budget: largest remaining error of an equation.
+  double lag;                ///< [s] Budget: time not simulated yet.
 } sinew_step_report;
 
 /// Advances everything in the world by one time step.
@@ -367,10 +374,12 @@ typedef enum sinew_storage {
 
 /// Time integrator of a body.
 typedef enum sinew_solver {
-  SINEW_SOLVER_VERLET = 0,    ///< Explicit; takes as many substeps as stability needs. Default.
+  SINEW_SOLVER_VERLET = 0,    ///< Explicit; takes as many substeps as stability needs.
   SINEW_SOLVER_IMPLICIT = 1,  ///< Implicit; stable at any step size.
   /// Reference solver: the equations of IMPLICIT solved to double precision; slow.
-  SINEW_SOLVER_NEWTON = 2
+  SINEW_SOLVER_NEWTON = 2,
+  /// VERLET or IMPLICIT, chosen on creation; see sinew_solver_report. Default.
+  SINEW_SOLVER_AUTO = 3
 } sinew_solver;
 
 /// Source of the forces between the nodes of elements.
@@ -1822,6 +1831,59 @@ sinew_status sinew_blade_get_pose(const sinew_world *world, sinew_blade_id blade
 sinew_status sinew_blade_set_collision(sinew_world *world, sinew_blade_id blade, uint32_t category,
                                        uint32_t mask);
 
+/// Sets the number of substeps per step and its limit, from the next step on.
+/// See sinew_world_def.
+sinew_status sinew_world_set_substeps(sinew_world *world, uint32_t substeps, uint32_t max_substeps);
+
+/// Writes the number of substeps per step and its limit; both outputs are nullable.
+sinew_status sinew_world_get_substeps(const sinew_world *world, uint32_t *out_substeps,
+                                      uint32_t *out_max_substeps);
+
+/// Settings of a body that can change after creation; see sinew_body_def.
+typedef struct sinew_body_settings {
+  size_t struct_size;       ///< Set to sizeof(sinew_body_settings) before the call.
+  float contact_thickness;  ///< [m] Distance kept from the surface.
+  float contact_friction;   ///< Friction coefficient for tissue contact.
+  uint32_t meets_bodies;    ///< 1: collides with other bodies that have 1.
+  uint32_t meets_itself;    ///< 1: collides with itself.
+  float sleep_speed;        ///< [m/s] Speed of sleep; 0: never.
+  float sleep_time;         ///< [s] Time at rest before sleep.
+} sinew_body_settings;
+
+/// Changes the settings of a body from the next step on; start from sinew_body_get_settings.
+/// What is closer than a new contact_thickness is pushed off. A new sleep wakes the body.
+/// Errors: SINEW_STATUS_UNSUPPORTED if meets_ flags of a body that was cut change, other than both
+/// to 0.
+sinew_status sinew_body_set_settings(sinew_world *world, sinew_body_id body,
+                                     const sinew_body_settings *settings);
+
+/// Writes the settings of a body that can change.
+sinew_status sinew_body_get_settings(const sinew_world *world, sinew_body_id body,
+                                     sinew_body_settings *out);
+
+/// Sets the drag [N s/m] on each node of a body, at least 0, from the next step on.
+sinew_status sinew_body_set_node_damping(sinew_world *world, sinew_body_id body,
+                                         float node_damping);
+
+/// Writes the drag [N s/m] on a node.
+sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id body,
+                                         uint32_t node, float *out);
+
+/// Advances the world by at most `work` units of work.
+/// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The
+/// step covers `dt` [s] plus the lag, or as much as VERLET reaches in `work` substeps; the rest is
+/// the new lag. Other solvers stop after `work` products and continue in the next step. Tools, pins
+/// and blades complete their motion; forces act on the simulated time. `report` is nullable.
+/// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
+sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
+                                          sinew_step_report *report);
+
+/// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
+/// The first calls do little work and measure. A step can be late if the machine or the scene
+/// became slower. For a bitwise replay record `work` of `report`.
+sinew_status sinew_world_step_within(sinew_world *world, float dt, double seconds,
+                                     sinew_step_report *report);
+
 // ---- Ids and user data --------------------------------------------------------------------------
 
 /// Returns 1 if a body with this id exists in the world, else 0.
@@ -1906,21 +1968,41 @@ sinew_status sinew_body_get_energy(const sinew_world *world, sinew_body_id body,
 
 /// Report of the solver of a body for its last successful step.
 typedef struct sinew_solver_report {
-  size_t struct_size;   ///< Set to sizeof(sinew_solver_report) before the call.
-  uint32_t iterations;  ///< IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
+  size_t struct_size;      ///< Set to sizeof(sinew_solver_report) before the call.
+  uint32_t iterations;     ///< IMPLICIT, NEWTON: matrix-vector products of the step; 0 for VERLET.
   /// [m] Remaining error of the solved equations; 0 for VERLET. IMPLICIT: mass-weighted root mean
   /// square. NEWTON: largest displacement of the last correction; about 1/100 of it remains. It
   /// does not include the time discretization error.
   float error;
-  double added_mass;    ///< [kg] VERLET: total mass that mass_scaling adds.
-  uint32_t solves;      ///< IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
+  double added_mass;       ///< [kg] VERLET: total mass that mass_scaling adds.
+  uint32_t solves;         ///< IMPLICIT, NEWTON: number of linear systems solved; 0 for VERLET.
   /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
   uint32_t converged;
+  uint32_t solver;         ///< Solver in use, a sinew_solver value; never AUTO.
+  /// AUTO took IMPLICIT if VERLET needs more than 150 substeps; this is their number on creation,
+  /// else 0.
+  uint32_t auto_substeps;
+  /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
+  float auto_step;
+  uint32_t reserved;       ///< Reserved; set to 0 by the library.
 } sinew_solver_report;
 
 /// Writes how the solver of a body took the last step.
 sinew_status sinew_body_get_solver_report(const sinew_world *world, sinew_body_id body,
                                           sinew_solver_report *out);
+
+/// Limit of the substep of a step that was refused.
+typedef enum sinew_limit {
+  SINEW_LIMIT_NONE = 0,      ///< The step was not refused.
+  SINEW_LIMIT_SPRING = 1,    ///< Springs of a node; the nodes are the stiffest spring.
+  SINEW_LIMIT_ELEMENT = 2,   ///< Elements of a node; the nodes are the stiffest tetrahedron.
+  /// Anchor, bending, fiber, Maxwell or strain-limiting terms of a node.
+  SINEW_LIMIT_TERM = 3,
+  SINEW_LIMIT_CAVITY = 4,    ///< Pressure in a cavity.
+  /// Number of parts of a step of IMPLICIT or NEWTON in contact or attached.
+  SINEW_LIMIT_PARTS = 5,
+  SINEW_LIMIT_TOLERANCE = 6  ///< Tolerance of the world.
+} sinew_limit;
 
 /// Memory use of the springs of a body.
 typedef struct sinew_storage_report {

@@ -89,7 +89,14 @@ typedef struct sinew_step_report {
   /// inside other tissue, and inside their own body where that collides with itself. Contact pushes
   /// edges of another body out of a closed one in later steps.
   uint32_t crossings;
-  uint32_t reserved;         ///< Reserved; set to 0 by the library.
+  uint32_t limit;            ///< Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
+  sinew_body_id limit_body;  ///< UNSTABLE: body with the shortest substep.
+  uint32_t limit_nodes[4];   ///< Nodes of what limits it; the last is repeated.
+  uint32_t limit_substeps;   ///< UNSTABLE: substeps that the step needs.
+  uint32_t work;             ///< Budget: units of work allowed.
+  uint32_t work_done;        ///< Budget: units of work done.
+  float residual;            ///< [m] Budget: largest remaining error of an equation.
+  double lag;                ///< [s] Budget: time not simulated yet.
 } sinew_step_report;
 
 /// Advances everything in the world by one time step.

@@ -53,14 +53,18 @@ impl std::fmt::Display for Error {
             Error::OutOfMemory => f.write_str("out of memory"),
             Error::Unstable { report, allowed } if report.error_estimate > 0.0 => write!(
                 f,
-                "the step could not be taken in the {allowed} substeps allowed: the tolerance needs more, {} m is off",
+                "the step could not be taken in the {allowed} substeps allowed: the tolerance needs more, {} m is off; a larger \
+                 tolerance or max_substeps, or shorter steps, help",
                 report.error_estimate
             ),
-            Error::Unstable { report, allowed } => write!(
-                f,
-                "the step could not be taken in the {allowed} substeps allowed: the longest stable one is {} s",
-                report.stable_substep
-            ),
+            Error::Unstable { report, allowed } => {
+                write!(
+                    f,
+                    "the step could not be taken in the {allowed} substeps allowed: the longest stable one is {} s",
+                    report.stable_substep
+                )?;
+                report.limit.map_or(Ok(()), |limit| write!(f, "; {limit}"))
+            }
         }
     }
 }

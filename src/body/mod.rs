@@ -6,6 +6,7 @@ mod blade;
 #[cfg(test)]
 mod bound_tests;
 mod change_log;
+mod choice;
 mod coarse;
 mod cut;
 mod cut_masses;
@@ -18,6 +19,7 @@ mod energy;
 mod grasp;
 mod grow;
 mod hash;
+mod limit;
 mod material_point;
 mod order;
 mod origin;
@@ -28,6 +30,7 @@ mod published;
 mod query_tree;
 mod region;
 mod relief;
+mod settings;
 mod several;
 mod shown;
 mod sleep;
@@ -46,7 +49,8 @@ mod whole;
 use glam::{BVec3, DVec3, Vec3};
 
 use crate::def::{
-    BodyContact, BodyDefinition, Carried, EnclosedReport, Energy, Solver, SolverReport, Storage, StorageReport, Values,
+    BodyContact, BodyDefinition, Carried, EnclosedReport, Energy, Solver, SolverChoice, SolverReport, Storage,
+    StorageReport, Values,
 };
 use crate::geometry::Bounds;
 use crate::simd::ChosenKernel;
@@ -165,11 +169,13 @@ pub struct Body {
     pub(crate) sleeper: Option<Box<Sleeper>>,
     /// The part of the world's gravity that acts on it.
     pub(crate) gravity_scale: f32,
+    /// Its solver, and why.
+    choice: SolverChoice,
     /// What the caller keeps with it.
     user_data: usize,
 }
 
-saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper, gravity_scale } leaves { user_data: 0, shown: None, query_tree: QueryTree::default() } where Self::is_sound);
+saved!(Body { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, contacts, contact, bindings, cuttable, tears, node_room, is_cut_open, corners, grasps, carry, forces_current, forces_applied, coarse, published, sleeper, gravity_scale, choice } leaves { user_data: 0, shown: None, query_tree: QueryTree::default() } where Self::is_sound);
 
 /// What a world asks of its bodies.
 #[derive(Clone, Copy, Debug)]
@@ -178,10 +184,22 @@ pub(crate) struct Needs {
     /// 0: no contacts.
     pub tools: usize,
     pub kernel: ChosenKernel,
+    pub steps: Steps,
+}
+
+/// The steps that a body is made for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Steps {
+    /// How long they are, s.
+    pub length: f32,
+    /// 0: as many substeps as stability needs.
+    pub substeps: u32,
+    pub max_substeps: u32,
 }
 
 impl Body {
-    pub(crate) fn new(definition: &BodyDefinition, needs: Needs) -> Result<Self> {
+    /// Of a definition that names a solver.
+    fn with_solver(definition: &BodyDefinition, needs: Needs) -> Result<Self> {
         definition.check()?;
         let made = definition
             .material
@@ -315,6 +333,7 @@ impl Body {
             query_tree: QueryTree::default(),
             sleeper: None,
             gravity_scale: 1.0,
+            choice: SolverChoice::given(definition.solver),
             user_data: 0,
         };
         body.place(definition.positions);
@@ -328,7 +347,7 @@ impl Body {
         let positions = body.state.positions();
         let gathers = body.records.is_some();
         body.implicit = match definition.solver {
-            Solver::Verlet => None,
+            Solver::Verlet | Solver::Auto => None,
             Solver::Implicit => Some(memory::boxed(Implicit::new(
                 positions, gathers, order, iterations, accuracy,
             )?)?),

@@ -13,7 +13,7 @@ impl Body {
     /// Makes masses for elements as they are deformed: at the current state, or where a step that `was_tried` has come to. The longest stable
     /// substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for that.
     pub(crate) fn relieve(&mut self, request: &StepRequest, was_tried: bool, team: &Team) -> Option<f32> {
-        if request.substeps > 0 || request.tolerance > 0.0 {
+        if request.substeps > 0 || request.tolerance > 0.0 || !request.relieves {
             return None;
         }
         let (Some(scaling), Some(elements)) = (&mut self.scaling, &self.elements) else {

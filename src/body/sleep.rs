@@ -93,6 +93,16 @@ impl Sleeper {
         self.asleep_count == self.tiles.len()
     }
 
+    /// When it sleeps.
+    pub fn sleep(&self) -> Sleep {
+        self.sleep
+    }
+
+    /// Has it sleep otherwise.
+    pub fn set_sleep(&mut self, sleep: Sleep) {
+        self.sleep = sleep;
+    }
+
     /// Wakes a tile; whether it slept.
     fn wake(&mut self, tile: usize) -> bool {
         self.tiles[tile].quiet = 0.0;

@@ -21,12 +21,14 @@ pub const SINEW_STORAGE_FAST_LINK: u32 = 2;
 /// Chain of arrays of springs_per_node slots per node; for comparison.
 pub const SINEW_STORAGE_DYNAMIC_BULK: u32 = 3;
 
-/// Explicit; takes as many substeps as stability needs. Default.
+/// Explicit; takes as many substeps as stability needs.
 pub const SINEW_SOLVER_VERLET: u32 = 0;
 /// Implicit; stable at any step size.
 pub const SINEW_SOLVER_IMPLICIT: u32 = 1;
 /// Reference solver: the equations of IMPLICIT solved to double precision; slow.
 pub const SINEW_SOLVER_NEWTON: u32 = 2;
+/// VERLET or IMPLICIT, chosen on creation; see sinew_solver_report. Default.
+pub const SINEW_SOLVER_AUTO: u32 = 3;
 
 /// Springs as given, or one stiffness for all. Default.
 pub const SINEW_MATERIAL_NONE: u32 = 0;
@@ -334,7 +336,7 @@ impl sinew_body_def {
             tetrahedron_count: 0,
             storage: SINEW_STORAGE_PACKED,
             springs_per_node: 0,
-            solver: SINEW_SOLVER_VERLET,
+            solver: SINEW_SOLVER_AUTO,
             reserved: 0,
             order: 0,
             iterations: 0,
@@ -579,6 +581,7 @@ impl sinew_body_def {
                     SINEW_SOLVER_VERLET => Solver::Verlet,
                     SINEW_SOLVER_IMPLICIT => Solver::Implicit,
                     SINEW_SOLVER_NEWTON => Solver::Newton,
+                    SINEW_SOLVER_AUTO => Solver::Auto,
                     unknown => return Err(Error::invalid(format!("solver is {unknown}: no SINEW_SOLVER_..."))),
                 },
                 order: self.order,

@@ -44,6 +44,9 @@ pub mod sleep;
 pub mod report;
 
 #[allow(rustdoc::broken_intra_doc_links)]
+pub mod limit;
+
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod material;
 
 #[allow(rustdoc::broken_intra_doc_links)]
@@ -110,3 +113,9 @@ pub mod recording;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod log;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod settings;
+
+#[allow(rustdoc::broken_intra_doc_links)]
+pub mod budget;

@@ -3,9 +3,11 @@
 use std::mem::offset_of;
 
 use super::body::{sinew_body_id, with_body};
+use super::definition::{SINEW_SOLVER_IMPLICIT, SINEW_SOLVER_NEWTON, SINEW_SOLVER_VERLET};
 use super::guard::{sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
+use crate::def::Solver;
 
 /// Energy of a body [J] at the time of the positions.
 #[repr(C)]
@@ -56,6 +58,14 @@ pub struct sinew_solver_report {
     pub solves: u32,
     /// IMPLICIT, NEWTON: 1 if every solve reached its tolerance or rounding level; 0 for VERLET.
     pub converged: u32,
+    /// Solver in use, a sinew_solver value; never AUTO.
+    pub solver: u32,
+    /// AUTO took IMPLICIT if VERLET needs more than 150 substeps; this is their number on creation, else 0.
+    pub auto_substeps: u32,
+    /// [s] AUTO: step length of the choice, the mean of the world so far or 1/60 s; else 0.
+    pub auto_step: f32,
+    /// Reserved; set to 0 by the library.
+    pub reserved: u32,
 }
 
 /// Sums over the closed cavities of a body; all 0 without enclosed_stiffness and pressure.
@@ -94,7 +104,11 @@ unsafe impl Versioned for sinew_enclosed_report {
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_solver_report {
-    const SIZES: &'static [usize] = &[offset_of!(Self, added_mass), size_of::<Self>()];
+    const SIZES: &'static [usize] = &[
+        offset_of!(Self, added_mass),
+        offset_of!(Self, solver),
+        size_of::<Self>(),
+    ];
     const NAME: &'static str = "sinew_solver_report";
 }
 
@@ -162,7 +176,7 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
     // SAFETY: the same contract.
     unsafe {
         with_body(world, body, |body| {
-            let report = body.solver_report();
+            let (report, choice) = (body.solver_report(), body.solver_choice());
             memory::report("out", out)?.fill(sinew_solver_report {
                 struct_size: size_of::<sinew_solver_report>(),
                 iterations: report.iterations,
@@ -170,6 +184,14 @@ pub unsafe extern "C" fn sinew_body_get_solver_report(
                 added_mass: report.added_mass,
                 solves: report.solves,
                 converged: u32::from(report.converged),
+                solver: match choice.solver {
+                    Solver::Verlet | Solver::Auto => SINEW_SOLVER_VERLET,
+                    Solver::Implicit => SINEW_SOLVER_IMPLICIT,
+                    Solver::Newton => SINEW_SOLVER_NEWTON,
+                },
+                auto_substeps: choice.substeps,
+                auto_step: choice.step,
+                reserved: 0,
             });
             Ok(())
         })

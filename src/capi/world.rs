@@ -5,7 +5,9 @@ use std::mem::offset_of;
 use glam::Vec3;
 use libc::c_void;
 
+use super::body::sinew_body_id;
 use super::guard::{guard, with_world, with_world_mut};
+use super::limit::{SINEW_LIMIT_NONE, limit_of};
 use super::log::{self, SINEW_LOG_WARNING};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
@@ -98,8 +100,22 @@ pub struct sinew_step_report {
     /// It counts edges inside other tissue, and inside their own body where that collides with itself. Contact
     /// pushes edges of another body out of a closed one in later steps.
     pub crossings: u32,
-    /// Reserved; set to 0 by the library.
-    pub reserved: u32,
+    /// Cause of SINEW_STATUS_UNSTABLE, see diagnostics.h; else 0.
+    pub limit: u32,
+    /// UNSTABLE: body with the shortest substep.
+    pub limit_body: sinew_body_id,
+    /// Nodes of what limits it; the last is repeated.
+    pub limit_nodes: [u32; 4],
+    /// UNSTABLE: substeps that the step needs.
+    pub limit_substeps: u32,
+    /// Budget: units of work allowed.
+    pub work: u32,
+    /// Budget: units of work done.
+    pub work_done: u32,
+    /// [m] Budget: largest remaining error of an equation.
+    pub residual: f32,
+    /// [s] Budget: time not simulated yet.
+    pub lag: f64,
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers and pointers alone; what is no function is the caller's breach.
@@ -110,7 +126,11 @@ unsafe impl Versioned for sinew_world_def {
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
 unsafe impl Versioned for sinew_step_report {
-    const SIZES: &'static [usize] = &[offset_of!(Self, crossings), size_of::<Self>()];
+    const SIZES: &'static [usize] = &[
+        offset_of!(Self, crossings),
+        offset_of!(Self, limit_body),
+        size_of::<Self>(),
+    ];
     const NAME: &'static str = "sinew_step_report";
 }
 
@@ -167,7 +187,14 @@ impl From<StepReport> for sinew_step_report {
             bodies_restored: report.bodies_restored,
             error_estimate: report.error_estimate,
             crossings: report.crossings,
-            reserved: 0,
+            limit: report.limit.map_or(SINEW_LIMIT_NONE, |limit| limit_of(limit.of.kind)),
+            limit_body: report.limit.map(|limit| limit.body).unwrap_or_default().into(),
+            limit_nodes: report.limit.map_or([0; 4], |limit| limit.of.nodes),
+            limit_substeps: report.limit.map_or(0, |limit| limit.needed),
+            work: 0,
+            work_done: 0,
+            residual: 0.0,
+            lag: 0.0,
         }
     }
 }

@@ -311,6 +311,12 @@ impl Contacts {
         self.look_again();
     }
 
+    /// Has tools keep this far off the body, m.
+    pub fn set_thickness(&mut self, thickness: f32) {
+        self.thickness = thickness;
+        self.look_again();
+    }
+
     /// Other tools may meet the body than those that what is near was gathered for.
     pub fn look_again(&mut self) {
         self.candidates.invalidate();

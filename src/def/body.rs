@@ -64,13 +64,18 @@ pub enum Storage {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
     /// Explicit, with as many substeps as it needs to be stable.
-    #[default]
     Verlet,
     /// Stable at any step.
     Implicit,
     /// The accurate reference: the equations of [`Solver::Implicit`], solved exactly; slow.
     Newton,
+    /// [`Solver::Verlet`] where its substeps are few, else [`Solver::Implicit`]: chosen when the body is made, from its mesh, its
+    /// material and the length of the world's steps; see [`Body::solver_choice`](crate::Body::solver_choice).
+    #[default]
+    Auto,
 }
+
+crate::codec::saved_enum!(Solver { 0 => Verlet, 1 => Implicit, 2 => Newton, 3 => Auto });
 
 /// A smaller mass, kg, has no finite inverse.
 pub(crate) const SMALLEST_MASS: f32 = 1e-37;
@@ -240,7 +245,7 @@ impl Default for BodyDefinition<'_> {
             contact: BodyContact::default(),
             storage: Storage::Packed,
             springs_per_node: 0,
-            solver: Solver::Verlet,
+            solver: Solver::Auto,
             order: 0,
             iterations: 0,
             accuracy: 0.0,

@@ -1,6 +1,7 @@
 //! What callers say of bodies, as plain data that checks itself, and what bodies report.
 
 mod body;
+mod choice;
 mod contact;
 mod element_law;
 mod material;
@@ -16,12 +17,13 @@ pub(crate) use body::{
     MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite, finite_vector,
     finite_vectors, node_indices, not_negative,
 };
+pub use choice::{ChoiceReason, LimitKind, SolverChoice, SubstepLimit};
 pub(crate) use contact::check_reach;
 pub use contact::{BodyContact, CollisionFilter, Detection};
 pub use element_law::ElementLaw;
 pub use material::{Material, Model};
 pub use report::{EnclosedReport, Energy, SolverReport, StorageReport};
-pub use sleep::Sleep;
+pub use sleep::{BodySettings, Sleep};
 pub use spring_law::SpringLaw;
 pub(crate) use tearing::Withheld;
 pub use tearing::{TearReport, Tearing};

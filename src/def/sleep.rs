@@ -1,4 +1,4 @@
-//! When a body sleeps.
+//! When a body sleeps, and what of it can be set later.
 
 use super::not_negative;
 use crate::base::{Error, Result};
@@ -14,6 +14,21 @@ pub struct Sleep {
 }
 
 saved!(Sleep { speed, time });
+
+/// What of a body can be set after it was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodySettings {
+    /// [`BodyContact::thickness`](super::BodyContact::thickness).
+    pub thickness: f32,
+    /// [`BodyContact::friction`](super::BodyContact::friction).
+    pub friction: f32,
+    /// [`BodyContact::with_bodies`](super::BodyContact::with_bodies).
+    pub with_bodies: bool,
+    /// [`BodyContact::with_itself`](super::BodyContact::with_itself).
+    pub with_itself: bool,
+    /// When it sleeps.
+    pub sleep: Sleep,
+}
 
 impl Default for Sleep {
     /// Never; after half a second.

@@ -115,6 +115,41 @@ impl Elements {
         });
     }
 
+    /// The tetrahedron that bounds substeps with nodes at `positions`, its node of the highest frequency first, and the bound, s, where
+    /// bounds at rest are known; `None`: there is none with a free node.
+    pub fn tightest(&self, masses: &Masses, positions: &Vectors) -> Option<([u32; 4], f32)> {
+        let mut tightest = None;
+        let mut shortest = f32::INFINITY;
+        self.stiffenings(positions, &mut |corners, stiffening| {
+            for node in corners {
+                let inverse_mass = masses.inverse(node as usize);
+                let carried = self.carried_at_rest(node as usize, inverse_mass);
+                let limit = Rates {
+                    stiffest: 2.0 * stiffening as f32 * carried.stiffness * inverse_mass,
+                    most_damped: 2.0 * carried.damping * inverse_mass,
+                }
+                .limit();
+                if limit < shortest {
+                    (tightest, shortest) = (Some(node), limit);
+                }
+            }
+        });
+        let node = tightest?;
+        // Of those about the node the one that it carries most of.
+        let (mut found, mut most) = ([node; 4], -1.0);
+        self.visit(&mut |corners, rest| {
+            if let Some(place) = corners.iter().position(|&corner| corner == node) {
+                let free = corners.map(|node| masses.inverse(node as usize) > 0.0);
+                let carried = carried(self.law, rest, free)[place];
+                if carried > most {
+                    (found, most) = (corners, carried);
+                    found.swap(0, place);
+                }
+            }
+        });
+        Some((found, shortest))
+    }
+
     fn add_carried(&self, masses: &Masses, mut add: impl FnMut(usize, f64)) {
         self.visit(&mut |corners, rest| {
             let free = corners.map(|node| masses.inverse(node as usize) > 0.0);

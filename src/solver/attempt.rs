@@ -49,9 +49,26 @@ pub(crate) struct StepRequest<'a> {
     pub neighbor_speed: Option<f32>,
     /// Where the stages are timed, if they are.
     pub profile: Option<&'a Profile>,
+    /// Whether mass may be added where more substeps are needed than are allowed.
+    pub relieves: bool,
 }
 
 impl StepRequest<'_> {
+    /// That of a step without gravity or tools.
+    pub fn alone(dt: f32, max_substeps: u32) -> Self {
+        Self {
+            dt,
+            gravity: Vec3::ZERO,
+            substeps: 0,
+            max_substeps,
+            tolerance: 0.0,
+            tools: &[],
+            neighbor_speed: None,
+            relieves: false,
+            profile: None,
+        }
+    }
+
     /// The same with the gravity that acts on a body.
     pub fn of(&self, body: &Body) -> Self {
         Self {
@@ -228,6 +245,11 @@ pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Nee
             masses_for: 0.0,
         },
     }
+}
+
+/// How many substeps a step of VERLET takes with the nodes where they are.
+pub(crate) fn substeps_alone(body: &mut Body, request: &StepRequest, team: &Team) -> u32 {
+    needed(body, request, team).substeps
 }
 
 /// A number of substeps, 1 at least.

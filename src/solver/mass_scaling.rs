@@ -440,6 +440,13 @@ impl MassScaling {
         }
     }
 
+    /// Nodes are damped at these rates from now on, 1/s, with their masses as they are.
+    pub fn set_rates(&mut self, rates: &[f32]) {
+        for sliver in &mut self.slivers {
+            sliver.rate = rates[sliver.node as usize];
+        }
+    }
+
     /// Nodes differ in mass from now on.
     pub fn forget_uniform(&mut self) {
         self.uniform_inverse_mass = None;

@@ -144,6 +144,33 @@ impl Stability {
         }
     }
 
+    /// The node whose springs allow the shortest substep at these positions, the other end of its stiffest spring, and that substep, s;
+    /// `None`: no node that is free has springs.
+    pub fn tightest(springs: &dyn Springs, masses: Masses, positions: &Vectors) -> Option<([usize; 2], f32)> {
+        let mut tightest = None;
+        let mut shortest = f32::INFINITY;
+        for node in 0..masses.masses.len() {
+            if let Some(sums) = Sums::of(node, springs, &masses, positions)
+                && sums.anywhere.limit() < shortest
+            {
+                let limit = sums.limit_below(shortest);
+                if limit < shortest {
+                    (tightest, shortest) = (Some(node), limit);
+                }
+            }
+        }
+        let node = tightest?;
+        let (mut other, mut stiffest) = (node, -1.0);
+        springs.visit(node, &mut |link| {
+            let inverse_mass = masses.inverse(node) + masses.inverse(link.neighbour as usize);
+            let stiffness = (link.stiffness + link.damping / shortest) * inverse_mass;
+            if stiffness > stiffest {
+                (other, stiffest) = (link.neighbour as usize, stiffness);
+            }
+        });
+        Some(([node, other], shortest))
+    }
+
     /// The same after springs of these nodes, given in order, have come or changed: no other node has to be looked at. Where they
     /// became softer it may be lower than it has to be.
     pub fn changed(

@@ -401,6 +401,11 @@ impl Terms {
         }
     }
 
+    /// Shows what each node carries of each term, N/m, where those that are not free go no way.
+    pub fn show_carried(&self, masses: &Masses, see: &mut dyn FnMut(usize, f32)) {
+        self.laws.iter().for_each(|law| law.show_carried(masses, see));
+    }
+
     /// Forces are about to be worked out for other positions.
     pub fn begin(&mut self) {
         *self.stiffening.get_mut() = 1.0_f32.to_bits();

@@ -115,6 +115,9 @@ impl World {
             holds_made,
             haptics: _,
             clock,
+            work: _,
+            lag,
+            pace: _,
             user_data: _,
             profile: _,
             recorder: _,
@@ -127,6 +130,7 @@ impl World {
             slipped.save(to);
             holds_made.save(to);
             clock.save(to);
+            lag.save(to);
         });
         write_section(to, *b"BODY", |to| bodies.save(to));
         write_section(to, *b"TOOL", |to| tools.save(to));
@@ -166,6 +170,10 @@ impl World {
         world.slipped = Saved::load(&mut from)?;
         world.holds_made = Saved::load(&mut from)?;
         world.clock = Saved::load(&mut from)?;
+        world.lag = Saved::load(&mut from)?;
+        if !(world.lag >= 0.0 && world.lag.is_finite()) {
+            return Err(from.refusal("a lag that is none"));
+        }
         at_end(&from)?;
         let mut from = section(&mut bytes, *b"BODY", kernel)?;
         world.bodies = Slots::load("body", &mut from)?;

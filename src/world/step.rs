@@ -2,11 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
-use super::World;
+use super::{BodyId, World};
 use crate::base::{Count, Error, Result, Stage, Stopwatch};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
+use crate::def::{LimitKind, SubstepLimit};
 use crate::ids::Slots;
 use crate::solver::{Outcome, StepRequest, Together, attempt};
 use crate::threads::{Items, Team};
@@ -16,6 +17,9 @@ const SHARED_FROM: usize = 8192;
 
 /// Small bodies of fewer nodes in all are not worth waking anybody.
 const WORTH_SHARING: usize = 1024;
+
+/// The part of the longest stable substep that a step uses.
+const USED_OF_LIMIT: f32 = 0.8;
 
 /// What a step did.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +36,43 @@ pub struct StepReport {
     /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
     /// apart. Those of another body in one that is closed come out again by themselves.
     pub crossings: u32,
+    /// What a step that is refused as unstable failed by.
+    pub limit: Option<StepLimit>,
+}
+
+/// The body that needs more substeps than are allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepLimit {
+    /// Which.
+    pub body: BodyId,
+    /// What of it allows no longer substep, where its nodes were as the step began.
+    pub of: SubstepLimit,
+    /// How many substeps the step would need, as far as that is known.
+    pub needed: u32,
+}
+
+saved!(StepLimit { body, of, needed });
+
+impl std::fmt::Display for StepLimit {
+    /// Names the body, what limits it, and what helps.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { body, of, needed } = self;
+        let (index1, generation) = (body.0.index1, body.0.generation);
+        write!(f, "body {index1}:{generation} is limited by {}", of.kind.name())?;
+        match of.nodes() {
+            [] => {}
+            [node] => write!(f, " of node {node}")?,
+            nodes => write!(f, " of nodes {nodes:?}")?,
+        }
+        match of.kind {
+            LimitKind::Parts => write!(f, ": take shorter steps"),
+            LimitKind::Tolerance => write!(f, ": raise tolerance or max_substeps, or take shorter steps"),
+            _ => write!(
+                f,
+                " and needs {needed} substeps: use solver AUTO or IMPLICIT, raise mass_scaling or max_substeps, or take shorter steps"
+            ),
+        }
+    }
 }
 
 saved!(StepReport {
@@ -39,7 +80,8 @@ saved!(StepReport {
     stable_substep,
     bodies_restored,
     error_estimate,
-    crossings
+    crossings,
+    limit
 });
 
 impl World {
@@ -97,10 +139,11 @@ impl World {
                 Ok(_) => self.put_back(),
                 Err(report) => {
                     self.put_back();
+                    let limit = self.limit(dt);
                     return Err(Error::Unstable {
-                        report,
+                        report: StepReport { limit, ..report },
                         allowed: match self.definition.substeps {
-                            0 => self.definition.max_substeps,
+                            0 => self.definition.max_substeps.min(self.work),
                             fixed => fixed,
                         },
                     });
@@ -130,6 +173,7 @@ impl World {
             tissue,
             walks,
             profile,
+            work,
             ..
         } = self;
         let profile = profile.as_deref();
@@ -140,7 +184,8 @@ impl World {
             dt,
             gravity: definition.gravity,
             substeps: definition.substeps,
-            max_substeps: definition.max_substeps,
+            max_substeps: definition.max_substeps.min(*work),
+            relieves: *work == u32::MAX,
             // Fixed substeps are taken as they are.
             tolerance: if definition.substeps == 0 {
                 definition.tolerance
@@ -186,6 +231,29 @@ impl World {
         let crossings = tissue.find_crossings(bodies, true);
         watch.stop(profile, Stage::NarrowPhase);
         Ok(crossings)
+    }
+
+    /// What the step in progress failed by: of the body that needs most substeps.
+    fn limit(&self, dt: f32) -> Option<StepLimit> {
+        let failed = self.bodies.iter_ids().filter_map(|(id, body)| {
+            let Some(Outcome::Unstable { stable_substep, error }) = self.outcomes[id.index()] else {
+                return None;
+            };
+            Some((id, body, stable_substep, error))
+        });
+        let (id, body, stable_substep, error) = failed.min_by(|one, other| one.2.total_cmp(&other.2))?;
+        let of = if error > 0.0 {
+            SubstepLimit::of_all(LimitKind::Tolerance)
+        } else if body.implicit.is_some() {
+            SubstepLimit::of_all(LimitKind::Parts)
+        } else {
+            body.substep_limit()
+        };
+        Some(StepLimit {
+            body: BodyId(id),
+            of,
+            needed: (dt / (USED_OF_LIMIT * stable_substep)).ceil() as u32,
+        })
     }
 
     /// Takes back what bodies have tried.
@@ -337,6 +405,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
         bodies_restored: 0,
         error_estimate: 0.0,
         crossings,
+        limit: None,
     };
     for (place, body) in bodies.iter() {
         let stable_substep = match outcomes[place] {

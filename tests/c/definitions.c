@@ -55,7 +55,7 @@ static sinew_body_id body_of_the_oldest_definition(sinew_world *world)
     CHECK(def.now.triangles == NULL && def.now.triangle_count == 0);
     CHECK(def.now.tetrahedra == NULL && def.now.tetrahedron_count == 0);
     CHECK(def.now.storage == SINEW_STORAGE_PACKED && def.now.springs_per_node == 0);
-    CHECK(def.now.solver == SINEW_SOLVER_VERLET && def.now.reserved == 0);
+    CHECK(def.now.solver == SINEW_SOLVER_AUTO && def.now.reserved == 0);
     def.now.positions = three_nodes;
     def.now.node_count = 3;
     def.now.node_mass = 0.1f;

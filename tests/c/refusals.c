@@ -165,7 +165,7 @@ static void body_definitions(void)
     BODY(INVALID, "reserved", def.reserved = 1);
     BODY(INVALID, "storage", def.storage = 4);
     BODY(INVALID, "storage", def.storage = UINT32_MAX);
-    BODY(INVALID, "solver", def.solver = 3);
+    BODY(INVALID, "solver", def.solver = 4);
     BODY(INVALID, "solver", def.solver = UINT32_MAX);
     BODY(CAPACITY, "springs_per_node", def.storage = SINEW_STORAGE_FAST_LINK; def.springs_per_node = 1);
     BODY(INVALID, "order", def.order = 3);

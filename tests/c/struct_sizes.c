@@ -180,6 +180,10 @@ int main(void)
         sinew_step_report report;
         sinew_frame frame;
         SIZES("report->struct_size", sinew_step_report, report.struct_size, sinew_world_step(world, 1e-3f, &report));
+        SIZES("report->struct_size", sinew_step_report, report.struct_size,
+              sinew_world_step_with_budget(world, 1e-3f, 100, &report));
+        SIZES("report->struct_size", sinew_step_report, report.struct_size,
+              sinew_world_step_within(world, 1e-3f, 1, &report));
         MUST(sinew_reader_create(world, body, &reader));
         SIZES("out->struct_size", sinew_frame, frame.struct_size, sinew_reader_read(reader, &frame));
         sinew_reader_destroy(reader);
@@ -188,12 +192,16 @@ int main(void)
         sinew_energy energy;
         sinew_storage_report storage;
         sinew_solver_report solver;
+        sinew_body_settings settings;
         sinew_enclosed_report enclosed;
         sinew_tear_report torn;
         sinew_material_preset preset;
         SIZES("out->struct_size", sinew_energy, energy.struct_size, sinew_body_get_energy(world, body, &energy));
         SIZES("out->struct_size", sinew_storage_report, storage.struct_size, sinew_body_get_storage_report(world, body, &storage));
         SIZES("out->struct_size", sinew_solver_report, solver.struct_size, sinew_body_get_solver_report(world, body, &solver));
+        SIZES("out->struct_size", sinew_body_settings, settings.struct_size, sinew_body_get_settings(world, body, &settings));
+        SIZES("settings->struct_size", sinew_body_settings, settings.struct_size,
+              sinew_body_set_settings(world, body, &settings));
         SIZES("out->struct_size", sinew_enclosed_report, enclosed.struct_size, sinew_body_get_enclosed_report(world, body, &enclosed));
         SIZES("out->struct_size", sinew_tear_report, torn.struct_size, sinew_body_get_tear_report(world, body, &torn));
         SIZES("out->struct_size", sinew_material_preset, preset.struct_size,

@@ -10,7 +10,7 @@ const LAYOUT: &str = include_str!("layout.txt");
 const OVERVIEW: &str = include_str!("overview.txt");
 
 /// Constants that C has as an enumeration: its name, the prefix of its constants and its comment.
-const ENUMS: [(&str, &str, &str); 15] = [
+const ENUMS: [(&str, &str, &str); 16] = [
     (
         "sinew_status_code",
         "SINEW_STATUS_",
@@ -27,6 +27,11 @@ const ENUMS: [(&str, &str, &str); 15] = [
         "Memory layout of the springs of a body.",
     ),
     ("sinew_solver", "SINEW_SOLVER_", "Time integrator of a body."),
+    (
+        "sinew_limit",
+        "SINEW_LIMIT_",
+        "Limit of the substep of a step that was refused.",
+    ),
     (
         "sinew_material",
         "SINEW_MATERIAL_",

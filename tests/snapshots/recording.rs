@@ -41,8 +41,8 @@ fn frames(bytes: &[u8]) -> Vec<[usize; 2]> {
     let mut frames = Vec::new();
     let mut at = 12;
     while at < bytes.len() {
-        let length = u64::from_le_bytes(bytes[at + 13..at + 21].try_into().expect("8 bytes"));
-        let end = at + 21 + length as usize;
+        let length = u64::from_le_bytes(bytes[at + 17..at + 25].try_into().expect("8 bytes"));
+        let end = at + 25 + length as usize;
         frames.push([at + 1, end + 2]);
         at = end + 10;
     }
@@ -91,6 +91,23 @@ fn a_recording_changes_no_state() {
         assert_eq!(plain.state_hash(), recorded.state_hash());
     }
     assert_eq!(recorded.stop_recording(), Ok(10));
+    fs::remove_file(&path).expect("the file");
+}
+
+#[test]
+fn steps_of_bounded_work_are_replayed() {
+    let path = path("bounded");
+    let mut world = hanging();
+    world.start_recording(&path).expect("a file");
+    let mut lags = 0;
+    for work in [1, 2, 3, 50, 1, 7] {
+        let report = world.step_with_budget(8e-3, work).expect("a step");
+        lags += u32::from(report.lag > 0.0);
+    }
+    assert!(lags > 1, "some steps are cut short by their work");
+    let steps = world.stop_recording().expect("a recording");
+    let report = World::replay(&path, 1).expect("a replay");
+    assert_eq!((report.steps, report.difference), (steps, None));
     fs::remove_file(&path).expect("the file");
 }
 

@@ -21,6 +21,7 @@ fn springs_beyond_the_range_allow_no_step() {
             rest_lengths: Some(&[1.0]),
             masses: Values::Uniform(1e-3),
             stiffnesses: Values::Uniform(stiffness),
+            solver: Solver::Verlet,
             ..BodyDefinition::default()
         };
         let body = world.create_body(&definition).expect("a body");

@@ -3,6 +3,8 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod auto;
+mod budget;
 mod implicit;
 mod implicit_motion;
 mod implicit_press;
@@ -16,6 +18,7 @@ mod organ;
 mod pin_axes;
 mod rest_state;
 mod rigid_motion;
+mod settings;
 mod storages;
 mod threads;
 mod tolerance;

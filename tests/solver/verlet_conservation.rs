@@ -3,7 +3,7 @@
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use glam::{DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Viscosity, World, WorldDefinition};
+use sinew::{BodyDefinition, Material, Model, Solver, Viscosity, World, WorldDefinition};
 
 const STEPS: usize = 1_000_000;
 const WINDOW: usize = 20_000;
@@ -208,6 +208,7 @@ fn what_is_viscous_keeps_its_angular_momentum() {
             retardation_time: 2.6e-4,
             relaxation_time: 0.0,
         },
+        solver: Solver::Verlet,
         ..BodyDefinition::default()
     });
     let body = body.expect("a body");

@@ -1,7 +1,7 @@
 //! Bodies of springs for physics tests, owned by the test that changes them, and a world to step one in.
 
 use glam::{DVec3, Quat, Vec3};
-use sinew::{Body, BodyDefinition, BodyId, StepReport, Values, World, WorldDefinition};
+use sinew::{Body, BodyDefinition, BodyId, Solver, StepReport, Values, World, WorldDefinition};
 
 use super::reference::Reference;
 
@@ -123,6 +123,7 @@ impl Parts {
             stiffnesses: Values::Each(&self.stiffnesses),
             rest_lengths: Some(&self.rest_lengths),
             spring_dampings: Values::Uniform(self.spring_damping),
+            solver: Solver::Verlet,
             ..BodyDefinition::default()
         }
     }

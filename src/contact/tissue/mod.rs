@@ -162,6 +162,11 @@ impl Tissue {
     /// A body is gone.
     pub fn leave(&mut self, bodies: &mut Slots<Body>, place: usize) {
         self.bonds.leave(bodies, place);
+        self.shed(place);
+    }
+
+    /// A body meets no tissue any more; what is attached of it stays so.
+    pub fn shed(&mut self, place: usize) {
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }

@@ -391,6 +391,13 @@ impl Skin {
         self.nearby = Some(nearby);
     }
 
+    /// What is near itself is another: it keeps another distance.
+    pub fn forget_nearby(&mut self) {
+        if let Some(nearby) = &mut self.nearby {
+            nearby.forget();
+        }
+    }
+
     /// Takes the trees to where the triangles are.
     fn fit(&mut self) {
         if !self.is_fitted {

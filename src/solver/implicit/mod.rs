@@ -118,6 +118,8 @@ pub(crate) struct Implicit {
     /// The most products with the matrix for each equation asked for, and what is left of it for the step in progress.
     budget: u32,
     left: u32,
+    /// The most products in the step in progress, whatever the definition allows.
+    allowed: u32,
     /// The part of a step's correction that may be missing.
     accuracy: f32,
     histories: [History; 2],
@@ -180,6 +182,7 @@ pub(crate) struct Implicit {
 }
 
 saved!(Implicit {
+    allowed,
     order,
     budget,
     left,
@@ -259,6 +262,7 @@ impl Implicit {
             order: if order == 0 { 2 } else { order },
             budget,
             left: 0,
+            allowed: u32::MAX,
             accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
             is_deflected: false,
             histories: [
@@ -440,6 +444,11 @@ impl Implicit {
             newton: Some(Newton::new(positions.len(), springs, elements, beside)?),
             ..Self::solving(&Vectors::zeros(0)?, positions.len(), false, order, budget, accuracy)?
         })
+    }
+
+    /// Lets each step from now on take so many products at most; `u32::MAX`: as many as the definition allows.
+    pub fn allow(&mut self, products: u32) {
+        self.allowed = products;
     }
 
     /// Makes room for so many springs in all.

@@ -76,7 +76,7 @@ pub(in crate::solver) fn run(
     let mut parts = 1;
     if let Some(mut implicit) = body.implicit.take() {
         implicit.report = SolverReport::BEFORE;
-        implicit.left = implicit.budget.saturating_mul(request.substeps.max(1));
+        implicit.left = (implicit.budget.saturating_mul(request.substeps.max(1))).min(implicit.allowed);
         let short = (f64::from(request.dt) / (f64::from(substeps) * contact::LONGEST))
             .ceil()
             .max(1.0);
@@ -123,7 +123,7 @@ pub(in crate::solver) fn run(
 impl Implicit {
     /// Lets a step of so many parts have its share for each.
     fn grant(&mut self, parts: u32) {
-        let share = (self.budget / SHARE).max(1);
+        let share = (self.budget.min(self.allowed) / SHARE).max(1);
         self.left = self.left.max(share.saturating_mul(parts));
     }
 }
@@ -206,7 +206,7 @@ pub(in crate::solver) fn begin_parts(body: &mut Body, request: &StepRequest, par
     begin(body, request);
     if let Some(implicit) = &mut body.implicit {
         implicit.report = SolverReport::BEFORE;
-        implicit.left = implicit.budget;
+        implicit.left = implicit.budget.min(implicit.allowed);
         implicit.grant(parts);
         implicit.begin();
     }

@@ -13,7 +13,8 @@
 //! |---|---|
 //! | 1 byte: [`BEGIN`] | 1 byte: [`END`] |
 //! | 4 bytes: `dt`, f32 | 1 byte: 1 where the step was refused, else 0 |
-//! | 8 bytes: how long the snapshot is | 8 bytes: the state hash |
+//! | 4 bytes: the units of work that it may do, u32 | 8 bytes: the state hash |
+//! | 8 bytes: how long the snapshot is | |
 //! | 8 bytes: how long the difference is | |
 //! | the [`difference`] to the snapshot after the last step | |
 //!
@@ -65,6 +66,7 @@ impl Recorder {
         }
         put(&mut self.frame, &[BEGIN])?;
         put(&mut self.frame, &dt.to_le_bytes())?;
+        put(&mut self.frame, &world.work.to_le_bytes())?;
         put(&mut self.frame, &(self.now.len() as u64).to_le_bytes())?;
         let length_at = self.frame.len();
         put(&mut self.frame, &[0; 8])?;

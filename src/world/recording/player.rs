@@ -92,9 +92,11 @@ impl Frames {
         }
     }
 
-    /// How the next step begins: its length, the size of its snapshot, and the difference.
-    fn begin(&mut self) -> Result<Option<(f32, usize, Vec<u8>)>> {
-        let (Some(dt), Some(size), Some(length)) = (self.array()?, self.array()?, self.array()?) else {
+    /// How the next step begins: its length and work, the size of its snapshot, and the difference.
+    fn begin(&mut self) -> Result<Option<((f32, u32), usize, Vec<u8>)>> {
+        let (Some(dt), Some(work), Some(size), Some(length)) =
+            (self.array()?, self.array()?, self.array()?, self.array()?)
+        else {
             return Ok(None);
         };
         let [size, length] = [size, length].map(u64::from_le_bytes);
@@ -104,7 +106,8 @@ impl Frames {
         let too_long = |_| Error::invalid(format!("{} is damaged: a snapshot of {size} bytes", self.name));
         let mut bytes = memory::filled(0, usize::try_from(length).map_err(too_long)?)?;
         let size = usize::try_from(size).map_err(too_long)?;
-        Ok(self.fill(&mut bytes)?.map(|()| (f32::from_le_bytes(dt), size, bytes)))
+        let step = (f32::from_le_bytes(dt), u32::from_le_bytes(work));
+        Ok(self.fill(&mut bytes)?.map(|()| (step, size, bytes)))
     }
 
     /// How a step ended: whether it was refused, and the hash.
@@ -134,7 +137,7 @@ impl World {
         let mut world: Option<World> = None;
         let mut before = Vec::new();
         while frames.frame(BEGIN)?.is_some() {
-            let Some((dt, size, difference)) = frames.begin()? else {
+            let Some(((dt, work), size, difference)) = frames.begin()? else {
                 report.is_cut_short = true;
                 break;
             };
@@ -144,7 +147,7 @@ impl World {
                 Some(it) if bytes == before => it,
                 _ => World::load(&bytes, thread_count, None)?,
             };
-            let result = it.step(dt);
+            let result = it.step_of(dt, work);
             let Some((is_refused, recorded)) = frames.end()? else {
                 report.is_cut_short = true;
                 break;

@@ -1,0 +1,88 @@
+//! Steps of bounded work and time.
+
+use super::guard::{sinew_world, with_world_mut};
+use super::memory;
+use super::status::sinew_status;
+use super::world::sinew_step_report;
+use crate::base::{Error, Result};
+use crate::world::{BudgetReport, World};
+
+impl From<BudgetReport> for sinew_step_report {
+    fn from(report: BudgetReport) -> Self {
+        Self {
+            work: report.work,
+            work_done: report.work_done,
+            residual: report.error,
+            lag: report.lag,
+            ..report.step.into()
+        }
+    }
+}
+
+/// Steps, and writes what came of it.
+///
+/// # Safety
+/// As of what calls it.
+unsafe fn step(
+    world: *mut sinew_world,
+    report: *mut sinew_step_report,
+    step: impl FnOnce(&mut World) -> Result<BudgetReport>,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let report = (!report.is_null()).then(|| memory::report("report", report));
+            let report = report.transpose()?;
+            let result = step(world);
+            let told = match &result {
+                Ok(done) => Some((*done).into()),
+                Err(Error::Unstable { report, .. }) => Some((*report).into()),
+                Err(_) => None,
+            };
+            if let (Some(report), Some(told)) = (report, told) {
+                report.fill(told);
+            }
+            result.map(drop)
+        })
+    }
+}
+
+/// Advances the world by at most `work` units of work.
+///
+/// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The step covers `dt` [s]
+/// plus the lag, or as much as VERLET reaches in `work` substeps; the rest is the new lag. Other solvers stop after
+/// `work` products and continue in the next step. Tools, pins and blades complete their motion; forces act on the
+/// simulated time. `report` is nullable.
+///
+/// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_step_with_budget(
+    world: *mut sinew_world,
+    dt: f32,
+    work: u32,
+    report: *mut sinew_step_report,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { step(world, report, |world| world.step_with_budget(dt, work)) }
+}
+
+/// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
+///
+/// The first calls do little work and measure. A step can be late if the machine or the scene became slower. For a
+/// bitwise replay record `work` of `report`.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_step_within(
+    world: *mut sinew_world,
+    dt: f32,
+    seconds: f64,
+    report: *mut sinew_step_report,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe { step(world, report, |world| world.step_within(dt, seconds)) }
+}

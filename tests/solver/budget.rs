@@ -1,0 +1,176 @@
+//! Steps of bounded work: what they do is bounded, nothing is lost, energy does not grow, and the same work gives the same bits.
+
+use glam::Vec3;
+use sinew::{BodyDefinition, Error, Shape, Solver, ToolDefinition, World, WorldDefinition};
+
+use crate::support::bodies::{FREE, Parts, Scene};
+
+const DT: f32 = 1.0 / 60.0;
+
+const EARTH: WorldDefinition = WorldDefinition {
+    gravity: Vec3::new(0.0, -9.81, 0.0),
+    ..FREE
+};
+
+/// A block held at a corner, whose explicit steps take some tens of substeps.
+fn block() -> Parts {
+    let mut parts = Parts::block([6, 3, 3], 0.02, 1e-3, 2000.0);
+    parts.masses[0] = 0.0;
+    parts.node_dampings.fill(1e-4);
+    parts
+}
+
+fn scene(solver: Solver, threads: u32) -> Scene {
+    let world = WorldDefinition {
+        thread_count: threads,
+        ..EARTH
+    };
+    Scene::with(&block(), world, |definition| BodyDefinition { solver, ..definition })
+}
+
+#[test]
+fn a_step_with_work_enough_is_a_step() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let (mut plain, mut budgeted) = (scene(solver, 1), scene(solver, 1));
+        for _ in 0..20 {
+            let report = plain.step(DT);
+            let done = budgeted.world.step_with_budget(DT, 1_000_000).expect("a step");
+            assert_eq!((done.step, done.lag), (report, 0.0));
+        }
+        assert_eq!(plain.world.state_hash(), budgeted.world.state_hash(), "{solver:?}");
+    }
+}
+
+#[test]
+fn explicit_work_is_bounded_and_time_is_carried_on() {
+    let mut scene = scene(Solver::Verlet, 1);
+    let needed = scene.step(DT).substeps;
+    assert!(needed > 20, "{needed}");
+    let energy = scene.energy();
+    let kinetic = |scene: &Scene| scene.body().energy(scene.world.gravity()).kinetic;
+    let mut most = kinetic(&scene);
+    for step in 1..=30 {
+        let done = scene.world.step_with_budget(DT, 7).expect("a step");
+        assert!(done.work_done <= 7 && done.work == 7, "{done:?}");
+        assert_eq!((done.error, done.step.bodies_restored), (0.0, 0));
+        assert!(done.lag > 0.0 && done.lag < f64::from(DT) * f64::from(step), "{done:?}");
+        most = most.max(kinetic(&scene));
+        // Leapfrog's energy swings by a part of what moves; it does not drift.
+        assert!(
+            scene.energy() <= energy + 0.02 * most,
+            "{} J of {energy} J",
+            scene.energy()
+        );
+    }
+    assert!(scene.world.lag() > 10.0 * f64::from(DT), "{} s", scene.world.lag());
+    // Nothing of the time is lost, and all of it is made up for.
+    let mut steps = 31;
+    while scene.world.lag() > 0.0 && steps < 60 {
+        scene.world.step_with_budget(DT, 1_000_000).expect("a step");
+        steps += 1;
+        let known = scene.world.time() + scene.world.lag();
+        assert!((known / (f64::from(steps) * f64::from(DT)) - 1.0).abs() < 1e-6);
+    }
+    assert_eq!(scene.world.lag(), 0.0);
+}
+
+#[test]
+fn an_equation_that_is_solved_in_part_gains_no_energy_and_says_what_is_off() {
+    let mut scene = scene(Solver::Implicit, 1);
+    let energy = scene.energy();
+    let mut largest = 0.0_f32;
+    for _ in 0..60 {
+        let done = scene.world.step_with_budget(DT, 3).expect("a step");
+        // An equation takes one product at least, whatever is left.
+        assert!(done.work_done <= 12 && done.lag == 0.0, "{done:?}");
+        assert!(scene.is_finite() && done.step.bodies_restored == 0);
+        assert!(
+            scene.energy() <= energy + 1e-4 * energy.abs(),
+            "{} J of {energy} J",
+            scene.energy()
+        );
+        largest = largest.max(done.error);
+    }
+    let mut solved = self::scene(Solver::Implicit, 1);
+    let done = solved.world.step_with_budget(DT, 1000).expect("a step");
+    assert!(
+        largest > 10.0 * done.error && done.error > 0.0,
+        "{largest} m, {} m",
+        done.error
+    );
+}
+
+#[test]
+fn recorded_work_is_replayed_to_the_bit() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let mut timed = scene(solver, 1);
+        let works: Vec<u32> = (0..12)
+            .map(|step| {
+                let seconds = [1e-5, 1e-3, 1.0][step % 3];
+                timed.world.step_within(DT, seconds).expect("a step").work
+            })
+            .collect();
+        let mut replayed = scene(solver, 2);
+        for (step, work) in works.into_iter().enumerate() {
+            if step == 6 {
+                let bytes = replayed.world.save().expect("a snapshot");
+                replayed.world = World::load(&bytes, 1, None).expect("a world");
+            }
+            replayed.world.step_with_budget(DT, work).expect("a step");
+        }
+        assert_eq!(timed.world.state_hash(), replayed.world.state_hash(), "{solver:?}");
+        assert_eq!(timed.world.lag(), replayed.world.lag());
+    }
+}
+
+#[test]
+fn contact_holds_however_little_work_is_allowed() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let mut parts = block();
+        parts.masses[0] = parts.masses[1];
+        let lowest = parts
+            .positions
+            .iter()
+            .fold(f32::INFINITY, |low, place| low.min(place.y));
+        parts.positions.iter_mut().for_each(|place| place.y += 0.01 - lowest);
+        let mut scene = Scene::with(&parts, EARTH, |definition| BodyDefinition { solver, ..definition });
+        scene
+            .world
+            .create_tool(&ToolDefinition::new(Shape::Plane))
+            .expect("a plane");
+        let mut nearest = f64::INFINITY;
+        for _ in 0..60 {
+            scene.world.step_with_budget(DT, 10).expect("a step");
+            let lowest = scene
+                .positions()
+                .iter()
+                .fold(f64::INFINITY, |low, place| low.min(place.y));
+            assert!(lowest > -1e-6, "{solver:?}: {lowest} m");
+            nearest = nearest.min(lowest);
+        }
+        assert!(nearest < 1e-3, "{solver:?}: it has landed, {nearest} m");
+    }
+}
+
+#[test]
+fn what_is_no_budget_is_refused() {
+    let mut scene = scene(Solver::Verlet, 1);
+    let before = scene.world.state_hash();
+    let world = &mut scene.world;
+    for (refused, word) in [
+        (world.step_with_budget(DT, 0), "work is 0"),
+        (world.step_with_budget(f32::NAN, 5), "dt is NaN"),
+        (world.step_within(DT, 0.0), "seconds is 0"),
+        (world.step_within(DT, f64::INFINITY), "seconds is inf"),
+        (world.step_within(-1.0, 1.0), "dt is -1"),
+    ] {
+        let Err(Error::InvalidArgument(message)) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!(message.contains(word), "{message}");
+    }
+    world.set_substeps(100, 1000).expect("substeps");
+    assert!(matches!(world.step_with_budget(DT, 5), Err(Error::Unsupported(_))));
+    world.set_substeps(0, 1000).expect("substeps");
+    assert_eq!((world.state_hash(), world.lag()), (before, 0.0));
+}
