@@ -415,6 +415,7 @@ fn terms_and_elements_see_that_springs_became_stiffer() {
             stiffnesses: Values::Uniform(4.0),
             spring_law,
             volume_stiffness,
+            solver: Solver::Verlet,
             ..Default::default()
         });
         let mut scene = Scene {
