@@ -35,7 +35,7 @@ mod world;
 
 pub use base::{Error, Result};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
-pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
+pub use contact::{Contact, ContactChange, MassProperties, Pose, Shape, ToolDefinition};
 pub use def::{
     BodyContact, BodyDefinition, CollisionFilter, Detection, ElementLaw, EnclosedReport, Energy, Material, Model,
     Sleep, Solver, SolverReport, SpringLaw, Storage, StorageReport, TearReport, Tearing, Values, Viscosity, Yielding,

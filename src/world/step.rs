@@ -72,12 +72,20 @@ impl World {
             tool.set_out();
         }
         self.lead_blades();
-        let mut left = TRIES;
+        self.divide_as_before();
+        let (mut left, mut rounds) = (TRIES, 0);
         let crossings = loop {
             self.plan_tools();
+            self.plan_flights(dt);
             match self.attempt(dt, team) {
-                Ok(crossings) if left == 0 || self.are_within_limits(dt, left == 1) => break crossings,
-                Ok(_) => self.put_back(),
+                Ok(crossings) => {
+                    let are_within = left == 0 || self.are_within_limits(dt, left == 1);
+                    if self.are_divided(rounds) && are_within {
+                        break crossings;
+                    }
+                    rounds += 1;
+                    self.put_back();
+                }
                 Err(report) => {
                     self.put_back();
                     return Err(Error::Unstable {
@@ -89,7 +97,7 @@ impl World {
                     });
                 }
             }
-            left -= 1;
+            left = left.saturating_sub(1);
         };
         let report = report(&self.bodies, &self.outcomes, crossings);
         self.commit(dt, team);
@@ -104,6 +112,7 @@ impl World {
             definition,
             bodies,
             paths,
+            dynamic,
             outcomes,
             tissue,
             walks,
@@ -121,6 +130,7 @@ impl World {
                 0.0
             },
             tools: paths,
+            dynamic,
             neighbor_speed: None,
         };
         let Some(tissue) = tissue else {
@@ -169,7 +179,6 @@ impl World {
             tools,
             paths,
             outcomes,
-            tissue,
             ..
         } = self;
         for (index, (_, tool)) in tools.iter_mut().enumerate() {
@@ -181,6 +190,8 @@ impl World {
             tool.led_to = tool.target.take().unwrap_or(tool.pose);
             tool.reach = None;
         }
+        self.end_flights(dt);
+        let Self { tissue, outcomes, .. } = self;
         if let Some(tissue) = tissue {
             tissue.bonds.commit(outcomes, dt);
         }
