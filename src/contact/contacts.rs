@@ -227,6 +227,11 @@ impl Contacts {
         self.driven.reserve(tools, dynamic)
     }
 
+    /// Whether tools of the step are rigid bodies.
+    pub fn has_dynamic(&self) -> bool {
+        !self.driven.paths.is_empty()
+    }
+
     /// Where a dynamic tool is at the end of a step of `dt` seconds, as the body moved it; `None`: the body did not press it.
     pub fn dynamic_end(&self, index: usize, dt: f32) -> Option<RigidMotion> {
         let is_pressed = self.loads[index].impulse != DVec3::ZERO;
