@@ -492,10 +492,10 @@ impl Contacts {
             return;
         }
         let mut paths = std::mem::take(&mut self.driven.paths);
-        let (dt, drifts) = (meeting.dt, meeting.drifts);
+        let (dt, kick) = (meeting.dt, (meeting.drifts, meeting.mobility.half));
         if !paths.is_empty() {
             let ends = [meeting.start, meeting.end];
-            self.driven.look_ahead(&mut paths, ends, dt, drifts);
+            self.driven.look_ahead(&mut paths, ends, dt, kick);
             if !self.candidates.covers(&paths, self.filter, meeting.origin) {
                 self.candidates.invalidate();
             }
@@ -513,7 +513,7 @@ impl Contacts {
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
             let ends = [fraction(part(index)), fraction(part(index + 1))];
             if !paths.is_empty() && slices > 1 {
-                self.driven.look_ahead(&mut paths, ends, dt, drifts);
+                self.driven.look_ahead(&mut paths, ends, dt, kick);
             }
             self.presses.yielding.clear();
             self.driven.show_yielding(|tool| self.presses.yielding.push(tool));

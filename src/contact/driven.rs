@@ -37,6 +37,9 @@ struct Copied {
     taken: Load,
     /// The energy that contact gave it, J.
     received: f64,
+    /// For how long its drive has acted, s, and acts in the slice in progress.
+    driven_for: f64,
+    kick: f64,
     /// For how long the contacts of the last slice moved it, s.
     moved_for: f64,
 }
@@ -185,6 +188,8 @@ impl Driven {
             gone: 0.0,
             taken: Load::default(),
             received: 0.0,
+            driven_for: 0.0,
+            kick: 0.0,
             moved_for: 0.0,
         }));
         self.paths.extend(tools.iter().cloned());
@@ -206,16 +211,31 @@ impl Driven {
     pub fn end(&self, index: usize, dt: f32) -> Option<RigidMotion> {
         let mut copy = *self.copies.iter().find(|copy| copy.tool.index == index)?;
         copy.fly_to(1.0, f64::from(dt));
+        // The half kick that closes a step may have been left to the next.
+        copy.kick = f64::from(dt) - copy.driven_for;
+        copy.kick();
         Some(copy.tool.motion)
     }
 
     /// Has the ways lead on from where the tools are as a slice begins that lasts from `start` to `end`, fractions of the step, as fast as
-    /// they would be without contact.
-    pub fn look_ahead(&mut self, paths: &mut [ToolPath], [start, end]: [f64; 2], dt: f32, drifts: bool) {
+    /// they would be without contact: their drive acts for as long as the forces on nodes, the half of the slice, all of it, or where nodes do not
+    /// drift what is left of the step.
+    pub fn look_ahead(
+        &mut self,
+        paths: &mut [ToolPath],
+        [start, end]: [f64; 2],
+        dt: f32,
+        (drifts, half): (bool, bool),
+    ) {
         let step = f64::from(dt);
         for copy in &mut self.copies {
             copy.fly_to(start, step);
             copy.moved_for = if drifts { (end - start) * step } else { 0.0 };
+            copy.kick = match (drifts, half) {
+                (false, _) => step - copy.driven_for,
+                (true, true) => 0.5 * copy.moved_for,
+                (true, false) => copy.moved_for,
+            };
             let mut ahead = *copy;
             ahead.kick();
             ahead.show(&mut paths[copy.tool.index], [start, end], step);
@@ -267,8 +287,9 @@ impl Copied {
     /// Gives it what its drive gives it in a slice.
     fn kick(&mut self) {
         let (acceleration, torque) = self.tool.drive;
-        self.tool.motion.velocity += acceleration * self.moved_for;
-        self.tool.motion.angular_momentum += torque * self.moved_for;
+        self.tool.motion.velocity += acceleration * self.kick;
+        self.tool.motion.angular_momentum += torque * self.kick;
+        self.driven_for += self.kick;
     }
 
     fn fly_to(&mut self, part: f64, step: f64) {
@@ -276,7 +297,9 @@ impl Copied {
             let DynamicTool {
                 mass, motion, drive, ..
             } = &mut self.tool;
-            motion.fly(mass, *drive, (part - self.gone) * step);
+            let duration = (part - self.gone) * step;
+            motion.fly(mass, *drive, duration);
+            self.driven_for += duration;
             self.gone = part;
         }
     }
