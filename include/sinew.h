@@ -35,6 +35,7 @@
 #include "sinew/attachment.h"
 #include "sinew/cutting.h"
 #include "sinew/haptics.h"
+#include "sinew/dynamics.h"
 #include "sinew/render.h"
 #include "sinew/query.h"
 #include "sinew/more.h"

@@ -257,6 +257,32 @@ public:
     sinew::pose out{};
     return check(sinew_tool_get_target(world(), id, out.position.data(), out.orientation.data())), out;
   }
+  sinew_mass_properties mass_of_density(float density) const {
+    auto out = sized<sinew_mass_properties>();
+    return check(sinew_tool_get_mass_of_density(world(), id, density, &out)), out;
+  }
+  void set_mass(const sinew_mass_properties &mass) { check(sinew_tool_set_mass(world(), id, &mass)); }
+  void make_kinematic() { check(sinew_tool_set_mass(world(), id, nullptr)); }
+  sinew_mass_properties mass() const { // all zero where the tool is kinematic
+    auto out = sized<sinew_mass_properties>();
+    return check(sinew_tool_get_mass(world(), id, &out)), out;
+  }
+  void set_velocity(vec3 velocity, vec3 angular = {}) {
+    check(sinew_tool_set_velocity(world(), id, velocity.data(), angular.data()));
+  }
+  vec3 velocity() const {
+    vec3 out{};
+    return check(sinew_tool_get_velocity(world(), id, out.data(), nullptr)), out;
+  }
+  vec3 angular_velocity() const {
+    vec3 out{};
+    return check(sinew_tool_get_velocity(world(), id, nullptr, out.data())), out;
+  }
+  void apply(const sinew::wrench &of) { check(sinew_tool_apply_wrench(world(), id, of.force.data(), of.torque.data())); }
+  void teleport(vec3 position) { check(sinew_tool_teleport(world(), id, position.data(), nullptr)); }
+  void teleport(const sinew::pose &to) {
+    check(sinew_tool_teleport(world(), id, to.position.data(), to.orientation.data()));
+  }
   sinew::wrench wrench() const {
     sinew::wrench out{};
     return check(sinew_tool_get_wrench(world(), id, out.force.data(), out.torque.data())), out;

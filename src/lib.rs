@@ -36,7 +36,7 @@ mod world;
 
 pub use base::{Error, Result};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
-pub use contact::{Contact, ContactChange, Pose, Shape, ToolDefinition};
+pub use contact::{Contact, ContactChange, MassProperties, Pose, Shape, ToolDefinition};
 pub use debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 pub use def::{
     BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw, EnclosedReport,

@@ -5,6 +5,7 @@ mod attachments;
 mod blade;
 mod blades;
 mod budget;
+mod dynamic;
 mod haptics;
 mod holds;
 mod looks;
@@ -24,7 +25,7 @@ use glam::{Quat, Vec3};
 use crate::base::{Error, Profile, Result, StateHasher, memory};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::codec::saved;
-use crate::contact::{Contact, ContactChange, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::def::{BodyDefinition, CollisionFilter, finite_vector, not_negative};
 use crate::ids::{SlotId, Slots};
@@ -107,6 +108,8 @@ pub struct World {
     tools: Slots<Tool>,
     /// The ways of the tools in the step in progress.
     paths: Vec<ToolPath>,
+    /// Those of them that are rigid bodies.
+    dynamic: Vec<DynamicTool>,
     /// Contacts of tissue with tissue, where bodies ask for them.
     pub(crate) tissue: Option<Box<Tissue>>,
     /// The bodies that take their substeps together, by their places; none where none can.
@@ -160,6 +163,7 @@ impl World {
             bodies: Slots::new("body"),
             tools: Slots::new("tool"),
             paths: Vec::new(),
+            dynamic: Vec::new(),
             tissue: None,
             walks: Vec::new(),
             outcomes: Vec::new(),
@@ -210,7 +214,10 @@ impl World {
                 max_substeps: self.definition.max_substeps,
             },
         };
-        let body = Body::new(definition, needs)?;
+        let mut body = Body::new(definition, needs)?;
+        if let Some(contacts) = &mut body.contacts {
+            contacts.reserve_dynamic(needs.tools, self.dynamic_count())?;
+        }
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
         let id = self.bodies.insert(body)?;
         match self.join_tissue(id).and_then(|()| self.meet_blades(id)) {
@@ -481,9 +488,10 @@ impl World {
     ///
     /// # Errors
     /// [`Error::StaleId`]. [`Error::InvalidArgument`]: a number is not finite, a coordinate is further than 1e9 m from 0, or the
-    /// orientation is zero, or a [`HapticHandle`](crate::HapticHandle) leads the tool.
+    /// orientation is zero, a [`HapticHandle`](crate::HapticHandle) leads the tool, or it is dynamic.
     pub fn set_pose(&mut self, tool: ToolId, position: Vec3, orientation: Option<Quat>) -> Result<()> {
         self.check_not_led(tool)?;
+        self.check_kinematic(tool)?;
         let tool = self.tools.get_mut(tool.0)?;
         let pose = tool.target.unwrap_or(tool.pose);
         let target = Pose {

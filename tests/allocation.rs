@@ -434,6 +434,45 @@ fn steps_allocate_nothing(storage: Storage, solver: Solver, tolerances: &[f32]) 
 }
 
 #[test]
+fn nor_does_one_with_dynamic_tools() {
+    for solver in [Solver::Verlet, Solver::Implicit] {
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let cloth = |world: &mut World, height: f32| {
+            let mesh = Mesh::cloth([0.2, 0.2], [6, 6]).expect("a cloth");
+            let positions: Vec<Vec3> = mesh.positions.iter().map(|at| *at + Vec3::Y * height).collect();
+            let definition = BodyDefinition {
+                positions: &positions,
+                triangles: &mesh.triangles,
+                masses: Values::Uniform(2e-3),
+                stiffnesses: Values::Uniform(50.0),
+                spring_dampings: Values::Uniform(1e-2),
+                solver,
+                ..BodyDefinition::default()
+            };
+            world.create_body(&definition).expect("a body")
+        };
+        let tool = |world: &mut World, shape: Shape, height: f32| {
+            let mut definition = ToolDefinition::new(shape);
+            definition.pose.position = Vec3::Y * height;
+            let tool = world.create_tool(&definition).expect("a tool");
+            if shape != Shape::Plane {
+                let mass = world.mass_of_density(tool, 300.0).expect("a mass");
+                world.set_dynamic(tool, Some(&mass)).expect("a dynamic tool");
+            }
+        };
+        // Bodies and tools that come before and after the first dynamic one.
+        cloth(&mut world, 0.0);
+        tool(&mut world, Shape::Sphere { radius: 0.02 }, 0.03);
+        cloth(&mut world, -0.005);
+        tool(&mut world, Shape::Plane, -0.01);
+        tool(&mut world, Shape::Sphere { radius: 0.01 }, 0.06);
+        for step in 0..30 {
+            assert_eq!(asked(|| drop(world.step(0.008))), 0, "{solver:?}, step {step}");
+        }
+    }
+}
+
+#[test]
 fn nor_does_one_of_what_is_under_pressure() {
     let block = Mesh::block([0.05; 3], [3; 3]).expect("a block");
     for solver in [Solver::Verlet, Solver::Implicit, Solver::Newton] {

@@ -706,6 +706,36 @@ public static unsafe class Sinew
     public static extern int sinew_haptic_get_contacts(IntPtr haptic, sinew_haptic_contact* contacts, UIntPtr capacity, UIntPtr* count);
 
     [StructLayout(LayoutKind.Sequential)]
+    public struct sinew_mass_properties
+    {
+        public UIntPtr struct_size;
+        public float mass;
+        public fixed float center_of_mass[3];
+        public fixed float inertia[6];
+    }
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_mass_of_density(IntPtr world, sinew_tool_id tool, float density, sinew_mass_properties* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_set_mass(IntPtr world, sinew_tool_id tool, sinew_mass_properties* mass);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_mass(IntPtr world, sinew_tool_id tool, sinew_mass_properties* @out);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_set_velocity(IntPtr world, sinew_tool_id tool, float* velocity, float* angular_velocity);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_get_velocity(IntPtr world, sinew_tool_id tool, float* velocity, float* angular_velocity);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_apply_wrench(IntPtr world, sinew_tool_id tool, float* force, float* torque);
+
+    [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+    public static extern int sinew_tool_teleport(IntPtr world, sinew_tool_id tool, float* position, float* orientation);
+
+    [StructLayout(LayoutKind.Sequential)]
     public struct sinew_embedding_def
     {
         public UIntPtr struct_size;

@@ -565,6 +565,26 @@ typedef struct sinew_haptic_contact {
 } sinew_haptic_contact;
 sinew_status sinew_haptic_get_contacts(const sinew_haptic *haptic, sinew_haptic_contact *contacts,
                                        size_t capacity, size_t *count);
+typedef struct sinew_mass_properties {
+  size_t struct_size;
+  float mass;
+  float center_of_mass[3];
+  float inertia[6];
+} sinew_mass_properties;
+sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool_id tool,
+                                            float density, sinew_mass_properties *out);
+sinew_status sinew_tool_set_mass(sinew_world *world, sinew_tool_id tool,
+                                 const sinew_mass_properties *mass);
+sinew_status sinew_tool_get_mass(const sinew_world *world, sinew_tool_id tool,
+                                 sinew_mass_properties *out);
+sinew_status sinew_tool_set_velocity(sinew_world *world, sinew_tool_id tool, const float *velocity,
+                                     const float *angular_velocity);
+sinew_status sinew_tool_get_velocity(const sinew_world *world, sinew_tool_id tool, float *velocity,
+                                     float *angular_velocity);
+sinew_status sinew_tool_apply_wrench(sinew_world *world, sinew_tool_id tool, const float *force,
+                                     const float *torque);
+sinew_status sinew_tool_teleport(sinew_world *world, sinew_tool_id tool, const float *position,
+                                 const float *orientation);
 typedef struct sinew_embedding_def {
   size_t struct_size;
   const float *vertices;

@@ -56,6 +56,9 @@ pub mod rest_state;
 pub mod tool;
 
 #[allow(rustdoc::broken_intra_doc_links)]
+pub mod dynamic;
+
+#[allow(rustdoc::broken_intra_doc_links)]
 pub mod contact;
 
 #[allow(rustdoc::broken_intra_doc_links)]

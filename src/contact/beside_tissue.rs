@@ -60,6 +60,7 @@ impl Contacts {
                 }
             }
         }
+        self.driven.amend(&self.loads);
         if given != Bounds::EMPTY {
             let fastest = given.magnitudes().length();
             self.candidates.spend(self.found_for * fastest);

@@ -597,7 +597,7 @@ impl Zone {
     fn of(tool: &ToolPath, origin: DVec3) -> Self {
         if let Some(sweep) = tool.sweep(origin) {
             let (slot, bounds) = (tool.slot, sweep.bounds);
-            return match tool.solid_at(0.0, origin) {
+            return match tool.solid_at(tool.begun(), origin) {
                 Solid::Mesh(standing) => Zone::Mesh {
                     slot,
                     bounds,

@@ -2,6 +2,7 @@
 
 use glam::{BVec3, DVec3, Vec3, Vec3A};
 
+use super::driven::Yielding;
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
 use super::impulses::{LEVERAGE, pushed_out};
@@ -41,6 +42,8 @@ pub(super) struct Constraint {
     pub friction: f32,
     /// The tool's place among those near the body.
     pub tool: usize,
+    /// Its place among the dynamic tools of the step; [`u32::MAX`]: the tool is led.
+    pub yielding: u32,
     /// Which end of a capsule a face meets, since it may meet both; 0 of all else.
     pub tip: u8,
     /// The mass that an impulse at the contact moves, kg; less where its nodes are held along axes near the normal.
@@ -76,6 +79,7 @@ saved!(Constraint {
     depth,
     friction,
     tool,
+    yielding,
     tip,
     effective_mass,
     free_mass,
@@ -91,12 +95,25 @@ impl Constraint {
     /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility;
     /// `None` where none of them can move along the normal.
     pub fn new(
-        (feature, weights): (Feature, [f32; 3]),
+        met: (Feature, [f32; 3]),
         supports: &Supports,
         starts: [Vec3; MOST],
         normal: Vec3,
         mobility: &Mobility,
         held: [BVec3; MOST],
+    ) -> Option<Self> {
+        Self::between(met, supports, starts, normal, (mobility, held), [0.0; 2])
+    }
+
+    /// The same for a tool that becomes so much faster for an impulse, along the normal and along any direction at most, 1/kg: nodes
+    /// that cannot move stop it.
+    pub fn between(
+        (feature, weights): (Feature, [f32; 3]),
+        supports: &Supports,
+        starts: [Vec3; MOST],
+        normal: Vec3,
+        (mobility, held): (&Mobility, [BVec3; MOST]),
+        [recoil, most_recoil]: [f32; 2],
     ) -> Option<Self> {
         let shares = supports.shares(weights);
         let mut nodes = [0; MOST];
@@ -116,6 +133,7 @@ impl Constraint {
             free += answer * share;
             leverage = leverage.max(answer / LEVERAGE);
         }
+        let (rigid, free) = (rigid + recoil, free + most_recoil);
         let inverse_mass = leverage.max(rigid);
         // The nearer the normal is to axes that nodes are held along, the less is given, down to nothing.
         let fading = (rigid / leverage.min(free)).min(1.0);
@@ -134,6 +152,7 @@ impl Constraint {
             depth: 0.0,
             friction: 0.0,
             tool: 0,
+            yielding: u32::MAX,
             tip: 0,
             effective_mass: fading / inverse_mass,
             free_mass: 1.0 / leverage.max(free),
@@ -209,12 +228,16 @@ impl Constraint {
     }
 
     /// What it asks of the velocities at these places of its nodes.
-    pub fn press(&self, place_of: impl Fn(u32) -> u32) -> Press {
+    pub fn press(&self, place_of: impl Fn(u32) -> u32, yielding: &[Yielding]) -> Press {
         let mut places = [0; MOST];
         for (place, &node) in places.iter_mut().zip(self.nodes()) {
             *place = place_of(node);
         }
+        let tool = yielding.get(self.yielding as usize);
         Press {
+            yielding: self.yielding,
+            arm: tool.map_or(Vec3A::ZERO, |tool| Vec3A::from(self.arm) - tool.center),
+            is_backed: false,
             places,
             shares: self.shares,
             answers: self.answers.map(Vec3A::from),
@@ -239,6 +262,11 @@ impl Constraint {
     /// What the tissue received, N s.
     pub fn given(&self) -> Vec3 {
         self.normal * self.impulse + self.friction_impulse
+    }
+
+    /// The part of such a way out, m, that a dynamic tool goes.
+    pub fn push_back(&self, tool: &mut Yielding, way: f32) {
+        tool.push_out(-self.normal * (way * self.effective_mass));
     }
 
     /// Moves the nodes out of the tool by so much, m, without giving them speed.

@@ -4,10 +4,11 @@
 //! speculative contact; sequential impulses, Catto 2005). Nothing is stored as a penalty, so that contact neither
 //! shortens the substep nor gives energy back, and the impulses are the tool's force.
 
-use glam::{BVec3, DVec3, Vec3};
+use glam::{BVec3, DVec3, Vec3, Vec3A};
 
 use super::candidates::{Candidates, met, zone_bit};
 use super::constraint::Constraint;
+use super::driven::{Driven, DynamicTool};
 use super::features::{Feature, Features};
 use super::holds::Holds;
 use super::impulses::{SWEEPS, pushed_out};
@@ -17,6 +18,7 @@ use super::path::{Motion, Solid, ToolPath};
 use super::press::{Presses, solve_alone};
 use super::press_nodes::{PressNodes, PressingSolid};
 use super::report::Touch;
+use super::rigid::RigidMotion;
 use super::supports::{MOST, Supports};
 use super::sweep::Corners;
 use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
@@ -60,6 +62,14 @@ impl Load {
         self.impulse += impulse;
         self.angular_impulse += arm.as_dvec3().cross(impulse);
     }
+
+    /// What it has more than it had before.
+    pub(super) fn since(&self, before: &Self) -> Self {
+        Self {
+            impulse: self.impulse - before.impulse,
+            angular_impulse: self.angular_impulse - before.angular_impulse,
+        }
+    }
 }
 
 /// The contacts of one body; kept only in worlds that have tools.
@@ -98,6 +108,8 @@ pub(crate) struct Contacts {
     held: Vec<(u32, usize)>,
     /// Features that a change of the surface brings.
     pub(super) fresh: Vec<u32>,
+    /// Tools that are rigid bodies.
+    pub(super) driven: Driven,
 }
 
 saved!(Contacts {
@@ -120,7 +132,7 @@ saved!(Contacts {
     committed,
     held,
     fresh
-});
+} leaves { driven: Driven::default() });
 
 /// One substep of a body near tools.
 pub(crate) struct Meeting<'a> {
@@ -195,6 +207,7 @@ impl Contacts {
             committed: true,
             held: Vec::new(),
             fresh: Vec::new(),
+            driven: Driven::default(),
         };
         contacts.reserve(tools)?;
         Ok(contacts)
@@ -202,11 +215,34 @@ impl Contacts {
 
     /// Makes room for `tools` tools, at so many places in the world.
     pub fn reserve(&mut self, tools: usize) -> Result<()> {
+        self.driven.reserve_ways(tools)?;
         self.loads.try_reserve(tools.saturating_sub(self.loads.len()))?;
         self.reserve_together(self.features.count(), tools)?;
         self.touched.try_reserve(tools.saturating_sub(self.touched.len()))?;
         self.touched.resize(tools.max(self.touched.len()), [false; 2]);
         self.candidates.reserve(tools)
+    }
+
+    /// Makes room for so many tools, of which so many are rigid bodies.
+    pub fn reserve_dynamic(&mut self, tools: usize, dynamic: usize) -> Result<()> {
+        self.presses.reserve_yielding(dynamic, self.together)?;
+        self.driven.reserve(tools, dynamic)
+    }
+
+    /// Whether tools of the step are rigid bodies.
+    pub fn has_dynamic(&self) -> bool {
+        !self.driven.paths.is_empty()
+    }
+
+    /// Where a dynamic tool is at the end of a step of `dt` seconds, as the body moved it; `None`: the body did not press it.
+    pub fn dynamic_end(&self, index: usize, dt: f32) -> Option<RigidMotion> {
+        let is_pressed = self.loads[index].impulse != DVec3::ZERO;
+        is_pressed.then(|| self.driven.end(index, dt)).flatten()
+    }
+
+    /// The energy that contact gave a dynamic tool in the step, J; `None`: the tool is led.
+    pub fn received(&self, index: usize) -> Option<f64> {
+        self.driven.received(index)
     }
 
     /// Makes room for what so many features and tools may have in common.
@@ -224,7 +260,8 @@ impl Contacts {
     }
 
     /// Starts a step over.
-    pub fn begin(&mut self, tools: &[ToolPath], origin: DVec3) {
+    pub fn begin(&mut self, (tools, dynamic): (&[ToolPath], &[DynamicTool]), origin: DVec3) {
+        self.driven.begin(tools, dynamic);
         self.loads.clear();
         self.loads.resize(tools.len(), Load::default());
         // A step that is begun again goes back to where its nodes were.
@@ -462,19 +499,16 @@ impl Contacts {
         if meeting.tools.is_empty() {
             return;
         }
-        self.find_candidates(&meeting);
-        if self.candidates.near().is_empty() && self.holds.is_empty() {
-            self.clear_contacts();
-            return;
+        let mut paths = std::mem::take(&mut self.driven.paths);
+        let (dt, kick) = (meeting.dt, (meeting.drifts, meeting.mobility.half));
+        if !paths.is_empty() {
+            let ends = [meeting.start, meeting.end];
+            self.driven.look_ahead(&mut paths, ends, dt, kick);
+            if !self.candidates.covers(&paths, self.filter, meeting.origin) {
+                self.candidates.invalidate();
+            }
         }
-        let is_foreseen = !self.holds.is_empty();
-        let slices = if meeting.drifts && !is_foreseen {
-            self.needed_slices(&meeting)
-        } else {
-            1
-        };
-        self.pressed_for = meeting.kick() / slices as f32;
-        self.found_for = meeting.substep / slices as f32;
+        let slices = self.begin_slices(&meeting.along(&paths));
         for index in 0..slices {
             let part = |index: u32| f64::from(index) / f64::from(slices);
             let slice = Slice {
@@ -485,21 +519,46 @@ impl Contacts {
                 foresees: false,
             };
             let fraction = |part: f64| (meeting.start + (meeting.end - meeting.start) * part).min(1.0);
-            if is_foreseen {
-                self.take_up(&meeting);
-            } else {
-                self.clear_contacts();
-            }
             let ends = [fraction(part(index)), fraction(part(index + 1))];
+            if !paths.is_empty() && slices > 1 {
+                self.driven.look_ahead(&mut paths, ends, dt, kick);
+            }
+            self.presses.yielding.clear();
+            self.driven.show_yielding(|tool| self.presses.yielding.push(tool));
+            let mut meeting = meeting.along(&paths);
+            if self.holds.is_empty() {
+                self.clear_contacts();
+            } else {
+                self.take_up(&meeting);
+            }
             self.find(&mut meeting, &slice, ends);
             let watch = Stopwatch::start(meeting.profile);
             self.solve(&mut meeting, &slice);
             watch.stop(meeting.profile, Stage::ContactSolver);
+            self.driven.arrive(&self.loads, ends[1], &self.presses.yielding);
         }
-        if self.given != Bounds::EMPTY {
+        self.driven.paths = paths;
+        if slices > 0 && self.given != Bounds::EMPTY {
             let fastest = self.given.magnitudes().length();
             self.candidates.spend(meeting.substep * fastest);
         }
+    }
+
+    /// In how many slices a substep is taken; 0: nothing is near.
+    fn begin_slices(&mut self, meeting: &Meeting) -> u32 {
+        self.find_candidates(meeting);
+        if self.candidates.near().is_empty() && self.holds.is_empty() {
+            self.clear_contacts();
+            return 0;
+        }
+        let slices = if meeting.drifts && self.holds.is_empty() {
+            self.needed_slices(meeting)
+        } else {
+            1
+        };
+        self.pressed_for = meeting.kick() / slices as f32;
+        self.found_for = meeting.substep / slices as f32;
+        slices
     }
 
     /// Makes the contacts that a solved equation has seen what it found.
@@ -555,12 +614,14 @@ impl Contacts {
             }
             let bit = zone_bit(zone);
             zone += 1;
-            if all & bit == 0 {
+            let yields = self.driven.place(place);
+            // An equation cannot move a tool.
+            if all & bit == 0 || slice.foresees && yields.is_some() {
                 continue;
             }
             let motion = tool.motion(start, end, meeting.dt, meeting.origin);
             let room = motion.room(meeting, slice);
-            let nodes = if node_by_node {
+            let nodes = if node_by_node && yields.is_none() {
                 self.find_nodes(meeting, slice, (place, &motion), (bit, is_alone))
             } else {
                 0
@@ -805,16 +866,26 @@ impl Contacts {
         (feature, tip): (Feature, u8),
         found: Option<ContactGeometry>,
     ) {
-        let found = found.and_then(|geometry| meeting.constraint(slice, feature, &geometry, friction));
-        let Some(found) = found else {
+        let yielding = self
+            .driven
+            .place(tool)
+            .map(|place| (place, &self.presses.yielding[place]));
+        let found = found.and_then(|geometry| {
+            let recoil = yielding.map_or([0.0; 2], |(_, tool)| {
+                let arm = Vec3A::from(geometry.arm) - tool.center;
+                [tool.answer(arm, geometry.normal.into()), tool.largest_answer(arm)]
+            });
+            meeting.constraint(slice, feature, &geometry, friction, recoil)
+        });
+        let Some(mut constraint) = found else {
             return;
         };
-        let mut constraint = found;
         (constraint.tool, constraint.tip) = (tool, tip);
+        constraint.yielding = yielding.map_or(u32::MAX, |(place, _)| place as u32);
         if self.constraints.len() < self.together {
             self.constraints.push(constraint);
         } else if !slice.foresees {
-            solve_alone(&mut constraint, meeting.velocities);
+            solve_alone(&mut constraint, meeting.velocities, &mut self.presses.yielding);
             self.settle(meeting, slice, &constraint, true);
         }
     }
@@ -849,7 +920,11 @@ impl Contacts {
         if meeting.drifts {
             for constraint in &self.constraints {
                 if constraint.depth > 0.0 {
-                    constraint.push_out(meeting.next_positions, pushed_out(meeting.substep) * constraint.depth);
+                    let way = pushed_out(meeting.substep) * constraint.depth;
+                    constraint.push_out(meeting.next_positions, way);
+                    if let Some(tool) = self.presses.yielding.get_mut(constraint.yielding as usize) {
+                        constraint.push_back(tool, way);
+                    }
                 }
             }
             // What an equation that was not solved to the end has let in.
@@ -937,6 +1012,17 @@ impl Slice {
 }
 
 impl Meeting<'_> {
+    /// The same with tools on these ways; without any those that it has.
+    fn along<'a>(&'a mut self, paths: &'a [ToolPath]) -> Meeting<'a> {
+        Meeting {
+            tools: if paths.is_empty() { self.tools } else { paths },
+            velocities: self.velocities,
+            next_positions: self.next_positions,
+            pins: self.pins,
+            ..*self
+        }
+    }
+
     /// Whether the slice is the whole of a substep in which every node moves by its mass alone: none is held along some axes, asleep, or bound to others.
     fn is_even(&self, slice: &Slice) -> bool {
         let is_whole = slice.first && slice.duration == self.substep && self.drifts && !self.mobility.half;

@@ -225,13 +225,14 @@ pub(super) fn mesh_geometry(
 }
 
 impl Meeting<'_> {
-    /// The contact of a feature that meets a tool thus; `None` where none of its nodes can move along the normal.
+    /// The contact of a feature that meets a tool thus, which answers impulses so; `None` where neither can move along the normal.
     pub(super) fn constraint(
         &self,
         slice: &Slice,
         feature: Feature,
         geometry: &ContactGeometry,
         friction: f32,
+        recoil: [f32; 2],
     ) -> Option<Constraint> {
         let supports = Supports::of(feature, self.bindings);
         let mut starts = [Vec3::ZERO; MOST];
@@ -240,7 +241,8 @@ impl Meeting<'_> {
         }
         let held = self.held_axes(&supports);
         let (weights, normal) = (geometry.weights, geometry.normal);
-        let mut constraint = Constraint::new((feature, weights), &supports, starts, normal, &self.mobility, held)?;
+        let nodes = (&self.mobility, held);
+        let mut constraint = Constraint::between((feature, weights), &supports, starts, normal, nodes, recoil)?;
         constraint.surface_velocity = geometry.surface_velocity;
         constraint.arm = geometry.arm;
         constraint.friction = friction;

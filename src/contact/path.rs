@@ -20,6 +20,10 @@ pub(crate) struct ToolPath {
     end: Pose,
     /// The whole turn of the step as axis times angle, rad.
     turn: Vec3,
+    /// At what fraction of the step it starts: 0 but for a dynamic tool that contact has led elsewhere.
+    begun: f64,
+    /// How far it may leave that line, m: a dynamic tool becomes faster on its way.
+    strays: f32,
 }
 
 /// A tool's solid at one instant, in a body's coordinates.
@@ -103,7 +107,30 @@ impl ToolPath {
             start,
             end,
             turn,
+            begun: 0.0,
+            strays: 0.0,
         }
+    }
+
+    /// Has it lead from here to there, turning by so much, rad, from this fraction of the step on, and stray from that by no more than
+    /// `strays`, m.
+    pub fn lead(&mut self, [start, end]: [Pose; 2], turn: Vec3, begun: f64, strays: f32) {
+        (self.start, self.end, self.turn, self.begun, self.strays) = (start, end, turn, begun, strays);
+    }
+
+    /// The fraction of the step at which it starts.
+    pub(super) fn begun(&self) -> f64 {
+        self.begun
+    }
+
+    /// What part of it lies behind at a fraction of the step.
+    fn part(&self, fraction: f64) -> f64 {
+        (fraction - self.begun) / (1.0 - self.begun)
+    }
+
+    /// How long it takes in a step of `dt` seconds, s.
+    fn lasts(&self, dt: f32) -> f64 {
+        f64::from(dt) * (1.0 - self.begun)
     }
 
     /// Whether it comes to within `margin` of something in these bounds in the step, as far as boxes tell.
@@ -112,7 +139,7 @@ impl ToolPath {
         if let Some(sweep) = self.sweep(origin) {
             return sweep.bounds.overlaps(&bounds);
         }
-        [0.0, 1.0]
+        [self.begun, 1.0]
             .into_iter()
             .any(|fraction| match self.solid_at(fraction, origin) {
                 Solid::HalfSpace { point, normal } => {
@@ -125,7 +152,7 @@ impl ToolPath {
 
     /// Whether it is elsewhere, or turned otherwise, after the step.
     pub fn moves(&self) -> bool {
-        self.start != self.end
+        self.start != self.end || self.strays > 0.0
     }
 
     /// How far its position moves in the step, m, and how far it turns, as axis times angle, rad.
@@ -142,10 +169,11 @@ impl ToolPath {
     /// Its position after `fraction` of the step, in the coordinates of a body that begin at `origin`.
     fn centre_at(&self, fraction: f64, origin: DVec3) -> Vec3 {
         let (start, end) = (self.start.position.as_dvec3(), self.end.position.as_dvec3());
-        (start.lerp(end, fraction) - origin).as_vec3()
+        (start.lerp(end, self.part(fraction)) - origin).as_vec3()
     }
 
     fn orientation_at(&self, fraction: f64) -> Quat {
+        let fraction = self.part(fraction);
         if self.turn == Vec3::ZERO || fraction <= 0.0 {
             self.start.orientation
         } else if fraction >= 1.0 {
@@ -229,20 +257,20 @@ impl ToolPath {
             from: self.solid_at(start, origin),
             to: self.solid_at(end, origin),
             centre: self.centre_at(end, origin),
-            velocity: ((self.end.position.as_dvec3() - self.start.position.as_dvec3()) / f64::from(dt)).as_vec3(),
-            spin: self.turn / dt,
+            velocity: ((self.end.position.as_dvec3() - self.start.position.as_dvec3()) / self.lasts(dt)).as_vec3(),
+            spin: self.turn / self.lasts(dt) as f32,
         }
     }
 
     /// What it sweeps over the step; `None` for a plane, which has no end.
     pub fn sweep(&self, origin: DVec3) -> Option<Sweep> {
-        let centres = Bounds::of([0.0, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
+        let centres = Bounds::of([self.begun, 1.0].map(|end| self.centre_at(end, origin)).into_iter());
         let (bounds, reach, thickness) = match &self.form {
             Form::HalfSpace => return None,
             Form::Rounded { radius, half_length } => (centres.extended(radius + half_length), *half_length, *radius),
             Form::Mesh(solid) => {
                 // Between its ends a corner that turns goes outside their box by no more than the height of its arc.
-                let ends = [0.0, 1.0].map(|end| (self.centre_at(end, origin), self.orientation_at(end)));
+                let ends = [self.begun, 1.0].map(|end| (self.centre_at(end, origin), self.orientation_at(end)));
                 let corners = ends
                     .into_iter()
                     .flat_map(|(centre, orientation)| solid.corners().map(|corner| centre + orientation * corner));
@@ -252,8 +280,8 @@ impl ToolPath {
             }
         };
         Some(Sweep {
-            bounds,
-            travel: self.start.position.distance(self.end.position) + self.turn.length() * reach,
+            bounds: bounds.extended(self.strays),
+            travel: self.start.position.distance(self.end.position) + self.turn.length() * reach + self.strays,
             thickness,
         })
     }
@@ -267,7 +295,7 @@ impl ToolPath {
             let turn = self.orientation_at(end).angle_between(standing.orientation);
             self.centre_at(end, origin).distance(standing.centre) + turn * solid.reach()
         };
-        far(0.0).max(far(1.0))
+        far(self.begun).max(far(1.0)) + self.strays
     }
 
     /// How fast its fastest point moves, m/s; for a plane the point at its position.
@@ -276,7 +304,7 @@ impl ToolPath {
             Some(sweep) => sweep.travel,
             None => self.start.position.distance(self.end.position),
         };
-        travel / dt
+        travel / self.lasts(dt) as f32
     }
 }
 

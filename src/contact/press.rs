@@ -5,6 +5,7 @@
 use glam::{Vec3, Vec3A};
 
 use super::constraint::Constraint;
+use super::driven::Yielding;
 use super::impulses::{Sweep, relax};
 use super::supports::MOST;
 use crate::base::{Result, memory};
@@ -14,6 +15,12 @@ use crate::soa::Vectors;
 /// One contact as its impulse is found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Press {
+    /// Its tool's place among the dynamic ones; [`u32::MAX`]: the tool is led.
+    pub yielding: u32,
+    /// From the centre of mass of a dynamic tool, m.
+    pub arm: Vec3A,
+    /// Whether another tool holds one of its nodes against it.
+    pub is_backed: bool,
     /// Where the velocities of its nodes are; of fewer than [`MOST`] the rest has no share.
     pub places: [u32; MOST],
     pub shares: [f32; MOST],
@@ -36,6 +43,9 @@ pub(super) struct Press {
 }
 
 saved!(Press {
+    yielding,
+    arm,
+    is_backed,
     places,
     shares,
     answers,
@@ -53,11 +63,15 @@ saved!(Press {
 impl Press {
     /// Gives what is missing, or takes back what was too much: how much faster the contact moves for it, m/s.
     #[inline]
-    fn solve(&mut self, velocities: &mut [Vec3A]) -> f32 {
+    fn solve(&mut self, velocities: &mut [Vec3A], yielding: &mut [Yielding]) -> f32 {
         let places = self.places.map(|place| place as usize);
         let mut velocity = velocities[places[0]] * self.shares[0];
         for index in 1..MOST {
             velocity += velocities[places[index]] * self.shares[index];
+        }
+        let mut tool = yielding.get_mut(self.yielding as usize);
+        if let Some(tool) = &tool {
+            velocity -= tool.gained(self.arm);
         }
         let missing = self.least_speed - velocity.dot(self.normal);
         let impulse = (self.impulse * (1.0 - self.give) + missing * self.effective_mass).max(0.0);
@@ -77,7 +91,33 @@ impl Press {
         for index in 0..MOST {
             velocities[places[index]] += given * self.answers[index];
         }
+        if let Some(tool) = &mut tool {
+            tool.recoil(self.arm, given);
+        }
         given.length() / self.free_mass
+    }
+
+    /// The same for nodes that are held from behind: what goes against that is taken there.
+    fn solve_backed(&mut self, velocities: &mut [Vec3A], yielding: &mut [Yielding], backs: &mut [Back]) -> f32 {
+        let places = self.places.map(|place| place as usize);
+        let before = places.map(|place| velocities[place]);
+        let change = self.solve(velocities, yielding);
+        for index in (0..MOST).filter(|&index| self.shares[index] > 0.0) {
+            let back = &mut backs[places[index]];
+            let answer = self.answers[index].max_element();
+            if back.normal == Vec3A::ZERO || answer == 0.0 {
+                continue;
+            }
+            let along = (velocities[places[index]] - before[index]).dot(back.normal);
+            velocities[places[index]] -= back.normal * along;
+            back.taken -= along * self.shares[index] / answer;
+        }
+        change
+    }
+
+    /// Whether it is one of a led tool and a single node, to which it gives something.
+    fn is_back(&self) -> bool {
+        self.yielding == u32::MAX && self.shares[0] == 1.0 && self.impulse > 0.0 && self.give == 0.0
     }
 
     /// Whether it has given anything.
@@ -86,6 +126,9 @@ impl Press {
     }
 }
 
+/// A node is held between two tools where their normals look against each other by this cosine or more.
+const HELD_BETWEEN: f32 = 0.1;
+
 /// The contacts of a slice while they are solved.
 #[derive(Debug, Default)]
 pub(super) struct Presses {
@@ -93,20 +136,39 @@ pub(super) struct Presses {
     /// The nodes of all of them, in order, and their velocities.
     nodes: Vec<u32>,
     velocities: Vec<Vec3A>,
+    /// Dynamic tools; empty where there are none.
+    pub yielding: Vec<Yielding>,
+    /// What holds each node against a dynamic tool.
+    backs: Vec<Back>,
 }
 
-saved!(Presses {
-    presses,
-    nodes,
-    velocities
-});
+saved!(Presses { presses, nodes, velocities } leaves { yielding: Vec::new(), backs: Vec::new() });
+
+/// A tool that is led and presses a node: it takes what a dynamic tool gives the node against it.
+#[derive(Clone, Copy, Debug)]
+struct Back {
+    /// Away from that tool; 0 where there is none.
+    normal: Vec3A,
+    /// What it has taken that its contact has not yet, N s.
+    taken: f32,
+    /// What its contact has given, N s.
+    impulse: f32,
+}
 
 impl Presses {
     /// Makes room for so many contacts of a body of so many nodes.
     pub fn reserve(&mut self, contacts: usize) -> Result<()> {
         memory::reserve(&mut self.presses, contacts)?;
         memory::reserve(&mut self.nodes, MOST * contacts)?;
-        memory::reserve(&mut self.velocities, MOST * contacts)
+        memory::reserve(&mut self.velocities, MOST * contacts)?;
+        let is_used = self.yielding.capacity() > 0;
+        memory::reserve(&mut self.backs, if is_used { MOST * contacts } else { 0 })
+    }
+
+    /// Makes room for so many dynamic tools beside.
+    pub fn reserve_yielding(&mut self, count: usize, contacts: usize) -> Result<()> {
+        memory::reserve(&mut self.yielding, count)?;
+        memory::reserve(&mut self.backs, if count > 0 { MOST * contacts } else { 0 })
     }
 
     /// Gives the impulses of these contacts, for which there is room, in so many sweeps at most: the most that one of the first sweep
@@ -121,10 +183,17 @@ impl Presses {
         nodes.dedup();
         let place = |node: u32| nodes.binary_search(&node).unwrap_or_default() as u32;
         presses.clear();
-        presses.extend(constraints.iter().map(|constraint| constraint.press(place)));
+        presses.extend(
+            constraints
+                .iter()
+                .map(|constraint| constraint.press(place, &self.yielding)),
+        );
 
         self.read(velocities);
         let first = relax(sweeps, None, |sweep| self.sweep_own(sweep));
+        if !self.yielding.is_empty() && self.find_backs() {
+            relax(sweeps, Some(first), |sweep| self.sweep_backed(sweep));
+        }
         self.write(velocities);
         self.hand_over(constraints);
         first
@@ -161,11 +230,73 @@ impl Presses {
         }
     }
 
+    /// Finds the nodes that are held between a tool that is led and a dynamic one, and has the contacts of the dynamic one know: whether there
+    /// are any. However heavy that is and however light the nodes, it is stopped then; contact by contact it would take as many sweeps as it
+    /// is heavier.
+    fn find_backs(&mut self) -> bool {
+        let none = Back {
+            normal: Vec3A::ZERO,
+            taken: 0.0,
+            impulse: 0.0,
+        };
+        self.backs.clear();
+        self.backs.resize(self.nodes.len(), none);
+        for press in self.presses.iter().filter(|press| press.is_back()) {
+            let back = &mut self.backs[press.places[0] as usize];
+            if press.impulse > back.impulse {
+                (back.normal, back.impulse) = (press.normal, press.impulse);
+            }
+        }
+        let mut any = false;
+        for press in &mut self.presses {
+            let Some(tool) = self.yielding.get(press.yielding as usize) else {
+                continue;
+            };
+            let places = press.places.map(|place| place as usize);
+            let is_held = |index: usize| self.backs[places[index]].normal.dot(press.normal) < -HELD_BETWEEN;
+            if !(0..MOST).any(is_held) {
+                continue;
+            }
+            any = true;
+            let nodes = (0..MOST).map(|index| {
+                let answer = press.normal * press.answers[index];
+                let normal = self.backs[places[index]].normal;
+                press.shares[index] * press.normal.dot(answer - normal * answer.dot(normal))
+            });
+            press.is_backed = true;
+            press.effective_mass = 1.0 / (nodes.sum::<f32>() + tool.answer(press.arm, press.normal));
+            press.give = 0.0;
+        }
+        any
+    }
+
+    /// One sweep in which contacts of dynamic tools act through nodes on what is behind those.
+    fn sweep_backed(&mut self, sweep: Sweep) -> f32 {
+        let mut largest = 0.0_f32;
+        for press in &mut self.presses {
+            if press.is_back() {
+                let back = &mut self.backs[press.places[0] as usize];
+                if back.normal == press.normal {
+                    press.impulse += std::mem::take(&mut back.taken);
+                }
+            }
+            if sweep == Sweep::All || press.presses() {
+                let change = if press.is_backed {
+                    press.solve_backed(&mut self.velocities, &mut self.yielding, &mut self.backs)
+                } else {
+                    press.solve(&mut self.velocities, &mut self.yielding)
+                };
+                largest = largest.max(change);
+            }
+        }
+        largest
+    }
+
     fn sweep_own(&mut self, sweep: Sweep) -> f32 {
         let mut largest = 0.0_f32;
         for press in &mut self.presses {
             if sweep == Sweep::All || press.presses() {
-                largest = largest.max(press.solve(&mut self.velocities));
+                largest = largest.max(press.solve(&mut self.velocities, &mut self.yielding));
             }
         }
         largest
@@ -173,7 +304,7 @@ impl Presses {
 }
 
 /// Gives the impulse of one contact as if there were no others.
-pub(super) fn solve_alone(constraint: &mut Constraint, velocities: &mut Vectors) {
+pub(super) fn solve_alone(constraint: &mut Constraint, velocities: &mut Vectors, yielding: &mut [Yielding]) {
     let mut own = [Vec3A::ZERO; MOST];
     for (velocity, &node) in own.iter_mut().zip(constraint.nodes()) {
         *velocity = velocities.get(node as usize).into();
@@ -185,8 +316,8 @@ pub(super) fn solve_alone(constraint: &mut Constraint, velocities: &mut Vectors)
             .position(|&known| known == node)
             .unwrap_or_default() as u32
     };
-    let mut press = constraint.press(place);
-    press.solve(&mut own);
+    let mut press = constraint.press(place, yielding);
+    press.solve(&mut own, yielding);
     constraint.take(&press);
     for (velocity, &node) in own.iter().zip(constraint.nodes()) {
         velocities.set(node as usize, Vec3::from(*velocity));

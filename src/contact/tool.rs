@@ -7,6 +7,7 @@ use glam::{Quat, Vec3};
 use super::cuboid;
 use super::limit::Reach;
 use super::mesh_solid::MeshSolid;
+use super::rigid::Rigid;
 use super::rounded;
 use crate::base::{Error, Result, StateHasher};
 use crate::codec::{saved, saved_enum};
@@ -175,6 +176,8 @@ pub(crate) struct Tool {
     pub force: Vec3,
     /// Mean torque about its position over the last step, N m.
     pub torque: Vec3,
+    /// Its mass and motion, where forces move it.
+    pub rigid: Option<Box<Rigid>>,
     /// What the caller keeps with it.
     pub user_data: usize,
 }
@@ -189,7 +192,8 @@ saved!(Tool {
     led_to,
     reach,
     force,
-    torque
+    torque,
+    rigid
 } leaves { user_data: 0 });
 
 /// A longer capsule, as a part of its radius, has no caps among triangles with corners in `f32`.
@@ -265,6 +269,7 @@ impl Tool {
             reach: None,
             force: Vec3::ZERO,
             torque: Vec3::ZERO,
+            rigid: None,
             user_data: 0,
         })
     }
@@ -290,6 +295,11 @@ impl Tool {
     pub fn set_force_limit(&mut self, limit: f32) -> Result<()> {
         self.force_limit = force_limit(limit)?;
         Ok(())
+    }
+
+    /// Whether it is a plane.
+    pub fn is_plane(&self) -> bool {
+        matches!(self.form, Form::HalfSpace)
     }
 
     /// Where the step in progress takes it.
@@ -319,6 +329,9 @@ impl Tool {
         if self.force_limit.is_finite() {
             // The search for how far it gets begins with it.
             hasher.write_floats(&self.force.to_array());
+        }
+        if let Some(rigid) = &self.rigid {
+            rigid.hash(hasher);
         }
         self.filter.hash(hasher);
         hasher.write_u64(u64::from(self.target.is_some()));

@@ -11,7 +11,7 @@ use super::verlet::{self, Taken, TooLong};
 use crate::base::Profile;
 use crate::body::Body;
 use crate::codec::saved;
-use crate::contact::{Contacts, ToolPath};
+use crate::contact::{Contacts, DynamicTool, ToolPath};
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
@@ -45,6 +45,8 @@ pub(crate) struct StepRequest<'a> {
     /// Metres; 0: off.
     pub tolerance: f32,
     pub tools: &'a [ToolPath],
+    /// Those of them that are rigid bodies.
+    pub dynamic: &'a [DynamicTool],
     /// How fast nodes of the bodies are that take their substeps together, m/s; `None`: each body steps by itself.
     pub neighbor_speed: Option<f32>,
     /// Where the stages are timed, if they are.
@@ -66,6 +68,7 @@ impl StepRequest<'_> {
             neighbor_speed: None,
             relieves: false,
             profile: None,
+            dynamic: &[],
         }
     }
 

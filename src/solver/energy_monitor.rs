@@ -261,7 +261,13 @@ impl<'a> Account<'a> {
             work += DVec3::select(pin.axes, force, DVec3::ZERO).dot(pin.travel.as_dvec3());
         }
         let loads = body.contacts.iter().flat_map(Contacts::loads);
-        for (tool, load) in self.request.tools.iter().zip(loads).filter(|(tool, _)| tool.moves()) {
+        let tools = self.request.tools.iter().zip(loads).enumerate();
+        for (index, (tool, load)) in tools.filter(|(_, (tool, _))| tool.moves()) {
+            let received = body.contacts.as_ref().and_then(|contacts| contacts.received(index));
+            if let Some(received) = received {
+                work -= received;
+                continue;
+            }
             // Where tissue meets a tool faster than that goes, the rest is lost.
             let [way, turn] = tool.travel();
             work -= (load.impulse.dot(way) + load.angular_impulse.dot(turn)) / f64::from(self.request.dt);

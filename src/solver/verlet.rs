@@ -338,7 +338,7 @@ pub(crate) fn begin(body: &mut Body, request: &StepRequest) {
     }
     body.begin_grasps(request.tools);
     if let Some(contacts) = &mut body.contacts {
-        contacts.begin(request.tools, body.origin);
+        contacts.begin((request.tools, request.dynamic), body.origin);
     }
 }
 

@@ -154,7 +154,7 @@ impl World {
     /// Refuses nodes that cannot be held by this tool, by these names.
     fn check_nodes(&self, body: BodyId, nodes: &[u32], tool: ToolId, name: impl Fn(usize) -> String) -> Result<()> {
         let body = self.bodies.get(body.0)?;
-        self.tools.get(tool.0)?;
+        self.check_kinematic(tool)?;
         for (index, &node) in nodes.iter().enumerate() {
             let name = Lazy(|| name(index));
             body.check_node(&name, node)?;
@@ -171,7 +171,7 @@ impl World {
         grips: impl ExactSizeIterator<Item = Grip>,
         force_limit: f32,
     ) -> Result<Vec<AttachmentId>> {
-        self.tools.get(tool.0)?;
+        self.check_kinematic(tool)?;
         let held = self.bodies.get_mut(body.0)?;
         check_limit(force_limit)?;
         let mut ids = memory::reserved(grips.len())?;

@@ -74,9 +74,11 @@ impl World {
     /// refused: each step leads it to where the handle's proxy was last, as [`World::tool_target`] tells. Each step costs the handle some microseconds.
     ///
     /// # Errors
-    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: something in the definition is out of its range, or another handle leads the tool.
+    /// [`Error::StaleId`]. [`Error::InvalidArgument`]: something in the definition is out of its range, another handle leads the tool, or it is
+    /// dynamic.
     /// [`Error::OutOfMemory`].
     pub fn create_haptic(&mut self, definition: &HapticDefinition) -> Result<HapticHandle> {
+        self.check_kinematic(definition.tool)?;
         let tool = self.tools.get(definition.tool.0)?;
         let pose = tool.pose;
         let coupling = definition.coupling(lever_of(&tool.form))?;

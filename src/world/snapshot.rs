@@ -106,6 +106,7 @@ impl World {
             bodies,
             tools,
             paths: _,
+            dynamic: _,
             tissue,
             walks,
             outcomes: _,
@@ -203,6 +204,7 @@ impl World {
         world.walks = memory::filled(None, walk_count)?;
         world.outcomes = memory::reserved(world.bodies.places() + 1)?;
         world.paths = memory::reserved(world.tools.places() + 1)?;
+        world.reserve_dynamic(world.dynamic_count())?;
         Ok(world)
     }
 }

@@ -129,14 +129,22 @@ impl World {
         }
         self.lead_blades();
         watch.stop(self.profile.as_deref(), Stage::Plan);
-        let mut left = TRIES;
+        self.divide_as_before();
+        let (mut left, mut rounds) = (TRIES, 0);
         let crossings = loop {
             let watch = Stopwatch::start(self.profile.as_deref());
             self.plan_tools();
+            self.plan_flights(dt);
             watch.stop(self.profile.as_deref(), Stage::Plan);
             match self.attempt(dt, team) {
-                Ok(crossings) if left == 0 || self.are_within_limits(dt, left == 1) => break crossings,
-                Ok(_) => self.put_back(),
+                Ok(crossings) => {
+                    let are_within = left == 0 || self.are_within_limits(dt, left == 1);
+                    if self.are_divided(rounds) && are_within {
+                        break crossings;
+                    }
+                    rounds += 1;
+                    self.put_back();
+                }
                 Err(report) => {
                     self.put_back();
                     let limit = self.limit(dt);
@@ -149,7 +157,7 @@ impl World {
                     });
                 }
             }
-            left -= 1;
+            left = left.saturating_sub(1);
         };
         let report = report(&self.bodies, &self.outcomes, crossings);
         let watch = Stopwatch::start(self.profile.as_deref());
@@ -169,6 +177,7 @@ impl World {
             definition,
             bodies,
             paths,
+            dynamic,
             outcomes,
             tissue,
             walks,
@@ -193,6 +202,7 @@ impl World {
                 0.0
             },
             tools: paths,
+            dynamic,
             neighbor_speed: None,
             profile,
         };
@@ -272,7 +282,6 @@ impl World {
             tools,
             paths,
             outcomes,
-            tissue,
             ..
         } = self;
         for (index, (_, tool)) in tools.iter_mut().enumerate() {
@@ -284,6 +293,8 @@ impl World {
             tool.led_to = tool.target.take().unwrap_or(tool.pose);
             tool.reach = None;
         }
+        self.end_flights(dt);
+        let Self { tissue, outcomes, .. } = self;
         if let Some(tissue) = tissue {
             tissue.bonds.commit(outcomes, dt);
         }

@@ -124,6 +124,49 @@ static void what_they_ask(void)
     BODY(UNSUPPORTED, "contact_detection", def.contact_detection = SINEW_DETECTION_DISTANCE_FIELD);
 }
 
+/* A tool of the world is kinematic, a sphere. */
+static void rigid_bodies(void)
+{
+    sinew_mass_properties mass;
+    const float three[3] = {0, 1, 0};
+    int i;
+    mass.struct_size = sizeof mass;
+    REFUSES_NO_TOOL(sinew_tool_get_mass_of_density(world, tool, 1.0f, &mass));
+    REFUSED(INVALID, "out", sinew_tool_get_mass_of_density(the.world, the.tool, 1.0f, NULL));
+    REFUSES_NO_TOOL(sinew_tool_get_mass(world, tool, &mass));
+    REFUSED(INVALID, "out", sinew_tool_get_mass(the.world, the.tool, NULL));
+    MUST(sinew_tool_get_mass_of_density(the.world, the.tool, 1000.0f, &mass));
+    REFUSES_NO_TOOL(sinew_tool_set_mass(world, tool, &mass));
+    REFUSES_NO_TOOL(sinew_tool_teleport(world, tool, three, NULL));
+    REFUSED(INVALID, "position", sinew_tool_teleport(the.world, the.tool, NULL, NULL));
+    REFUSES_NO_TOOL(sinew_tool_set_velocity(world, tool, three, three));
+    REFUSED(INVALID, "velocity", sinew_tool_set_velocity(the.world, the.tool, NULL, three));
+    REFUSED(INVALID, "angular_velocity", sinew_tool_set_velocity(the.world, the.tool, three, NULL));
+    REFUSED(INVALID, "kinematic", sinew_tool_set_velocity(the.world, the.tool, three, three));
+    REFUSES_NO_TOOL(sinew_tool_get_velocity(world, tool, out.force, out.torque));
+    REFUSED(INVALID, "kinematic", sinew_tool_get_velocity(the.world, the.tool, out.force, out.torque));
+    REFUSES_NO_TOOL(sinew_tool_apply_wrench(world, tool, three, three));
+    REFUSED(INVALID, "force", sinew_tool_apply_wrench(the.world, the.tool, NULL, three));
+    REFUSED(INVALID, "torque", sinew_tool_apply_wrench(the.world, the.tool, three, NULL));
+    REFUSED(INVALID, "kinematic", sinew_tool_apply_wrench(the.world, the.tool, three, three));
+    for (i = 0; i < OR_NEGATIVE; i++) {
+        sinew_mass_properties bad_mass = mass;
+        bad_mass.mass = bad[i];
+        REFUSED(INVALID, "mass", sinew_tool_set_mass(the.world, the.tool, &bad_mass));
+        REFUSED(INVALID, "density", sinew_tool_get_mass_of_density(the.world, the.tool, bad[i], &mass));
+    }
+    for (i = 0; i < NOT_FINITE; i++) {
+        sinew_mass_properties bad_mass = mass;
+        bad_mass.inertia[4] = bad[i];
+        REFUSED(INVALID, "inertia", sinew_tool_set_mass(the.world, the.tool, &bad_mass));
+        bad_mass = mass;
+        bad_mass.center_of_mass[1] = bad[i];
+        REFUSED(INVALID, "center_of_mass", sinew_tool_set_mass(the.world, the.tool, &bad_mass));
+    }
+    mass.struct_size = 4;
+    REFUSED(INVALID, "struct_size", sinew_tool_set_mass(the.world, the.tool, &mass));
+}
+
 static void results(void)
 {
     REFUSES_NO_TOOL(sinew_tool_get_contacts(world, tool, out.contacts, 2, &out.count));
@@ -136,6 +179,7 @@ static void results(void)
     REFUSED(INVALID, "count", sinew_world_get_contact_changes(the.world, out.changes, 2, NULL));
     REFUSES_NO_TOOL(sinew_tool_get_pose(world, tool, out.position, out.orientation));
     REFUSES_NO_BODY(sinew_body_is_closed(world, body, &out.closed));
+    rigid_bodies();
     REFUSED(INVALID, "out", sinew_body_is_closed(the.world, the.body, NULL));
 }
 

@@ -158,6 +158,14 @@ int main(void)
         def.radius = 0.01f;
         def.position[1] = 1;
         SIZES("def->struct_size", sinew_tool_def, def.struct_size, sinew_tool_create(world, &def, &tool));
+        {
+            sinew_mass_properties mass;
+            SIZES("out->struct_size", sinew_mass_properties, mass.struct_size,
+                  sinew_tool_get_mass_of_density(world, tool, 1000, &mass));
+            SIZES("mass->struct_size", sinew_mass_properties, mass.struct_size, sinew_tool_set_mass(world, tool, &mass));
+            SIZES("out->struct_size", sinew_mass_properties, mass.struct_size, sinew_tool_get_mass(world, tool, &mass));
+            MUST(sinew_tool_set_mass(world, tool, NULL));
+        }
     }
     {
         DEFINITION(haptic, def);

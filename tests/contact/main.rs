@@ -8,6 +8,7 @@ mod candidates;
 mod changed;
 mod detection_exact;
 mod doors;
+mod dynamic;
 mod friction;
 mod grasp;
 mod hard;

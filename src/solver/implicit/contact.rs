@@ -58,7 +58,9 @@ impl Substep<'_> {
                 stiffness_of(node, per_mass)
             });
         });
-        if body.contacts.as_ref().is_none_or(|contacts| contacts.holds.is_empty()) {
+        // Nor is a dynamic tool's impulse on a node one that goes on.
+        let is_of_order_1 = |contacts: &Contacts| !contacts.holds.is_empty() || contacts.has_dynamic();
+        if !body.contacts.as_ref().is_some_and(is_of_order_1) {
             return *self;
         }
         self.of_order_1()

@@ -1,0 +1,238 @@
+//! Tools that are rigid bodies, and what couples a tool to a rigid body of another engine.
+
+use glam::{Quat, Vec3};
+
+use super::guard::{sinew_world, with_world, with_world_mut};
+use super::memory::{self, Versioned};
+use super::status::sinew_status;
+use super::tool::sinew_tool_id;
+use crate::contact::MassProperties;
+
+/// Mass, center of mass and inertia of a rigid tool, in the tool's own axes.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_mass_properties {
+    /// Set to sizeof(sinew_mass_properties) before the call.
+    pub struct_size: usize,
+    /// [kg] Mass, 1e-12 to 1e12.
+    pub mass: f32,
+    /// [m] Center of mass, from the tool's position; each coordinate is within 1e9.
+    pub center_of_mass: [f32; 3],
+    /// [kg m^2] Inertia tensor xx yy zz xy xz yz about the center of mass.
+    ///
+    /// It is positive definite, and no principal moment exceeds the sum of the other two.
+    pub inertia: [f32; 6],
+}
+
+// SAFETY: repr(C), begins with struct_size; numbers, which any bits are.
+unsafe impl Versioned for sinew_mass_properties {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_mass_properties";
+}
+
+impl sinew_mass_properties {
+    const NONE: Self = Self {
+        struct_size: size_of::<Self>(),
+        mass: 0.0,
+        center_of_mass: [0.0; 3],
+        inertia: [0.0; 6],
+    };
+}
+
+impl From<MassProperties> for sinew_mass_properties {
+    fn from(properties: MassProperties) -> Self {
+        Self {
+            mass: properties.mass,
+            center_of_mass: properties.center_of_mass.to_array(),
+            inertia: properties.inertia,
+            ..Self::NONE
+        }
+    }
+}
+
+/// Writes the mass properties of a tool that is filled evenly with material.
+///
+/// `density` [kg/m^3] is above 0. `out` sets struct_size.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_mass_of_density(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    density: f32,
+    out: *mut sinew_mass_properties,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let out = memory::report("out", out)?;
+            out.fill(world.mass_of_density(tool.id(), density)?.into());
+            Ok(())
+        })
+    }
+}
+
+/// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
+///
+/// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at rest; a new mass
+/// leaves its velocity. Contact keeps momentum and is stable for light and heavy tools. Pinned nodes are obstacles;
+/// other tools are not. Bodies near a dynamic tool do not sleep. force_limit has no effect.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the tool.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_set_mass(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    mass: *const sinew_mass_properties,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            if mass.is_null() {
+                return world.set_dynamic(tool.id(), None);
+            }
+            let mass = memory::definition("mass", mass, sinew_mass_properties::NONE)?;
+            let properties = MassProperties {
+                mass: mass.mass,
+                center_of_mass: Vec3::from_array(mass.center_of_mass),
+                inertia: mass.inertia,
+            };
+            world.set_dynamic(tool.id(), Some(&properties))
+        })
+    }
+}
+
+/// Writes the mass properties of a dynamic tool; all zero if the tool is kinematic.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_mass(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    out: *mut sinew_mass_properties,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let out = memory::report("out", out)?;
+            let properties = world.mass_properties(tool.id())?;
+            out.fill(properties.map_or(sinew_mass_properties::NONE, Into::into));
+            Ok(())
+        })
+    }
+}
+
+/// Sets the velocity of a dynamic tool, in world axes.
+///
+/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] are 3 floats each.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_set_velocity(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    velocity: *const f32,
+    angular_velocity: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let velocity = memory::vector("velocity", velocity)?;
+            let spin = memory::vector("angular_velocity", angular_velocity)?;
+            world.set_tool_velocity(tool.id(), velocity, spin)
+        })
+    }
+}
+
+/// Writes the velocity of a dynamic tool, in world axes.
+///
+/// `velocity` [m/s] of the center of mass and `angular_velocity` [rad/s] receive 3 floats each; both are nullable.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_get_velocity(
+    world: *const sinew_world,
+    tool: sinew_tool_id,
+    velocity: *mut f32,
+    angular_velocity: *mut f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let velocity = memory::optional_output_array("velocity", velocity, 3)?;
+            let spin = memory::optional_output_array("angular_velocity", angular_velocity, 3)?;
+            let (linear, angular) = world.tool_velocity(tool.id())?;
+            for (place, vector) in [(velocity, linear), (spin, angular)] {
+                if let Some(place) = place {
+                    place.copy_from_slice(&vector.to_array());
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Adds a force and a torque on a dynamic tool throughout the next step, in world axes.
+///
+/// `force` [N] acts at the center of mass, `torque` [N m] about it; they are 3 floats each.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if the tool is kinematic.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_apply_wrench(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    force: *const f32,
+    torque: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let force = memory::vector("force", force)?;
+            let torque = memory::vector("torque", torque)?;
+            world.apply_wrench(tool.id(), force, torque)
+        })
+    }
+}
+
+/// Moves a tool to a new pose at once, without a sweep.
+///
+/// `position` [m] is 3 floats, each within 1e9; `orientation` is x y z w, not zero, nullable: unchanged. Tissue inside
+/// is pushed out over the next steps. A dynamic tool keeps its velocity; a pending sinew_tool_set_pose is dropped.
+///
+/// Errors: SINEW_STATUS_INVALID_ARGUMENT if attachments or a haptic handle use the tool.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_tool_teleport(
+    world: *mut sinew_world,
+    tool: sinew_tool_id,
+    position: *const f32,
+    orientation: *const f32,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let position = memory::vector("position", position)?;
+            let orientation = memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1)?;
+            let orientation = orientation.map(|orientation| Quat::from_array(orientation[0]));
+            world.teleport(tool.id(), position, orientation)
+        })
+    }
+}
