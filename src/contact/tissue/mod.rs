@@ -15,6 +15,7 @@ mod link;
 mod nearby;
 mod search;
 mod skin;
+mod warm_start;
 mod wound;
 
 pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
@@ -25,6 +26,7 @@ use self::link::Link;
 use self::link::Side;
 use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
+use self::warm_start::{Pushes, give_again};
 use glam::{DVec3, Vec3};
 
 use crate::base::{Result, memory};
@@ -89,6 +91,8 @@ pub(crate) struct Tissue {
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
+    /// What contacts gave in the last substep.
+    pushes: Pushes,
     /// What is attached.
     pub bonds: Bonds,
 }
@@ -99,6 +103,7 @@ saved!(Tissue {
     clearances,
     links,
     known,
+    pushes,
     bonds
 });
 
@@ -112,6 +117,7 @@ impl Tissue {
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
+        self.pushes.reserve(room)?;
         let spare = body.spare_nodes();
         let clearances = if body.contact.with_bodies {
             Some(Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?)
@@ -317,6 +323,11 @@ impl Tissue {
 
     /// Stops what meets in a substep of the bodies of an island.
     pub fn meet(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+        if moment.begins {
+            self.pushes.forget();
+        } else {
+            self.pushes.keep(&self.links);
+        }
         self.links.clear();
         for &place in self.islands.members(island) {
             let place = place as usize;
@@ -416,13 +427,14 @@ impl Tissue {
     /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
     fn solve(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) -> bool {
         let mut first = None;
+        let mut has_begun = false;
         for _ in 0..SEARCHES {
             let known = self.links.len();
-            if first.is_some() {
+            if has_begun {
                 self.go_on(island, bodies, moment);
             }
-            self.find(island, bodies, moment, moment.begins && first.is_none());
-            if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
+            self.find(island, bodies, moment, moment.begins && !has_begun);
+            if self.links.len() == known && (has_begun || !self.bonds.act()) {
                 break;
             }
             let Self {
@@ -433,11 +445,16 @@ impl Tissue {
                 ..
             } = self;
             let members = islands.members(island);
-            if first.is_none() {
+            if !has_begun {
                 // Contacts with tools go on from what they have done in the substep.
                 each_pressed(members, skins, bodies, moment, |skin, body, contacts| {
                     contacts.begin_sweeps(|node| skin.velocities.set(node, body.mean_velocity(node)));
                 });
+            }
+            has_begun = true;
+            let recalled = give_again(&mut links[known..], skins);
+            if recalled > 0.0 {
+                first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
             }
             first = Some(relax(SWEEPS, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
@@ -449,7 +466,7 @@ impl Tissue {
                 changed
             }));
         }
-        first.is_some()
+        has_begun
     }
 
     /// Has what impulses did to nodes be seen in what is bound to them.
@@ -486,10 +503,11 @@ impl Tissue {
             clearances,
             links,
             known,
+            pushes,
             bonds,
             islands,
         } = self;
-        let key = |link: &Link| link.sides.map(|side| side.key());
+        let key = Link::key;
         known.clear();
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
@@ -541,6 +559,7 @@ impl Tissue {
                     link.friction = friction;
                     link.is_parted = touch.is_parted;
                     link.allow_gap(touch.gap, moment.duration);
+                    pushes.recall(&mut link);
                     links.push(link);
                 }
             });
