@@ -10,6 +10,7 @@ mod looks;
 mod push;
 mod readers;
 mod resistance;
+mod rest;
 mod snapshot;
 mod step;
 mod sutures;

@@ -5,7 +5,7 @@
 use glam::{Vec3, Vec3A};
 
 use super::constraint::Constraint;
-use super::impulses::{Sweep, relax};
+use super::impulses::{Effort, Sweep, relax};
 use super::supports::MOST;
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -124,7 +124,7 @@ impl Presses {
         presses.extend(constraints.iter().map(|constraint| constraint.press(place)));
 
         self.read(velocities);
-        let first = relax(sweeps, None, |sweep| self.sweep_own(sweep));
+        let first = relax(Effort::of(sweeps), None, |sweep| self.sweep_own(sweep));
         self.write(velocities);
         self.hand_over(constraints);
         first

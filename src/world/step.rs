@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::World;
+use super::rest::{rest_islands, rouse_groups, wake_islands};
 use crate::base::{Error, Result};
 use crate::body::Body;
 use crate::codec::saved;
@@ -127,16 +128,12 @@ impl World {
             attempt_bodies(bodies, outcomes, &request, |_| true, team);
             return reported(bodies, outcomes).map(|()| 0);
         };
+        rouse_groups(tissue, bodies, request.tools);
         tissue.plan(bodies, dt);
-        // What meets other tissue, or is joined to it, does not sleep.
-        for (place, body) in bodies.iter_mut() {
-            if tissue.islands.has(place) {
-                body.wake_to_step();
-            }
-        }
         let islands = &tissue.islands;
         attempt_bodies(bodies, outcomes, &request, |place| !islands.has(place), team);
         loop {
+            wake_islands(tissue, bodies, outcomes);
             tissue.find_crossings(bodies, false);
             let mut together = Together {
                 tissue,
@@ -163,7 +160,9 @@ impl World {
         self.clock.tick(dt);
         self.bodies.iter_mut().for_each(|(_, body)| body.set_clock(self.clock));
         let moved_by = (&*self.paths, self.definition.gravity);
-        commit_bodies(&mut self.bodies, &self.outcomes, moved_by, dt, team);
+        let islands = self.tissue.as_ref().map(|tissue| &tissue.islands);
+        let goes_alone = |place: usize| islands.is_none_or(|islands| !islands.has(place));
+        commit_bodies(&mut self.bodies, &self.outcomes, moved_by, (dt, goes_alone), team);
         let Self {
             bodies,
             tools,
@@ -183,6 +182,8 @@ impl World {
         }
         if let Some(tissue) = tissue {
             tissue.bonds.commit(outcomes, dt);
+            let took = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Done { .. })));
+            rest_islands(tissue, bodies, took);
         }
         self.end_slipped();
     }
@@ -329,7 +330,7 @@ fn commit_bodies(
     bodies: &mut Slots<Body>,
     outcomes: &[Option<Outcome>],
     (tools, gravity): (&[ToolPath], Vec3),
-    dt: f32,
+    (dt, goes_alone): (f32, impl Fn(usize) -> bool),
     team: &Team,
 ) {
     for (place, body) in bodies.iter_mut() {
@@ -339,7 +340,11 @@ fn commit_bodies(
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit((substeps, dt), carry, tools, team);
                 body.fade(dt, team);
-                body.doze(dt, (tools, gravity * body.gravity_scale), team);
+                if goes_alone(place) {
+                    body.doze(dt, (tools, gravity * body.gravity_scale), team);
+                } else {
+                    body.doze_together(dt);
+                }
                 body.find_tears(team);
             }
             Some(Outcome::Asleep) => body.sleep_on(),

@@ -187,7 +187,8 @@ impl Link {
         (0..2).flat_map(move |side| {
             let sign = [1.0, -1.0][side];
             let (body, movers) = (self.sides[side].body, self.movers[side]);
-            (0..self.counts[side] as usize).map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
+            (0..self.counts[side] as usize)
+                .map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
         })
     }
 

@@ -19,11 +19,7 @@ struct Push {
     friction: Vec3,
 }
 
-saved!(Push {
-    key,
-    impulse,
-    friction
-});
+saved!(Push { key, impulse, friction });
 
 /// The impulses of the last substep of the same step and island, in the order of their sides.
 #[derive(Debug, Default)]
