@@ -14,6 +14,7 @@ mod push;
 mod readers;
 mod recording;
 mod resistance;
+mod rest;
 mod settings;
 mod snapshot;
 mod step;

@@ -381,9 +381,7 @@ impl Body {
         let Some(mut sleeper) = self.sleeper.take() else {
             return;
         };
-        sleeper.step = dt;
-        sleeper.margin = self.contact.thickness + NEAR * self.extent();
-        sleeper.bounds = self.local_bounds().extended(sleeper.margin);
+        self.stand_about(&mut sleeper, dt);
         self.touch(&mut sleeper, tools);
         self.see_rest(&mut sleeper, dt);
         self.feel(&mut sleeper, gravity, team);
@@ -415,6 +413,46 @@ impl Body {
             self.forces_current = false;
         }
         self.sleeper = Some(sleeper);
+    }
+
+    /// The same of a body that takes its steps together with others, which may hold it up: it falls asleep with all of them.
+    pub(crate) fn doze_together(&mut self, dt: f32) {
+        self.forget_sleep();
+        let Some(mut sleeper) = self.sleeper.take() else {
+            return;
+        };
+        self.stand_about(&mut sleeper, dt);
+        self.see_rest(&mut sleeper, dt);
+        self.sleeper = Some(sleeper);
+    }
+
+    /// Whether all of it has been at rest for long enough to sleep.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.sleeper.as_ref().is_some_and(|sleeper| {
+            let mut tiles = sleeper.tiles.iter().zip(&sleeper.asleep);
+            tiles.all(|(it, &is_asleep)| is_asleep || it.quiet >= sleeper.sleep.time)
+        })
+    }
+
+    /// Has all of it sleep.
+    pub(crate) fn fall_asleep(&mut self) {
+        let Some(mut sleeper) = self.sleeper.take() else {
+            return;
+        };
+        for tile in 0..sleeper.tiles.len() {
+            if !sleeper.is_asleep(tile) {
+                self.stand_still(tile);
+                sleeper.rest(tile);
+            }
+        }
+        self.sleeper = Some(sleeper);
+    }
+
+    /// Keeps the length of the last step, and where tools wake it.
+    fn stand_about(&self, sleeper: &mut Sleeper, dt: f32) {
+        sleeper.step = dt;
+        sleeper.margin = self.contact.thickness + NEAR * self.extent();
+        sleeper.bounds = self.local_bounds().extended(sleeper.margin);
     }
 
     /// Has the nodes of a tile stand still in all that a step reads.

@@ -33,15 +33,34 @@ pub(super) enum Sweep {
     Pressing,
 }
 
+/// How long sweeps go on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// So many at most.
+    pub sweeps: u32,
+    /// What a sweep changes is nothing, as a part of what the first one did.
+    pub converged: f32,
+}
+
+impl Effort {
+    /// So many at most, until they change as little as rounding leaves of slow tissue.
+    pub fn of(sweeps: u32) -> Self {
+        Self {
+            sweeps,
+            converged: CONVERGED,
+        }
+    }
+}
+
 /// Sweeps until one over all changes velocities by next to nothing beside `first`, m/s, or else beside what the first of them does: the
 /// most that it changed.
-pub(super) fn relax(sweeps: u32, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
+pub(super) fn relax(effort: Effort, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
     let mut first = first;
-    let mut left = sweeps;
+    let mut left = effort.sweeps;
     while left > 0 {
         left -= 1;
         let largest = sweep(Sweep::All);
-        let still = CONVERGED * *first.get_or_insert(largest);
+        let still = effort.converged * *first.get_or_insert(largest);
         if !(largest > still) {
             break;
         }

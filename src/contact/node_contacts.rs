@@ -9,7 +9,7 @@ use super::candidates::NearestPlane;
 use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
-use super::impulses::{LEVERAGE, Sweep, pushed_out, relax};
+use super::impulses::{Effort, LEVERAGE, Sweep, pushed_out, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
 use super::path::{Motion, Solid};
 use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
@@ -348,7 +348,7 @@ fn solve(contacts: &mut [NodeContact], velocities: &mut Vectors, sweeps: u32) {
         velocities.set(node, velocity);
         return;
     }
-    relax(sweeps, None, |_| {
+    relax(Effort::of(sweeps), None, |_| {
         let pressed = contacts.iter_mut().map(|contact| contact.press(&mut velocity));
         pressed.fold(0.0, f32::max)
     });

@@ -6,7 +6,7 @@ use glam::{Vec3, Vec3A};
 
 use super::constraint::Constraint;
 use super::driven::Yielding;
-use super::impulses::{Sweep, relax};
+use super::impulses::{Effort, Sweep, relax};
 use super::supports::MOST;
 use crate::base::{Result, memory};
 use crate::codec::saved;
@@ -190,9 +190,10 @@ impl Presses {
         );
 
         self.read(velocities);
-        let first = relax(sweeps, None, |sweep| self.sweep_own(sweep));
+        let effort = Effort::of(sweeps);
+        let first = relax(effort, None, |sweep| self.sweep_own(sweep));
         if !self.yielding.is_empty() && self.find_backs() {
-            relax(sweeps, Some(first), |sweep| self.sweep_backed(sweep));
+            relax(effort, Some(first), |sweep| self.sweep_backed(sweep));
         }
         self.write(velocities);
         self.hand_over(constraints);

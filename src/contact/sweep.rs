@@ -134,10 +134,15 @@ impl Corners {
     /// The separation when they first touch, or at the end of the substep where they do not; `None` where they stay
     /// further apart than the radius and `margin`, as far as they do not touch.
     pub fn approach(&self, segment: &Segment, margin: f32) -> Option<Separation> {
+        self.approach_from(self.separation(segment, 0.0), segment, margin)
+    }
+
+    /// The same, where the separation as the substep begins is known.
+    pub fn approach_from(&self, start: Separation, segment: &Segment, margin: f32) -> Option<Separation> {
         let closing = self.closing(segment);
         let touching = TOUCHING * segment.radius;
         let margin = margin.max(touching);
-        let mut separation = self.separation(segment, 0.0);
+        let mut separation = start;
         let mut gap = separation.offset.length() - segment.radius;
         if !(gap <= closing + margin) {
             return None;

@@ -66,6 +66,7 @@ impl Floats {
         self.values.len() - LINE * (skew + 1) - 2 * MARGIN
     }
 
+    #[inline]
     fn places(&self) -> Range<usize> {
         self.first..self.first + self.count
     }
@@ -215,13 +216,24 @@ impl Vectors {
 
     #[inline(always)]
     pub fn get(&self, node: usize) -> Vec3 {
-        Vec3::from(self.axes().map(|axis| axis[node]))
+        let [x, y, z] = &self.axes;
+        debug_assert!(node < x.count);
+        Vec3::new(
+            x.values[x.first + node],
+            y.values[y.first + node],
+            z.values[z.first + node],
+        )
     }
 
     #[inline(always)]
     pub fn set(&mut self, node: usize, value: Vec3) {
-        let [x, y, z] = self.axes_mut();
-        (x[node], y[node], z[node]) = value.into();
+        let [x, y, z] = &mut self.axes;
+        debug_assert!(node < x.count);
+        (
+            x.values[x.first + node],
+            y.values[y.first + node],
+            z.values[z.first + node],
+        ) = value.into();
     }
 
     pub fn len(&self) -> usize {

@@ -39,6 +39,12 @@ impl Together<'_> {
     /// Takes the step of all islands without making it current.
     pub fn attempt(&mut self, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
         for island in 0..self.tissue.islands.count() {
+            if self.tissue.is_asleep(island, bodies) {
+                for &place in self.tissue.islands.members(island) {
+                    outcomes[place as usize] = Some(Outcome::Asleep);
+                }
+                continue;
+            }
             self.attempt_island(island, bodies, outcomes);
         }
     }

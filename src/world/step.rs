@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::rest::{rest_islands, rouse_groups, wake_islands};
 use super::{BodyId, World};
 use crate::base::{Count, Error, Result, Stage, Stopwatch};
 use crate::body::Body;
@@ -211,18 +212,14 @@ impl World {
             return reported(bodies, outcomes).map(|()| 0);
         };
         let watch = Stopwatch::start(profile);
+        rouse_groups(tissue, bodies, request.tools);
         tissue.plan(bodies, dt);
         watch.stop(profile, Stage::BroadPhase);
-        // What meets other tissue, or is joined to it, does not sleep.
-        for (place, body) in bodies.iter_mut() {
-            if tissue.islands.has(place) {
-                body.wake_to_step();
-            }
-        }
         let islands = &tissue.islands;
         attempt_bodies(bodies, outcomes, &request, |place| !islands.has(place), team);
         loop {
             let watch = Stopwatch::start(profile);
+            wake_islands(tissue, bodies, outcomes);
             tissue.find_crossings(bodies, false);
             watch.stop(profile, Stage::NarrowPhase);
             let mut together = Together {
@@ -276,7 +273,9 @@ impl World {
         self.clock.tick(dt);
         self.bodies.iter_mut().for_each(|(_, body)| body.set_clock(self.clock));
         let moved_by = (&*self.paths, self.definition.gravity);
-        commit_bodies(&mut self.bodies, &self.outcomes, moved_by, dt, team);
+        let islands = self.tissue.as_ref().map(|tissue| &tissue.islands);
+        let goes_alone = |place: usize| islands.is_none_or(|islands| !islands.has(place));
+        commit_bodies(&mut self.bodies, &self.outcomes, moved_by, (dt, goes_alone), team);
         let Self {
             bodies,
             tools,
@@ -294,9 +293,16 @@ impl World {
             tool.reach = None;
         }
         self.end_flights(dt);
-        let Self { tissue, outcomes, .. } = self;
+        let Self {
+            bodies,
+            tissue,
+            outcomes,
+            ..
+        } = self;
         if let Some(tissue) = tissue {
             tissue.bonds.commit(outcomes, dt);
+            let took = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Done { .. })));
+            rest_islands(tissue, bodies, took);
         }
         self.end_slipped();
     }
@@ -444,7 +450,7 @@ fn commit_bodies(
     bodies: &mut Slots<Body>,
     outcomes: &[Option<Outcome>],
     (tools, gravity): (&[ToolPath], Vec3),
-    dt: f32,
+    (dt, goes_alone): (f32, impl Fn(usize) -> bool),
     team: &Team,
 ) {
     for (place, body) in bodies.iter_mut() {
@@ -454,7 +460,11 @@ fn commit_bodies(
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit((substeps, dt), carry, tools, team);
                 body.fade(dt, team);
-                body.doze(dt, (tools, gravity * body.gravity_scale), team);
+                if goes_alone(place) {
+                    body.doze(dt, (tools, gravity * body.gravity_scale), team);
+                } else {
+                    body.doze_together(dt);
+                }
                 body.find_tears(team);
             }
             Some(Outcome::Asleep) => body.sleep_on(),

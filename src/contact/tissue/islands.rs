@@ -69,11 +69,16 @@ impl Islands {
         memory::reserve(&mut self.members, count)?;
         memory::reserve(&mut self.islands, count)?;
         memory::reserve(&mut self.reaches, count)?;
-        memory::reserve(&mut self.pairs, (count * count / 2).min(ROOM * count))?;
+        memory::reserve(&mut self.pairs, room_for(count))?;
         while self.parents.len() < count {
             memory::push(&mut self.parents, NONE)?;
         }
         Ok(())
+    }
+
+    /// Near pairs that there is room for.
+    pub fn room(&self) -> usize {
+        room_for(self.parents.len())
     }
 
     /// Begins anew: each body is an island of its own, where this tells so, or in none.
@@ -232,11 +237,6 @@ impl Islands {
         &self.members[self.islands[island].members.clone()]
     }
 
-    /// The bodies of all islands.
-    pub fn all_members(&self) -> &[u32] {
-        &self.members
-    }
-
     /// The near pairs of an island, the lower place first, in order.
     pub fn pairs(&self, island: usize) -> impl Iterator<Item = [usize; 2]> + '_ {
         let members = if self.is_full { self.members(island) } else { &[] };
@@ -252,6 +252,11 @@ impl Islands {
         let pairs = listed.iter().copied().chain(all);
         pairs.map(|pair| pair.map(|place| place as usize))
     }
+}
+
+/// Near pairs that there is room for among so many bodies.
+fn room_for(bodies: usize) -> usize {
+    (bodies * bodies / 2).min(ROOM * bodies)
 }
 
 /// What a body reaches with velocities in a box, which others may come near.

@@ -20,6 +20,9 @@ pub(super) struct Side {
 
 saved!(Side { body, nodes, weights });
 
+/// Which sides a contact is between, whatever points of them.
+pub(super) type Key = [(usize, [u32; 3]); 2];
+
 /// A contact over one step: the first side stays clear of the second.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
@@ -33,9 +36,9 @@ pub(super) struct Link {
     /// Whether they were one until a cut parted them.
     pub is_parted: bool,
     pub friction: f32,
-    /// The nodes that move each side, with their parts of it; of those that there are not the part is 0. They are the side's own but where
-    /// it is bound to others.
+    /// The nodes that move each side, so many of them, with their parts of it. They are the side's own but where it is bound to others.
     movers: [[(u32, f32); MOST]; 2],
+    counts: [u32; 2],
     /// How much faster each of these becomes for an impulse, 1/kg.
     answers: [[Vec3; MOST]; 2],
     mass: f32,
@@ -52,6 +55,7 @@ saved!(Link {
     is_parted,
     friction,
     movers,
+    counts,
     answers,
     mass,
     impulse,
@@ -101,7 +105,8 @@ impl Link {
     pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2]) -> Option<Self> {
         let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
-        let movers = [0, 1].map(|side| sides[side].movers(bodies[side]));
+        let movers = [0, 1].map(|side| used_first(sides[side].movers(bodies[side])));
+        let counts = movers.map(|movers| movers.iter().filter(|(_, part)| *part > 0.0).count() as u32);
         for (movers, (body, answers)) in movers.iter().zip(bodies.into_iter().zip(&mut answers)) {
             for (answer, &(node, weight)) in answers.iter_mut().zip(movers) {
                 let mobility = body.inverse_masses[node as usize] * weight;
@@ -119,6 +124,7 @@ impl Link {
             is_parted: false,
             friction: 0.0,
             movers,
+            counts,
             answers,
             mass: 1.0 / whole.max(leverage),
             impulse: 0.0,
@@ -155,13 +161,14 @@ impl Link {
     }
 
     fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>]) {
-        for (index, sign) in [1.0, -1.0].into_iter().enumerate() {
+        for (index, impulse) in [impulse, -impulse].into_iter().enumerate() {
             if let Some(skin) = &mut skins[self.sides[index].body] {
-                for (&(node, _), answer) in self.movers[index].iter().zip(&self.answers[index]) {
-                    if *answer != Vec3::ZERO {
-                        let mean = skin.velocities.get(node as usize) + impulse * *answer * sign;
-                        skin.velocities.set(node as usize, mean);
-                    }
+                let [x, y, z] = skin.velocities.axes_mut();
+                let answers = self.answers[index].iter();
+                for (&(node, _), answer) in self.movers[index][..self.counts[index] as usize].iter().zip(answers) {
+                    let node = node as usize;
+                    let change = impulse * *answer;
+                    (x[node], y[node], z[node]) = (x[node] + change.x, y[node] + change.y, z[node] + change.z);
                 }
             }
         }
@@ -180,13 +187,14 @@ impl Link {
         (0..2).flat_map(move |side| {
             let sign = [1.0, -1.0][side];
             let (body, movers) = (self.sides[side].body, self.movers[side]);
-            (0..MOST).map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
+            (0..self.counts[side] as usize)
+                .map(move |place| (body, movers[place].0 as usize, push * self.answers[side][place] * sign))
         })
     }
 
     /// The nodes that move a side, with their parts of it.
     pub fn movers(&self, side: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
-        self.movers[side].iter().copied().filter(|(_, part)| *part > 0.0)
+        self.movers[side][..self.counts[side] as usize].iter().copied()
     }
 
     /// What the first side received, N s.
@@ -197,9 +205,64 @@ impl Link {
     /// Of the first side against the second, m/s.
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
         let [first, second] = [0, 1].map(|side| match &skins[self.sides[side].body] {
-            Some(skin) => weighted(self.movers[side].into_iter(), |node| skin.velocities.get(node)),
+            Some(skin) => {
+                let [x, y, z] = skin.velocities.axes();
+                let mut sum = Vec3::ZERO;
+                for &(node, part) in &self.movers[side][..self.counts[side] as usize] {
+                    let node = node as usize;
+                    sum += Vec3::new(x[node], y[node], z[node]) * part;
+                }
+                sum
+            }
             None => Vec3::ZERO,
         });
         first - second
     }
+
+    /// Which sides it is between, whatever points of them.
+    pub fn key(&self) -> Key {
+        self.sides.map(|side| side.key())
+    }
+
+    /// Takes it to give what it gave before; [`give_again`](super::warm_start::give_again) has nodes receive it.
+    pub fn recall(&mut self, impulse: f32, friction: Vec3) {
+        self.impulse = impulse;
+        let friction = friction.reject_from_normalized(self.normal);
+        self.friction_impulse = friction.clamp_length_max(self.friction * impulse);
+    }
+
+    /// What it gives along its normal and across it, N s.
+    pub fn impulses(&self) -> (f32, Vec3) {
+        (self.impulse, self.friction_impulse)
+    }
+
+    /// The work of what it gives, J, at the velocity that its sides have now; of that, what keeps them from coming closer than they may.
+    pub fn work(&self, skins: &[Option<Skin>]) -> [f32; 2] {
+        let given = self.given();
+        [given.dot(self.velocity(skins)), self.impulse * self.least_speed]
+    }
+
+    /// Has nodes receive so many times what it gives.
+    pub fn give_share(&self, share: f32, skins: &mut [Option<Skin>]) {
+        self.give(self.given() * share, skins);
+    }
+
+    /// Takes it to have given so many times what it gave.
+    pub fn scale(&mut self, share: f32) {
+        self.impulse *= share;
+        self.friction_impulse *= share;
+    }
+
+    /// How fast what it gives makes its sides alone, m/s.
+    pub fn speed(&self) -> f32 {
+        self.given().length() / self.mass
+    }
+}
+
+/// Those that have a part come first, in their order.
+fn used_first(movers: [(u32, f32); MOST]) -> [(u32, f32); MOST] {
+    let mut used = [(0, 0.0); MOST];
+    let with_part = movers.into_iter().filter(|(_, part)| *part > 0.0);
+    used.iter_mut().zip(with_part).for_each(|(used, mover)| *used = mover);
+    used
 }

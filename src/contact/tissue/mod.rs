@@ -9,34 +9,46 @@ mod bonds;
 mod change;
 mod clearances;
 mod crossing;
+mod groups;
 mod images;
 mod islands;
 mod link;
 mod nearby;
+mod pairs;
 mod search;
 mod skin;
+mod warm_start;
 mod wound;
 
 pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
 pub(crate) use self::change::{SkinChange, SurfaceToBe};
 use self::clearances::Clearances;
+use self::groups::Groups;
 use self::islands::{Islands, Reach};
 use self::link::Link;
 use self::link::Side;
+use self::pairs::Pairs;
 use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
+use self::warm_start::{Pushes, give_again};
 use glam::{DVec3, Vec3};
 
 use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::contact::impulses::{PUSHED_OUT, SWEEPS, Sweep, relax};
+use crate::contact::impulses::{Effort, PUSHED_OUT, Sweep, relax};
 use crate::geometry::Bounds;
 use crate::ids::Slots;
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
+
+/// Contacts of tissue begin with the impulses of the last substep, and the next one corrects what few sweeps leave.
+const EFFORT: Effort = Effort {
+    sweeps: 32,
+    converged: 1e-3,
+};
 
 /// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
 const LEAST_THICKNESS: f32 = 1e-3;
@@ -91,6 +103,12 @@ pub(crate) struct Tissue {
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
+    /// What contacts gave in the last substep.
+    pushes: Pushes,
+    /// What bodies are near each other with.
+    pairs: Pairs,
+    /// Bodies that fell asleep together.
+    pub groups: Groups,
     /// What is attached.
     pub bonds: Bonds,
 }
@@ -101,6 +119,9 @@ saved!(Tissue {
     clearances,
     links,
     known,
+    pushes,
+    pairs,
+    groups,
     bonds
 });
 
@@ -110,10 +131,15 @@ impl Tissue {
         let mut skin = Skin::new(body)?;
         self.add_images(&mut skin)?;
         self.islands.make_place(place)?;
+        self.groups.make_place(place)?;
         let more = ROOM * skin.room;
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
         self.known.try_reserve(room.saturating_sub(self.known.len()))?;
+        self.pushes.reserve(room)?;
+        let features = |skin: &Skin| skin.nodes.capacity() + skin.edges.capacity();
+        let known = self.skins.iter().flatten().map(features).sum::<usize>();
+        self.pairs.reserve(known + features(&skin), self.islands.room())?;
         let spare = body.spare_nodes();
         let clearances = if body.contact.with_bodies {
             Some(Clearances::new(skin.nodes.len() + spare, skin.edges.len() + 3 * spare)?)
@@ -162,6 +188,12 @@ impl Tissue {
     /// A body is gone.
     pub fn leave(&mut self, bodies: &mut Slots<Body>, place: usize) {
         self.bonds.leave(bodies, place);
+        for other in self.groups.others(place) {
+            if let Some(body) = bodies.at_mut(other) {
+                body.wake();
+            }
+        }
+        self.groups.leave(place);
         self.shed(place);
     }
 
@@ -244,21 +276,45 @@ impl Tissue {
             .map_or(DVec3::ZERO, |(_, body)| body.origin)
     }
 
+    /// Whether all bodies of an island sleep: then nothing of it changes.
+    pub fn is_asleep(&self, island: usize, bodies: &Slots<Body>) -> bool {
+        let mut members = self.islands.members(island).iter();
+        members.all(|&place| bodies.at(place as usize).is_some_and(Body::is_asleep))
+    }
+
+    /// Whether all bodies of an island have been at rest for long enough, and may sleep: what is attached does not.
+    pub fn is_at_rest(&self, island: usize, bodies: &Slots<Body>) -> bool {
+        let members = self.islands.members(island);
+        let mut bound = self.bonds.bodies().flatten();
+        members
+            .iter()
+            .all(|&place| bodies.at(place as usize).is_some_and(Body::is_at_rest))
+            && !bound.any(|place| members.contains(&(place as u32)))
+    }
+
     /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
     /// there are.
     pub fn find_crossings(&mut self, bodies: &Slots<Body>, at_end: bool) -> u32 {
-        for &place in self.islands.all_members() {
-            let place = place as usize;
-            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place)) {
-                skin.stand(body, at_end);
-                skin.pierces.fill(false);
-            }
-        }
         let mut count = 0_u32;
         let islands = std::mem::take(&mut self.islands);
         for island in 0..islands.count() {
-            for &a in islands.members(island) {
-                let a = a as usize;
+            let members = islands.members(island).iter().map(|&place| place as usize);
+            if members
+                .clone()
+                .all(|place| bodies.at(place).is_some_and(Body::is_asleep))
+            {
+                let skins = members.filter_map(|place| self.skins.get(place)?.as_ref());
+                count = skins.fold(count, |count, skin| count.saturating_add(skin.crossings));
+                continue;
+            }
+            for place in members.clone() {
+                if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place)) {
+                    skin.stand(body, at_end);
+                    skin.pierces.fill(false);
+                    skin.crossings = 0;
+                }
+            }
+            for a in members {
                 if bodies.at(a).is_some_and(|body| body.contact.with_itself) {
                     count = count.saturating_add(self.mark_crossings(bodies, [a; 2]));
                 }
@@ -294,6 +350,7 @@ impl Tissue {
         }
         if let Some(Some(first)) = self.skins.get_mut(a) {
             first.pierces = pierces;
+            first.crossings = first.crossings.saturating_add(count);
         }
         count
     }
@@ -325,6 +382,12 @@ impl Tissue {
     /// Stops what meets in a substep of the bodies of an island.
     pub fn meet(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         let watch = Stopwatch::start(moment.profile);
+        if moment.begins {
+            self.pushes.forget();
+            self.pairs.forget();
+        } else {
+            self.pushes.keep(&self.links);
+        }
         self.links.clear();
         for &place in self.islands.members(island) {
             let place = place as usize;
@@ -334,6 +397,7 @@ impl Tissue {
                 skin.follow(body, moment.duration);
             }
         }
+        self.pairs.advance(self.islands.pairs(island), &self.skins);
         self.bonds.follow(bodies, &self.skins, moment);
         self.draw(island, bodies, moment);
         watch.stop(moment.profile, Stage::BroadPhase);
@@ -434,16 +498,17 @@ impl Tissue {
     /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
     fn solve(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) -> bool {
         let mut first = None;
+        let mut has_begun = false;
         for _ in 0..SEARCHES {
             let known = self.links.len();
-            if first.is_some() {
+            if has_begun {
                 self.go_on(island, bodies, moment);
             }
             let watch = Stopwatch::start(moment.profile);
-            self.find(island, bodies, moment, moment.begins && first.is_none());
+            self.find(island, bodies, moment, moment.begins && !has_begun);
             watch.stop(moment.profile, Stage::NarrowPhase);
             watch.take_off(moment.profile, Stage::ContactSolver);
-            if self.links.len() == known && (first.is_some() || !self.bonds.act()) {
+            if self.links.len() == known && (has_begun || !self.bonds.act()) {
                 break;
             }
             let Self {
@@ -454,13 +519,18 @@ impl Tissue {
                 ..
             } = self;
             let members = islands.members(island);
-            if first.is_none() {
+            if !has_begun {
                 // Contacts with tools go on from what they have done in the substep.
                 each_pressed(members, skins, bodies, moment, |skin, body, contacts| {
                     contacts.begin_sweeps(|node| skin.velocities.set(node, body.mean_velocity(node)));
                 });
             }
-            first = Some(relax(SWEEPS, first, |sweep| {
+            has_begun = true;
+            let recalled = give_again(&mut links[known..], skins);
+            if recalled > 0.0 {
+                first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
+            }
+            first = Some(relax(EFFORT, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
                 let mut changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
@@ -470,7 +540,7 @@ impl Tissue {
                 changed
             }));
         }
-        first.is_some()
+        has_begun
     }
 
     /// Has what impulses did to nodes be seen in what is bound to them.
@@ -500,44 +570,99 @@ impl Tissue {
         }
     }
 
+    /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
+    fn search<'a>(
+        skins: &'a [Option<Skin>],
+        [a, b]: [usize; 2],
+        bodies: &Slots<Body>,
+        moment: &Moment,
+    ) -> Option<Search<'a>> {
+        let party = |place: usize| {
+            let skin = skins.get(place)?.as_ref()?;
+            Some(Party { place, skin })
+        };
+        let (first, second) = (party(a)?, party(b)?);
+        let both = [bodies.at(a)?, bodies.at(b)?];
+        let radius = radius(&first, &second, both)?;
+        let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
+        is_looked_at.then(|| Search {
+            parties: [first, second],
+            dt: moment.duration,
+            radius,
+            in_images: a != b && meet_in_images(first.skin, second.skin),
+            measures: Measure::Nothing,
+        })
+    }
+
+    /// The same of a pair that is not found in images.
+    fn search_by_distance<'a>(
+        skins: &'a [Option<Skin>],
+        pair: [usize; 2],
+        bodies: &Slots<Body>,
+        moment: &Moment,
+    ) -> Option<Search<'a>> {
+        Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
+    }
+
+    /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
+    fn know_pairs(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+        let Self {
+            skins, pairs, islands, ..
+        } = self;
+        let mut all = islands.pairs(island).enumerate();
+        let holds = all.all(|(number, pair)| {
+            let search = Self::search_by_distance(skins, pair, bodies, moment);
+            search.is_none_or(|search| pairs.holds(number, &search))
+        });
+        if holds {
+            return;
+        }
+        for &place in islands.members(island) {
+            if let Some(Some(skin)) = skins.get_mut(place as usize) {
+                skin.fit();
+            }
+        }
+        if pairs.can_be_found() {
+            pairs.begin();
+            let added = islands.pairs(island).try_for_each(|pair| {
+                let search = Self::search_by_distance(skins, pair, bodies, moment);
+                pairs.add(search.as_ref())
+            });
+            if added.is_none() {
+                pairs.fail();
+            }
+        }
+    }
+
     /// Adds the contacts that are not known yet, of those that meet.
     fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment, measures: bool) {
+        self.know_pairs(island, bodies, moment);
         let Self {
             skins,
             clearances,
             links,
             known,
+            pushes,
+            pairs,
             bonds,
             islands,
+            ..
         } = self;
-        let key = |link: &Link| link.sides.map(|side| side.key());
+        let key = Link::key;
         known.clear();
         known.extend(0..links.len() as u32);
         known.sort_unstable_by_key(|&link| key(&links[link as usize]));
-        let of_one = islands.members(island).iter().map(|&place| [place as usize; 2]);
-        for [a, b] in of_one.chain(islands.pairs(island)) {
-            let party = |place: usize| {
-                let skin = skins.get(place)?.as_ref()?;
-                Some(Party { place, skin })
-            };
-            let (Some(first), Some(second)) = (party(a), party(b)) else {
+        let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
+        let of_two = islands.pairs(island).enumerate();
+        for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
+            let Some(mut search) = Self::search(skins, [a, b], bodies, moment) else {
                 continue;
             };
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
                 continue;
             };
-            let is_looked_at = moment.concerns(body_a) && moment.concerns(body_b);
-            let Some(radius) = radius(&first, &second, [body_a, body_b]).filter(|_| is_looked_at) else {
-                continue;
-            };
             let friction = body_a.contact.friction.max(body_b.contact.friction);
-            let mut search = Search {
-                parties: [first, second],
-                dt: moment.duration,
-                radius,
-                in_images: a != b && meet_in_images(first.skin, second.skin),
-                measures: Measure::Nothing,
-            };
+            let number = number.filter(|_| !search.in_images);
             // A place is lent to neither where it is its own partner.
             let mut none = [None, None];
             let [kept_a, kept_b] = match clearances.get_disjoint_mut([a, b]) {
@@ -546,10 +671,14 @@ impl Tissue {
             };
             if measures && [&*kept_a, &*kept_b].into_iter().flatten().any(|kept| kept.is_new) {
                 search.measures = Measure::Reductions;
-                search.run([&mut *kept_a, &mut *kept_b], |_| {});
+                search.run(
+                    [&mut *kept_a, &mut *kept_b],
+                    number.and_then(|number| pairs.of(number)),
+                    |_| {},
+                );
             }
             search.measures = if measures { Measure::Distances } else { Measure::Nothing };
-            search.run([kept_a, kept_b], |touch| {
+            search.run([kept_a, kept_b], number.and_then(|number| pairs.of(number)), |touch| {
                 let sides = touch.sides.map(|side| side.key());
                 let is_known = known
                     .binary_search_by_key(&sides, |&link| key(&links[link as usize]))
@@ -562,6 +691,7 @@ impl Tissue {
                     link.friction = friction;
                     link.is_parted = touch.is_parted;
                     link.allow_gap(touch.gap, moment.duration);
+                    pushes.recall(&mut link);
                     links.push(link);
                 }
             });

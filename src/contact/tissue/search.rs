@@ -5,12 +5,10 @@ use glam::Vec3;
 
 use super::clearances::{Clearances, Part};
 use super::link::Side;
+use super::pairs::Known;
 use super::skin::{Clearance, NONE, PARTED, Skin};
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::geometry::Bounds;
-
-/// A node that lies within another body is led out through a face that is no further than this part of a short edge.
-const LED_OUT: f32 = 0.5;
 
 /// Distances that are the same but for this part are those of faces that share the closest point: which side it is on says the one that is
 /// seen most squarely.
@@ -35,6 +33,15 @@ pub(super) struct Touch {
     pub is_parted: bool,
 }
 
+/// Where those features come from that may be near a corner or an edge.
+#[derive(Clone, Copy)]
+enum From<'a> {
+    /// Trees or images.
+    Search,
+    /// They are known: triangles near a corner, edges near an edge.
+    Known(&'a [u32]),
+}
+
 /// A search over a step of `dt` seconds for what comes closer than `radius`, m.
 pub(super) struct Search<'a> {
     pub parties: [Party<'a>; 2],
@@ -56,15 +63,38 @@ pub(super) enum Measure {
 }
 
 impl Search<'_> {
-    /// Shows all that meets. `kept` are the clearances of the two parties; a surface with itself has none.
-    pub fn run(&self, kept: [&mut Option<Clearances>; 2], mut see: impl FnMut(Touch)) {
+    /// Shows all that meets. `kept` are the clearances of the two parties; a surface with itself has none. What of two bodies is near may be known.
+    pub fn run(&self, kept: [&mut Option<Clearances>; 2], known: Option<Known>, mut see: impl FnMut(Touch)) {
         let [first, second] = self.parties;
         let [mut of_first, of_second] = kept.map(Option::as_mut);
-        self.nodes_with_faces(first, second, of_first.as_deref_mut(), &mut see);
-        if !self.is_of_one() {
-            self.nodes_with_faces(second, first, of_second, &mut see);
+        if let Some(Known { runs, features, moved }) = known {
+            let [corners, others, edges] = runs;
+            let reach = self.reach();
+            for (runs, [of_nodes, of_faces], mut kept) in [
+                (corners, [first, second], of_first.as_deref_mut()),
+                (others, [second, first], of_second),
+            ] {
+                for run in runs.iter_mut().filter(|run| run.apart - moved <= reach) {
+                    let from = From::Known(run.of(features));
+                    let corner = run.number as usize;
+                    let parties = [of_nodes, of_faces];
+                    run.apart = moved + self.node_with_faces(parties, corner, from, kept.as_deref_mut(), &mut see);
+                }
+            }
+            let reach = self.reach_of_edges();
+            for run in edges.iter_mut().filter(|run| run.apart - moved <= reach) {
+                let (from, edge) = (From::Known(run.of(features)), run.number as usize);
+                run.apart = moved + self.edge_with_edges(edge, from, of_first.as_deref_mut(), &mut see);
+            }
+            return;
         }
-        self.edges_with_edges(first, second, of_first, &mut see);
+        self.nodes_with_faces([first, second], of_first.as_deref_mut(), &mut see);
+        if !self.is_of_one() {
+            self.nodes_with_faces([second, first], of_second, &mut see);
+        }
+        for edge in 0..first.skin.edges.len() {
+            self.edge_with_edges(edge, From::Search, of_first.as_deref_mut(), &mut see);
+        }
         if self.is_of_one() {
             self.across_wounds(&mut see);
             self.edges_across_wounds(&mut see);
@@ -77,7 +107,18 @@ impl Search<'_> {
 
     /// Shows the triangles that a corner, by its place among those of its surface, comes within `reach` of on its way through a box; those that are
     /// seen there where they are to be found in images.
-    fn near_corner(&self, corner: usize, skin: &Skin, bounds: &Bounds, reach: f32, see: impl FnMut(usize)) {
+    fn near_corner(
+        &self,
+        (corner, from): (usize, From),
+        skin: &Skin,
+        bounds: &Bounds,
+        reach: f32,
+        mut see: impl FnMut(usize),
+    ) {
+        if let From::Known(triangles) = from {
+            triangles.iter().for_each(|&triangle| see(triangle as usize));
+            return;
+        }
         match &skin.images {
             _ if self.is_of_one() => skin.near_itself(corner, bounds, reach + skin.spread, see),
             Some(images) if self.in_images => images.near(skin, bounds, reach, see),
@@ -108,15 +149,24 @@ impl Search<'_> {
         }
     }
 
-    fn nodes_with_faces(
+    fn nodes_with_faces(&self, parties: [Party; 2], mut kept: Option<&mut Clearances>, see: &mut impl FnMut(Touch)) {
+        for corner in 0..parties[0].skin.nodes.len() {
+            self.node_with_faces(parties, corner, From::Search, kept.as_deref_mut(), see);
+        }
+    }
+
+    /// Shows where a corner of the first surface meets the second: how far anything that it was compared with is from it at first, m.
+    fn node_with_faces(
         &self,
-        of_nodes: Party,
-        of_faces: Party,
-        mut kept: Option<&mut Clearances>,
+        [of_nodes, of_faces]: [Party; 2],
+        corner: usize,
+        from: From,
+        kept: Option<&mut Clearances>,
         see: &mut impl FnMut(Touch),
-    ) {
+    ) -> f32 {
         let shift = shift(of_nodes.skin, of_faces.skin);
-        for (corner, &node) in of_nodes.skin.nodes.iter().enumerate() {
+        let node = of_nodes.skin.nodes[corner];
+        {
             let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
             let radius = self.radius_of(kept.as_deref(), Part::Corner(corner));
             let segment = Segment {
@@ -124,6 +174,7 @@ impl Search<'_> {
                 steps: [step; 2],
                 radius,
             };
+            let mut least = f32::INFINITY;
             let mut front = f32::INFINITY;
             let mut touched: Option<(f32, usize, (Separation, Clearance))> = None;
             // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
@@ -131,9 +182,9 @@ impl Search<'_> {
             let mut behind: Option<(usize, Separation)> = None;
             let around = Bounds::of([place, place + step].into_iter());
             let is_solid = of_faces.skin.is_closed && !self.is_of_one();
-            let depth = if is_solid { LED_OUT * of_faces.skin.short } else { 0.0 };
+            let depth = if is_solid { of_faces.skin.depth() } else { 0.0 };
             let reach = self.radius.max(depth) + of_faces.skin.spread;
-            self.near_corner(corner, of_faces.skin, &around, reach, |triangle| {
+            self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
                 let nodes = of_faces.skin.triangles[triangle];
                 if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
                     return;
@@ -141,6 +192,7 @@ impl Search<'_> {
                 let corners = self.corners(of_faces, &nodes);
                 let start = corners.separation(&segment, 0.0);
                 let distance = start.offset.length();
+                least = least.min(distance);
                 if self.is_far(of_faces.skin, distance) {
                     return;
                 }
@@ -158,7 +210,7 @@ impl Search<'_> {
                     |(least, known, _): (f32, usize, _)| distance < least || distance == least && triangle < known;
                 if height >= 0.0
                     && touched.is_none_or(is_closer)
-                    && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners))
+                    && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
                 {
                     touched = Some((distance, triangle, found));
                 }
@@ -169,7 +221,7 @@ impl Search<'_> {
                 Some(_) => 0.0,
                 None => front,
             };
-            self.measure(kept.as_deref_mut(), Part::Corner(corner), nearest_there);
+            self.measure(kept, Part::Corner(corner), nearest_there);
             // On the wrong side it is led out, or let out where it is deep.
             let is_behind = behind.is_some();
             let closest = match behind {
@@ -195,20 +247,24 @@ impl Search<'_> {
                 let offset = if is_behind { found.offset } else { -found.offset };
                 self.show(sides, offset, (clearance, shift), see);
             }
+            least
         }
     }
 
-    fn edges_with_edges(
+    /// The same of an edge of the first surface and edges of the second.
+    fn edge_with_edges(
         &self,
-        first: Party,
-        second: Party,
-        mut kept: Option<&mut Clearances>,
+        index: usize,
+        from: From,
+        kept: Option<&mut Clearances>,
         see: &mut impl FnMut(Touch),
-    ) {
+    ) -> f32 {
+        let [first, second] = self.parties;
         let shift = shift(first.skin, second.skin);
-        for (index, &edge) in first.skin.edges.iter().enumerate() {
+        let edge = first.skin.edges[index];
+        {
             if first.skin.pierces[index] || edge[0] == NONE {
-                continue;
+                return f32::INFINITY;
             }
             let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
             let segment = Segment {
@@ -216,6 +272,7 @@ impl Search<'_> {
                 steps: ways.map(|(_, step)| step),
                 radius: self.radius_of(kept.as_deref(), Part::Edge(index)),
             };
+            let mut least = f32::INFINITY;
             let mut nearest = f32::INFINITY;
             let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
             let mut see_edges = |edges: [u32; 3]| {
@@ -228,12 +285,14 @@ impl Search<'_> {
                         continue;
                     }
                     let corners = self.corners(second, &other);
-                    let start = corners.separation(&segment, 0.0).offset.length();
+                    let from_start = corners.separation(&segment, 0.0);
+                    let start = from_start.offset.length();
+                    least = least.min(start);
                     if self.is_far(second.skin, start) {
                         continue;
                     }
                     nearest = nearest.min(start);
-                    let met = self.approach(second.skin, (edge, &segment), (&other, &corners));
+                    let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
                     let Some((found, clearance)) = met else {
                         continue;
                     };
@@ -249,6 +308,7 @@ impl Search<'_> {
             };
             let reach = self.radius + second.skin.spread;
             match &second.skin.images {
+                _ if let From::Known(others) = from => others.iter().for_each(|&other| see_edges([other, NONE, NONE])),
                 Some(images) if self.in_images => {
                     // The box about all of a long edge is mostly beside it.
                     let [from, to] = segment.ends;
@@ -273,7 +333,7 @@ impl Search<'_> {
                     }
                 }
             }
-            self.measure(kept.as_deref_mut(), Part::Edge(index), nearest);
+            self.measure(kept, Part::Edge(index), nearest);
             if let Some((_, other, (found, clearance))) = closest {
                 let sides = [
                     Side {
@@ -289,6 +349,7 @@ impl Search<'_> {
                 ];
                 self.show(sides, -found.offset, (clearance, shift), see);
             }
+            least
         }
     }
 
@@ -298,8 +359,9 @@ impl Search<'_> {
         skin: &Skin,
         (nodes, segment): ([u32; 2], &Segment),
         (others, corners): (&[u32], &Corners),
+        start: Separation,
     ) -> Option<(Separation, Clearance)> {
-        let found = corners.approach(segment, 0.0)?;
+        let found = corners.approach_from(start, segment, 0.0)?;
         if !self.is_of_one() {
             return Some((found, Clearance::of(segment.radius)));
         }
@@ -310,12 +372,11 @@ impl Search<'_> {
         }
         // What was one place has no side yet.
         let radius = clearance.radius;
-        let start = corners.separation(segment, 0.0).offset.length_squared();
-        if start < (PARTED * radius) * (PARTED * radius) {
+        if start.offset.length_squared() < (PARTED * radius) * (PARTED * radius) {
             return None;
         }
         let segment = Segment { radius, ..*segment };
-        Some((corners.approach(&segment, 0.0)?, clearance))
+        Some((corners.approach_from(start, &segment, 0.0)?, clearance))
     }
 
     /// Shows what meets in this direction, of sides that keep so far apart, and in coordinates so far apart.

@@ -32,6 +32,8 @@ pub(crate) struct Skin {
     pub is_closed: bool,
     /// The edges that pass through other tissue, or the body's own, as the step begins.
     pub pierces: Vec<bool>,
+    /// How many times they do, as that was looked for last.
+    pub crossings: u32,
     /// Where the body's coordinates begin.
     pub origin: DVec3,
     /// Where nodes are as a step or substep begins, in the body's coordinates, and how fast they go through it, m/s.
@@ -40,6 +42,8 @@ pub(crate) struct Skin {
     /// The middle of these velocities, m/s, and how far any node leaves that, m.
     pub drift: Vec3,
     pub spread: f32,
+    /// The box of all ways that nodes have gone since they were looked at last, m.
+    pub moved: Bounds,
     /// The box of all velocities that were given.
     pub given: Bounds,
     /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
@@ -74,11 +78,13 @@ saved!(Skin {
     room,
     is_closed,
     pierces,
+    crossings,
     origin,
     starts,
     velocities,
     drift,
     spread,
+    moved,
     given,
     short,
     extent,
@@ -98,6 +104,9 @@ pub(super) const PARTED: f32 = 0.1;
 
 /// Sides of a cut pass through each other where edges do by more than this part of a short edge.
 const CROSSING: f32 = 0.01;
+
+/// A node that lies within another body is led out through a face that is no further than this part of a short edge.
+const LED_OUT: f32 = 0.5;
 
 /// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
@@ -194,11 +203,13 @@ impl Skin {
             forest,
             is_closed: mesh::is_closed(&triangles)?,
             pierces,
+            crossings: 0,
             origin: body.origin,
             starts: body.zeros()?,
             velocities: body.zeros()?,
             drift: Vec3::ZERO,
             spread: 0.0,
+            moved: Bounds::EMPTY,
             given: Bounds::EMPTY,
             triangles,
             changing,
@@ -292,6 +303,11 @@ impl Skin {
         !may_meet && self.first_distance(nodes, others).is_some_and(|apart| apart <= radius)
     }
 
+    /// How deep a node that lies within it may be to be led out through a face, m.
+    pub fn depth(&self) -> f32 {
+        LED_OUT * self.short
+    }
+
     /// What keeps off it where it has no thickness, m.
     pub fn least_thickness(&self) -> f32 {
         LEAST_THICKNESS * self.short
@@ -364,15 +380,13 @@ impl Skin {
             let velocity = bound.of(|node| self.velocities.get(node));
             self.velocities.set(bound.node as usize, velocity);
         }
-        if self.nearby.is_some() {
-            let ways = self
-                .nodes
-                .iter()
-                .map(|&node| self.velocities.get(node as usize) - self.drift);
-            let ways = Bounds::of(ways);
-            self.spread = self.spread.max(duration * ways.magnitudes().length());
-            self.know_nearby(&body.contact);
-        }
+        let ways = self
+            .nodes
+            .iter()
+            .map(|&node| self.velocities.get(node as usize) - self.drift);
+        let ways = Bounds::of(ways);
+        self.spread = self.spread.max(duration * ways.magnitudes().length());
+        self.know_nearby(&body.contact);
     }
 
     /// Has what is near itself known, or the trees where it is, so far as it is looked for.
@@ -398,8 +412,8 @@ impl Skin {
         }
     }
 
-    /// Takes the trees to where the triangles are.
-    fn fit(&mut self) {
+    /// Takes the trees to where the triangles are, if they are not there.
+    pub fn fit(&mut self) {
         if !self.is_fitted {
             let (triangles, starts) = (&self.triangles, &self.starts);
             self.forest
@@ -432,6 +446,9 @@ impl Skin {
         self.take(body.origin, body.bindings.as_ref(), 0.0, |node| {
             (positions.get(node), Vec3::ZERO)
         });
+        if self.meets_bodies {
+            self.fit();
+        }
         self.know_nearby(&body.contact);
     }
 
@@ -444,9 +461,10 @@ impl Skin {
     ) {
         self.origin = origin;
         self.given = Bounds::EMPTY;
-        let mut all = Bounds::EMPTY;
+        let (mut all, mut moved) = (Bounds::EMPTY, Bounds::EMPTY);
         for &node in self.changing.iter().flat_map(|changing| &changing.movers) {
             let (start, velocity) = motion_of(node as usize);
+            moved = moved.with(start - self.starts.get(node as usize));
             self.starts.set(node as usize, start);
             self.velocities.set(node as usize, velocity);
         }
@@ -457,16 +475,17 @@ impl Skin {
                 None => motion_of(node as usize),
                 Some(bound) => [bound.of(|node| motion_of(node).0), bound.of(|node| motion_of(node).1)].into(),
             };
+            moved = moved.with(start - self.starts.get(node as usize));
             self.starts.set(node as usize, start);
             self.velocities.set(node as usize, velocity);
             all = all.with(velocity);
         }
+        self.moved = moved;
         self.drift = 0.5 * (all.min + all.max);
         self.travel = duration * all.magnitudes().length();
         self.spread = 0.5 * duration * (all.max - all.min).length();
         self.is_fitted = false;
-        // Where what is near itself is known, nothing else looks for anything by the trees.
-        if self.nearby.is_none() || self.meets_bodies || self.wound().is_some_and(Wound::is_open) {
+        if self.images.is_some() || self.wound().is_some_and(Wound::is_open) {
             self.fit();
         }
     }

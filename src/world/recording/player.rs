@@ -31,6 +31,17 @@ pub struct ReplayDifference {
     pub replayed: u64,
 }
 
+/// How a step begins.
+struct Beginning {
+    /// s
+    dt: f32,
+    /// The units of work that it may do.
+    work: u32,
+    /// That of its snapshot, bytes.
+    size: usize,
+    difference: Vec<u8>,
+}
+
 /// The file, as far as it was read.
 struct Frames {
     file: BufReader<File>,
@@ -92,8 +103,8 @@ impl Frames {
         }
     }
 
-    /// How the next step begins: its length and work, the size of its snapshot, and the difference.
-    fn begin(&mut self) -> Result<Option<((f32, u32), usize, Vec<u8>)>> {
+    /// How the next step begins.
+    fn begin(&mut self) -> Result<Option<Beginning>> {
         let (Some(dt), Some(work), Some(size), Some(length)) =
             (self.array()?, self.array()?, self.array()?, self.array()?)
         else {
@@ -106,8 +117,12 @@ impl Frames {
         let too_long = |_| Error::invalid(format!("{} is damaged: a snapshot of {size} bytes", self.name));
         let mut bytes = memory::filled(0, usize::try_from(length).map_err(too_long)?)?;
         let size = usize::try_from(size).map_err(too_long)?;
-        let step = (f32::from_le_bytes(dt), u32::from_le_bytes(work));
-        Ok(self.fill(&mut bytes)?.map(|()| (step, size, bytes)))
+        Ok(self.fill(&mut bytes)?.map(|()| Beginning {
+            dt: f32::from_le_bytes(dt),
+            work: u32::from_le_bytes(work),
+            size,
+            difference: bytes,
+        }))
     }
 
     /// How a step ended: whether it was refused, and the hash.
@@ -137,17 +152,17 @@ impl World {
         let mut world: Option<World> = None;
         let mut before = Vec::new();
         while frames.frame(BEGIN)?.is_some() {
-            let Some(((dt, work), size, difference)) = frames.begin()? else {
+            let Some(begun) = frames.begin()? else {
                 report.is_cut_short = true;
                 break;
             };
-            let bytes = applied(&before, &difference, size)?;
+            let bytes = applied(&before, &begun.difference, begun.size)?;
             // Where nothing was called between two steps the world goes on.
             let mut it = match world.take() {
                 Some(it) if bytes == before => it,
                 _ => World::load(&bytes, thread_count, None)?,
             };
-            let result = it.step_of(dt, work);
+            let result = it.step_of(begun.dt, begun.work);
             let Some((is_refused, recorded)) = frames.end()? else {
                 report.is_cut_short = true;
                 break;

@@ -1,0 +1,302 @@
+//! What of two bodies is near each other, kept from substep to substep of a step, until they may have come nearer than was looked for (Verlet 1967).
+//!
+//! Beside each corner and edge stands how far the bodies may move against each other before anything can reach it: until then it is passed over.
+//! A substep so examines what touches and next to nothing else. What is found is a matter of distances alone: a search by the trees finds the same.
+
+use glam::Vec3;
+
+use super::search::{Party, Search};
+use super::skin::{NONE, Skin};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::contact::sweep::Segment;
+use crate::geometry::Bounds;
+
+/// What is listed may come this part of a short edge nearer before all is looked for again, at least and at most, and in between as far as in so
+/// many substeps.
+const LEAST_MARGIN: f32 = 0.05;
+const MOST_MARGIN: f32 = 0.5;
+const SUBSTEPS: f32 = 16.0;
+
+/// Features near corners and edges that there is room for, for each of those.
+const ROOM: usize = 4;
+
+/// What rounding may take from distances, as a part of them.
+const ROUNDING: f32 = 1e-3;
+
+/// A corner or an edge, and what of the other body is near it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// Its place among those of its surface.
+    pub number: u32,
+    first: u32,
+    end: u32,
+    /// How far apart it and they were, together with how far the bodies had moved by then, m.
+    pub apart: f32,
+}
+
+saved!(Run {
+    number,
+    first,
+    end,
+    apart
+});
+
+/// What of two bodies is near: corners of the first with triangles of the second, the other way round, and edges with edges.
+#[derive(Clone, Copy, Debug)]
+struct List {
+    first: u32,
+    ends: [u32; 3],
+    /// Everything that was no further apart than this is listed, m.
+    within: f32,
+    /// How far the bodies have moved against each other since, at most, m.
+    moved: f32,
+}
+
+saved!(List {
+    first,
+    ends,
+    within,
+    moved
+});
+
+/// The lists of the near pairs of an island, in their order.
+#[derive(Debug, Default)]
+pub(super) struct Pairs {
+    is_known: bool,
+    /// Whether there was no room in this step.
+    is_full: bool,
+    lists: Vec<List>,
+    runs: Vec<Run>,
+    features: Vec<u32>,
+}
+
+saved!(Pairs {
+    is_known,
+    is_full,
+    lists,
+    runs,
+    features
+});
+
+/// The list of one pair, to be gone through.
+pub(super) struct Known<'a> {
+    pub runs: [&'a mut [Run]; 3],
+    pub features: &'a [u32],
+    pub moved: f32,
+}
+
+impl Run {
+    /// What is near it, of all features that are listed.
+    pub fn of<'a>(&self, features: &'a [u32]) -> &'a [u32] {
+        &features[self.first as usize..self.end as usize]
+    }
+}
+
+impl Pairs {
+    /// Makes room for surfaces of so many corners and edges in all, and so many pairs of bodies.
+    pub fn reserve(&mut self, features: usize, pairs: usize) -> Result<()> {
+        memory::reserve(&mut self.lists, pairs)?;
+        memory::reserve(&mut self.runs, features)?;
+        memory::reserve(&mut self.features, ROOM * features)
+    }
+
+    /// A step of an island begins.
+    pub fn forget(&mut self) {
+        (self.is_known, self.is_full) = (false, false);
+    }
+
+    /// Takes into account how far bodies went since they were looked at last.
+    pub fn advance(&mut self, pairs: impl Iterator<Item = [usize; 2]>, skins: &[Option<Skin>]) {
+        if !self.is_known {
+            return;
+        }
+        for (list, [a, b]) in self.lists.iter_mut().zip(pairs) {
+            if let (Some(Some(first)), Some(Some(second))) = (skins.get(a), skins.get(b)) {
+                let (a, b) = (&first.moved, &second.moved);
+                let most = (a.max - b.min).abs().max((b.max - a.min).abs()).length();
+                list.moved += most * (1.0 + ROUNDING);
+            }
+        }
+    }
+
+    /// Whether everything that can meet in this search is in the list of the pair.
+    pub fn holds(&self, pair: usize, search: &Search) -> bool {
+        let list = self.lists.get(pair).filter(|_| self.is_known);
+        list.is_some_and(|list| search.reach() * (1.0 + ROUNDING) + list.moved <= list.within)
+    }
+
+    /// Whether it is worth looking for what is near.
+    pub fn can_be_found(&self) -> bool {
+        !self.is_full
+    }
+
+    /// Begins anew.
+    pub fn begin(&mut self) {
+        self.lists.clear();
+        self.runs.clear();
+        self.features.clear();
+        self.is_known = true;
+    }
+
+    /// There was no room.
+    pub fn fail(&mut self) {
+        (self.is_known, self.is_full) = (false, true);
+    }
+
+    /// Adds the list of the next pair, by trees that are where the surfaces are; of one that does not meet nothing is listed. `None` without room.
+    pub fn add(&mut self, search: Option<&Search>) -> Option<()> {
+        let first = self.runs.len() as u32;
+        let mut list = List {
+            first,
+            ends: [first; 3],
+            within: 0.0,
+            moved: 0.0,
+        };
+        if let Some(search) = search {
+            list.within = search.reach() + search.margin();
+            let [a, b] = search.parties;
+            self.corners(search, [a, b], list.within)?;
+            list.ends[0] = self.runs.len() as u32;
+            self.corners(search, [b, a], list.within)?;
+            list.ends[1] = self.runs.len() as u32;
+            self.edges(search, list.within)?;
+            list.ends[2] = self.runs.len() as u32;
+        }
+        put(&mut self.lists, list)
+    }
+
+    /// The list of a pair.
+    pub fn of(&mut self, pair: usize) -> Option<Known<'_>> {
+        let list = self.lists.get(pair).filter(|_| self.is_known)?;
+        let [a, b, c] = list.ends.map(|end| (end - list.first) as usize);
+        let runs = self.runs.get_mut(list.first as usize..list.ends[2] as usize)?;
+        let (corners, edges) = runs[..c].split_at_mut(b);
+        let (of_first, of_second) = corners.split_at_mut(a);
+        Some(Known {
+            runs: [of_first, of_second, edges],
+            features: &self.features,
+            moved: list.moved,
+        })
+    }
+
+    fn corners(&mut self, search: &Search, [of_nodes, of_faces]: [Party; 2], within: f32) -> Option<()> {
+        let skin = of_faces.skin;
+        let shift = super::search::shift(of_nodes.skin, skin);
+        let around = skin.forest.bounds().extended(within);
+        for (number, &node) in of_nodes.skin.nodes.iter().enumerate() {
+            let place = of_nodes.skin.starts.get(node as usize) + shift;
+            let here = Bounds::of([place].into_iter());
+            if !around.overlaps(&here) {
+                continue;
+            }
+            let segment = still([place; 2]);
+            self.gather(number, |see| {
+                skin.near(&here, within, |triangle| {
+                    let apart = distance(search, of_faces, &segment, &skin.triangles[triangle]);
+                    see(triangle as u32, apart, within);
+                });
+            })?;
+        }
+        Some(())
+    }
+
+    fn edges(&mut self, search: &Search, within: f32) -> Option<()> {
+        let [first, second] = search.parties;
+        let shift = super::search::shift(first.skin, second.skin);
+        let around = second.skin.forest.bounds().extended(within);
+        for (number, &edge) in first.skin.edges.iter().enumerate() {
+            if first.skin.pierces[number] || edge[0] == NONE {
+                continue;
+            }
+            let ends = edge.map(|node| first.skin.starts.get(node as usize) + shift);
+            let here = Bounds::of(ends.into_iter());
+            if !around.overlaps(&here) {
+                continue;
+            }
+            let segment = still(ends);
+            self.gather(number, |see| {
+                second.skin.near(&here, within, |triangle| {
+                    let owned = second.skin.owned(triangle).into_iter().filter(|&other| other != NONE);
+                    for other in owned.filter(|&other| !second.skin.pierces[other as usize]) {
+                        let apart = distance(search, second, &segment, &second.skin.edges[other as usize]);
+                        see(other, apart, within);
+                    }
+                });
+            })?;
+        }
+        Some(())
+    }
+
+    /// The run of one more corner or edge, if anything is near it.
+    fn gather(&mut self, number: usize, near: impl FnOnce(&mut dyn FnMut(u32, f32, f32))) -> Option<()> {
+        let first = self.features.len();
+        let mut has_room = true;
+        let mut nearest = f32::INFINITY;
+        let features = &mut self.features;
+        near(&mut |feature, apart, within| {
+            if apart <= within {
+                nearest = nearest.min(apart);
+                has_room = has_room && put(features, feature).is_some();
+            }
+        });
+        if !has_room {
+            return None;
+        }
+        if self.features.len() > first {
+            self.features[first..].sort_unstable();
+            let run = Run {
+                number: number as u32,
+                first: first as u32,
+                end: self.features.len() as u32,
+                apart: nearest,
+            };
+            put(&mut self.runs, run)?;
+        }
+        Some(())
+    }
+}
+
+impl Search<'_> {
+    /// How far apart anything is at most that can meet, m.
+    pub fn reach(&self) -> f32 {
+        let depths = self.parties.map(|party| party.skin.depth());
+        self.radius.max(depths[0]).max(depths[1]) + self.motion()
+    }
+
+    /// The same of edges: none is led out of a body.
+    pub fn reach_of_edges(&self) -> f32 {
+        self.radius + self.motion()
+    }
+
+    /// How far anything of one body goes against anything of the other at most, m.
+    fn motion(&self) -> f32 {
+        let [a, b] = self.parties.map(|party| party.skin);
+        a.spread + b.spread + (a.drift - b.drift).length() * self.dt
+    }
+
+    /// How much further away than that is listed, m.
+    fn margin(&self) -> f32 {
+        let [a, b] = self.parties.map(|party| party.skin.short);
+        let short = a.min(b);
+        (SUBSTEPS * self.motion()).clamp(LEAST_MARGIN * short, MOST_MARGIN * short)
+    }
+}
+
+fn still(ends: [Vec3; 2]) -> Segment {
+    Segment {
+        ends,
+        steps: [Vec3::ZERO; 2],
+        radius: 0.0,
+    }
+}
+
+fn distance(search: &Search, party: Party, segment: &Segment, nodes: &[u32]) -> f32 {
+    search.corners(party, nodes).separation(segment, 0.0).offset.length()
+}
+
+/// Adds a value where there is room for it.
+fn put<T>(values: &mut Vec<T>, value: T) -> Option<()> {
+    let has_room = values.len() < values.capacity();
+    has_room.then(|| values.push(value))
+}
