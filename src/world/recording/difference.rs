@@ -132,7 +132,8 @@ mod tests {
             assert!(applied(&old, &good[..length], 700).is_err(), "{length}");
         }
         assert!(applied(&old, &good, 699).is_err() && applied(&old, &good, 701).is_err());
-        for at in 0..24 {
+        // Where nothing is copied from does not matter.
+        for at in 8..24 {
             let mut bad = good.clone();
             bad[at] = bad[at].wrapping_add(200);
             assert!(applied(&old, &bad, 700).is_err(), "byte {at}");
