@@ -35,7 +35,8 @@ static void drop(float mass) {
   sinew_tool_id ball;
   CHECK(sinew_tool_create(world, &tool, &ball));
   /* The shape gives the inertia for a density; the density of this ball is such that it has the mass. */
-  sinew_mass_properties properties = {.struct_size = sizeof properties};
+  sinew_mass_properties properties;
+  properties.struct_size = sizeof properties;
   CHECK(sinew_tool_get_mass_of_density(world, ball, mass / 0.0141372f, &properties));
   CHECK(sinew_tool_set_mass(world, ball, &properties));
 
