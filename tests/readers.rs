@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, BodyId, BodyReader, Error, Frame, RestStateDefinition, Storage, Tearing, Values, World,
+    BodyDefinition, BodyId, BodyReader, Error, Frame, RestStateDefinition, Solver, Storage, Tearing, Values, World,
     WorldDefinition,
 };
 
@@ -209,6 +209,7 @@ fn a_step_that_is_unstable_is_not_seen() {
         triangles: &mesh.triangles,
         masses: Values::Uniform(1e-4),
         stiffnesses: Values::Uniform(1e3),
+        solver: Solver::Verlet,
         ..BodyDefinition::default()
     };
     let body = world.create_body(&body).expect("a body");
