@@ -23,7 +23,7 @@ const CORE: [&str; 5] = [
     "sinew/tool.h",
 ];
 const CORE_LINES: usize = 900;
-const ALL_LINES: usize = 2530;
+const ALL_LINES: usize = 2570;
 const IN_ONE: &str = "sinew/sinew_all.h";
 
 fn root() -> PathBuf {
