@@ -29,8 +29,8 @@ sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
 /// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at
-/// rest; a new mass leaves its velocity. Contact keeps momentum and is stable for light and heavy
-/// tools. Pinned nodes are obstacles; other tools are not. Bodies near a dynamic tool do not sleep.
+/// rest; a new mass leaves its velocity. Contact keeps momentum and, with VERLET, is stable for any
+/// mass. Pinned nodes are obstacles; other tools are not. Bodies near a dynamic tool do not sleep.
 /// force_limit has no effect.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the
 /// tool.

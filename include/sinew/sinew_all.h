@@ -1390,8 +1390,8 @@ sinew_status sinew_tool_get_mass_of_density(const sinew_world *world, sinew_tool
 
 /// Makes a tool dynamic: a rigid body that forces, gravity and contact with tissue move.
 /// `mass` is nullable: the tool becomes kinematic again, as it is created. A dynamic tool starts at
-/// rest; a new mass leaves its velocity. Contact keeps momentum and is stable for light and heavy
-/// tools. Pinned nodes are obstacles; other tools are not. Bodies near a dynamic tool do not sleep.
+/// rest; a new mass leaves its velocity. Contact keeps momentum and, with VERLET, is stable for any
+/// mass. Pinned nodes are obstacles; other tools are not. Bodies near a dynamic tool do not sleep.
 /// force_limit has no effect.
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT for a plane, or if attachments or a haptic handle use the
 /// tool.
@@ -1933,8 +1933,9 @@ sinew_status sinew_body_get_node_damping(const sinew_world *world, sinew_body_id
 /// Advances the world by at most `work` units of work.
 /// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The
 /// step covers `dt` [s] plus the lag, or as much as VERLET reaches in `work` substeps; the rest is
-/// the new lag. Other solvers stop after `work` products and continue in the next step. Tools, pins
-/// and blades complete their motion; forces act on the simulated time. `report` is nullable.
+/// the new lag, which plain steps leave. Other solvers stop after `work` products, or one for each
+/// millisecond near a tool, and continue in the next step. Tools, pins and blades complete their
+/// motion. `report` is nullable.
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
 sinew_status sinew_world_step_with_budget(sinew_world *world, float dt, uint32_t work,
                                           sinew_step_report *report);

@@ -50,9 +50,9 @@ unsafe fn step(
 /// Advances the world by at most `work` units of work.
 ///
 /// A unit is one substep of each VERLET body or one matrix-vector product of each other body. The step covers `dt` [s]
-/// plus the lag, or as much as VERLET reaches in `work` substeps; the rest is the new lag. Other solvers stop after
-/// `work` products and continue in the next step. Tools, pins and blades complete their motion; forces act on the
-/// simulated time. `report` is nullable.
+/// plus the lag, or as much as VERLET reaches in `work` substeps; the rest is the new lag, which plain steps leave.
+/// Other solvers stop after `work` products, or one for each millisecond near a tool, and continue in the next step.
+/// Tools, pins and blades complete their motion. `report` is nullable.
 ///
 /// Errors: SINEW_STATUS_UNSUPPORTED with fixed substeps or a tolerance.
 ///

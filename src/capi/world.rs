@@ -270,7 +270,12 @@ pub unsafe extern "C" fn sinew_world_step(
         let result = world.step(dt);
         if let (Some(report), Ok(value) | Err(Error::Unstable { report: value, .. })) = (report, &result) {
             // SAFETY: still there, by the same contract.
-            unsafe { report.fill((*value).into()) };
+            unsafe {
+                report.fill(sinew_step_report {
+                    lag: world.lag(),
+                    ..(*value).into()
+                });
+            }
         }
         if let Ok(StepReport {
             bodies_restored: count @ 1..,

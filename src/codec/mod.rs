@@ -55,8 +55,11 @@ pub(crate) fn write_section(to: &mut Writer, tag: [u8; 4], content: impl FnOnce(
     to.put_at(place, &(size as u64).to_le_bytes());
 }
 
-/// Completes the header.
+/// Completes the header; what is too short for one is refused when it is opened.
 pub(crate) fn seal(bytes: &mut [u8]) {
+    if bytes.len() < HEADER {
+        return;
+    }
     let size = bytes.len() as u64;
     bytes[CHECKSUM - 8..CHECKSUM].copy_from_slice(&size.to_le_bytes());
     let checksum = checksum(bytes);

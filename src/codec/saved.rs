@@ -313,10 +313,7 @@ impl<T: Saved> Saved for Vec<T> {
         if count > from.left() / T::LEAST {
             return Err(from.refusal("more is announced than there is"));
         }
-        if room < count {
-            return Err(from.refusal("a list is larger than its room"));
-        }
-        let mut values = from.reserved(room)?;
+        let mut values = from.reserved(room.max(count))?;
         T::load_all(count, &mut values, from)?;
         Ok(values)
     }

@@ -70,7 +70,7 @@ impl std::fmt::Display for StepLimit {
             LimitKind::Tolerance => write!(f, ": raise tolerance or max_substeps, or take shorter steps"),
             _ => write!(
                 f,
-                " and needs {needed} substeps: use solver AUTO or IMPLICIT, raise mass_scaling or max_substeps, or take shorter steps"
+                " and needs {needed} substeps: use solver IMPLICIT, raise mass_scaling or max_substeps, or take shorter steps"
             ),
         }
     }

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use glam::Vec3;
 use sinew::mesh::Mesh;
 use sinew::{
-    BodyDefinition, Error, HapticDefinition, Pose, ReplayReport, Shape, ToolDefinition, Values, World, WorldDefinition,
+    BodyDefinition, Error, HapticDefinition, Pose, ReplayReport, Shape, Solver, ToolDefinition, Values, World,
+    WorldDefinition,
 };
 
 use super::acts::Caller;
@@ -105,6 +106,33 @@ fn steps_of_bounded_work_are_replayed() {
         lags += u32::from(report.lag > 0.0);
     }
     assert!(lags > 1, "some steps are cut short by their work");
+    let steps = world.stop_recording().expect("a recording");
+    let report = World::replay(&path, 1).expect("a replay");
+    assert_eq!((report.steps, report.difference), (steps, None));
+    fs::remove_file(&path).expect("the file");
+}
+
+#[test]
+fn what_is_called_between_steps_of_a_solved_body_is_replayed() {
+    let path = path("solved");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let mesh = Mesh::cloth([0.1; 2], [6, 6]).expect("a cloth");
+    world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+            masses: Values::Uniform(1e-4),
+            stiffnesses: Values::Uniform(20.0),
+            solver: Solver::Implicit,
+            ..BodyDefinition::default()
+        })
+        .expect("a body");
+    world.start_recording(&path).expect("a file");
+    for (work, y) in [(3, -9.0), (5, -1.0), (2, -3.0)] {
+        world.set_gravity(Vec3::new(0.0, y, 0.0)).expect("a gravity");
+        world.step_with_budget(0.01, work).expect("a step");
+        world.step(0.01).expect("a step");
+    }
     let steps = world.stop_recording().expect("a recording");
     let report = World::replay(&path, 1).expect("a replay");
     assert_eq!((report.steps, report.difference), (steps, None));

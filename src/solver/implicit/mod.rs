@@ -182,7 +182,6 @@ pub(crate) struct Implicit {
 }
 
 saved!(Implicit {
-    allowed,
     order,
     budget,
     left,
@@ -220,7 +219,7 @@ saved!(Implicit {
     newton,
     report,
     told
-} where Self::ends);
+} leaves { allowed: u32::MAX } where Self::ends);
 
 impl Experience {
     const NONE: Self = Self {

@@ -8,6 +8,7 @@ use super::super::World;
 use super::difference::applied;
 use super::{BEGIN, END, MAGIC, VERSION};
 use crate::base::{Error, Result, memory};
+use crate::codec::seal;
 
 /// What came of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -156,7 +157,11 @@ impl World {
                 report.is_cut_short = true;
                 break;
             };
-            let bytes = applied(&before, &begun.difference, begun.size)?;
+            let mut bytes = applied(&before, &begun.difference, begun.size)?;
+            // Lists of a world that was loaded may have other room than those that were recorded. What is in the first snapshot is checked as it is.
+            if !before.is_empty() {
+                seal(&mut bytes);
+            }
             // Where nothing was called between two steps the world goes on.
             let mut it = match world.take() {
                 Some(it) if bytes == before => it,
