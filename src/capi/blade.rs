@@ -192,8 +192,7 @@ pub unsafe extern "C" fn sinew_blade_set_pose(
     unsafe {
         with_world_mut(world, |world| {
             let position = memory::vector("position", position)?;
-            let orientation = memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1)?;
-            let orientation = orientation.map(|orientation| Quat::from_array(orientation[0]));
+            let orientation = memory::optional_orientation("orientation", orientation)?;
             world.set_blade_pose(blade.id(), position, orientation)
         })
     }

@@ -1,11 +1,9 @@
 //! Steps of bounded work and time.
 
-use super::guard::{sinew_world, with_world_mut};
-use super::memory;
+use super::guard::sinew_world;
 use super::status::sinew_status;
-use super::world::sinew_step_report;
-use crate::base::{Error, Result};
-use crate::world::{BudgetReport, World};
+use super::world::{sinew_step_report, step_and_report};
+use crate::world::BudgetReport;
 
 impl From<BudgetReport> for sinew_step_report {
     fn from(report: BudgetReport) -> Self {
@@ -13,37 +11,8 @@ impl From<BudgetReport> for sinew_step_report {
             work: report.work,
             work_done: report.work_done,
             residual: report.error,
-            lag: report.lag,
             ..report.step.into()
         }
-    }
-}
-
-/// Steps, and writes what came of it.
-///
-/// # Safety
-/// As of what calls it.
-unsafe fn step(
-    world: *mut sinew_world,
-    report: *mut sinew_step_report,
-    step: impl FnOnce(&mut World) -> Result<BudgetReport>,
-) -> sinew_status {
-    // SAFETY: the same contract.
-    unsafe {
-        with_world_mut(world, |world| {
-            let report = (!report.is_null()).then(|| memory::report("report", report));
-            let report = report.transpose()?;
-            let result = step(world);
-            let told = match &result {
-                Ok(done) => Some((*done).into()),
-                Err(Error::Unstable { report, .. }) => Some((*report).into()),
-                Err(_) => None,
-            };
-            if let (Some(report), Some(told)) = (report, told) {
-                report.fill(told);
-            }
-            result.map(drop)
-        })
     }
 }
 
@@ -66,7 +35,7 @@ pub unsafe extern "C" fn sinew_world_step_with_budget(
     report: *mut sinew_step_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe { step(world, report, |world| world.step_with_budget(dt, work)) }
+    unsafe { step_and_report(world, report, |world| world.step_with_budget(dt, work)) }
 }
 
 /// Advances the world by as much work as fits into `seconds`, judged by the speed of earlier calls.
@@ -84,5 +53,5 @@ pub unsafe extern "C" fn sinew_world_step_within(
     report: *mut sinew_step_report,
 ) -> sinew_status {
     // SAFETY: the same contract.
-    unsafe { step(world, report, |world| world.step_within(dt, seconds)) }
+    unsafe { step_and_report(world, report, |world| world.step_within(dt, seconds)) }
 }

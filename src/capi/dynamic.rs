@@ -1,6 +1,6 @@
 //! Tools that are rigid bodies, and what couples a tool to a rigid body of another engine.
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
@@ -230,8 +230,7 @@ pub unsafe extern "C" fn sinew_tool_teleport(
     unsafe {
         with_world_mut(world, |world| {
             let position = memory::vector("position", position)?;
-            let orientation = memory::optional_array("orientation", orientation.cast::<[f32; 4]>(), 1)?;
-            let orientation = orientation.map(|orientation| Quat::from_array(orientation[0]));
+            let orientation = memory::optional_orientation("orientation", orientation)?;
             world.teleport(tool.id(), position, orientation)
         })
     }

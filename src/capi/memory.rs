@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use std::fmt;
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use libc::c_char;
 
 use crate::base::{Error, Result, memory};
@@ -125,6 +125,16 @@ pub(super) unsafe fn optional_output_array<'a, T>(
 pub(super) unsafe fn vector(name: &str, pointer: *const f32) -> Result<Vec3> {
     // SAFETY: the same contract.
     unsafe { reference(name, pointer.cast::<[f32; 3]>()) }.map(|&vector| vector.into())
+}
+
+/// The orientation that `pointer` points to; `None` where it is NULL.
+///
+/// # Safety
+/// `pointer` is NULL or points to 4 floats that nobody changes meanwhile.
+pub(super) unsafe fn optional_orientation(name: &str, pointer: *const f32) -> Result<Option<Quat>> {
+    // SAFETY: the same contract.
+    let orientation = unsafe { optional_array(name, pointer.cast::<[f32; 4]>(), 1) }?;
+    Ok(orientation.map(|orientation| Quat::from_array(orientation[0])))
 }
 
 /// The text that `pointer` points to.

@@ -46,9 +46,11 @@ pub unsafe extern "C" fn sinew_world_get_substeps(
     unsafe {
         with_world(world, |world| {
             let [substeps, max_substeps] = world.substeps();
+            let out_substeps = memory::optional_output_array("out_substeps", out_substeps, 1)?;
+            let out_max_substeps = memory::optional_output_array("out_max_substeps", out_max_substeps, 1)?;
             for (out, value) in [(out_substeps, substeps), (out_max_substeps, max_substeps)] {
-                if !out.is_null() {
-                    *memory::output("out_substeps", out)? = value;
+                if let Some(out) = out {
+                    out[0] = value;
                 }
             }
             Ok(())

@@ -260,38 +260,45 @@ pub unsafe extern "C" fn sinew_world_step(
     dt: f32,
     report: *mut sinew_step_report,
 ) -> sinew_status {
-    let step = |world: &mut World| {
-        let report = if report.is_null() {
-            None
-        } else {
-            // SAFETY: the same contract.
-            Some(unsafe { memory::report("report", report) }?)
-        };
-        let result = world.step(dt);
-        if let (Some(report), Ok(value) | Err(Error::Unstable { report: value, .. })) = (report, &result) {
-            // SAFETY: still there, by the same contract.
-            unsafe {
-                report.fill(sinew_step_report {
-                    lag: world.lag(),
-                    ..(*value).into()
-                });
-            }
-        }
-        if let Ok(StepReport {
-            bodies_restored: count @ 1..,
-            ..
-        }) = &result
-        {
-            let time = world.time();
-            log::log(
-                SINEW_LOG_WARNING,
-                format_args!("the step to {time} s restored {count} bodies"),
-            );
-        }
-        result.map(drop)
-    };
     // SAFETY: the same contract.
-    unsafe { with_world_mut(world, step) }
+    unsafe { step_and_report(world, report, |world| world.step(dt)) }
+}
+
+/// Takes a step, and writes what came of it, also where it is refused as unstable.
+///
+/// # Safety
+/// `world` is NULL or a world nobody else uses; `report` is NULL or writable for the size that it states.
+pub(super) unsafe fn step_and_report<Report: Into<sinew_step_report>>(
+    world: *mut sinew_world,
+    report: *mut sinew_step_report,
+    step: impl FnOnce(&mut World) -> Result<Report>,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world_mut(world, |world| {
+            let report = (!report.is_null()).then(|| memory::report("report", report));
+            let report = report.transpose()?;
+            let result = step(world).map(Into::into);
+            let told = match &result {
+                Ok(told) => Some(*told),
+                Err(Error::Unstable { report, .. }) => Some((*report).into()),
+                Err(_) => None,
+            };
+            let lag = world.lag();
+            if let (Some(report), Some(told)) = (report, told) {
+                report.fill(sinew_step_report { lag, ..told });
+            }
+            let count = result?.bodies_restored;
+            if count > 0 {
+                let time = world.time();
+                log::log(
+                    SINEW_LOG_WARNING,
+                    format_args!("the step to {time} s restored {count} bodies"),
+                );
+            }
+            Ok(())
+        })
+    }
 }
 
 /// Sets the gravitational acceleration from the next step on.

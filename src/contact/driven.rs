@@ -203,13 +203,12 @@ impl Driven {
 
     /// The energy that contact gave a tool, J; `None`: it is led.
     pub fn received(&self, index: usize) -> Option<f64> {
-        let copy = self.copies.iter().find(|copy| copy.tool.index == index)?;
-        Some(copy.received)
+        Some(self.copies[self.place(index)?].received)
     }
 
     /// Where a tool is when the step has ended.
     pub fn end(&self, index: usize, dt: f32) -> Option<RigidMotion> {
-        let mut copy = *self.copies.iter().find(|copy| copy.tool.index == index)?;
+        let mut copy = self.copies[self.place(index)?];
         copy.fly_to(1.0, f64::from(dt));
         // The half kick that closes a step may have been left to the next.
         copy.kick = f64::from(dt) - copy.driven_for;

@@ -15,7 +15,7 @@ use crate::contact::{Contacts, DynamicTool, ToolPath};
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
-pub(super) const RESERVE: f32 = 0.8;
+pub(crate) const RESERVE: f32 = 0.8;
 
 /// The part that is used of the substep that is stable wherever the nodes go: nothing is to be made up for as they move.
 const RESERVE_ANYWHERE: f32 = 0.9;

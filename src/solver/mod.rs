@@ -17,7 +17,7 @@ mod substep;
 mod verlet;
 mod watched;
 
-pub(crate) use attempt::{Carry, Outcome, StepRequest, attempt, fewer_substeps, substeps_alone};
+pub(crate) use attempt::{Carry, Outcome, RESERVE, StepRequest, attempt, fewer_substeps, substeps_alone};
 pub(crate) use closing::{close, close_beside, make_up_for, mean_force, show_closed};
 pub(crate) use energy_monitor::{EnergyAccount, Sums};
 pub(crate) use gravity::GravityKicks;

@@ -41,7 +41,7 @@ impl World {
         if it.is_plane() {
             return Err(Error::invalid("tool is a plane: a plane cannot be dynamic"));
         }
-        if self.bodies.iter().any(|(_, body)| body.is_held_by(place)) {
+        if self.is_holding(place) {
             return Err(Error::invalid(
                 "tool holds attachments: release them before it is dynamic",
             ));
@@ -116,7 +116,7 @@ impl World {
             orientation: orientation.unwrap_or(it.pose.orientation),
         };
         let pose = pose.checked()?;
-        if self.bodies.iter().any(|(_, body)| body.is_held_by(place)) {
+        if self.is_holding(place) {
             return Err(Error::invalid(
                 "tool holds attachments: release them before it is moved at once",
             ));

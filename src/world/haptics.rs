@@ -205,7 +205,7 @@ impl World {
     }
 
     /// Whether the tool at this place holds something.
-    fn is_holding(&self, place: usize) -> bool {
+    pub(super) fn is_holding(&self, place: usize) -> bool {
         self.bodies.iter().any(|(_, body)| body.is_held_by(place))
     }
 

@@ -10,7 +10,7 @@ use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
 use crate::def::{LimitKind, SubstepLimit};
 use crate::ids::Slots;
-use crate::solver::{Outcome, StepRequest, Together, attempt};
+use crate::solver::{Outcome, RESERVE, StepRequest, Together, attempt};
 use crate::threads::{Items, Team};
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
@@ -18,9 +18,6 @@ const SHARED_FROM: usize = 8192;
 
 /// Small bodies of fewer nodes in all are not worth waking anybody.
 const WORTH_SHARING: usize = 1024;
-
-/// The part of the longest stable substep that a step uses.
-const USED_OF_LIMIT: f32 = 0.8;
 
 /// What a step did.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -259,7 +256,7 @@ impl World {
         Some(StepLimit {
             body: BodyId(id),
             of,
-            needed: (dt / (USED_OF_LIMIT * stable_substep)).ceil() as u32,
+            needed: (dt / (RESERVE * stable_substep)).ceil() as u32,
         })
     }
 

@@ -163,12 +163,9 @@ impl Link {
     fn give(&self, impulse: Vec3, skins: &mut [Option<Skin>]) {
         for (index, impulse) in [impulse, -impulse].into_iter().enumerate() {
             if let Some(skin) = &mut skins[self.sides[index].body] {
-                let [x, y, z] = skin.velocities.axes_mut();
-                let answers = self.answers[index].iter();
-                for (&(node, _), answer) in self.movers[index][..self.counts[index] as usize].iter().zip(answers) {
-                    let node = node as usize;
-                    let change = impulse * *answer;
-                    (x[node], y[node], z[node]) = (x[node] + change.x, y[node] + change.y, z[node] + change.z);
+                for ((node, _), answer) in self.movers(index).zip(&self.answers[index]) {
+                    let mean = skin.velocities.get(node as usize) + impulse * *answer;
+                    skin.velocities.set(node as usize, mean);
                 }
             }
         }
@@ -205,15 +202,7 @@ impl Link {
     /// Of the first side against the second, m/s.
     fn velocity(&self, skins: &[Option<Skin>]) -> Vec3 {
         let [first, second] = [0, 1].map(|side| match &skins[self.sides[side].body] {
-            Some(skin) => {
-                let [x, y, z] = skin.velocities.axes();
-                let mut sum = Vec3::ZERO;
-                for &(node, part) in &self.movers[side][..self.counts[side] as usize] {
-                    let node = node as usize;
-                    sum += Vec3::new(x[node], y[node], z[node]) * part;
-                }
-                sum
-            }
+            Some(skin) => weighted(self.movers(side), |node| skin.velocities.get(node)),
             None => Vec3::ZERO,
         });
         first - second

@@ -278,8 +278,7 @@ impl Tissue {
 
     /// Whether all bodies of an island sleep: then nothing of it changes.
     pub fn is_asleep(&self, island: usize, bodies: &Slots<Body>) -> bool {
-        let mut members = self.islands.members(island).iter();
-        members.all(|&place| bodies.at(place as usize).is_some_and(Body::is_asleep))
+        are_asleep(self.islands.members(island), bodies)
     }
 
     /// Whether all bodies of an island have been at rest for long enough, and may sleep: what is attached does not.
@@ -299,10 +298,7 @@ impl Tissue {
         let islands = std::mem::take(&mut self.islands);
         for island in 0..islands.count() {
             let members = islands.members(island).iter().map(|&place| place as usize);
-            if members
-                .clone()
-                .all(|place| bodies.at(place).is_some_and(Body::is_asleep))
-            {
+            if are_asleep(islands.members(island), bodies) {
                 let skins = members.filter_map(|place| self.skins.get(place)?.as_ref());
                 count = skins.fold(count, |count, skin| count.saturating_add(skin.crossings));
                 continue;
@@ -748,6 +744,12 @@ fn join_movers(bonds: &Bonds, bodies: &Slots<Body>, places: [usize; 2], corners:
         }
     }
     bonds.join(places, [0, 1].map(|side| &movers[side][..counts[side]]))
+}
+
+/// Whether the bodies at all these places sleep.
+fn are_asleep(places: &[u32], bodies: &Slots<Body>) -> bool {
+    let mut places = places.iter();
+    places.all(|&place| bodies.at(place as usize).is_some_and(Body::is_asleep))
 }
 
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.

@@ -166,89 +166,87 @@ impl Search<'_> {
     ) -> f32 {
         let shift = shift(of_nodes.skin, of_faces.skin);
         let node = of_nodes.skin.nodes[corner];
-        {
-            let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
-            let radius = self.radius_of(kept.as_deref(), Part::Corner(corner));
-            let segment = Segment {
-                ends: [place; 2],
-                steps: [step; 2],
-                radius,
-            };
-            let mut least = f32::INFINITY;
-            let mut front = f32::INFINITY;
-            let mut touched: Option<(f32, usize, (Separation, Clearance))> = None;
-            // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
-            let mut nearest = (f32::INFINITY, 0.0_f32);
-            let mut behind: Option<(usize, Separation)> = None;
-            let around = Bounds::of([place, place + step].into_iter());
-            let is_solid = of_faces.skin.is_closed && !self.is_of_one();
-            let depth = if is_solid { of_faces.skin.depth() } else { 0.0 };
-            let reach = self.radius.max(depth) + of_faces.skin.spread;
-            self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
-                let nodes = of_faces.skin.triangles[triangle];
-                if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
-                    return;
-                }
-                let corners = self.corners(of_faces, &nodes);
-                let start = corners.separation(&segment, 0.0);
-                let distance = start.offset.length();
-                least = least.min(distance);
-                if self.is_far(of_faces.skin, distance) {
-                    return;
-                }
-                let height = if is_solid { height(&corners, &start) } else { 0.0 };
-                if height >= 0.0 {
-                    front = front.min(distance);
-                }
-                let is_nearer = distance < nearest.0 * (1.0 - SAME)
-                    || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
-                if is_solid && is_nearer {
-                    nearest = (distance, height.abs());
-                    behind = (height < 0.0).then_some((triangle, start));
-                }
-                let is_closer =
-                    |(least, known, _): (f32, usize, _)| distance < least || distance == least && triangle < known;
-                if height >= 0.0
-                    && touched.is_none_or(is_closer)
-                    && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
-                {
-                    touched = Some((distance, triangle, found));
-                }
-            });
-            // What was made within another is led out as far as its thickness asks for.
-            let nearest_there = match behind {
-                Some(_) if self.measures == Measure::Reductions => f32::INFINITY,
-                Some(_) => 0.0,
-                None => front,
-            };
-            self.measure(kept, Part::Corner(corner), nearest_there);
-            // On the wrong side it is led out, or let out where it is deep.
-            let is_behind = behind.is_some();
-            let closest = match behind {
-                Some((triangle, start)) => {
-                    (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, Clearance::of(radius))))
-                }
-                None => touched.map(|(_, triangle, found)| (triangle, found)),
-            };
-            if let Some((triangle, (found, clearance))) = closest {
-                let nodes = of_faces.skin.triangles[triangle];
-                let sides = [
-                    Side {
-                        body: of_nodes.place,
-                        nodes: [node; 3],
-                        weights: [1.0, 0.0, 0.0],
-                    },
-                    Side {
-                        body: of_faces.place,
-                        nodes,
-                        weights: found.weights,
-                    },
-                ];
-                let offset = if is_behind { found.offset } else { -found.offset };
-                self.show(sides, offset, (clearance, shift), see);
+        let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
+        let radius = self.radius_of(kept.as_deref(), Part::Corner(corner));
+        let segment = Segment {
+            ends: [place; 2],
+            steps: [step; 2],
+            radius,
+        };
+        let mut least = f32::INFINITY;
+        let mut front = f32::INFINITY;
+        let mut touched: Option<(f32, usize, (Separation, Clearance))> = None;
+        // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
+        let mut nearest = (f32::INFINITY, 0.0_f32);
+        let mut behind: Option<(usize, Separation)> = None;
+        let around = Bounds::of([place, place + step].into_iter());
+        let is_solid = of_faces.skin.is_closed && !self.is_of_one();
+        let depth = if is_solid { of_faces.skin.depth() } else { 0.0 };
+        let reach = self.radius.max(depth) + of_faces.skin.spread;
+        self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
+            let nodes = of_faces.skin.triangles[triangle];
+            if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
+                return;
             }
-            least
+            let corners = self.corners(of_faces, &nodes);
+            let start = corners.separation(&segment, 0.0);
+            let distance = start.offset.length();
+            least = least.min(distance);
+            if self.is_far(of_faces.skin, distance) {
+                return;
+            }
+            let height = if is_solid { height(&corners, &start) } else { 0.0 };
+            if height >= 0.0 {
+                front = front.min(distance);
+            }
+            let is_nearer =
+                distance < nearest.0 * (1.0 - SAME) || distance < nearest.0 * (1.0 + SAME) && height.abs() > nearest.1;
+            if is_solid && is_nearer {
+                nearest = (distance, height.abs());
+                behind = (height < 0.0).then_some((triangle, start));
+            }
+            let is_closer =
+                |(least, known, _): (f32, usize, _)| distance < least || distance == least && triangle < known;
+            if height >= 0.0
+                && touched.is_none_or(is_closer)
+                && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
+            {
+                touched = Some((distance, triangle, found));
+            }
+        });
+        // What was made within another is led out as far as its thickness asks for.
+        let nearest_there = match behind {
+            Some(_) if self.measures == Measure::Reductions => f32::INFINITY,
+            Some(_) => 0.0,
+            None => front,
+        };
+        self.measure(kept, Part::Corner(corner), nearest_there);
+        // On the wrong side it is led out, or let out where it is deep.
+        let is_behind = behind.is_some();
+        let closest = match behind {
+            Some((triangle, start)) => {
+                (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, Clearance::of(radius))))
+            }
+            None => touched.map(|(_, triangle, found)| (triangle, found)),
+        };
+        if let Some((triangle, (found, clearance))) = closest {
+            let nodes = of_faces.skin.triangles[triangle];
+            let sides = [
+                Side {
+                    body: of_nodes.place,
+                    nodes: [node; 3],
+                    weights: [1.0, 0.0, 0.0],
+                },
+                Side {
+                    body: of_faces.place,
+                    nodes,
+                    weights: found.weights,
+                },
+            ];
+            let offset = if is_behind { found.offset } else { -found.offset };
+            self.show(sides, offset, (clearance, shift), see);
         }
+        least
     }
 
     /// The same of an edge of the first surface and edges of the second.
@@ -262,95 +260,93 @@ impl Search<'_> {
         let [first, second] = self.parties;
         let shift = shift(first.skin, second.skin);
         let edge = first.skin.edges[index];
-        {
-            if first.skin.pierces[index] || edge[0] == NONE {
-                return f32::INFINITY;
-            }
-            let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
-            let segment = Segment {
-                ends: ways.map(|(place, _)| place),
-                steps: ways.map(|(_, step)| step),
-                radius: self.radius_of(kept.as_deref(), Part::Edge(index)),
-            };
-            let mut least = f32::INFINITY;
-            let mut nearest = f32::INFINITY;
-            let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
-            let mut see_edges = |edges: [u32; 3]| {
-                for other in second.skin.sound(edges) {
-                    if self.is_of_one()
-                        && (other <= edge
-                            || other.iter().any(|node| edge.contains(node))
-                            || first.skin.are_of_wound(edge, &other))
-                    {
-                        continue;
-                    }
-                    let corners = self.corners(second, &other);
-                    let from_start = corners.separation(&segment, 0.0);
-                    let start = from_start.offset.length();
-                    least = least.min(start);
-                    if self.is_far(second.skin, start) {
-                        continue;
-                    }
-                    nearest = nearest.min(start);
-                    let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
-                    let Some((found, clearance)) = met else {
-                        continue;
-                    };
-                    // At an end of either it is a node that meets.
-                    if found.inside && found.along > 0.0 && found.along < 1.0 {
-                        let is_closer =
-                            |(least, known, _): (f32, [u32; 2], _)| start < least || start == least && other < known;
-                        if closest.is_none_or(is_closer) {
-                            closest = Some((start, other, (found, clearance)));
-                        }
-                    }
-                }
-            };
-            let reach = self.radius + second.skin.spread;
-            match &second.skin.images {
-                _ if let From::Known(others) = from => others.iter().for_each(|&other| see_edges([other, NONE, NONE])),
-                Some(images) if self.in_images => {
-                    // The box about all of a long edge is mostly beside it.
-                    let [from, to] = segment.ends;
-                    let pieces = images.pieces(to - from);
-                    for piece in 0..pieces {
-                        let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
-                        let places = shares.map(|share| segment.at(share)).into_iter().flatten();
-                        let (skin, around) = (second.skin, Bounds::of(places));
-                        images.near(skin, &around, reach, |triangle| {
-                            see_edges(images.edges_near(skin, triangle, &around, reach));
-                        });
-                    }
-                }
-                _ => {
-                    let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
-                    let skin = second.skin;
-                    let see = |triangle| see_edges(skin.owned(triangle));
-                    if self.is_of_one() {
-                        skin.near_edge(index, &around, reach + skin.spread, see);
-                    } else {
-                        skin.near(&around, reach, see);
-                    }
-                }
-            }
-            self.measure(kept, Part::Edge(index), nearest);
-            if let Some((_, other, (found, clearance))) = closest {
-                let sides = [
-                    Side {
-                        body: first.place,
-                        nodes: [edge[0], edge[1], edge[1]],
-                        weights: [1.0 - found.along, found.along, 0.0],
-                    },
-                    Side {
-                        body: second.place,
-                        nodes: [other[0], other[1], other[1]],
-                        weights: found.weights,
-                    },
-                ];
-                self.show(sides, -found.offset, (clearance, shift), see);
-            }
-            least
+        if first.skin.pierces[index] || edge[0] == NONE {
+            return f32::INFINITY;
         }
+        let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
+        let segment = Segment {
+            ends: ways.map(|(place, _)| place),
+            steps: ways.map(|(_, step)| step),
+            radius: self.radius_of(kept.as_deref(), Part::Edge(index)),
+        };
+        let mut least = f32::INFINITY;
+        let mut nearest = f32::INFINITY;
+        let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
+        let mut see_edges = |edges: [u32; 3]| {
+            for other in second.skin.sound(edges) {
+                if self.is_of_one()
+                    && (other <= edge
+                        || other.iter().any(|node| edge.contains(node))
+                        || first.skin.are_of_wound(edge, &other))
+                {
+                    continue;
+                }
+                let corners = self.corners(second, &other);
+                let from_start = corners.separation(&segment, 0.0);
+                let start = from_start.offset.length();
+                least = least.min(start);
+                if self.is_far(second.skin, start) {
+                    continue;
+                }
+                nearest = nearest.min(start);
+                let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
+                let Some((found, clearance)) = met else {
+                    continue;
+                };
+                // At an end of either it is a node that meets.
+                if found.inside && found.along > 0.0 && found.along < 1.0 {
+                    let is_closer =
+                        |(least, known, _): (f32, [u32; 2], _)| start < least || start == least && other < known;
+                    if closest.is_none_or(is_closer) {
+                        closest = Some((start, other, (found, clearance)));
+                    }
+                }
+            }
+        };
+        let reach = self.radius + second.skin.spread;
+        match &second.skin.images {
+            _ if let From::Known(others) = from => others.iter().for_each(|&other| see_edges([other, NONE, NONE])),
+            Some(images) if self.in_images => {
+                // The box about all of a long edge is mostly beside it.
+                let [from, to] = segment.ends;
+                let pieces = images.pieces(to - from);
+                for piece in 0..pieces {
+                    let shares = [piece, piece + 1].map(|end| end as f32 / pieces as f32);
+                    let places = shares.map(|share| segment.at(share)).into_iter().flatten();
+                    let (skin, around) = (second.skin, Bounds::of(places));
+                    images.near(skin, &around, reach, |triangle| {
+                        see_edges(images.edges_near(skin, triangle, &around, reach));
+                    });
+                }
+            }
+            _ => {
+                let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
+                let skin = second.skin;
+                let see = |triangle| see_edges(skin.owned(triangle));
+                if self.is_of_one() {
+                    skin.near_edge(index, &around, reach + skin.spread, see);
+                } else {
+                    skin.near(&around, reach, see);
+                }
+            }
+        }
+        self.measure(kept, Part::Edge(index), nearest);
+        if let Some((_, other, (found, clearance))) = closest {
+            let sides = [
+                Side {
+                    body: first.place,
+                    nodes: [edge[0], edge[1], edge[1]],
+                    weights: [1.0 - found.along, found.along, 0.0],
+                },
+                Side {
+                    body: second.place,
+                    nodes: [other[0], other[1], other[1]],
+                    weights: found.weights,
+                },
+            ];
+            self.show(sides, -found.offset, (clearance, shift), see);
+        }
+        least
     }
 
     /// Where a node or an edge comes too close to a face or an edge, and how far they keep apart.

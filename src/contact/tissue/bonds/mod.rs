@@ -193,6 +193,14 @@ impl Bond {
     }
 }
 
+/// Where a point that is bound is now, m.
+fn place(point: &Bound, bodies: &Slots<Body>) -> Option<DVec3> {
+    let body = bodies.at(point.body)?;
+    let positions = body.state.positions();
+    let place = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
+    Some(point.nodes.into_iter().map(place).sum::<DVec3>() / point.weight() + body.origin)
+}
+
 /// The corners of two points: a node that has a part in both has the difference.
 fn corners_of(points: &[Bound; 2]) -> [Corner; CORNERS] {
     let mut corners = [Corner::default(); CORNERS];
@@ -311,24 +319,17 @@ impl Bonds {
     /// Where the first point of a bond is now, m.
     pub fn place_of(&self, bodies: &Slots<Body>, id: SlotId) -> Option<DVec3> {
         let bond = self.bonds.iter().find(|bond| bond.id == id)?;
-        let body = bodies.at(bond.points[0].body)?;
-        let positions = body.state.positions();
-        let place = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
-        let (nodes, whole) = (bond.points[0].nodes, bond.points[0].weight());
-        Some(nodes.into_iter().map(place).sum::<DVec3>() / whole + body.origin)
+        place(&bond.points[0], bodies)
     }
 
     /// Shows both points of each bond between points of tissue, where they are now, m.
     pub fn show_ends(&self, bodies: &Slots<Body>, mut see: impl FnMut([DVec3; 2])) {
-        for bond in &self.bonds {
-            let place = |point: &Bound| {
-                let body = bodies.at(point.body)?;
-                let positions = body.state.positions();
-                let of = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
-                let whole = point.weight();
-                (whole > 0.0).then(|| point.nodes.into_iter().map(of).sum::<DVec3>() / whole + body.origin)
-            };
-            if let [Some(first), Some(second)] = bond.points.each_ref().map(place) {
+        for bond in self
+            .bonds
+            .iter()
+            .filter(|bond| bond.points.iter().all(|point| point.weight() > 0.0))
+        {
+            if let [Some(first), Some(second)] = bond.points.each_ref().map(|point| place(point, bodies)) {
                 see([first, second]);
             }
         }
