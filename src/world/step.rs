@@ -8,7 +8,7 @@ use crate::base::{Count, Error, Result, Stage, Stopwatch};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
-use crate::def::{LimitKind, SubstepLimit};
+use crate::def::{ChoiceReason, LimitKind, SubstepLimit};
 use crate::ids::Slots;
 use crate::solver::{Outcome, RESERVE, StepRequest, Together, attempt};
 use crate::threads::{Items, Team};
@@ -47,14 +47,27 @@ pub struct StepLimit {
     pub of: SubstepLimit,
     /// How many substeps the step would need, as far as that is known.
     pub needed: u32,
+    /// Whether [`Solver::Auto`](crate::Solver::Auto) chose the solver of the body: naming it again would not help.
+    pub is_chosen: bool,
 }
 
-saved!(StepLimit { body, of, needed });
+saved!(StepLimit {
+    body,
+    of,
+    needed,
+    is_chosen
+});
 
 impl std::fmt::Display for StepLimit {
     /// Names the body, what limits it, and what helps.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { body, of, needed } = self;
+        let Self {
+            body,
+            of,
+            needed,
+            is_chosen,
+        } = self;
+        let solver = if *is_chosen { "IMPLICIT" } else { "AUTO or IMPLICIT" };
         let (index1, generation) = (body.0.index1, body.0.generation);
         write!(f, "body {index1}:{generation} is limited by {}", of.kind.name())?;
         match of.nodes() {
@@ -67,7 +80,7 @@ impl std::fmt::Display for StepLimit {
             LimitKind::Tolerance => write!(f, ": raise tolerance or max_substeps, or take shorter steps"),
             _ => write!(
                 f,
-                " and needs {needed} substeps: use solver IMPLICIT, raise mass_scaling or max_substeps, or take shorter steps"
+                " and needs {needed} substeps: use solver {solver}, raise mass_scaling or max_substeps, or take shorter steps"
             ),
         }
     }
@@ -256,6 +269,7 @@ impl World {
         Some(StepLimit {
             body: BodyId(id),
             of,
+            is_chosen: body.solver_choice().reason != ChoiceReason::Given,
             needed: (dt / (RESERVE * stable_substep)).ceil() as u32,
         })
     }

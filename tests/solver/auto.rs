@@ -143,6 +143,31 @@ fn an_unstable_step_names_the_spring_and_what_helps() {
 }
 
 #[test]
+fn a_body_that_chose_its_solver_is_not_told_to_choose() {
+    let mut parts = Parts::chain(10, Vec3::X * 0.1, 0.01, 10.0);
+    parts.stiffnesses[6] = 1e6;
+    let mut world = World::new(WorldDefinition {
+        max_substeps: 100,
+        ..FREE
+    })
+    .expect("a world");
+    // After a step this short VERLET needs few substeps.
+    world.step(1e-4).expect("a step");
+    let definition = BodyDefinition {
+        solver: Solver::Auto,
+        mass_scaling: 0.0,
+        ..parts.definition()
+    };
+    let body = world.create_body(&definition).expect("a body");
+    assert_eq!(world.body(body).expect("it").solver_choice().solver, Solver::Verlet);
+    let (limit, message) = refused(&mut world);
+    assert!(
+        limit.is_chosen && message.contains("IMPLICIT") && !message.contains("AUTO"),
+        "{message}"
+    );
+}
+
+#[test]
 fn an_unstable_step_names_the_element_or_the_term() {
     let mut mesh = Mesh::block([0.08, 0.04, 0.04], [4, 2, 2]).expect("a mesh");
     // A corner that is drawn in makes flat tetrahedra.
