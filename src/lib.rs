@@ -39,12 +39,13 @@ pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, 
 pub use contact::{Contact, ContactChange, MassProperties, Pose, Shape, ToolDefinition};
 pub use debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 pub use def::{
-    BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw, EnclosedReport,
-    Energy, LimitKind, Material, Model, Sleep, Solver, SolverChoice, SolverReport, SpringLaw, Storage, StorageReport,
-    SubstepLimit, TearReport, Tearing, Values, Viscosity, Yielding,
+    Anchor, BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw,
+    EnclosedReport, Energy, LimitKind, Material, Model, Sleep, Solver, SolverChoice, SolverReport, SpringLaw, Storage,
+    StorageReport, SubstepLimit, SurfacePoint, TearReport, Tearing, Values, Viscosity, Yielding,
 };
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
+pub use ids::{AttachmentId, BladeId, BodyId, ToolId};
 pub use picture::{BodyValues, PictureDefinition};
 pub use query::{RayHit, SurfaceHit};
 pub use readers::{BodyReader, Frame};
@@ -52,6 +53,6 @@ pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use threads::RunTasks;
 pub use world::{
-    Anchor, AttachmentId, BladeDefinition, BladeId, BladeReport, BodyId, BudgetReport, ReplayDifference, ReplayReport,
-    StepLimit, StepProfile, StepReport, SurfacePoint, SutureDefinition, SutureReport, ToolId, World, WorldDefinition,
+    BladeDefinition, BladeReport, BudgetReport, ReplayDifference, ReplayReport, StepLimit, StepProfile, StepReport,
+    SutureDefinition, SutureReport, World, WorldDefinition,
 };

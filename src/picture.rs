@@ -6,9 +6,10 @@ use crate::base::{Error, Result, memory};
 use crate::body::Body;
 use crate::contact::{Contact, Form, Pose, Tool};
 use crate::def::finite_vector;
+use crate::ids::BodyId;
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
-use crate::world::{BodyId, World};
+use crate::world::World;
 
 /// How a world is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]

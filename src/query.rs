@@ -10,7 +10,8 @@ use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
 use crate::geometry::predicates::pierce;
-use crate::world::{BodyId, ToolId, World};
+use crate::ids::{BodyId, ToolId};
+use crate::world::World;
 
 /// A point of a body's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

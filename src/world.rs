@@ -25,20 +25,17 @@ use glam::{Quat, Vec3};
 
 use crate::base::{Error, Profile, Result, StateHasher, memory};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
-use crate::codec::saved;
 use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
-use crate::def::{BodyDefinition, CollisionFilter, finite_vector, not_negative};
-use crate::ids::{SlotId, Slots};
+use crate::def::{Anchor, BodyDefinition, CollisionFilter, finite_vector, not_negative};
+use crate::ids::{AttachmentId, BodyId, SlotId, Slots, ToolId};
 use crate::readers::Clock;
 use crate::simd::{ChosenKernel, Kernel};
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
 use crate::threads::{RunTasks, Threads};
-pub use attachments::{Anchor, AttachmentId, SurfacePoint};
 use attachments::{Attachment, Which};
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
-pub use blades::BladeId;
 pub use budget::BudgetReport;
 use budget::Pace;
 pub use profile::StepProfile;
@@ -86,18 +83,6 @@ impl Default for WorldDefinition {
         }
     }
 }
-
-/// A body of a world.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct BodyId(pub(crate) SlotId);
-
-saved!(BodyId { 0 });
-
-/// A tool of a world.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct ToolId(pub(crate) SlotId);
-
-saved!(ToolId { 0 });
 
 /// Bodies and tools that are stepped together.
 #[derive(Debug)]

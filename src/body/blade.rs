@@ -6,8 +6,8 @@ use super::cuttable::passes;
 use super::{Body, Stroke};
 use crate::base::Result;
 use crate::cutting::{CutEnd, CutMaterial, Met, Sweep};
+use crate::def::{Anchor, SurfacePoint};
 use crate::geometry::Bounds;
-use crate::world::{Anchor, SurfacePoint};
 
 /// A point of the tissue in which a blade stands.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,9 @@ use glam::{DVec3, Quat, Vec3};
 use super::{Body, Bound, NewNode};
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
 use crate::def::{BodyDefinition, Solver, Storage, Values};
+use crate::ids::{BodyId, ToolId};
 use crate::springs::Rewiring;
-use crate::world::{BodyId, ToolId, World, WorldDefinition};
+use crate::world::{World, WorldDefinition};
 
 const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
@@ -608,7 +609,7 @@ fn what_a_tool_holds_at_a_bound_point_it_does_not_touch() {
         // Beside it, where faces are met that are bound to what it holds.
         let tool = sphere(&mut world, 0.012, middle + Vec3::new(0.006, -0.008, 0.002), 0.5);
         if drawn == Drawn::Plainly {
-            let point = crate::world::SurfacePoint {
+            let point = crate::def::SurfacePoint {
                 triangle: 0,
                 weights: [0.5, 0.5, 0.0],
             };

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Body;
-use crate::world::SurfacePoint;
+use crate::def::SurfacePoint;
 
 /// A point of the surface, where it is in the rest shape and now.
 #[derive(Clone, Copy, Debug)]

@@ -72,6 +72,7 @@ use crate::codec::saved;
 use crate::contact::{Contact, Contacts, ToolPath};
 use crate::elements::{Elements, Law};
 use crate::enclosed::Enclosed;
+use crate::ids::BodyId;
 use crate::material::Made;
 use crate::readers::Shown;
 use crate::solver::{
@@ -81,7 +82,6 @@ use crate::solver::{
 use crate::springs::{Springs, store};
 use crate::terms::Terms;
 use crate::threads::Team;
-use crate::world::BodyId;
 pub(crate) use material_point::MaterialPoint;
 use order::{order_for_springs, order_for_tetrahedra};
 use origin::shift_towards;

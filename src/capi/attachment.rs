@@ -6,8 +6,8 @@ use super::memory;
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
 use crate::base::Result;
-use crate::ids::SlotId;
-use crate::world::{Anchor, AttachmentId, SurfacePoint};
+use crate::def::{Anchor, SurfacePoint};
+use crate::ids::{AttachmentId, SlotId};
 
 /// Id of an attachment or a suture; all zero means none.
 #[repr(C)]

@@ -7,8 +7,8 @@ use super::memory::{self, Versioned};
 use super::status::{SINEW_STATUS_OK, sinew_status, status_of};
 use crate::contact::Pose;
 use crate::def::CollisionFilter;
-use crate::ids::SlotId;
-use crate::world::{BladeDefinition, BladeId};
+use crate::ids::{BladeId, SlotId};
+use crate::world::BladeDefinition;
 
 /// Id of a blade; all zero means none.
 #[repr(C)]

@@ -9,8 +9,7 @@ use super::status::sinew_status;
 use crate::base::{Error, Result};
 use crate::body::Body;
 use crate::def::CollisionFilter;
-use crate::ids::SlotId;
-use crate::world::BodyId;
+use crate::ids::{BodyId, SlotId};
 
 /// Bit of the x axis.
 pub const SINEW_AXIS_X: u32 = 1;

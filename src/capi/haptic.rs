@@ -10,7 +10,7 @@ use super::tool::sinew_tool_id;
 use crate::base::Error;
 use crate::contact::Pose;
 use crate::haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
-use crate::world::ToolId;
+use crate::ids::ToolId;
 
 /// Haptic handle: couples a device to a tool, used by the device's thread.
 ///

@@ -6,7 +6,8 @@ use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
 use crate::base::Result;
-use crate::world::{Anchor, SurfacePoint, SutureDefinition};
+use crate::def::{Anchor, SurfacePoint};
+use crate::world::SutureDefinition;
 
 /// Settings of a suture, filled by sinew_suture_def_init.
 #[repr(C)]

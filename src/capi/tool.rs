@@ -10,8 +10,7 @@ use super::status::sinew_status;
 use crate::base::{Error, Result};
 use crate::contact::{Pose, Shape, ToolDefinition};
 use crate::def::{CollisionFilter, Detection};
-use crate::ids::SlotId;
-use crate::world::ToolId;
+use crate::ids::{SlotId, ToolId};
 
 /// Id of a tool; all zero means none.
 #[repr(C)]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::codec::saved;
-use crate::world::{BodyId, ToolId};
+use crate::ids::{BodyId, ToolId};
 
 /// Where a tool pressed a body when the last step ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

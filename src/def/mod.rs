@@ -1,5 +1,6 @@
 //! What callers say of bodies, as plain data that checks itself, and what bodies report.
 
+mod anchor;
 mod body;
 mod choice;
 mod contact;
@@ -12,6 +13,7 @@ mod tearing;
 mod viscosity;
 mod yielding;
 
+pub use anchor::{Anchor, SurfacePoint};
 pub use body::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use body::{
     MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite, finite_vector,

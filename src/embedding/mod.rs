@@ -11,8 +11,9 @@ use crate::body::Body;
 use crate::cutting::CutMaterial;
 use crate::def::{BodyDefinition, Values};
 use crate::geometry::vertex_normals;
+use crate::ids::BodyId;
 use crate::mesh::Mesh;
-use crate::world::{BodyId, World};
+use crate::world::World;
 
 use bind::Binding;
 use follow::Follower;

@@ -2,7 +2,7 @@
 
 use crate::base::{Error, Result};
 use crate::def::not_negative;
-use crate::world::ToolId;
+use crate::ids::ToolId;
 
 use super::six::Six;
 

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3, Vec3};
 
 use super::six::{self, Matrix, Six};
-use crate::world::BodyId;
+use crate::ids::BodyId;
 
 /// Contacts that a model has room for; of more the most pressed.
 pub(crate) const MOST_CONTACTS: usize = 32;

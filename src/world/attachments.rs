@@ -2,19 +2,14 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{BodyId, ToolId, World, make_walks};
+use super::{World, make_walks};
 use crate::base::{Error, Result, memory};
 use crate::body::Grip;
 use crate::codec::{saved, saved_enum};
 use crate::contact::{Bonds, Bound, Thread};
-use crate::ids::SlotId;
+use crate::def::{Anchor, SurfacePoint};
+use crate::ids::{AttachmentId, BodyId, ToolId};
 use crate::solver::Outcome;
-
-/// What a tool holds of a body, or a body of another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct AttachmentId(pub(crate) SlotId);
-
-saved!(AttachmentId { 0 });
 
 /// Whose attachment it is.
 #[derive(Clone, Copy, Debug)]
@@ -59,28 +54,6 @@ impl Which<'_> {
         }
     }
 }
-
-/// A point of a body's surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
-    /// Which triangle of [`Body::surface`](crate::Body::surface).
-    pub triangle: u32,
-    /// The parts of its corners in the point: at least 0, and 1 in sum.
-    pub weights: [f32; 3],
-}
-
-saved!(SurfacePoint { triangle, weights });
-
-/// Where a body is attached to a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Anchor {
-    /// A node, of the surface or not.
-    Node(u32),
-    /// A point of the surface.
-    Point(SurfacePoint),
-}
-
-saved_enum!(Anchor { 0 => Node(it), 1 => Point(it) });
 
 /// How far the sum of a point's weights may be from 1.
 const SUM_OFF: f32 = 1e-3;

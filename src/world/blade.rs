@@ -2,7 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use super::BodyId;
 use super::resistance::Knot;
 use crate::base::{Error, Result, StateHasher, memory};
 use crate::body::{CutReport, Stroke};
@@ -10,7 +9,7 @@ use crate::codec::saved;
 use crate::contact::{Lead, Pose};
 use crate::cutting::Met;
 use crate::def::{CollisionFilter, finite_vector};
-use crate::ids::SlotId;
+use crate::ids::{BodyId, SlotId};
 use crate::mesh::FURTHEST;
 
 /// A proxy is held at no more points: a blade through more layers of a body is held at some.

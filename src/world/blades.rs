@@ -7,16 +7,12 @@
 
 use glam::{DVec3, Quat, Vec3};
 
+use super::World;
 use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
-use super::{BodyId, World};
 use crate::base::Result;
 use crate::contact::{Lead, Pose};
 use crate::def::CollisionFilter;
-use crate::ids::{SlotId, Slots};
-
-/// A blade of a world.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct BladeId(pub(crate) SlotId);
+use crate::ids::{BladeId, BodyId, SlotId, Slots};
 
 impl World {
     /// Adds a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it ([`BodyDefinition::spare_nodes`]) as

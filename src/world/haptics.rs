@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
-use super::{BodyId, ToolId, World};
+use super::World;
 use crate::base::{Error, Result};
 use crate::contact::{Form, Pose};
 use crate::handover::triple_buffer::{Reader, Writer, triple_buffer};
@@ -10,6 +10,7 @@ use crate::haptics::{
     Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Model, Secant, Sent, Six, ZERO,
     about, along, difference, inverse, joined, product, scaled, spread, sum, turn, turned,
 };
+use crate::ids::{BodyId, ToolId};
 
 /// What nobody feels, N.
 const UNFELT: f64 = 1e-3;

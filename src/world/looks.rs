@@ -1,9 +1,10 @@
 //! What a caller reads of a world, of its tools and blades, and keeps with them.
 
-use super::{AttachmentId, BladeId, BodyId, ToolId, World};
+use super::World;
 use crate::base::Result;
 use crate::contact::Pose;
 use crate::def::CollisionFilter;
+use crate::ids::{AttachmentId, BladeId, BodyId, ToolId};
 
 impl World {
     /// The sum of the lengths of the steps that were taken, s.

@@ -2,13 +2,14 @@
 
 use glam::{DVec3, Vec3};
 
+use super::World;
 use super::approach::Approach;
 use super::blade::{Blade, BladeReport, Proxy, Stand, edge_behind};
 use super::holds::{NOWHERE, fill, points_at};
 use super::resistance::{Advance, Resistance};
-use super::{BodyId, World};
 use crate::base::Result;
 use crate::cutting::{Met, Sweep};
+use crate::ids::BodyId;
 
 /// An edge that turned back through no more than this part of a cell is out of the tissue.
 const TURNED_BACK: f64 = 0.1;

@@ -1,7 +1,8 @@
 //! Readers of bodies.
 
-use super::{BodyId, World};
+use super::World;
 use crate::base::Result;
+use crate::ids::BodyId;
 use crate::readers::BodyReader;
 
 impl World {

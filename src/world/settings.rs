@@ -1,9 +1,10 @@
 //! Settings of a world and of its bodies that change between steps.
 
-use super::{BodyId, World, make_walks};
+use super::{World, make_walks};
 use crate::base::{Error, Result, memory};
 use crate::body::CoarseStep;
 use crate::def::{BodyContact, BodySettings};
+use crate::ids::BodyId;
 
 impl World {
     /// The substeps of a step, 0: as many as stability needs, and how many are allowed then.

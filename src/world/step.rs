@@ -2,14 +2,14 @@
 
 use glam::{DVec3, Vec3};
 
+use super::World;
 use super::rest::{rest_islands, rouse_groups, wake_islands};
-use super::{BodyId, World};
 use crate::base::{Count, Error, Result, Stage, Stopwatch};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
 use crate::def::{ChoiceReason, LimitKind, SubstepLimit};
-use crate::ids::Slots;
+use crate::ids::{BodyId, Slots};
 use crate::solver::{Outcome, RESERVE, StepRequest, Together, attempt};
 use crate::threads::{Items, Team};
 

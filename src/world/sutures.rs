@@ -1,9 +1,11 @@
 //! Sutures: threads between two points, which pull only.
 
-use super::attachments::{Anchor, AttachmentId, Which, check_limit, refuse_one_point};
-use super::{BodyId, World};
+use super::World;
+use super::attachments::{Which, check_limit, refuse_one_point};
 use crate::base::{Error, Result};
 use crate::contact::{Thread, distance};
+use crate::def::Anchor;
+use crate::ids::{AttachmentId, BodyId};
 
 /// What a suture is like.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,10 +19,10 @@ use glam::{DVec3, Vec3};
 use crate::base::{Result, StateHasher, memory};
 use crate::body::Body;
 use crate::codec::saved;
+use crate::def::Anchor;
 use crate::geometry::Bounds;
 use crate::ids::{SlotId, Slots};
 use crate::solver::Outcome;
-use crate::world::Anchor;
 
 pub(crate) use self::thread::{Lead, Thread};
 
@@ -554,7 +554,7 @@ fn forget(bodies: &mut Slots<Body>, place: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::SurfacePoint;
+    use crate::def::SurfacePoint;
 
     fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
         let mut all = [(0, 0.0); OF_POINT];
