@@ -112,10 +112,13 @@ fn broken_links(document: &Path, text: &str) -> Vec<String> {
     links(text).into_iter().filter(is_broken).collect()
 }
 
-fn c_programs(text: &str) -> impl Iterator<Item = &str> {
-    text.split("```c\n")
-        .skip(1)
+/// The blocks of a language.
+fn code<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
+    let fence = format!("```{language}\n");
+    let blocks = text.split(&fence).skip(1);
+    blocks
         .map(|rest| rest.split("```").next().unwrap_or_default())
+        .collect()
 }
 
 #[test]
@@ -136,18 +139,22 @@ fn what_else_the_documents_show_is_part_of_programs_that_run() {
         .filter(|path| path.extension().is_some_and(|extension| extension == "c"))
         .map(read)
         .collect();
+    let wrapped = read("c_examples/quickstart.cpp");
     let mut count = 0;
     for document in documents() {
-        for snippet in c_programs(&read(&document)) {
-            assert!(
-                programs.contains(snippet),
-                "{}: no program has\n{snippet}",
-                document.display()
-            );
-            count += 1;
+        let text = read(&document);
+        for (language, programs) in [("c", &programs), ("cpp", &wrapped)] {
+            for snippet in code(&text, language) {
+                assert!(
+                    programs.contains(snippet),
+                    "{}: no program has\n{snippet}",
+                    document.display()
+                );
+                count += 1;
+            }
         }
     }
-    assert!(count > 5, "{count} programs");
+    assert!(count > 20, "{count} snippets");
 }
 
 #[test]
@@ -185,6 +192,7 @@ fn a_broken_link_is_found() {
 fn every_page_is_in_an_index() {
     for (folder, index) in [
         ("docs/guide", "docs/README.md"),
+        ("docs/tutorials", "docs/tutorials/README.md"),
         ("docs/methods", "docs/methods/README.md"),
         ("docs/decisions", "docs/decisions/README.md"),
     ] {
@@ -194,6 +202,22 @@ fn every_page_is_in_an_index() {
             .collect();
         for page in files(Path::new(folder)).filter(|page| is_document(page) && page.as_path() != Path::new(index)) {
             assert!(listed.contains(&page), "{index} lacks {}", page.display());
+        }
+    }
+}
+
+/// Every page of the guide is in the book, and every entry of the book exists.
+#[test]
+fn the_book_has_every_page() {
+    let summary = links(&read("docs/SUMMARY.md"));
+    for folder in ["docs/guide", "docs/tutorials"] {
+        for page in files(Path::new(folder)) {
+            let entry = page
+                .strip_prefix("docs")
+                .expect("a page")
+                .to_string_lossy()
+                .into_owned();
+            assert!(summary.contains(&entry), "docs/SUMMARY.md lacks {entry}");
         }
     }
 }
@@ -229,8 +253,10 @@ fn what_is_read_first_stays_short() {
     assert!(words <= 1300, "README.md: {words} words");
     let map = read("ARCHITECTURE.md").len();
     assert!(map <= 12 * 1024, "ARCHITECTURE.md: {map} bytes");
-    for page in files(Path::new("docs/methods")).chain(files(Path::new("docs/guide"))) {
-        let words = read(&page).split_whitespace().count();
-        assert!(words <= 1500, "{}: {words} words", page.display());
+    for (folder, most) in [("docs/methods", 1500), ("docs/guide", 1500), ("docs/tutorials", 1000)] {
+        for page in files(Path::new(folder)) {
+            let words = read(&page).split_whitespace().count();
+            assert!(words <= most, "{}: {words} words", page.display());
+        }
     }
 }
