@@ -68,7 +68,12 @@ impl Query {
 }
 
 impl Query {
-    /// How near the two come at least, in `f64`: no touch that is found is further apart than that allows.
+    /// Whether it is found though the two stay twice as far apart as they keep: the advances of the search came to an end.
+    fn is_found_beyond(&self, radius: f32) -> bool {
+        self.is_found(radius) && self.least_distance() > 2.0 * f64::from(radius * self.longest_edge())
+    }
+
+    /// How near the two come at least, m, in `f64`, or a little less.
     fn least_distance(&self) -> f64 {
         const SAMPLES: usize = 2000;
         let [start, end] = self.points;
@@ -140,8 +145,9 @@ fn exact_queries_are_all_found() {
         let counts = count(&queries);
         let _ = writeln!(
             std::io::stderr(),
-            "{kind}: {} queries, {touching} touch; missed, found without a touch: {counts:?}",
-            queries.len()
+            "{kind}: {} queries, {touching} touch; missed, found without a touch: {counts:?}; found beyond twice the radius: {:?}",
+            queries.len(),
+            RADII.map(|radius| queries.iter().filter(|query| query.is_found_beyond(radius)).count())
         );
         for ([missed, _], radius) in counts.into_iter().zip(RADII) {
             assert_eq!(missed, 0, "{kind}, radius {radius}");
