@@ -2,6 +2,11 @@
 
 use glam::Vec3;
 
+use crate::geometry::nearest::nearest_of_segments;
+
+/// The squared sine of the angle below which two segments are compared in `f64`: above it the distance is right to some 1e-5 of their length.
+const NEARLY_PARALLEL: f32 = 1e-4;
+
 /// How far along the segment from `a` to `b` the point closest to `point` lies, 0 to 1.
 pub(super) fn closest_on_segment(point: Vec3, a: Vec3, b: Vec3) -> f32 {
     let along = b - a;
@@ -26,11 +31,12 @@ pub(super) fn closest_of_segments(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> (f32, f
     let parallel = first.dot(second);
     let (ahead, behind) = (first.dot(between), second.dot(between));
     let denominator = first_squared * second_squared - parallel * parallel;
-    let on_first = if denominator > 1e-6 * first_squared * second_squared {
-        ((parallel * behind - ahead * second_squared) / denominator).clamp(0.0, 1.0)
-    } else {
-        0.5
-    };
+    // Of nearly parallel ones rounding would decide, and a distance that is found too long lets a sweep step over a touch.
+    if !(denominator > NEARLY_PARALLEL * first_squared * second_squared) {
+        let (on_first, on_second) = nearest_of_segments(a.as_dvec3(), b.as_dvec3(), c.as_dvec3(), d.as_dvec3());
+        return (on_first as f32, on_second as f32);
+    }
+    let on_first = ((parallel * behind - ahead * second_squared) / denominator).clamp(0.0, 1.0);
     let on_second = (parallel * on_first + behind) / second_squared;
     if (0.0..=1.0).contains(&on_second) {
         return (on_first, on_second);

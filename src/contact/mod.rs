@@ -31,6 +31,8 @@ mod rounded;
 mod supports;
 mod surface;
 mod sweep;
+#[cfg(test)]
+mod sweep_tests;
 mod tissue;
 mod tool;
 

@@ -12,14 +12,14 @@ use sinew::{
 const YOUNG: f32 = 5000.0;
 const SIDE: f32 = 0.04;
 
-const LAWS: [ElementLaw; 4] = [
+pub const LAWS: [ElementLaw; 4] = [
     ElementLaw::NeoHookean,
     ElementLaw::MooneyRivlin { ratio: 0.0 },
     ElementLaw::MooneyRivlin { ratio: 0.3 },
     ElementLaw::MooneyRivlin { ratio: 1.0 },
 ];
 
-fn tissue(nu: f32) -> Material {
+pub fn tissue(nu: f32) -> Material {
     Material {
         model: Model::Tetrahedra,
         young_modulus: YOUNG,
@@ -29,11 +29,11 @@ fn tissue(nu: f32) -> Material {
     }
 }
 
-fn block() -> Mesh {
+pub fn block() -> Mesh {
     Mesh::block([SIDE; 3], [3; 3]).expect("a block")
 }
 
-fn scene(mesh: &Mesh, world: WorldDefinition, law: ElementLaw, nu: f32, solver: Solver) -> Scene {
+pub fn scene(mesh: &Mesh, world: WorldDefinition, law: ElementLaw, nu: f32, solver: Solver) -> Scene {
     let definition = BodyDefinition {
         positions: &mesh.positions,
         tetrahedra: &mesh.tetrahedra,
@@ -69,7 +69,7 @@ fn density(law: ElementLaw, nu: f64, gradient: DMat3) -> f64 {
 }
 
 /// The derivative of the energy with an entry of the deformation, Pa.
-fn stress(law: ElementLaw, nu: f64, gradient: DMat3, column: usize, row: usize) -> f64 {
+pub fn stress(law: ElementLaw, nu: f64, gradient: DMat3, column: usize, row: usize) -> f64 {
     const STEP: f64 = 1e-5;
     let at = |by: f64| {
         let mut moved = gradient;
@@ -80,7 +80,7 @@ fn stress(law: ElementLaw, nu: f64, gradient: DMat3, column: usize, row: usize) 
 }
 
 /// The stretch of the free axes that leaves no stress across them.
-fn free_stretch(stress: impl Fn(f64) -> f64) -> f64 {
+pub fn free_stretch(stress: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.2, 3.0);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
@@ -94,14 +94,14 @@ fn free_stretch(stress: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// The force of the pins on a side along an axis, over its area at rest, Pa.
-fn pull(mesh: &Mesh, scene: &Scene, side: usize, axis: usize) -> f64 {
+pub fn pull(mesh: &Mesh, scene: &Scene, side: usize, axis: usize) -> f64 {
     let nodes = (0..mesh.positions.len()).filter(|&node| mesh.positions[node][side] > 0.499 * SIDE);
     let force = |node: usize| f64::from(scene.body().pin_force(node as u32).expect("a pin")[axis]);
     nodes.map(force).sum::<f64>() / f64::from(SIDE * SIDE)
 }
 
 /// Holds the low sides of all axes and the high sides of some, which are stretched, and finds rest.
-fn stretched(mesh: &Mesh, law: ElementLaw, nu: f32, stretches: [Option<f32>; 3]) -> Scene {
+pub fn stretched(mesh: &Mesh, law: ElementLaw, nu: f32, stretches: [Option<f32>; 3]) -> Scene {
     let mut scene = scene(mesh, FREE, law, nu, Solver::Newton);
     let mut positions = mesh.positions.clone();
     for (axis, stretch) in stretches.into_iter().enumerate() {
