@@ -15,8 +15,6 @@ sinew_status create_cloth(sample *s) {
   def.node_mass = 5e-5f;          /* [kg] */
   def.node_damping = 2e-4f;       /* [N s/m] drag of the air */
   def.stiffness = 30.0f;          /* [N/m] */
-  def.spring_damping = 2e-3f;     /* [N s/m] */
-  def.bending_stiffness = 2e-6f;  /* [N m] */
   def.contact_thickness = 0.001f; /* [m] */
   def.position[1] = 0.12f;        /* [m] above the ball */
   TRY(scene_add_body(s, &def, 0x3E6FA8));

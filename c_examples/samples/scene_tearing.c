@@ -20,8 +20,6 @@ sinew_status create_tearing(sample *s) {
   def.node_mass = 5e-5f;
   def.node_damping = 4e-3f;
   def.stiffness = 100.0f;
-  def.spring_damping = 5e-3f;
-  def.bending_stiffness = 5e-6f;
   def.tear_strain = 0.35f;
   def.most_tears = 8;         /* in a step */
   def.smallest_piece = 1e-4f; /* [m^2] */
