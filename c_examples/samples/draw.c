@@ -11,6 +11,7 @@
 
 #define RINGS 24
 #define SIDES 32
+#define THREAD 0x282C5AFFu /* color of sutures where nothing else is drawn as lines */
 #define LINE_ROOM 200000 /* corners of lines and points */
 
 /* Buffers of a body, or of the shape of a tool. */
@@ -56,7 +57,7 @@ static const char LIT_FRAGMENT[] =
   "const vec3 sun = normalize(vec3(0.45, 1.0, 0.55)), fill = normalize(vec3(-0.8, 0.25, 0.5));\n"
   "void main() {\n"
   "  vec3 to_eye = normalize(eye - world), n = normalize(away + vec3(0, 1e-6, 0));\n"
-  "  if (dot(n, to_eye) < 0.0) n = -n;\n" /* both sides of a sheet */
+  "  if (!gl_FrontFacing) n = -n;\n" /* both sides of a sheet */
   "  float key = max(0.0, 0.85 * dot(n, sun) + 0.15), soft = max(0.0, dot(n, fill));\n"
   "  vec3 sky = mix(vec3(0.30, 0.27, 0.26), vec3(0.52, 0.55, 0.60), 0.5 + 0.5 * n.y);\n"
   "  float shine = pow(max(0.0, dot(n, normalize(sun + to_eye))), 48.0);\n"
@@ -200,6 +201,7 @@ const char *draw_open(void) {
   glEnable(GL_DEPTH_TEST);
   glEnable(GL_MULTISAMPLE);
   glEnable(GL_PROGRAM_POINT_SIZE);
+  glLineWidth(2);
   return NULL;
 }
 
@@ -291,7 +293,7 @@ static sinew_status draw_floor(const sample *s) {
     sinew_status status = sinew_tool_get_pose(s->world, s->tools[k].id, position, turned);
     if (status != SINEW_STATUS_OK) return status;
     pose_matrix(position, turned, model);
-    for (int i = 0; i < 3; i++) shade[i] = 0.72f * s->tools[k].color[i];
+    for (int i = 0; i < 3; i++) shade[i] = 0.80f * s->tools[k].color[i];
     draw_shape(&gl.plane, model, wide, 0, s->tools[k].color, 1);
     const float h = position[1] + 2e-4f;
     const float shadow[16] = {1, 0, 0, 0, -0.45f, 0, -0.55f, 0, 0, 0, 1, 0, 0.45f * h, h, 0.55f * h, 1};
@@ -307,7 +309,7 @@ static void add_corner(corner *to, const float *position, uint32_t rgba) {
 }
 
 static void add_line(void *context, const float *points, uint32_t rgba) {
-  (void)context;
+  if (*(const uint32_t *)context == SINEW_DRAW_ATTACHMENTS) rgba = THREAD;
   if (debug.line_count + 2 > LINE_ROOM) return;
   for (int k = 0; k < 2; k++) add_corner(&debug.lines[debug.line_count++], points + 3 * k, rgba);
 }
@@ -332,6 +334,7 @@ static sinew_status draw_debug(const sample *s, uint32_t flags) {
   sinew_debug_draw def;
   sinew_status status = sinew_debug_draw_init(&def, sizeof def);
   def.flags = flags;
+  def.context = &flags;
   def.draw_line = add_line;
   def.draw_point = add_point;
   debug.line_count = debug.point_count = 0;

@@ -1,8 +1,9 @@
 /* The samples program: scenes of soft tissue to pull, press and cut.
  *
  *   samples [--scene NAME]                    in a window
- *   samples --offscreen FRAMES [--scene NAME] [--pointer pull|press|cut] [--out FILE.png] [--apng]
- *                                             unseen; prints what happened and saves the last picture, or all of them
+ *   samples --offscreen FRAMES [--scene NAME] [--pointer pull|press|cut] [--width W] [--height H] [--out FILE.png]
+ *                                             unseen; prints what happened and saves the last picture
+ *   samples --offscreen FRAMES --apng --out FOLDER   saves all frames as an animated PNG
  *   samples --list                            names of the scenes
  *
  * Left button: pull.  Right button: press.  Middle button, or Shift and left: cut.  Wheel and arrows: camera.
@@ -252,7 +253,7 @@ static void run_offscreen(int frames, int has_pointer, const char *out, int is_a
   }
   if (app.refused[0]) printf("refused: %s\n", app.refused);
   if (is_animation) join_frames(out, SAMPLE_SCENES[app.number].name, (uint32_t)frames, 33);
-  else save(".", out);
+  else save(out[0] == '/' ? "" : ".", out);
 }
 
 static uint32_t number_of(const char *name, const char *what) {

@@ -49,7 +49,7 @@ sinew_status create_balloon(sample *s) {
 
   TRY(scene_tool(&floor, SINEW_SHAPE_PLANE, 0, 0, 0, 0, 0, 0));
   floor.friction = 0.8f;
-  TRY(scene_add_tool(s, &floor, 0x5D7F86));
+  TRY(scene_add_tool(s, &floor, 0xB3C4C6));
   TRY(scene_tool(&weight, SINEW_SHAPE_BOX, 0.05f, 0.006f, 0.05f, 0, 2 * RADIUS + 0.01f, 0));
   weight.friction = 0.8f;
   TRY(scene_add_tool(s, &weight, 0xB08D57));

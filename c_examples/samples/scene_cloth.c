@@ -22,8 +22,8 @@ sinew_status create_cloth(sample *s) {
   TRY(scene_tool(&ball, SINEW_SHAPE_SPHERE, 0.09f, 0, 0, 0, 0.01f, 0));
   TRY(scene_add_tool(s, &ball, 0xD9A441));
   TRY(scene_tool(&floor, SINEW_SHAPE_PLANE, 0, 0, 0, 0, -0.1f, 0));
-  TRY(scene_add_tool(s, &floor, 0x5D7F86));
+  TRY(scene_add_tool(s, &floor, 0xB3C4C6));
   s->cut_depth = 0.02f;
-  scene_camera(s, 0.30f, 0.35f, 0.55f, 0.0f, -0.01f, 0.0f);
+  scene_camera(s, 0.24f, 0.26f, 0.46f, 0.0f, -0.02f, 0.0f);
   return SINEW_STATUS_OK;
 }

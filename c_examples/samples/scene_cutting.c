@@ -4,7 +4,7 @@
  * scalpel touches nothing. */
 #include "scene.h"
 
-#define TENSION 0.15f    /* how much the block is stretched */
+#define TENSION 0.2f     /* how much the block is stretched */
 #define STRETCHING 0.5f  /* [s] how long that takes */
 #define EDGE_LOW 0.0f    /* [m] the edge reaches from half the depth to above the block */
 #define EDGE_HIGH 0.04f
@@ -31,6 +31,7 @@ sinew_status create_cutting(sample *s) {
   scene_tissue(&def, 5400.0f, 0.006f);
   def.toughness = 20.0f; /* [J/m^2] */
   TRY(scene_add_body(s, &def, 0xC9615A));
+  TRY(sinew_body_set_gravity_scale(s->world, s->bodies[0].id, 0)); /* nothing is below it */
   TRY(scene_pin(s, s->bodies[0].id, 0, -1, -0.059f));
   TRY(scene_pin(s, s->bodies[0].id, 0, 0.059f, 1));
 

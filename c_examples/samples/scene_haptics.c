@@ -1,11 +1,11 @@
 /* A simulated hand strokes tissue with a ball and feels it at 1 kHz.
  *
  * A program with a device ticks the haptic handle on the device's own thread. Here a step is preceded by its ticks. The
- * pale ball is where the hand is, the bright one is the tool: the tissue holds it back, and the hand feels the
- * difference. */
+ * blue pen ends where the hand is, the ball is the tool: the tissue holds it back, and the hand feels the difference. */
 #include "scene.h"
 
 #define TICK 0.001f /* [s] */
+#define PEN 0.03f   /* [m] half the length of the pen */
 
 sinew_status create_haptics(sample *s);
 sinew_status act_haptics(sample *s, float seconds);
@@ -14,7 +14,7 @@ sinew_status act_haptics(sample *s, float seconds);
 static void hand_at(double time, float hand[3]) {
   const float down = scene_smooth((float)time);
   hand[0] = 0.035f * sinf(1.2f * (float)time) * down;
-  hand[1] = 0.05f - 0.032f * down;
+  hand[1] = 0.05f - 0.036f * down;
   hand[2] = 0.02f * sinf(2.1f * (float)time) * down;
 }
 
@@ -38,7 +38,7 @@ sinew_status create_haptics(sample *s) {
   haptic.force_limit = 3.0f; /* [N] what the device can exert */
   TRY(sinew_haptic_create(s->world, &haptic, &s->haptic));
 
-  TRY(scene_tool(&hand, SINEW_SHAPE_SPHERE, 0.006f, 0, 0, 0, 0.05f, 0));
+  TRY(scene_tool(&hand, SINEW_SHAPE_CAPSULE, 0.003f, PEN, 0, 0, 0.05f + PEN, 0));
   hand.collision_mask = 0; /* it is only drawn */
   TRY(scene_add_tool(s, &hand, 0x4F9FD6));
   scene_camera(s, 0.11f, 0.15f, 0.22f, 0.0f, 0.0f, 0.0f);
@@ -55,5 +55,6 @@ sinew_status act_haptics(sample *s, float seconds) {
   }
   scene_say(s, "the hand feels", sqrt((double)felt.force[0] * felt.force[0] + felt.force[1] * felt.force[1] +
                                       felt.force[2] * felt.force[2]), "N");
+  hand[1] += PEN;
   return sinew_tool_set_pose(s->world, s->tools[1].id, hand, NULL);
 }

@@ -17,7 +17,7 @@ sinew_status create_organ(sample *s) {
   TRY(scene_pin(s, s->bodies[0].id, 1, low[1], low[1] + 0.12f * (high[1] - low[1])));
 
   TRY(scene_tool(&table, SINEW_SHAPE_PLANE, 0, 0, 0, 0, low[1] - 0.001f, 0));
-  TRY(scene_add_tool(s, &table, 0x5D7F86));
-  scene_camera(s, 0.12f, 0.22f, 0.30f, 0.0f, 0.0f, 0.0f);
+  TRY(scene_add_tool(s, &table, 0xB3C4C6));
+  scene_camera(s, 0.09f, 0.18f, 0.25f, 0.0f, -0.01f, 0.0f);
   return SINEW_STATUS_OK;
 }

@@ -30,13 +30,13 @@ sinew_status create_pile(sample *s) {
   }
   TRY(scene_tool(&floor, SINEW_SHAPE_PLANE, 0, 0, 0, 0, 0, 0));
   floor.friction = 0.6f;
-  TRY(scene_add_tool(s, &floor, 0x5D7F86));
+  TRY(scene_add_tool(s, &floor, 0xB3C4C6));
   for (uint32_t i = 0; i < 3; i++) {
     const float across = 0.03f * ((float)i - 1.0f);
     TRY(scene_tool(&ball, SINEW_SHAPE_SPHERE, 0.018f, 0, 0, across, 0.62f + 0.05f * (float)i, -across));
     TRY(scene_add_tool(s, &ball, 0x9AA4AE));
     TRY(scene_make_dynamic(s, 2000.0f));
   }
-  scene_camera(s, 0.25f, 0.30f, 0.48f, 0.0f, 0.08f, 0.0f);
+  scene_camera(s, 0.20f, 0.24f, 0.38f, 0.0f, 0.06f, 0.0f);
   return SINEW_STATUS_OK;
 }

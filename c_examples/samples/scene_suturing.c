@@ -23,11 +23,12 @@ sinew_status create_suturing(sample *s) {
   TRY(scene_body(s, &def));
   scene_tissue(&def, 5400.0f, 0.006f);
   TRY(scene_add_body(s, &def, 0xE0A98C));
+  TRY(sinew_body_set_gravity_scale(s->world, s->bodies[0].id, 0)); /* nothing is below it */
   TRY(scene_pin(s, s->bodies[0].id, 0, -1, -0.059f));
   TRY(scene_pin(s, s->bodies[0].id, 0, 0.059f, 1));
   TRY(sinew_body_cut(s->world, s->bodies[0].id, start, end, NULL));
   s->cut_depth = 0.015f;
-  scene_camera(s, 0.06f, 0.19f, 0.15f, 0.0f, 0.0f, 0.0f);
+  scene_camera(s, 0.06f, 0.21f, 0.17f, 0.0f, 0.0f, 0.0f);
   return SINEW_STATUS_OK;
 }
 
@@ -50,7 +51,7 @@ static sinew_status put_thread(sample *s, uint32_t k) {
 }
 
 sinew_status act_suturing(sample *s, float seconds) {
-  if (s->time < STRETCHING) return scene_spread(s, 0.006f * seconds / STRETCHING);
+  if (s->time < STRETCHING) return scene_spread(s, 0.013f * seconds / STRETCHING);
   for (uint32_t k = 0; k < THREADS; k++) {
     const float since = (float)s->time - STRETCHING - 0.5f - 0.5f * DRAW_TIME * (float)k;
     if (since < 0) break;

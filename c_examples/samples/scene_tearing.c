@@ -3,8 +3,8 @@
  * A body with tear_strain tears by itself, most easily where strain concentrates: at the end of the notch. */
 #include "scene.h"
 
-#define PULL_SPEED 0.03f /* [m/s] of each end */
-#define PULL_TIME 2.5f   /* [s] */
+#define PULL_SPEED 0.015f /* [m/s] of each end */
+#define PULL_TIME 4.0f    /* [s] */
 
 sinew_status create_tearing(sample *s);
 sinew_status act_tearing(sample *s, float seconds);
@@ -21,14 +21,14 @@ sinew_status create_tearing(sample *s) {
   def.node_damping = 4e-3f;
   def.stiffness = 100.0f;
   def.tear_strain = 0.35f;
-  def.most_tears = 8;         /* in a step */
-  def.smallest_piece = 1e-4f; /* [m^2] */
+  def.most_tears = 3;         /* in a step */
+  def.smallest_piece = 5e-4f; /* [m^2] */
   TRY(scene_add_body(s, &def, 0x5B9A68));
   TRY(scene_pin(s, s->bodies[0].id, 0, -1, -0.099f));
   TRY(scene_pin(s, s->bodies[0].id, 0, 0.099f, 1));
   TRY(sinew_body_cut(s->world, s->bodies[0].id, start, end, NULL));
   s->cut_depth = 0.02f;
-  scene_camera(s, 0.05f, 0.22f, 0.26f, 0.0f, 0.0f, 0.0f);
+  scene_camera(s, 0.06f, 0.27f, 0.30f, 0.0f, 0.0f, 0.0f);
   return SINEW_STATUS_OK;
 }
 
