@@ -7,7 +7,7 @@ mod support;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 use support::{Library, root, skip, succeed};
 
@@ -40,8 +40,12 @@ fn build() -> Option<PathBuf> {
     Some(target.join("c_examples/samples"))
 }
 
+/// One virtual display at a time: `xvfb-run -a` is not safe against another one that starts at the same moment.
+static TURN: Mutex<()> = Mutex::new(());
+
 /// Plays a scene for some frames; what the program printed, and its last picture.
 fn play(program: &Path, scene: &str, frames: u32, pointer: &str) -> (String, PathBuf) {
+    let _turn = TURN.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("samples");
     std::fs::create_dir_all(&folder).unwrap();
     let name = format!("{scene}_{pointer}.png");
@@ -117,7 +121,7 @@ fn every_scene_runs_and_is_drawn() {
 fn the_pointer_pulls_tissue_along() {
     let Some(program) = program() else { return };
     for scene in ["organ", "cloth", "pile"] {
-        let (printed, _) = play(program, scene, 40, "pull");
+        let (printed, _) = play(program, scene, 60, "pull");
         let [moved, nearest, force] = numbers(&printed, "pointer")[..] else {
             panic!("{printed}")
         };

@@ -49,7 +49,8 @@ static void start(uint32_t number) {
   app.is_recording = 0;
   CHECK(sample_start(&scene, number, &app.options));
   CHECK(sinew_world_set_profiling(scene.world, 1));
-  const float x = scene.eye[0] - scene.target[0], y = scene.eye[1] - scene.target[1], z = scene.eye[2] - scene.target[2];
+  const float x = scene.eye[0] - scene.target[0], y = scene.eye[1] - scene.target[1];
+  const float z = scene.eye[2] - scene.target[2];
   app.distance = sqrtf(x * x + y * y + z * z);
   app.turn = atan2f(x, z);
   app.tilt = asinf(y / app.distance);
@@ -78,7 +79,8 @@ static void step(int x, int y) {
 }
 
 static uint32_t debug_flags(void) {
-  const uint32_t all = SINEW_DRAW_CONTACTS | SINEW_DRAW_NORMALS | SINEW_DRAW_PINS | SINEW_DRAW_SPRINGS | SINEW_DRAW_BOUNDS;
+  const uint32_t all =
+    SINEW_DRAW_CONTACTS | SINEW_DRAW_NORMALS | SINEW_DRAW_PINS | SINEW_DRAW_SPRINGS | SINEW_DRAW_BOUNDS;
   return SINEW_DRAW_ATTACHMENTS | (app.debug ? all : 0); /* threads are always drawn */
 }
 
@@ -167,7 +169,7 @@ static void run_window(SDL_Window *window) {
   }
 }
 
-/* ---- Off screen --------------------------------------------------------------------------------------------------- */
+/* ---- Off screen ---- */
 
 /* A framebuffer with four samples per pixel, and one to read from. */
 static GLuint framebuffers[2];

@@ -36,8 +36,8 @@ sinew_status scene_add_tool(sample *s, const sinew_tool_def *def, uint32_t color
 /* Gives the last tool a density [kg/m^3]: from then on forces move it. */
 sinew_status scene_make_dynamic(sample *s, float density);
 
-/* Pins the nodes of a body whose coordinate along an axis (0 to 2) is between two values [m]. */
-sinew_status scene_pin(sample *s, sinew_body_id body, int axis, float low, float high);
+/* Pins the nodes of the first body whose coordinate along an axis (0 to 2) is between two values [m]. */
+sinew_status scene_pin(sample *s, int axis, float low, float high);
 
 /* Moves the pinned nodes of the first body by a distance [m] along x, away from x = 0, during the next step. */
 sinew_status scene_spread(sample *s, float distance);

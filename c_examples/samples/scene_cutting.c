@@ -32,8 +32,8 @@ sinew_status create_cutting(sample *s) {
   def.toughness = 20.0f; /* [J/m^2] */
   TRY(scene_add_body(s, &def, 0xC9615A));
   TRY(sinew_body_set_gravity_scale(s->world, s->bodies[0].id, 0)); /* nothing is below it */
-  TRY(scene_pin(s, s->bodies[0].id, 0, -1, -0.059f));
-  TRY(scene_pin(s, s->bodies[0].id, 0, 0.059f, 1));
+  TRY(scene_pin(s, 0, -1, -0.059f));
+  TRY(scene_pin(s, 0, 0.059f, 1));
 
   TRY(sinew_blade_def_init(&blade, sizeof blade));
   blade.edge[1] = EDGE_LOW;

@@ -28,7 +28,7 @@ sinew_status create_haptics(sample *s) {
   TRY(scene_body(s, &def));
   scene_tissue(&def, 5400.0f, 0.008f);
   TRY(scene_add_body(s, &def, 0xC98A6B));
-  TRY(scene_pin(s, s->bodies[0].id, 1, -1, -0.019f));
+  TRY(scene_pin(s, 1, -1, -0.019f));
 
   TRY(scene_tool(&ball, SINEW_SHAPE_SPHERE, 0.012f, 0, 0, 0, 0.05f, 0));
   TRY(scene_add_tool(s, &ball, 0xE3E8ED));

@@ -14,7 +14,7 @@ sinew_status create_organ(sample *s) {
   scene_tissue(&def, 6000.0f, 0.011f);
   TRY(scene_add_body(s, &def, 0xA8443A));
   TRY(sinew_body_get_bounds(s->world, s->bodies[0].id, low, high));
-  TRY(scene_pin(s, s->bodies[0].id, 1, low[1], low[1] + 0.12f * (high[1] - low[1])));
+  TRY(scene_pin(s, 1, low[1], low[1] + 0.12f * (high[1] - low[1])));
 
   TRY(scene_tool(&table, SINEW_SHAPE_PLANE, 0, 0, 0, 0, low[1] - 0.001f, 0));
   TRY(scene_add_tool(s, &table, 0xB3C4C6));

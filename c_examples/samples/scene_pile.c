@@ -1,7 +1,7 @@
 /* Soft blocks and steel balls fall onto each other.
  *
- * Bodies collide with each other if both have meets_bodies. A tool with a mass is a rigid body: the balls push the blocks
- * and are pushed by them. Balls pass through each other. */
+ * Bodies collide with each other if both have meets_bodies. A tool with a mass is a rigid body: balls and blocks push
+ * each other. Balls pass through each other. */
 #include "scene.h"
 
 sinew_status create_pile(sample *s);

@@ -24,8 +24,8 @@ sinew_status create_suturing(sample *s) {
   scene_tissue(&def, 5400.0f, 0.006f);
   TRY(scene_add_body(s, &def, 0xE0A98C));
   TRY(sinew_body_set_gravity_scale(s->world, s->bodies[0].id, 0)); /* nothing is below it */
-  TRY(scene_pin(s, s->bodies[0].id, 0, -1, -0.059f));
-  TRY(scene_pin(s, s->bodies[0].id, 0, 0.059f, 1));
+  TRY(scene_pin(s, 0, -1, -0.059f));
+  TRY(scene_pin(s, 0, 0.059f, 1));
   TRY(sinew_body_cut(s->world, s->bodies[0].id, start, end, NULL));
   s->cut_depth = 0.015f;
   scene_camera(s, 0.06f, 0.21f, 0.17f, 0.0f, 0.0f, 0.0f);

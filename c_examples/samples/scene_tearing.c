@@ -24,8 +24,8 @@ sinew_status create_tearing(sample *s) {
   def.most_tears = 3;         /* in a step */
   def.smallest_piece = 5e-4f; /* [m^2] */
   TRY(scene_add_body(s, &def, 0x5B9A68));
-  TRY(scene_pin(s, s->bodies[0].id, 0, -1, -0.099f));
-  TRY(scene_pin(s, s->bodies[0].id, 0, 0.099f, 1));
+  TRY(scene_pin(s, 0, -1, -0.099f));
+  TRY(scene_pin(s, 0, 0.099f, 1));
   TRY(sinew_body_cut(s->world, s->bodies[0].id, start, end, NULL));
   s->cut_depth = 0.02f;
   scene_camera(s, 0.06f, 0.27f, 0.30f, 0.0f, 0.0f, 0.0f);

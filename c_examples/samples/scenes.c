@@ -138,22 +138,32 @@ sinew_status scene_make_dynamic(sample *s, float density) {
   return sinew_tool_set_mass(s->world, tool, &mass);
 }
 
-sinew_status scene_pin(sample *s, sinew_body_id body, int axis, float low, float high) {
-  float least[3] = {-10, -10, -10}, most[3] = {10, 10, 10};
-  least[axis] = low;
-  most[axis] = high;
-  return sinew_body_pin_box(s->world, body, least, most, NULL);
+static const float *node_at(sinew_vec3_view nodes, size_t i) {
+  return (const float *)((const char *)nodes.data + i * nodes.stride);
+}
+
+sinew_status scene_pin(sample *s, int axis, float low, float high) {
+  const sinew_body_id body = s->bodies[0].id;
+  sinew_vec3_view nodes;
+  TRY(sinew_body_get_positions(s->world, body, &nodes));
+  for (size_t i = 0; i < nodes.count; i++) {
+    const float at = node_at(nodes, i)[axis];
+    if (at < low || at > high) continue;
+    if (s->pin_count == SAMPLE_PINS) return SINEW_STATUS_CAPACITY;
+    TRY(sinew_body_pin(s->world, body, (uint32_t)i));
+    s->pins[s->pin_count++] = (uint32_t)i;
+  }
+  return SINEW_STATUS_OK;
 }
 
 sinew_status scene_spread(sample *s, float distance) {
   const sinew_body_id body = s->bodies[0].id;
   sinew_vec3_view nodes;
   TRY(sinew_body_get_positions(s->world, body, &nodes));
-  for (size_t i = 0; i < nodes.count; i++) {
-    const float *node = (const float *)((const char *)nodes.data + i * nodes.stride);
-    const float moved[3] = {node[0] + copysignf(distance, node[0]), node[1], node[2]};
-    const sinew_status status = sinew_body_move_pin(s->world, body, (uint32_t)i, moved);
-    if (status != SINEW_STATUS_OK && status != SINEW_STATUS_INVALID_ARGUMENT) return status; /* that one is not pinned */
+  for (uint32_t k = 0; k < s->pin_count; k++) {
+    const float *at = node_at(nodes, s->pins[k]);
+    const float moved[3] = {at[0] + copysignf(distance, at[0]), at[1], at[2]};
+    TRY(sinew_body_move_pin(s->world, body, s->pins[k], moved));
   }
   return SINEW_STATUS_OK;
 }

@@ -13,6 +13,7 @@ extern "C" {
 
 #define SAMPLE_BODIES 16
 #define SAMPLE_TOOLS 16
+#define SAMPLE_PINS 512
 
 /* Choices that hold for every scene. */
 typedef struct sample_options {
@@ -66,6 +67,8 @@ typedef struct sample {
 
   /* What single scenes keep. */
   sinew_mesh *mesh;             /* while a scene is created */
+  uint32_t pins[SAMPLE_PINS];   /* pinned nodes of the first body */
+  uint32_t pin_count;
   sinew_blade_id blade;
   sinew_haptic *haptic;
   sinew_attachment_id sutures[8];
