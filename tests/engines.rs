@@ -102,25 +102,6 @@ fn love_draws_soft_blocks_by_luajit() {
 }
 
 #[test]
-fn the_viewer_pulls_presses_and_cuts() {
-    begin("viewer");
-    let needs = ["sdl2.pc", "gl.pc", "xvfb-run", "xauth"];
-    if let Some(said) = run("viewer", &needs, &["DISPLAY=".into()]) {
-        for did in ["pulled", "pressed", "cut"] {
-            assert!(said.lines().any(|line| line.starts_with(did)), "{said}");
-        }
-        for scene in ["CLOTH", "TEARING", "PRESSURE"] {
-            assert!(said.lines().any(|line| line.starts_with(scene)), "{said}");
-        }
-        let by_hand = ["viewer_pull.png", "viewer_press.png", "viewer_cut.png"];
-        let scenes = ["viewer_scene_1.png", "viewer_scene_2.png", "viewer_scene_3.png"];
-        for picture in by_hand.into_iter().chain(scenes) {
-            shows_something("viewer", picture);
-        }
-    }
-}
-
-#[test]
 fn mono_calls_it_as_unity_does() {
     begin("mono");
     if let Some(said) = run("mono", &["mcs", "mono"], &[]) {

@@ -1,9 +1,7 @@
 # make engines    the library in other engines, one after another: runs those that are installed, and leaves pictures in target/pictures/
-# make love, viewer, mono, bullet, godot    one of them; Debian's packages are named beside it below
-# make samples              the viewer under its other name; it has a list of scenes (key N)
-# make samples WINDOW=1     the viewer in a window, for a person
+# make love, mono, bullet, godot    one of them; Debian's packages are named beside it below
 
-ENGINES := love viewer mono bullet godot
+ENGINES := love mono bullet godot
 ENGINE_BUILD := $(BUILD)/engines
 ENGINE_LINK := $(LIBRARY) '-Wl,-rpath,$(abspath $(BUILD))' -lm
 # A display where there is none.
@@ -21,14 +19,6 @@ engines: engine_folders
 love: engine_folders
 	$(DISPLAYED) env XDG_DATA_HOME=$(abspath $(ENGINE_BUILD)/home) \
 	  love engines/love $(abspath ../include/sinew/sinew_all.h $(LIBRARY)) $(abspath $(PICTURES))/love.png 100
-
-# libsdl2-dev, libgl-dev, pkg-config, libgl1-mesa-dri, xvfb, xauth
-viewer: engine_folders
-	$(CC) -std=c99 $(WARNINGS) $(CFLAGS) -I../include engines/viewer/viewer.c -o $(ENGINE_BUILD)/viewer \
-	  $$(pkg-config --cflags --libs sdl2) -lGL $(ENGINE_LINK)
-	$(if $(WINDOW),$(ENGINE_BUILD)/viewer,$(DISPLAYED) $(ENGINE_BUILD)/viewer -o $(PICTURES))
-
-samples: viewer
 
 # mono-mcs, mono-runtime
 mono: engine_folders
@@ -48,4 +38,4 @@ godot: engine_folders
 	HOME=$(abspath $(ENGINE_BUILD)/home) SINEW_SHIM=$(abspath $(ENGINE_BUILD))/libsoft.so SINEW_PICTURE=$(abspath $(PICTURES))/godot.png \
 	  $(GODOT) --path engines/godot
 
-.PHONY: engines engine_folders samples $(ENGINES)
+.PHONY: engines engine_folders $(ENGINES)
