@@ -6,7 +6,7 @@ fn main() {
     let version = concat!(env!("CARGO_PKG_VERSION_MAJOR"), ".", env!("CARGO_PKG_VERSION_MINOR"));
     match std::env::var("CARGO_CFG_TARGET_OS").as_deref() {
         Ok("macos") => println!("cargo:rustc-cdylib-link-arg=-Wl,-install_name,@rpath/libsinew.{version}.dylib"),
-        Ok("windows") => {}
+        Ok("windows" | "unknown") => {}
         _ => println!("cargo:rustc-cdylib-link-arg=-Wl,-soname,libsinew.so.{version}"),
     }
 }

@@ -8,4 +8,4 @@ pub(crate) mod symbolic_perturbation;
 
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
-pub(crate) use profile::{Count, Profile, Stage, Stopwatch};
+pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};

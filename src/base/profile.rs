@@ -3,6 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use super::{Error, Result};
+
 /// A stage of a step that is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
@@ -82,6 +84,14 @@ impl Profile {
     pub fn count(&self, count: Count, more: usize) {
         self.counts[count as usize].fetch_add(more as u64, Ordering::Relaxed);
     }
+}
+
+/// Refuses what reads a clock where there is none: WebAssembly without a system's interface.
+pub(crate) fn check_clock(reader: &str) -> Result<()> {
+    if cfg!(all(target_family = "wasm", target_os = "unknown")) {
+        return Err(Error::Unsupported(format!("{reader}: this platform has no clock")));
+    }
+    Ok(())
 }
 
 /// The clock: where a stage began. It borrows nothing, so that what is timed may change the world.

@@ -1,7 +1,7 @@
 //! Debug drawing through callbacks.
 
 use glam::Vec3;
-use libc::c_void;
+use std::ffi::c_void;
 
 use super::guard::{guard, sinew_world, with_world};
 use super::memory::{self, Versioned};

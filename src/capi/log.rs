@@ -4,7 +4,7 @@ use std::fmt::{self, Display, Write};
 use std::sync::RwLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use libc::{c_char, c_void};
+use std::ffi::{c_char, c_void};
 
 use super::guard::guard;
 use super::status::sinew_status;

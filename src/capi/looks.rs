@@ -1,6 +1,6 @@
 //! Settings that were made, what the caller keeps with things, whether ids are valid, and rays that meet tools.
 
-use libc::c_void;
+use std::ffi::c_void;
 
 use super::attachment::sinew_attachment_id;
 use super::blade::sinew_blade_id;

@@ -1,6 +1,6 @@
 //! Figures of tissues.
 
-use libc::c_char;
+use std::ffi::c_char;
 
 use super::guard::guard;
 use super::memory::{self, Versioned};

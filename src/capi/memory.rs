@@ -1,12 +1,11 @@
 //! What crosses the border as a pointer: checked, and turned into references and slices.
 
 use std::borrow::Cow;
-use std::ffi::CStr;
+use std::ffi::{CStr, c_char};
 use std::fmt;
 use std::ops::Range;
 
 use glam::{Quat, Vec3};
-use libc::c_char;
 
 use crate::base::{Error, Result, memory};
 

@@ -2,7 +2,7 @@
 
 use std::mem::offset_of;
 
-use libc::c_char;
+use std::ffi::c_char;
 
 use super::guard::guard;
 use super::memory::{self, Versioned};

@@ -1,7 +1,7 @@
 //! Pictures.
 
 use glam::Vec3;
-use libc::c_char;
+use std::ffi::c_char;
 
 use super::body::sinew_body_id;
 use super::guard::{guard, sinew_world, with_world};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use libc::c_char;
+use std::ffi::c_char;
 
 use super::guard::{guard, sinew_world, with_world_mut};
 use super::memory::{self, Versioned};

@@ -1,6 +1,6 @@
 //! Worlds as bytes.
 
-use libc::c_void;
+use std::ffi::c_void;
 
 use super::guard::{guard, sinew_world, with_world};
 use super::memory;

@@ -3,7 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::fmt::{self, Write};
 
-use libc::c_char;
+use std::ffi::c_char;
 
 use super::log;
 use crate::base::Error;

@@ -3,7 +3,7 @@
 use std::mem::offset_of;
 
 use glam::{Quat, Vec3};
-use libc::c_void;
+use std::ffi::c_void;
 
 use super::body::{sinew_body_id, with_body, with_body_mut};
 use super::definition::sinew_body_def;

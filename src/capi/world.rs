@@ -3,7 +3,7 @@
 use std::mem::offset_of;
 
 use glam::Vec3;
-use libc::c_void;
+use std::ffi::c_void;
 
 use super::body::sinew_body_id;
 use super::guard::{guard, with_world, with_world_mut};

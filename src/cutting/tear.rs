@@ -145,7 +145,7 @@ impl CutSurface {
         let (x, y) = normal.any_orthonormal_pair();
         let (a, b, c) = (x.dot(forces * x), x.dot(forces * y), y.dot(forces * y));
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
-        let tension = middle + half.hypot(b);
+        let tension = middle + libm::hypot(half, b);
         // Of both rows of the matrix less the value the one with the longer solution.
         let pull = if half > 0.0 {
             x * (tension - c) + y * b

@@ -61,7 +61,7 @@ pub(crate) fn solid_angle(point: DVec3, triangle: [DVec3; 3]) -> f64 {
     let [a, b, c] = triangle.map(|corner| corner - point);
     let [length_a, length_b, length_c] = [a, b, c].map(DVec3::length);
     let cosine = length_a * length_b * length_c + a.dot(b) * length_c + b.dot(c) * length_a + c.dot(a) * length_b;
-    2.0 * a.dot(b.cross(c)).atan2(cosine)
+    2.0 * libm::atan2(a.dot(b.cross(c)), cosine)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@
 use std::time::Instant;
 
 use super::{StepReport, World};
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, check_clock};
 
 /// How often a step is tried over a shorter time, because its motion needs shorter substeps than were known.
 const TRIES: u32 = 16;
@@ -122,13 +122,14 @@ impl World {
     /// slower from one step to the next, or where it first meets a tool.
     ///
     /// # Errors
-    /// As [`World::step_with_budget`]; [`Error::InvalidArgument`]: `seconds` is out of its range.
+    /// As [`World::step_with_budget`]; [`Error::InvalidArgument`]: `seconds` is out of its range; [`Error::Unsupported`]: the platform has no clock.
     pub fn step_within(&mut self, dt: f32, seconds: f64) -> Result<BudgetReport> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(Error::invalid(format!(
                 "seconds is {seconds}: must be above 0 and finite"
             )));
         }
+        check_clock("step_within")?;
         let work = self.pace.work(seconds);
         let start = Instant::now();
         let report = self.step_with_budget(dt, work)?;

@@ -1,7 +1,7 @@
 //! What the stages of a step took, for whoever asks for it.
 
 use super::World;
-use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
+use crate::base::{Count, Profile, Result, Stage, Stopwatch, check_clock, memory};
 use crate::solver::Outcome;
 
 /// Times and counts of the last step, whether it was taken or refused.
@@ -50,11 +50,12 @@ impl World {
     /// Times and counts the stages of each step from the next one on, or no longer. A step that is not profiled reads no clock.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory); [`Error::Unsupported`](crate::Error::Unsupported): the platform has no clock.
     pub fn set_profiling(&mut self, on: bool) -> Result<()> {
         if !on {
             self.profile = None;
         } else if self.profile.is_none() {
+            check_clock("enabled is 1")?;
             self.profile = Some(memory::boxed(Profile::default())?);
         }
         Ok(())
