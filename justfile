@@ -4,7 +4,7 @@
 check:
     cargo fmt --check
     cargo clippy --lib -- -D warnings
-    cargo test --test header --test readme
+    cargo test --test project -- header:: readme:: layering:: words::
 
 # All tests, from Rust and C.
 test *ARGS:
@@ -16,13 +16,17 @@ gate:
 
 # Regenerates include/sinew.h from src/capi.
 header:
-    SINEW_WRITE_HEADER=1 cargo test --test header
+    SINEW_WRITE_HEADER=1 cargo test --test project header::
 
 # A bench by name, as in `just bench touch -- --quick`; reports go to target/report/.
 bench NAME *ARGS:
     cargo bench --bench {{NAME}} {{ARGS}}
 
+# State hashes of many scenes against those of a commit, for changes that must not change results.
+hashes COMMIT *SCENE:
+    bash .ci/hashes {{COMMIT}} {{SCENE}}
+
 # The Rust documentation, with warnings denied, and the links of all documents.
 docs:
     RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
-    cargo test --test readme
+    cargo test --test project readme::

@@ -1,6 +1,6 @@
 //! No tick changes the force by more than the motion of the hand explains, whatever becomes of the tissue.
 
-use crate::bench::*;
+use super::bench::*;
 use glam::{DVec3, dvec3, vec3};
 use sinew::Solver;
 use sinew::cutting::Sweep;

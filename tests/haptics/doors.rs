@@ -1,6 +1,6 @@
 //! What is refused, what ends, and what can be done again.
 
-use crate::bench::*;
+use super::bench::*;
 use glam::{DVec3, Quat, Vec3, dvec3, vec3};
 use sinew::{Error, HapticDefinition, Pose, Shape, Solver, ToolDefinition};
 

@@ -1,6 +1,6 @@
 //! A hand in the loop gains no energy.
 
-use crate::bench::*;
+use super::bench::*;
 use glam::{DVec3, dvec3};
 use sinew::Solver;
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::bench::*;
+use super::bench::*;
 use glam::{DVec3, Vec3, dvec3};
 use sinew::Solver;
 

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 
-use crate::bench::*;
+use super::bench::*;
 use glam::{Quat, Vec3, vec3};
 use sinew::{Pose, Solver};
 

@@ -1,6 +1,6 @@
 //! What turns: a capsule that lies on the tissue, led by a hand that turns it too.
 
-use crate::bench::*;
+use super::bench::*;
 use glam::{DQuat, DVec3, Quat, Vec3, dvec3, vec3};
 use sinew::{HapticDefinition, HapticTick, Pose, Shape, Solver, ToolDefinition};
 use std::f64::consts::FRAC_PI_2;

@@ -1,9 +1,0 @@
-//! What is cut meets itself and other tissue.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../support/mod.rs"]
-mod support;
-
-mod meetings;
-mod scene;
-mod wounds;

@@ -1,0 +1,16 @@
+//! Cuts through tetrahedral solids.
+#![allow(clippy::unwrap_used)]
+
+mod blade;
+mod block;
+mod hollow;
+mod motion;
+mod organs;
+mod random;
+mod refused;
+mod rings;
+mod shapes;
+mod strokes;
+mod sutures;
+mod tearing;
+mod toughness;

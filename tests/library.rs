@@ -1,0 +1,16 @@
+//! The library as Rust programs use it: one program for all tests that need neither an allocator nor a process of their own.
+
+mod support;
+
+mod contact;
+mod cutting;
+mod cutting_contact;
+mod cutting_solids;
+mod debug;
+mod haptics;
+mod material;
+mod mesh;
+mod snapshots;
+mod solver;
+mod stability;
+mod world;

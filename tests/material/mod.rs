@@ -1,0 +1,17 @@
+//! What tissue is made of: springs, elements and terms, and what changes them.
+
+mod enclosed;
+mod laws;
+mod meshes;
+mod recovery;
+mod region;
+mod springs;
+mod strain;
+mod terms_analytic;
+mod terms_forces;
+mod terms_kernels;
+mod terms_set;
+mod tetrahedra;
+mod theory;
+mod tune;
+mod viscosity;

@@ -1,0 +1,391 @@
+//! The header and the library as C and C++ programs meet them: every program of `tests/c` compiled as both, linked to
+//! the shared and to the static library, and run; the examples compiled; then under sanitizers and valgrind.
+#![cfg(target_os = "linux")]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+use std::thread;
+
+use crate::support::{Library, failure, installed, root, skip, succeed};
+
+const WARNINGS: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
+
+/// A compiler that is installed, for one language.
+struct Compiler {
+    name: &'static str,
+    /// As `-x` names it.
+    language: &'static str,
+}
+
+const ALL_COMPILERS: [Compiler; 4] = [
+    Compiler {
+        name: "gcc",
+        language: "c",
+    },
+    Compiler {
+        name: "g++",
+        language: "c++",
+    },
+    Compiler {
+        name: "clang",
+        language: "c",
+    },
+    Compiler {
+        name: "clang++",
+        language: "c++",
+    },
+];
+
+impl Compiler {
+    fn installed() -> impl Iterator<Item = &'static Compiler> {
+        ALL_COMPILERS.iter().filter(|compiler| {
+            let there = installed(compiler.name);
+            if !there {
+                skip(&format!("{}, which is not installed", compiler.name));
+            }
+            there
+        })
+    }
+
+    /// All the standards that the header promises.
+    fn standards(&self) -> &'static [&'static str] {
+        match self.language {
+            "c" => &["c99", "c11", "c17", "c2x"],
+            _ => &["c++11", "c++14", "c++17", "c++20", "c++2b"],
+        }
+    }
+
+    /// The standard that the programs are written in.
+    fn standard(&self) -> &'static str {
+        match self.language {
+            "c" => "c99",
+            _ => "c++17",
+        }
+    }
+
+    /// Compiles a program and links it; where it ends up.
+    fn build(&self, source: &Path, build: &Build) -> PathBuf {
+        let program = Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join(build.name)
+            .join(self.name)
+            .join(source.strip_prefix(root()).expect("a source of the crate"))
+            .with_extension("");
+        std::fs::create_dir_all(program.parent().expect("a folder")).expect("the target directory can be written");
+        let mut command = Command::new(self.name);
+        command
+            .arg(format!("-std={}", self.standard()))
+            .args(WARNINGS)
+            .args(["-O1", "-g", "-pthread"])
+            .args(build.options)
+            .arg(format!("-DEXPECTED_VERSION={}", version()))
+            .arg("-I")
+            .arg(root().join("include"))
+            .args(["-x", self.language])
+            .arg(source)
+            .args(["-x", "none", "-o"])
+            .arg(&program);
+        let library = Library::get();
+        match build.link {
+            Link::Shared => command
+                .arg(library.shared())
+                .arg(format!("-Wl,-rpath,{}", library.folder.display())),
+            Link::Static => command.arg(library.archive()).args(&library.native_libraries),
+        };
+        succeed(command.arg("-lm"));
+        program
+    }
+}
+
+enum Link {
+    Shared,
+    Static,
+}
+
+/// One way of building the programs, in a folder of its own: the tests run side by side.
+struct Build {
+    name: &'static str,
+    link: Link,
+    options: &'static [&'static str],
+}
+
+const SHARED: Build = Build {
+    name: "shared",
+    link: Link::Shared,
+    options: &[],
+};
+
+const STATIC: Build = Build {
+    name: "static",
+    link: Link::Static,
+    options: &[],
+};
+
+const SANITIZED: Build = Build {
+    name: "sanitized",
+    link: Link::Shared,
+    options: &["-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
+};
+
+const CHECKED: Build = Build {
+    name: "valgrind",
+    link: Link::Shared,
+    options: &[],
+};
+
+/// The version of the crate as `sinew_version` gives it.
+fn version() -> u32 {
+    let part = |text: &str| text.parse::<u32>().expect("a number");
+    part(env!("CARGO_PKG_VERSION_MAJOR")) << 16
+        | part(env!("CARGO_PKG_VERSION_MINOR")) << 8
+        | part(env!("CARGO_PKG_VERSION_PATCH"))
+}
+
+/// The C programs of a folder, in the order of their names.
+fn sources(folder: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(root().join(folder)) else {
+        return Vec::new();
+    };
+    let mut sources: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("a folder can be read").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "c"))
+        .collect();
+    sources.sort();
+    sources
+}
+
+/// Runs all of these programs, some side by side, and tells of every one that fails. Each finds its library by its own path alone:
+/// cargo puts older builds on the loader's.
+fn run_all(programs: impl Iterator<Item = Command> + Send) {
+    let programs = Mutex::new(programs);
+    let next = || programs.lock().expect("no program panicked").next();
+    let run = || {
+        let mut failures = Vec::new();
+        while let Some(mut program) = next() {
+            program
+                .env_remove("LD_LIBRARY_PATH")
+                .current_dir(env!("CARGO_TARGET_TMPDIR"));
+            failures.extend(failure(&mut program));
+        }
+        failures
+    };
+    let failures: Vec<String> = thread::scope(|scope| {
+        let count = thread::available_parallelism().map_or(1, usize::from);
+        let running: Vec<_> = (0..count).map(|_| scope.spawn(run)).collect();
+        let ended = running
+            .into_iter()
+            .map(|thread| thread.join().expect("a program that builds"));
+        ended.flatten().collect()
+    });
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+fn every_program_runs<'a>(compilers: impl Iterator<Item = &'a Compiler> + Send, build: &Build) {
+    let programs = sources("tests/c");
+    assert!(!programs.is_empty(), "there are programs in tests/c");
+    run_all(compilers.flat_map(|compiler| {
+        let built = programs.iter().map(move |source| compiler.build(source, build));
+        built.map(Command::new)
+    }));
+}
+
+#[test]
+fn programs_run_with_the_shared_library() {
+    every_program_runs(Compiler::installed(), &SHARED);
+}
+
+#[test]
+fn programs_run_with_the_static_library() {
+    // What compilers make of the programs does not depend on the library: one for each language links it.
+    let of = |language: &str| Compiler::installed().find(move |compiler| compiler.language == language);
+    every_program_runs(["c", "c++"].into_iter().filter_map(of), &STATIC);
+}
+
+/// It takes the place of glibc's allocator.
+#[test]
+#[cfg(target_env = "gnu")]
+fn a_first_refusal_for_want_of_memory_is_an_answer() {
+    if let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") {
+        let program = compiler.build(&root().join("tests/out_of_memory.c"), &SHARED);
+        run_all([Command::new(program)].into_iter());
+    }
+}
+
+#[test]
+fn the_examples_compile_as_c_and_as_cxx() {
+    for compiler in Compiler::installed() {
+        for folder in ["c_examples", "c_examples/lessons"] {
+            for source in sources(folder) {
+                compiler.build(&source, &SHARED);
+            }
+        }
+    }
+}
+
+/// Lessons are short, listed in the guide, and print what the comment at their top says.
+#[test]
+fn lessons_print_the_output_that_they_state() {
+    let Some(compiler) = Compiler::installed().find(|compiler| compiler.language == "c") else {
+        return;
+    };
+    let index = std::fs::read_to_string(root().join("docs/guide/examples.md")).expect("the list of examples");
+    let lessons = sources("c_examples/lessons");
+    assert!(lessons.len() >= 18, "{} lessons", lessons.len());
+    let mut wrong = Vec::new();
+    for lesson in lessons {
+        let name = lesson.file_name().expect("a file").to_string_lossy();
+        let text = std::fs::read_to_string(&lesson).expect("a lesson");
+        let (comment, _) = text.split_once("\n */\n").expect("a comment at the top");
+        let (_, stated) = comment.split_once(" * Output:\n").expect("a stated output");
+        let stated: Vec<&str> = stated.lines().map(|line| line.trim_start_matches(" *   ")).collect();
+        let output = succeed(&mut Command::new(compiler.build(&lesson, &SHARED)));
+        let printed = String::from_utf8_lossy(&output.stdout);
+        if printed.lines().collect::<Vec<_>>() != stated {
+            wrong.push(format!("{name} prints:\n{printed}"));
+        }
+        if text.lines().count() > 80 {
+            wrong.push(format!("{name} has more than 80 lines"));
+        }
+        if !index.contains(&format!("`{name}`")) {
+            wrong.push(format!("docs/guide/examples.md lacks {name}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The headers of C below `include/`.
+fn headers() -> Vec<String> {
+    let entries = std::fs::read_dir(root().join("include/sinew")).expect("include/sinew");
+    let names = entries.map(|entry| entry.expect("a file").file_name());
+    let mut headers: Vec<String> = names.map(|name| format!("sinew/{}", name.to_string_lossy())).collect();
+    headers.push("sinew.h".to_owned());
+    headers
+}
+
+#[test]
+fn each_header_stands_alone_in_every_standard() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("alone");
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    let headers = headers();
+    assert!(headers.len() > 10, "{headers:?}");
+    let alone: Vec<PathBuf> = headers
+        .iter()
+        .map(|header| {
+            let file = folder.join(header.replace('/', "_")).with_extension("c");
+            let text = format!("#include \"{header}\"\n#include \"{header}\"\n");
+            std::fs::write(&file, text).expect("a file can be written");
+            file
+        })
+        .collect();
+    for compiler in Compiler::installed() {
+        for standard in compiler.standards() {
+            succeed(
+                Command::new(compiler.name)
+                    .arg(format!("-std={standard}"))
+                    .args(WARNINGS)
+                    .arg("-fsyntax-only")
+                    .arg("-I")
+                    .arg(root().join("include"))
+                    .args(["-x", compiler.language])
+                    .args(&alone),
+            );
+        }
+    }
+}
+
+/// A program of its own: what is compiled of this text, where it can be.
+fn compiled(compiler: &Compiler, build: &Build, name: &str, text: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(build.name);
+    std::fs::create_dir_all(&folder).expect("a folder can be made");
+    let source = folder.join(name).with_extension("c");
+    let program = source.with_extension("out");
+    std::fs::write(&source, text).expect("a file can be written");
+    let done = Command::new(compiler.name)
+        .args(build.options)
+        .arg("-g")
+        .arg(&source)
+        .arg("-o")
+        .arg(&program)
+        .output();
+    done.is_ok_and(|output| output.status.success()).then_some(program)
+}
+
+/// Whether a program ends well.
+fn ends_well(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
+}
+
+/// Writes beyond what it was given, and ends well where nobody looks.
+const BEYOND: &str = "#include <stdlib.h>
+int main(int count, char **words) {
+    char *two = (char *)malloc(2);
+    (void)words;
+    two[count + 1] = 1;
+    count = two[count + 1] - 1;
+    free(two);
+    return count;
+}
+";
+
+/// Adds what cannot be added.
+const OVERFLOW: &str = "int main(int count, char **words) {
+    int most = 2147483647;
+    (void)words;
+    return (most + count) & 1;
+}
+";
+
+/// Loses what it was given.
+const LEAK: &str = "#include <stdlib.h>
+int main(int count, char **words) {
+    char *lost = (char *)malloc((size_t)count * 100);
+    (void)words;
+    lost[0] = 0;
+    count = lost[0];
+    lost = NULL;
+    return count;
+}
+";
+
+/// Whether the compiler's address and undefined-behaviour sanitizers are there and work.
+fn sanitizers_work(compiler: &Compiler) -> bool {
+    compiled(compiler, &SANITIZED, "nothing", "int main(void) { return 0; }\n")
+        .is_some_and(|program| ends_well(&mut Command::new(program)))
+}
+
+#[test]
+fn sanitizers_find_nothing() {
+    let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler)) else {
+        return skip("the sanitizers, which no compiler here has");
+    };
+    for (name, fault) in [("beyond", BEYOND), ("overflow", OVERFLOW)] {
+        let planted = compiled(compiler, &SANITIZED, name, fault).expect("a program");
+        assert!(!ends_well(&mut Command::new(planted)), "{name} is not found");
+    }
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| Command::new(compiler.build(&source, &SANITIZED))));
+}
+
+#[test]
+fn valgrind_finds_nothing() {
+    if !installed("valgrind") {
+        return skip("valgrind, which is not installed");
+    }
+    let Some(compiler) = Compiler::installed().next() else {
+        return;
+    };
+    let checked = |program: PathBuf| {
+        let mut valgrind = Command::new("valgrind");
+        valgrind
+            .args(["--quiet", "--leak-check=full", "--error-exitcode=9"])
+            .arg(program);
+        valgrind
+    };
+    for (name, fault) in [("beyond", BEYOND), ("leak", LEAK)] {
+        let planted = compiled(compiler, &CHECKED, name, fault).expect("a program");
+        assert!(ends_well(&mut Command::new(&planted)), "{name} is no good program");
+        assert!(!ends_well(&mut checked(planted)), "{name} is not found");
+    }
+    let programs = sources("tests/c").into_iter();
+    run_all(programs.map(|source| checked(compiler.build(&source, &CHECKED))));
+}

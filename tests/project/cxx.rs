@@ -1,0 +1,166 @@
+//! `include/sinew.hpp`: programs of `tests/cxx` and the example, built by each C++ compiler, run, also under sanitizers; and that it is
+//! not behind the C header.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::support::{Library, installed, root, skip, succeed};
+
+const COMPILERS: [&str; 2] = ["g++", "clang++"];
+
+/// What a C++ program does by the C function itself.
+const LEFT_TO_C: [&str; 13] = [
+    // Constants, and what `error` does not need.
+    "sinew_version",
+    "sinew_status_name",
+    // Lists with several arrays of one length, which gain nothing.
+    "sinew_body_get_spring_pairs",
+    "sinew_body_get_springs",
+    "sinew_body_set_springs",
+    "sinew_body_set_tear_limits",
+    "sinew_body_get_spring_strains",
+    "sinew_body_get_triangle_strains",
+    "sinew_body_get_tetrahedron_strains",
+    "sinew_mean_at_nodes",
+    "sinew_body_attach_points",
+    "sinew_body_attach_nodes_to_points",
+    "sinew_body_attach_points_to_points",
+];
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(root().join(path)).unwrap()
+}
+
+/// Every name that begins with `sinew_` and ends before one of these.
+fn names(text: &str) -> BTreeSet<&str> {
+    text.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'))
+        .filter(|word| word.starts_with("sinew_"))
+        .collect()
+}
+
+/// The functions of the C header.
+fn functions(header: &str) -> BTreeSet<&str> {
+    header
+        .lines()
+        .filter(|line| !line.starts_with([' ', '/', '#']) && !line.starts_with("typedef"))
+        .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
+        .collect()
+}
+
+fn built(compiler: &str, source: &Path, name: &str, options: &[&str]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cxx").join(compiler);
+    std::fs::create_dir_all(&folder).unwrap();
+    let program = folder.join(name);
+    let library = Library::get();
+    succeed(
+        Command::new(compiler)
+            .args([
+                "-std=c++17",
+                "-Wall",
+                "-Wextra",
+                "-Wpedantic",
+                "-Wshadow",
+                "-Werror",
+                "-O1",
+                "-g",
+            ])
+            .args(options)
+            .arg("-I")
+            .arg(root().join("include"))
+            .args(["-x", "c++"])
+            .arg(source)
+            .args(["-x", "none", "-o"])
+            .arg(&program)
+            .arg(library.shared())
+            .arg(format!("-Wl,-rpath,{}", library.folder.display())),
+    );
+    program
+}
+
+fn run(program: &Path) -> String {
+    let output = succeed(Command::new(program).env_remove("LD_LIBRARY_PATH"));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn programs_build_and_run() {
+    for compiler in COMPILERS {
+        if !installed(compiler) {
+            skip(&format!("{compiler}, which is not installed"));
+            continue;
+        }
+        run(&built(compiler, &root().join("tests/cxx/owners.cpp"), "owners", &[]));
+        let without = root().join("tests/cxx/without_exceptions.cpp");
+        run(&built(compiler, &without, "without_exceptions", &["-fno-exceptions"]));
+        // In both languages it is the same world.
+        let c = built(
+            compiler,
+            &root().join("c_examples/quickstart.c"),
+            "quickstart_c",
+            &["-xc++"],
+        );
+        let cpp = built(compiler, &root().join("c_examples/quickstart.cpp"), "quickstart", &[]);
+        assert_eq!(run(&cpp), run(&c));
+    }
+}
+
+#[test]
+fn nothing_is_lost_or_ended_twice() {
+    let options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let probe = Path::new(env!("CARGO_TARGET_TMPDIR")).join("probe.cpp");
+    std::fs::write(&probe, "int main() {}\n").unwrap();
+    let sanitizes = Command::new("g++")
+        .args(options)
+        .arg(&probe)
+        .arg("-o")
+        .arg(probe.with_extension("out"))
+        .output()
+        .is_ok_and(|output| output.status.success());
+    if !sanitizes {
+        return skip("sinew.hpp under sanitizers: no g++ that has them");
+    }
+    run(&built(
+        "g++",
+        &root().join("tests/cxx/owners.cpp"),
+        "owners_sanitized",
+        &options,
+    ));
+}
+
+#[test]
+fn it_is_not_behind_the_c_header() {
+    let (c, cpp) = (read("include/sinew/sinew_all.h"), read("include/sinew.hpp"));
+    let (functions, used) = (functions(&c), names(&cpp));
+    assert!(functions.len() > 100, "the functions are found");
+    let left = BTreeSet::from(LEFT_TO_C);
+    for function in &functions {
+        assert!(
+            used.contains(function) != left.contains(function),
+            "{function} is either in sinew.hpp or left to C"
+        );
+    }
+    assert!(left.is_subset(&functions), "what is left to C is there");
+
+    // What is declared and not defined is opaque: its owner destroys it.
+    let opaque: Vec<&str> = c
+        .lines()
+        .filter_map(|line| line.strip_prefix("typedef struct ")?.strip_suffix(';')?.split_once(' '))
+        .filter(|(tag, name)| tag == name)
+        .map(|(tag, _)| tag)
+        .collect();
+    assert!(opaque.len() >= 6, "the opaque types are found: {opaque:?}");
+    for name in opaque {
+        let class = name.strip_prefix("sinew_").unwrap();
+        let head = format!("class {class} : public owner<{name}, {name}_destroy> {{");
+        assert!(cpp.contains(&head), "{head}");
+    }
+    for init in functions.iter().filter(|name| name.ends_with("_def_init")) {
+        let def = init.strip_suffix("_init").unwrap();
+        let class = def.strip_prefix("sinew_").unwrap();
+        let head = format!("using {class} = definition<{def}, {init}>;");
+        assert!(cpp.contains(&head), "{head}");
+    }
+}

@@ -1,0 +1,70 @@
+//! What the shared library shows to a linker: exactly the functions of the header, under its versioned name.
+#![cfg(target_os = "linux")]
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use crate::support::{Library, installed, root, skip, succeed};
+
+/// The functions that the headers declare: every `sinew_...(` that begins a line.
+fn declared() -> BTreeSet<String> {
+    let header = std::fs::read_to_string(root().join("include/sinew/sinew_all.h")).expect("sinew_all.h");
+    header
+        .lines()
+        .filter(|line| !line.starts_with(['#', '/', ' ']) && !line.starts_with("typedef"))
+        .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
+        .map(str::to_owned)
+        .collect()
+}
+
+fn exported() -> BTreeSet<String> {
+    let output = succeed(
+        Command::new("nm")
+            .args(["-D", "--defined-only", "--format=posix"])
+            .arg(Library::get().shared()),
+    );
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn the_exported_symbols_are_the_headers_functions() {
+    if !installed("nm") {
+        return skip("the exported symbols: nm is not installed");
+    }
+    let (declared, exported) = (declared(), exported());
+    assert!(
+        declared.contains("sinew_world_step"),
+        "the header was read: {declared:?}"
+    );
+    let missing: Vec<_> = declared.difference(&exported).collect();
+    let unknown: Vec<_> = exported.difference(&declared).collect();
+    assert!(missing.is_empty(), "declared and not exported: {missing:?}");
+    assert!(unknown.is_empty(), "exported and not declared: {unknown:?}");
+    for name in &exported {
+        assert!(name.starts_with("sinew_"), "{name} has not the prefix");
+    }
+}
+
+#[test]
+fn the_shared_library_is_called_by_its_version() {
+    if !installed("readelf") {
+        return skip("the soname: readelf is not installed");
+    }
+    let output = succeed(Command::new("readelf").arg("-d").arg(Library::get().shared()));
+    let said = String::from_utf8_lossy(&output.stdout);
+    let soname = said
+        .lines()
+        .find(|line| line.contains("SONAME"))
+        .and_then(|line| line.split(['[', ']']).nth(1));
+    let expected = concat!(
+        "libsinew.so.",
+        env!("CARGO_PKG_VERSION_MAJOR"),
+        ".",
+        env!("CARGO_PKG_VERSION_MINOR")
+    );
+    assert_eq!(soname, Some(expected));
+}

@@ -1,0 +1,168 @@
+//! The table of stability, a part of it: each case with each solver at each step (with NEWTON at one), and one of the storages
+//! for each step.
+//! `cargo bench --bench stability` takes all of it.
+
+use super::{CASES, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
+use sinew::Solver;
+
+/// Tries a line of the table; what is not as it should be is told together.
+fn check(name: &str) {
+    let place = CASES
+        .iter()
+        .position(|case| case.name == name)
+        .expect("a line of the table");
+    let case = &CASES[place];
+    let mut wrong = Vec::new();
+    for solver in SOLVERS {
+        for (index, step) in STEPS.into_iter().enumerate() {
+            // NEWTON is slow: one of the steps for each line.
+            if solver == Solver::Newton && (place + index) % STEPS.len() != 0 {
+                continue;
+            }
+            let setup = Setup {
+                solver,
+                storage: STORAGES[(place + index) % STORAGES.len()],
+                step,
+                tier: Tier::Quick,
+            };
+            let verdict = Verdict::of(case, &setup);
+            if !verdict.is_expected(&setup) {
+                wrong.push(format!("{setup:?}: {verdict}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{name}\n{}", wrong.join("\n"));
+}
+
+macro_rules! lines {
+    ($($test:ident: $name:literal,)*) => {
+        $(#[test] fn $test() { check($name); })*
+
+        #[test]
+        fn every_line_of_the_table_is_tried() {
+            let tried = [$($name),*];
+            for case in &CASES {
+                assert!(tried.contains(&case.name), "{}", case.name);
+            }
+        }
+    };
+}
+
+lines! {
+    scattered: "scattered at random",
+    flattened: "flattened to a plane",
+    collapsed: "collapsed to a point",
+    scattered_large: "scattered, 9261 nodes",
+    coincident: "nodes in one place, springs without length",
+    stiffness_in_a_chain: "stiffness 1 : 1e6 in a chain",
+    stiffness_in_a_block: "stiffness 1 : 1e6 in a block",
+    masses: "masses 1 : 1e6",
+    above_the_limit: "a step far above the limit",
+    rotated: "started rotated",
+    reordered: "tetrahedra reordered",
+    inverted: "tetrahedra inverted",
+    far_from_the_origin: "10 km from the origin",
+    pin_let_go: "a pin stretched and let go",
+    pin_jumps: "a pin moved 100 cells in a step",
+    crushed: "crushed between two tools",
+    pushed: "1e6 N on a node for a step",
+    springs_removed: "springs removed in motion",
+    changing_steps: "steps of changing length",
+    a_million_steps: "a million steps",
+}
+
+/// What is not there yet, for the report: a solver that is offered takes part, and its line goes.
+#[test]
+fn what_is_pending_is_told() {
+    let setup = |solver| Setup {
+        solver,
+        storage: STORAGES[0],
+        step: 1e-3,
+        tier: Tier::Quick,
+    };
+    let case = CASES
+        .iter()
+        .find(|case| case.name == "tetrahedra inverted")
+        .expect("a case");
+    let mut lines = Vec::new();
+    for solver in SOLVERS {
+        if let Err(Stop::Unsupported(why)) = Verdict::of(case, &setup(solver)).outcome {
+            assert_ne!(solver, Solver::Verlet);
+            lines.push(format!("every case with {solver:?}: {why}"));
+        }
+    }
+    for (name, what) in PENDING {
+        assert!(CASES.iter().any(|case| case.name == name), "{name}");
+        lines.push(format!("{name}: {what}"));
+    }
+    crate::support::report_pending("Stability", &lines);
+}
+
+/// A few seconds of long runs.
+mod long_runs {
+    use super::super::long_runs::{Activity, found, quick};
+    use glam::Vec3;
+    use sinew::Solver;
+
+    fn check(solver: Solver) {
+        let mut wrong = Vec::new();
+        for (row, seconds) in quick().into_iter().filter(|(row, _)| row.solver == solver) {
+            let outcome = row.run(seconds, f64::INFINITY, &mut |_| {});
+            if outcome.has_failed() {
+                wrong.push(format!("{row}: {outcome}"));
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+
+    #[test]
+    fn verlet() {
+        check(Solver::Verlet);
+    }
+
+    #[test]
+    fn implicit() {
+        check(Solver::Implicit);
+    }
+
+    #[test]
+    fn newton() {
+        check(Solver::Newton);
+    }
+
+    /// Whether a check finds a change of the velocities.
+    fn finds(check: &str, activity: Activity, change: fn(Vec3) -> Vec3) {
+        let [before, after] = found(activity, change);
+        assert!(before.is_empty(), "{before:?}");
+        assert!(after.iter().any(|what| what.starts_with(check)), "{check}: {after:?}");
+    }
+
+    #[test]
+    fn planted_faults_are_found() {
+        finds("energy", Activity::Hanging, |v| 1.01 * v);
+        finds("momentum", Activity::Spinning, |v| v + Vec3::splat(1e-5));
+        finds("angular momentum", Activity::Spinning, |v| 0.997 * v);
+    }
+
+    /// The bound of the mean energy, by leapfrog of one mode: mass and frequency 1, substeps z.
+    #[test]
+    fn mean_energy_stays_below_what_leapfrog_conserves() {
+        for z in [0.1_f64, 0.5, 1.0, 1.6] {
+            let c = 2.0 * (z / 2.0).asin() / (z * (1.0 - z * z / 4.0).sqrt());
+            let [mut x, mut v] = [0.6_f64, 0.8];
+            let conserved = |x: f64, v: f64| c * (v * v + (1.0 - z * z / 4.0) * x * x) / 2.0;
+            let first = conserved(x, v);
+            let (mut sum, count) = (0.0, 100_000);
+            for _ in 0..count {
+                v -= z / 2.0 * x;
+                x += z * v;
+                v -= z / 2.0 * x;
+                sum += (v * v + x * x) / 2.0;
+            }
+            assert!((conserved(x, v) / first - 1.0).abs() < 1e-9, "z {z}");
+            let mean = sum / f64::from(count) / first;
+            let expected = (1.0 - z * z / 8.0) / (c * (1.0 - z * z / 4.0));
+            assert!((mean - expected).abs() < 1e-4 && mean < 1.0, "z {z}: {mean}");
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Worlds beside each other, their readers and embeddings, and tissue that sleeps.
+
+mod embedding;
+mod many_worlds;
+mod readers;
+mod sleep;
