@@ -9,7 +9,7 @@ use glam::{DVec3, Mat3A, Vec3, Vec3A};
 
 use super::contacts::Load;
 use super::path::ToolPath;
-use super::rigid::{Rigid, RigidMass, RigidMotion, turn_between, turned};
+use super::rigid::{Rigid, RigidMass, RigidMotion};
 use super::tool::Pose;
 use crate::base::{Result, memory};
 

@@ -7,6 +7,7 @@ use super::tool::{Form, Pose, Tool};
 use crate::codec::saved;
 use crate::def::CollisionFilter;
 use crate::geometry::Bounds;
+use crate::geometry::rotation::turned;
 
 /// The way of a tool over a step: a straight line at constant speed, turning at a constant rate.
 #[derive(Clone, Debug)]
@@ -179,7 +180,7 @@ impl ToolPath {
         } else if fraction >= 1.0 {
             self.end.orientation
         } else {
-            Quat::from_scaled_axis(self.turn * fraction as f32) * self.start.orientation
+            self.exact_orientation_at(fraction).as_quat()
         }
     }
 
@@ -199,7 +200,7 @@ impl ToolPath {
         } else if fraction >= 1.0 {
             end
         } else {
-            DQuat::from_scaled_axis(self.turn.as_dvec3() * fraction) * start
+            turned(start, self.turn.as_dvec3() * fraction)
         }
     }
 

@@ -7,6 +7,7 @@ use super::tool::{Form, Pose};
 use crate::base::{Error, Result, StateHasher};
 use crate::codec::saved;
 use crate::def::finite_vector;
+use crate::geometry::rotation::turned;
 use crate::mesh::FURTHEST;
 
 /// A body that turns by more than this in a part of its free flight takes it in more of them, rad.
@@ -308,18 +309,6 @@ impl RigidMotion {
             && self.velocity.is_finite()
             && self.angular_momentum.is_finite()
     }
-}
-
-/// Turned by axis times angle, rad.
-pub(crate) fn turned(from: DQuat, by: DVec3) -> DQuat {
-    (DQuat::from_scaled_axis(by) * from).normalize()
-}
-
-/// How it turned from one orientation to another, the shorter way round, as axis times angle, rad.
-pub(crate) fn turn_between(from: DQuat, to: DQuat) -> DVec3 {
-    let change = to * from.conjugate();
-    let change = if change.w < 0.0 { -change } else { change };
-    change.normalize().to_scaled_axis()
 }
 
 impl Rigid {

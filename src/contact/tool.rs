@@ -12,6 +12,7 @@ use super::rounded;
 use crate::base::{Error, Result, StateHasher};
 use crate::codec::{saved, saved_enum};
 use crate::def::{CollisionFilter, Detection, check_reach, finite_vector, not_negative};
+use crate::geometry::rotation::{turn_between, turned};
 use crate::mesh::FURTHEST;
 
 /// The shape of a tool, about its own origin.
@@ -68,17 +69,15 @@ impl Pose {
         if other.orientation == self.orientation {
             return Vec3::ZERO;
         }
-        let change = other.orientation * self.orientation.conjugate();
-        let change = if change.w < 0.0 { -change } else { change };
-        change.normalize().to_scaled_axis()
+        turn_between(self.orientation.as_dquat(), other.orientation.as_dquat()).as_vec3()
     }
 
     /// Where something is after a part of the way from here to there, 0 to 1.
     fn on_way_to(&self, other: &Self, part: f32) -> Self {
-        let turned = Quat::from_scaled_axis(self.turn_to(other) * part) * self.orientation;
+        let turn = self.turn_to(other).as_dvec3() * f64::from(part);
         Self {
             position: self.position.lerp(other.position, part),
-            orientation: turned.normalize(),
+            orientation: turned(self.orientation.as_dquat(), turn).as_quat(),
         }
     }
 

@@ -5,6 +5,7 @@ pub(crate) mod forest;
 pub(crate) mod nearest;
 mod normals;
 pub(crate) mod predicates;
+pub(crate) mod rotation;
 pub(crate) mod tree;
 
 pub(crate) use bounds::Bounds;

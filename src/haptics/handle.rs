@@ -9,6 +9,7 @@ use super::six::{self, Six};
 use crate::base::{Error, Result};
 use crate::contact::Pose;
 use crate::def::finite_vector;
+use crate::geometry::rotation;
 use crate::handover::triple_buffer::{Reader, Writer};
 
 /// Beside what the motion of the device explains, a tick changes the force by no more than this, N, or this part of it.
@@ -183,7 +184,10 @@ impl HapticHandle {
         let (position, orientation) = (pose.position.as_dvec3(), pose.orientation.as_dquat().normalize());
         let lever = self.coupling.lever;
         let way = self.device.map_or(six::ZERO, |(from, turned_from, _)| {
-            six::joined(position - from, six::turn(turned_from, orientation) * lever)
+            six::joined(
+                position - from,
+                rotation::turn_between(turned_from, orientation) * lever,
+            )
         });
         let velocity = six::joined(
             along.map_or(six::along(&way) / dt, |along| along.as_dvec3()),
@@ -289,7 +293,7 @@ impl HapticHandle {
         let turned = six::about(&drawn) / lever;
         let proxy = Pose {
             position: finite(motion.position + six::along(&drawn)),
-            orientation: six::turned(motion.orientation, turned.clamp_length_max(FURTHEST_TURN)).as_quat(),
+            orientation: rotation::turned(motion.orientation, turned.clamp_length_max(FURTHEST_TURN)).as_quat(),
         };
         let (time, work) = (self.clock, self.observer.by_proxy);
         self.poses.write(|sent| {

@@ -18,4 +18,4 @@ pub(crate) use definition::{Coupling, spread};
 pub(crate) use handle::Sent;
 pub(crate) use model::{Cone, MOST_CONTACTS, Model};
 pub(crate) use secant::Secant;
-pub(crate) use six::{Six, ZERO, about, along, difference, inverse, joined, product, scaled, sum, turn, turned};
+pub(crate) use six::{Six, ZERO, about, along, difference, inverse, joined, product, scaled, sum};

@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3, Vec3};
 
 use super::six::{self, Matrix, Six};
+use crate::geometry::rotation;
 use crate::ids::BodyId;
 
 /// Contacts that a model has room for; of more the most pressed.
@@ -85,7 +86,7 @@ impl Model {
     pub fn motion_to(&self, position: DVec3, orientation: DQuat, lever: f64) -> Six {
         six::joined(
             position - self.position,
-            six::turn(self.orientation, orientation) * lever,
+            rotation::turn_between(self.orientation, orientation) * lever,
         )
     }
 

@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::six::{self, Matrix, Six};
+use crate::geometry::rotation;
 
 /// The tool has to move by this part of its lever before anything is learnt: less is lost in what tissue does by itself.
 const LEAST_WAY: f64 = 0.02;
@@ -78,7 +79,7 @@ impl Secant {
         self.next = None;
         let way = six::joined(
             position - last.position,
-            six::turn(last.orientation, orientation) * lever,
+            rotation::turn_between(last.orientation, orientation) * lever,
         );
         let square = six::dot(&way, &way);
         if !(square.sqrt() >= LEAST_WAY * lever) {
@@ -103,7 +104,10 @@ impl Sample {
     fn and(&self, other: &Self, part: f64) -> Self {
         Self {
             position: self.position.lerp(other.position, part),
-            orientation: six::turned(self.orientation, part * six::turn(self.orientation, other.orientation)),
+            orientation: rotation::turned(
+                self.orientation,
+                part * rotation::turn_between(self.orientation, other.orientation),
+            ),
             wrench: std::array::from_fn(|k| self.wrench[k] + part * (other.wrench[k] - self.wrench[k])),
         }
     }
@@ -131,7 +135,7 @@ mod tests {
                 // Small enough that turns add up.
                 motion[axis] = 0.25e-3 * f64::from(round % 2 + 1);
                 let wrench = six::difference(&base, &six::product(&truth, &motion));
-                let turned = six::turned(DQuat::IDENTITY, six::about(&motion) / lever);
+                let turned = rotation::turned(DQuat::IDENTITY, six::about(&motion) / lever);
                 secant.learn((six::along(&motion), turned), &wrench, 0.016, lever, 1000.0);
             }
         }

@@ -61,30 +61,6 @@ pub(crate) fn limited(six: &Six, [most_along, most_about]: [f64; 2]) -> Six {
     )
 }
 
-/// How something turned from one orientation to another, the shorter way round, as axis times angle, rad.
-pub(crate) fn turn(from: DQuat, to: DQuat) -> DVec3 {
-    let change = to * from.conjugate();
-    let change = if change.w < 0.0 { -change } else { change };
-    let axis = DVec3::new(change.x, change.y, change.z);
-    let sine = axis.length();
-    if sine < 1e-12 {
-        return 2.0 * axis;
-    }
-    axis * (2.0 * libm::atan2(sine, change.w) / sine)
-}
-
-/// Turned by axis times angle, rad.
-pub(crate) fn turned(from: DQuat, by: DVec3) -> DQuat {
-    let half = 0.5 * by.length();
-    let part = if half < 1e-12 {
-        0.5
-    } else {
-        0.5 * libm::sin(half) / half
-    };
-    let axis = by * part;
-    (DQuat::from_xyzw(axis.x, axis.y, axis.z, libm::cos(half)) * from).normalize()
-}
-
 /// The matrix with these on its diagonal.
 pub(crate) fn diagonal(six: &Six) -> Matrix {
     std::array::from_fn(|row| std::array::from_fn(|column| if row == column { six[row] } else { 0.0 }))
@@ -148,6 +124,7 @@ pub(crate) fn clamped(matrix: &Matrix, range: [f64; 2]) -> Matrix {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::rotation;
 
     /// Numbers from a fixed seed.
     fn numbers() -> impl FnMut() -> f64 {
@@ -206,7 +183,7 @@ mod tests {
         for _ in 0..100 {
             let from = DQuat::from_xyzw(next(), next(), next(), next()).normalize();
             let by = DVec3::new(next(), next(), next()) * 4.0;
-            let found = turn(from, turned(from, by));
+            let found = rotation::turn_between(from, rotation::turned(from, by));
             assert!((found - by).length() < 1e-12, "{found} {by}");
         }
     }

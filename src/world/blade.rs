@@ -9,6 +9,7 @@ use crate::codec::saved;
 use crate::contact::{Lead, Pose};
 use crate::cutting::Met;
 use crate::def::{CollisionFilter, finite_vector};
+use crate::geometry::rotation::{turn_between, turned};
 use crate::ids::{BodyId, SlotId};
 use crate::mesh::FURTHEST;
 
@@ -22,7 +23,7 @@ const ROOM: usize = 256;
 const SPREAD: f64 = 0.05;
 
 /// A blade that turns by more than this in a step, rad, is followed in parts of it.
-const MOST_TURN: f32 = 0.5;
+const MOST_TURN: f64 = 0.5;
 
 /// What a blade is. Plain data, used only during [`World::create_blade`](crate::World::create_blade).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -225,9 +226,10 @@ impl Blade {
     /// from each to the next.
     pub fn ways(&self) -> (usize, impl Fn(usize) -> [Vec3; 2] + use<>) {
         let (edge, from, to) = (self.edge, self.pose, self.target.unwrap_or(self.pose));
-        let turn = from.orientation.angle_between(to.orientation);
+        let [start, end] = [from, to].map(|pose| pose.orientation.as_dquat().normalize());
+        let turn = turn_between(start, end);
         // Of what is no number none is more.
-        let count = ((turn / MOST_TURN).ceil() as usize).max(1);
+        let count = ((turn.length() / MOST_TURN).ceil() as usize).max(1);
         let [first, last] = self.edges();
         let at = move |index: usize| {
             if index == 0 {
@@ -237,7 +239,7 @@ impl Blade {
                 return last;
             }
             let part = index as f32 / count as f32;
-            let orientation = from.orientation.slerp(to.orientation, part);
+            let orientation = turned(start, turn * f64::from(part)).as_quat();
             edge.map(|end| from.position.lerp(to.position, part) + orientation * end)
         };
         (count, at)

@@ -5,10 +5,11 @@ use glam::{DQuat, DVec3, Vec3};
 use super::World;
 use crate::base::{Error, Result};
 use crate::contact::{Form, Pose};
+use crate::geometry::rotation;
 use crate::handover::triple_buffer::{Reader, Writer, triple_buffer};
 use crate::haptics::{
     Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Model, Secant, Sent, Six, ZERO,
-    about, along, difference, inverse, joined, product, scaled, spread, sum, turn, turned,
+    about, along, difference, inverse, joined, product, scaled, spread, sum,
 };
 use crate::ids::{BodyId, ToolId};
 
@@ -55,7 +56,7 @@ impl Link {
     /// coupling is felt as a jolt when the tool changes its speed, and a proxy without mass would rebound from it: of what the model did not foretell
     /// only so much is taken over at a time that it does not.
     fn take_over(&mut self, middle: (DVec3, DQuat), wrench: &Six, inertia: f64) -> Six {
-        let turned = turn(self.middle.1, middle.1) * self.coupling.lever;
+        let turned = rotation::turn_between(self.middle.1, middle.1) * self.coupling.lever;
         let way = joined(middle.0 - self.middle.0, turned);
         let foretold = difference(&self.felt, &product(self.secant.stiffness(), &way));
         let part = (1.5 / (1.0 + 4.0 * inertia / self.coupling.stiffness[0])).min(1.0);
@@ -165,12 +166,12 @@ impl World {
         let Link { coupling, before, .. } = *link;
         let lever = coupling.lever;
         let (start, end) = (before.position.as_dvec3(), tool.pose.position.as_dvec3());
-        let turn = turn(exact(before), exact(tool.pose));
+        let turn = rotation::turn_between(exact(before), exact(tool.pose));
         let wrench = joined(tool.force.as_dvec3(), tool.torque.as_dvec3() / lever);
         let way = joined(end - start, turn * lever);
         link.work -= wrench.iter().zip(way).map(|(part, way)| part * way).sum::<f64>();
         // A mean wrench stands for the middle of the step.
-        let middle = (0.5 * (start + end), turned(exact(before), 0.5 * turn));
+        let middle = (0.5 * (start + end), rotation::turned(exact(before), 0.5 * turn));
         // What bounces is met again.
         link.mass = self.mass_under(place).max(SURE_TO_MEET * link.mass);
         let felt = link.take_over(middle, &wrench, link.mass / (dt * dt));
