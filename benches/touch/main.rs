@@ -1,8 +1,8 @@
-//! What contact costs: whole scenes with a tool and without, in one run.
+//! What contact costs: whole scenes with a tool and without, and tissue with contact and without, in one run.
 //!
 //! `cargo bench --bench touch [-- --quick] [-- --only NAME]` writes `target/report/touch.md`. A row steps the same body twice, frame by frame
 //! of 1/60 s: once beside a tool, once without one. It reports processor time per frame (one thread), their ratio, the slowest frame, the
-//! deepest penetration of nodes and of the middles of faces, and the force on the tools.
+//! deepest penetration of nodes and of the middles of faces, and the force on the tools. `tissue.rs` has the second group of rows.
 #![allow(clippy::print_stderr)]
 
 #[path = "../storage/clock.rs"]
@@ -10,6 +10,7 @@
 mod clock;
 mod scene;
 mod scenes;
+mod tissue;
 
 use std::fmt::Write;
 use std::process::ExitCode;
@@ -113,6 +114,7 @@ fn main() -> ExitCode {
         eprintln!("{row}");
         let _ = writeln!(report, "{row}");
     }
+    tissue::report(&mut report, &only, is_quick);
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("target/report");
     if let Err(error) = std::fs::create_dir_all(&path).and_then(|()| std::fs::write(path.join("touch.md"), report)) {
         eprintln!("target/report/touch.md: {error}");

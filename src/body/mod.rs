@@ -94,6 +94,9 @@ use state::State;
 pub(crate) use stroke::Stroke;
 use tears::Tears;
 
+/// A body of so many nodes or fewer keeps the caller's order: the search for the fastest one takes longer than all else that makes the body.
+const FEW_NODES: usize = 32;
+
 /// Soft tissue: nodes with mass, joined by springs, with a surface where it has one.
 ///
 /// Coordinates and indices are the caller's throughout.
@@ -138,7 +141,7 @@ pub struct Body {
     pub(crate) implicit: Option<Box<Implicit>>,
     /// Forces from outside for the next step, N; kept from the first force on.
     pub(crate) applied: Option<Vectors>,
-    pub(crate) contacts: Option<Contacts>,
+    pub(crate) contacts: Option<Box<Contacts>>,
     pub(crate) contact: BodyContact,
     /// Points of its surface without mass; kept only by bodies that may be cut.
     pub(crate) bindings: Option<Bindings>,
@@ -211,6 +214,7 @@ impl Body {
         let mut springs = definition.resolved_springs()?;
         let law = made.as_ref().and_then(|made| made.law);
         let order = match definition.storage {
+            Storage::Packed if node_count <= FEW_NODES => NodeOrder::default(),
             Storage::Packed if springs.is_empty() && law.is_some() => {
                 order_for_tetrahedra(definition.positions, definition.tetrahedra)?
             }
@@ -594,7 +598,8 @@ impl Body {
             Some(contacts) => contacts.reserve(tools)?,
             None => {
                 let surface = self.order.own_triangles(&self.surface)?;
-                self.contacts = Some(Contacts::new(self.state.positions(), &surface, &self.contact, tools)?);
+                let contacts = Contacts::new(self.state.positions(), &surface, &self.contact, tools)?;
+                self.contacts = Some(memory::boxed(contacts)?);
             }
         }
         if self.cuttable.is_some() {

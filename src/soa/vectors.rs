@@ -18,64 +18,12 @@ pub(crate) const MARGIN: usize = 16;
 /// Numbers in a cache line.
 const LINE: usize = 16;
 
-/// How many cache lines further into its memory each axis begins than it had to. Arrays that begin at the same place of a memory page get
-/// in each other's way: a load waits for the store before it where their addresses agree in the last twelve bits.
-const SKEWS: [usize; 3] = [0, 21, 42];
+/// Numbers in a memory page. Arrays that begin at the same place of a page get in each other's way: a load waits for the store before it where their
+/// addresses agree in the last twelve bits.
+const PAGE: usize = 1024;
 
-/// One number per node, aligned to a cache line, with zeros on both sides that may be read.
-#[derive(Debug)]
-struct Floats {
-    values: Vec<f32>,
-    first: usize,
-    count: usize,
-}
-
-impl Floats {
-    /// `count` zeros, `skew` cache lines further into the memory taken than they had to be.
-    fn zeros(count: usize, skew: usize) -> Result<Self> {
-        Self::with_room(count, count, skew)
-    }
-
-    /// The same with room for `room` numbers, at least as many, to be grown into.
-    fn with_room(count: usize, room: usize, skew: usize) -> Result<Self> {
-        let padded = room.next_multiple_of(LINE);
-        let values = memory::filled(0.0_f32, LINE * (skew + 1) + padded + 2 * MARGIN)?;
-        // What cannot be aligned is not, and only slower.
-        let aligned = values.as_ptr().align_offset(LINE * size_of::<f32>()).min(LINE);
-        Ok(Self {
-            values,
-            first: aligned + LINE * skew + MARGIN,
-            count,
-        })
-    }
-
-    /// Makes room for so many numbers in all.
-    fn reserve(&mut self, room: usize, skew: usize) -> Result<()> {
-        if self.first + room.next_multiple_of(LINE) + MARGIN <= self.values.len() {
-            return Ok(());
-        }
-        let mut roomier = Self::with_room(self.count, room, skew)?;
-        let places = roomier.places();
-        roomier.values[places].copy_from_slice(&self.values[self.places()]);
-        *self = roomier;
-        Ok(())
-    }
-
-    /// So many numbers may there be, a multiple of a line's.
-    fn room(&self, skew: usize) -> usize {
-        self.values.len() - LINE * (skew + 1) - 2 * MARGIN
-    }
-
-    #[inline]
-    fn places(&self) -> Range<usize> {
-        self.first..self.first + self.count
-    }
-
-    /// With a margin before the first and one after the last block of sixteen.
-    fn padded_places(&self) -> Range<usize> {
-        self.first - MARGIN..self.first + self.count.next_multiple_of(LINE) + MARGIN
-    }
-}
+/// An axis that is longer than a page begins so many numbers further into its page than the one before it.
+const SKEW: usize = 21 * LINE;
 
 /// Vectors of some nodes in a row, to be read; at the ends of a body also the numbers to spare beyond them.
 #[derive(Clone, Copy, Debug)]
@@ -154,10 +102,14 @@ impl<'a> View<'a> {
     }
 }
 
-/// One vector per node.
+/// One vector per node: a number per node along each axis, the first aligned to a cache line, with zeros on both sides that may be read.
 #[derive(Debug)]
 pub(crate) struct Vectors {
-    axes: [Floats; 3],
+    values: Vec<f32>,
+    /// The place of node 0 along the first axis, and how far it is from there to the next axis.
+    first: usize,
+    stride: usize,
+    count: usize,
 }
 
 /// Where they lie in memory is not kept, but how much room there is.
@@ -167,11 +119,10 @@ impl Saved for Vectors {
 
     fn save(&self, to: &mut Writer) {
         self.len().save(to);
-        let room = self.axes[0].room(SKEWS[0]);
-        room.save(to);
-        to.needs(3 * size_of::<f32>() * room);
-        for axis in &self.axes {
-            f32::save_all(&axis.values[axis.places()], to);
+        self.room().save(to);
+        to.needs(3 * size_of::<f32>() * self.room());
+        for axis in self.axes() {
+            f32::save_all(axis, to);
         }
     }
 
@@ -181,77 +132,109 @@ impl Saved for Vectors {
             return Err(from.refusal("vectors have not the room that they take"));
         }
         from.will_take(room.checked_mul(3 * size_of::<f32>()))?;
-        let floats = |axis: usize| Floats::with_room(count, room, SKEWS[axis]);
-        let mut axes = [floats(0)?, floats(1)?, floats(2)?];
-        for axis in &mut axes {
-            let places = axis.places();
-            floats_into(&mut axis.values[places], from)?;
+        let mut vectors = Self::with_room(count, room)?;
+        for axis in vectors.axes_mut() {
+            floats_into(axis, from)?;
         }
-        Ok(Self { axes })
+        Ok(vectors)
     }
 }
 
 impl Vectors {
     /// `count` zero vectors.
     pub fn zeros(count: usize) -> Result<Self> {
-        let [x, y, z] = SKEWS.map(|skew| Floats::zeros(count, skew));
-        Ok(Self { axes: [x?, y?, z?] })
+        Self::with_room(count, count)
+    }
+
+    /// The same with room for `room` vectors, at least as many, to be grown into.
+    fn with_room(count: usize, room: usize) -> Result<Self> {
+        let least = room.next_multiple_of(LINE) + 2 * MARGIN;
+        let stride = if least < PAGE {
+            least
+        } else {
+            (least - SKEW).next_multiple_of(PAGE) + SKEW
+        };
+        let values = memory::filled(0.0_f32, LINE + 3 * stride)?;
+        // What cannot be aligned is not, and only slower.
+        let aligned = values.as_ptr().align_offset(LINE * size_of::<f32>()).min(LINE);
+        Ok(Self {
+            values,
+            first: aligned + MARGIN,
+            stride,
+            count,
+        })
     }
 
     /// Makes room for so many vectors in all.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
-        for (axis, skew) in self.axes.iter_mut().zip(SKEWS) {
-            axis.reserve(count, skew)?;
+        if count > self.room() {
+            let mut roomier = Self::with_room(self.count, count)?;
+            roomier.copy_from(self);
+            *self = roomier;
         }
         Ok(())
     }
 
     /// Adds zero vectors, for which there is room, up to so many in all.
     pub fn grow(&mut self, count: usize) {
-        for axis in &mut self.axes {
-            assert!(axis.first + count.next_multiple_of(LINE) + MARGIN <= axis.values.len());
-            axis.count = axis.count.max(count);
-        }
+        assert!(count <= self.room());
+        self.count = self.count.max(count);
+    }
+
+    /// So many vectors may there be, a multiple of a line's.
+    fn room(&self) -> usize {
+        self.stride - 2 * MARGIN
+    }
+
+    /// The places of the numbers along an axis, with a margin before the first and one after the last block of sixteen.
+    #[inline(always)]
+    fn padded_places(&self, axis: usize) -> Range<usize> {
+        let start = self.first - MARGIN + axis * self.stride;
+        start..start + self.count.next_multiple_of(LINE) + 2 * MARGIN
+    }
+
+    /// The numbers along each axis with those margins.
+    #[inline(always)]
+    fn padded_mut(&mut self) -> [&mut [f32]; 3] {
+        let all = self.padded_places(0);
+        let (x, rest) = self.values[all.start..].split_at_mut(self.stride);
+        let (y, z) = rest.split_at_mut(self.stride);
+        [x, y, z].map(|axis| &mut axis[..all.len()])
     }
 
     #[inline(always)]
     pub fn get(&self, node: usize) -> Vec3 {
-        let [x, y, z] = &self.axes;
-        debug_assert!(node < x.count);
-        Vec3::new(
-            x.values[x.first + node],
-            y.values[y.first + node],
-            z.values[z.first + node],
-        )
+        debug_assert!(node < self.count);
+        let first = self.first + node;
+        Vec3::from([0, 1, 2].map(|axis| self.values[first + axis * self.stride]))
     }
 
     #[inline(always)]
     pub fn set(&mut self, node: usize, value: Vec3) {
-        let [x, y, z] = &mut self.axes;
-        debug_assert!(node < x.count);
-        (
-            x.values[x.first + node],
-            y.values[y.first + node],
-            z.values[z.first + node],
-        ) = value.into();
+        debug_assert!(node < self.count);
+        let first = self.first + node;
+        for (axis, number) in value.to_array().into_iter().enumerate() {
+            self.values[first + axis * self.stride] = number;
+        }
     }
 
     pub fn len(&self) -> usize {
-        self.axes[0].count
+        self.count
     }
 
     /// The coordinates along each axis.
     #[inline(always)]
     pub fn axes(&self) -> [&[f32]; 3] {
-        self.axes.each_ref().map(|axis| &axis.values[axis.places()])
+        [0, 1, 2].map(|axis| {
+            let first = self.first + axis * self.stride;
+            &self.values[first..first + self.count]
+        })
     }
 
     #[inline(always)]
     pub fn axes_mut(&mut self) -> [&mut [f32]; 3] {
-        self.axes.each_mut().map(|axis| {
-            let places = axis.places();
-            &mut axis.values[places]
-        })
+        let count = self.count;
+        self.padded_mut().map(|axis| &mut axis[MARGIN..MARGIN + count])
     }
 
     /// The coordinates of some nodes along each axis.
@@ -269,7 +252,7 @@ impl Vectors {
     #[inline(always)]
     pub fn view(&self) -> View<'_> {
         View {
-            axes: self.axes.each_ref().map(|axis| &axis.values[axis.padded_places()]),
+            axes: [0, 1, 2].map(|axis| &self.values[self.padded_places(axis)]),
             start: -(MARGIN as isize),
             records: None,
         }
@@ -278,10 +261,7 @@ impl Vectors {
     /// The coordinates along each axis cut into pieces, each from the first node of a tile on; the first piece has the margin
     /// before it and the last the margin after it. `starts` are to be those of [`Vectors::piece_start`].
     pub fn pieces_mut<'a>(&'a mut self, starts: &'a [usize]) -> [Ragged<'a, f32>; 3] {
-        self.axes.each_mut().map(|axis| {
-            let places = axis.padded_places();
-            Ragged::new(&mut axis.values[places], starts)
-        })
+        self.padded_mut().map(|axis| Ragged::new(axis, starts))
     }
 
     /// Where a piece begins that begins with this tile.

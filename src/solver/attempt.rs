@@ -11,7 +11,7 @@ use super::verlet::{self, Taken, TooLong};
 use crate::base::Profile;
 use crate::body::Body;
 use crate::codec::saved;
-use crate::contact::{Contacts, DynamicTool, ToolPath};
+use crate::contact::{DynamicTool, ToolPath};
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
@@ -521,7 +521,7 @@ fn sums_fit(body: &Body) -> bool {
         && body
             .contacts
             .iter()
-            .flat_map(Contacts::loads)
+            .flat_map(|contacts| contacts.loads())
             .all(|load| fits(load.impulse) && fits(load.angular_impulse))
 }
 

@@ -26,7 +26,6 @@ use super::substep::{Before, Part};
 use crate::base::StateHasher;
 use crate::body::{Body, Inertia};
 use crate::codec::saved;
-use crate::contact::Contacts;
 use crate::simd::Loops;
 use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
 use crate::solver::write_records;
@@ -260,7 +259,7 @@ impl<'a> Account<'a> {
             let force = pin.force_sum / f64::from(self.substeps);
             work += DVec3::select(pin.axes, force, DVec3::ZERO).dot(pin.travel.as_dvec3());
         }
-        let loads = body.contacts.iter().flat_map(Contacts::loads);
+        let loads = body.contacts.iter().flat_map(|contacts| contacts.loads());
         let tools = self.request.tools.iter().zip(loads).enumerate();
         for (index, (tool, load)) in tools.filter(|(_, (tool, _))| tool.moves()) {
             let received = body.contacts.as_ref().and_then(|contacts| contacts.received(index));

@@ -198,7 +198,7 @@ impl<'a> Step<'a> {
         }
         let sums = account.compares.then(|| Sums::of_open(body, &part, team));
         // What a tool touches is closed with it.
-        if may_stay_open && body.contacts.as_ref().is_none_or(Contacts::are_far) {
+        if may_stay_open && body.contacts.as_deref().is_none_or(Contacts::are_far) {
             carry.closing = Some(ClosingKick {
                 substep,
                 gravity: request.gravity,

@@ -60,7 +60,7 @@ impl Substep<'_> {
         });
         // Nor is a dynamic tool's impulse on a node one that goes on.
         let is_of_order_1 = |contacts: &Contacts| !contacts.holds.is_empty() || contacts.has_dynamic();
-        if !body.contacts.as_ref().is_some_and(is_of_order_1) {
+        if !body.contacts.as_deref().is_some_and(is_of_order_1) {
             return *self;
         }
         self.of_order_1()
@@ -70,7 +70,7 @@ impl Substep<'_> {
     pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit) -> bool {
         let residual = |node: usize| implicit.residuals.get(node).as_dvec3();
         let imbalance = |contacts: &Contacts| contacts.holds.imbalance(residual);
-        body.contacts.as_ref().map_or(0.0, imbalance) <= f64::from(implicit.accuracy)
+        body.contacts.as_deref().map_or(0.0, imbalance) <= f64::from(implicit.accuracy)
     }
 
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which

@@ -219,7 +219,7 @@ impl Substep<'_> {
     fn work(&self, body: &Body, ways: &Vectors) -> f64 {
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node));
-        let mut work = body.contacts.as_ref().map_or(0.0, held);
+        let mut work = body.contacts.as_deref().map_or(0.0, held);
         for (axis, ways) in ways.axes().into_iter().enumerate() {
             let gravity = f64::from(self.request.gravity[axis]);
             if gravity != 0.0 {

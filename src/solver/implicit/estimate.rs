@@ -9,10 +9,13 @@
 //! coefficients give a better one, by Gauss-Radau quadrature with a node at t (Meurant, Tichy 2013): its factor takes the place
 //! of 1/t, and comes down as soon as the stiff part has been dealt with.
 
+use crate::base::{Result, memory};
 use crate::codec::saved;
 
-/// How many iterations are kept; of longer solutions the bound is that of the first so many, and too high.
-const KEPT: usize = 1024;
+/// How many iterations are kept at most, and for each node; of longer solutions the bound is that of the first so many, and too high. Without rounding
+/// a solution takes three for each node.
+const MOST_KEPT: usize = 1024;
+const KEPT_PER_NODE: usize = 6;
 
 /// The smallest eigenvalue is found from above: it may be less by this.
 const SAFETY: f64 = 0.5;
@@ -26,6 +29,8 @@ pub(super) struct Spectrum {
     /// Of each iteration, how long its way was in units of the search direction, and what part of that direction goes into the
     /// next.
     steps: Vec<[f64; 2]>,
+    /// How many iterations are kept.
+    most: usize,
     smallest: f64,
 }
 
@@ -33,18 +38,32 @@ saved!(Spectrum {
     diagonal,
     beside,
     steps,
+    most,
     smallest
 });
 
 impl Spectrum {
-    /// With room for all it takes.
-    pub fn new() -> crate::base::Result<Self> {
-        Ok(Self {
-            diagonal: crate::base::memory::reserved(KEPT)?,
-            beside: crate::base::memory::reserved(KEPT)?,
-            steps: crate::base::memory::reserved(KEPT)?,
+    /// With room for the solutions of so many nodes.
+    pub fn new(node_count: usize) -> Result<Self> {
+        let mut spectrum = Self {
+            diagonal: Vec::new(),
+            beside: Vec::new(),
+            steps: Vec::new(),
+            most: 0,
             smallest: 1.0,
-        })
+        };
+        spectrum.reserve(node_count)?;
+        Ok(spectrum)
+    }
+
+    /// Makes room for the solutions of so many nodes in all.
+    pub fn reserve(&mut self, node_count: usize) -> Result<()> {
+        let most = MOST_KEPT.min(KEPT_PER_NODE * node_count);
+        memory::reserve(&mut self.diagonal, most)?;
+        memory::reserve(&mut self.beside, most)?;
+        memory::reserve(&mut self.steps, most)?;
+        self.most = most;
+        Ok(())
     }
 
     /// Begins anew; what was known of the smallest eigenvalue stays known until there is more.
@@ -57,7 +76,7 @@ impl Spectrum {
     /// Takes in an iteration: how long its way was in units of the search direction, and what part of that direction goes
     /// into the next.
     pub fn take(&mut self, length: f64, growth: f64) {
-        if self.steps.len() == KEPT || !(length > 0.0 && growth >= 0.0) {
+        if self.steps.len() >= self.most || !(length > 0.0 && growth >= 0.0) {
             return;
         }
         let mut carried = 0.0;
@@ -166,7 +185,7 @@ mod tests {
     fn the_smallest_eigenvalue_is_that_of_the_matrix() {
         // All of whose eigenvalues the right-hand side has a part of.
         let eigenvalues: Vec<f64> = (0..40).map(|i| 0.01 * 1.2_f64.powi(i)).collect();
-        let mut spectrum = Spectrum::new().expect("memory");
+        let mut spectrum = Spectrum::new(40).expect("memory");
         run(&mut spectrum, &eigenvalues, vec![1.0; 40], 80, |_, _, _| ());
         let found = spectrum.smallest();
         assert!((found - 0.01).abs() < 0.06 * 0.01, "{found}");
@@ -177,7 +196,7 @@ mod tests {
         // A right-hand side that lies along the stiffest by a thousand times more than along the others.
         let eigenvalues: Vec<f64> = (0..40).map(|i| 0.01 * 1.3_f64.powi(i)).collect();
         let right: Vec<f64> = (0..40).map(|i| if i > 35 { 1000.0 } else { 1.0 }).collect();
-        let mut spectrum = Spectrum::new().expect("memory");
+        let mut spectrum = Spectrum::new(40).expect("memory");
         spectrum.assume(0.01);
         run(
             &mut spectrum,

@@ -71,7 +71,7 @@ impl Implicit {
         };
         self.search(body, 0.0, team);
         while solved.products < goal.budget && square > 0.0 {
-            let curvature = self.multiply(body, positions, tangent, body.contacts.as_ref(), team);
+            let curvature = self.multiply(body, positions, tangent, body.contacts.as_deref(), team);
             solved.products += 1;
             // Rounding may leave nothing to go along; what was found before that stands.
             if !(curvature > 0.0 && curvature.is_finite()) {

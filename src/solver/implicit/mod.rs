@@ -291,7 +291,7 @@ impl Implicit {
             coarse,
             stiffened: Vec::new(),
             partials: memory::filled(Partial::default(), tile_count(solved_count))?,
-            spectrum: Spectrum::new()?,
+            spectrum: Spectrum::new(solved_count)?,
             stale: true,
             was_stale: true,
             memory: Experience::NONE,
@@ -323,6 +323,7 @@ impl Implicit {
             records.reserve(count)?;
         }
         memory::reserve(&mut self.inertia, count)?;
+        self.spectrum.reserve(count)?;
         self.blocks.reserve(count)?;
         self.coarse.reserve(count)?;
         memory::reserve(&mut self.loads, self.coarse.size() * tile_count(count))?;

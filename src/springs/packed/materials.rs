@@ -74,6 +74,7 @@ impl Kinds {
             }
             rest = &rest[count..];
         }
+        memory::shrink(&mut found.kinds)?;
         Ok(found)
     }
 
