@@ -78,7 +78,7 @@ fn shows_something(path: &Path) {
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-    let frame = reader.next_frame(&mut pixels).unwrap();
+    reader.next_frame(&mut pixels).unwrap();
     let all: Vec<[u8; 3]> = pixels.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     let saturated = |p: &&[u8; 3]| p.iter().max().unwrap() - p.iter().min().unwrap() > 40;
     let share = all.iter().filter(saturated).count() as f64 / all.len() as f64;
