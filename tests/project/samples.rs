@@ -70,15 +70,14 @@ fn numbers(printed: &str, begins: &str) -> Vec<f64> {
     words.filter_map(|word| word.parse().ok()).collect()
 }
 
-/// The scene covers part of the picture: pixels that differ from those of the upper border, which is empty.
+/// Tissue, which is the only thing with strong colors, covers part of the picture, and not its corner.
 fn shows_something(path: &Path) {
     let mut decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-    let frame = reader.next_frame(&mut pixels).unwrap();
+    reader.next_frame(&mut pixels).unwrap();
     let all: Vec<[u8; 3]> = pixels.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-    let middle = frame.width as usize / 2;
     let saturated = |p: &&[u8; 3]| p.iter().max().unwrap() - p.iter().min().unwrap() > 40;
     let share = all.iter().filter(saturated).count() as f64 / all.len() as f64;
     assert!(
@@ -86,11 +85,7 @@ fn shows_something(path: &Path) {
         "{}: tissue has {share} of the picture",
         path.display()
     );
-    assert!(
-        !saturated(&&all[middle]),
-        "{}: the background is not above",
-        path.display()
-    );
+    assert!(!saturated(&&all[0]), "{}: no background in the corner", path.display());
     // Light and shade: a body in one flat color has few.
     let shades: BTreeSet<_> = all.iter().filter(saturated).map(|p| p.map(|c| c >> 3)).collect();
     assert!(shades.len() > 30, "{}: {} shades", path.display(), shades.len());
