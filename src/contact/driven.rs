@@ -12,6 +12,7 @@ use super::path::ToolPath;
 use super::rigid::{Rigid, RigidMass, RigidMotion};
 use super::tool::Pose;
 use crate::base::{Result, memory};
+use crate::geometry::rotation::{turn_between, turned};
 
 /// A dynamic tool in a step that begins.
 #[derive(Clone, Copy, Debug)]

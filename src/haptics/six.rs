@@ -3,7 +3,7 @@
 //! What turns is measured in metres at the lever of a tool, so that all six have the same unit: a motion is (way, lever angle), m, a wrench
 //! (force, torque / lever), N.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 pub(crate) type Six = [f64; 6];
 
@@ -125,6 +125,7 @@ pub(crate) fn clamped(matrix: &Matrix, range: [f64; 2]) -> Matrix {
 mod tests {
     use super::*;
     use crate::geometry::rotation;
+    use glam::DQuat;
 
     /// Numbers from a fixed seed.
     fn numbers() -> impl FnMut() -> f64 {

@@ -10,9 +10,6 @@ use crate::support::{Library, installed, report_folder, root, skip, succeed};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// Scenes in which dynamic tools turn: their sines are those of the system's library, and differ in the last bits.
-const TURNING: [&str; 2] = ["pile", "balloon"];
-
 /// A node that has WebAssembly's SIMD.
 const NODE: u32 = 16;
 
