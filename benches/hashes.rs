@@ -146,7 +146,7 @@ fn bodies(scenes: &mut Vec<(String, Scene)>) {
                 ..ELEMENTS
             });
         }),
-        ("viscous elements", |body| body.viscosity.retardation_time = 0.01),
+        ("viscous elements", |body| body.viscosity.retardation_time = 1e-3),
         ("Maxwell elements", |body| {
             body.viscosity = Viscosity {
                 retardation_time: 0.02,

@@ -3,6 +3,14 @@
 //! `cargo run --release --example cloth`
 //!
 //! ```text
+//! time [s]  lowest node [mm]  kinetic energy [mJ]
+//!     0.00                 0                  0.0
+//!     0.33              -171                  0.7
+//!     0.67              -177                  0.0
+//!     1.00              -177                  0.0
+//!     1.33              -177                  0.0
+//!     1.67              -177                  0.0
+//!     2.00              -177                  0.0
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -45,7 +53,7 @@ fn main() -> Result<()> {
                 .map(|place| place.y)
                 .fold(f32::INFINITY, f32::min);
             let kinetic = body.energy(world.gravity()).kinetic;
-            println!("{:8.2}  {:16.1}  {:19.3}", world.time(), 1e3 * lowest, 1e3 * kinetic);
+            println!("{:8.2}  {:16.0}  {:19.1}", world.time(), 1e3 * lowest, 1e3 * kinetic);
         }
         world.step(1.0 / 60.0)?;
     }

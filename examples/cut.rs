@@ -1,8 +1,16 @@
-//! A blade cuts a sheet in two, and one half falls.
+//! A blade cuts a sheet that is held at two sides in two.
 //!
 //! `cargo run --release --example cut`
 //!
 //! ```text
+//! blade [mm]  force [N]  nodes  pieces
+//!        -60      0.000    441       1
+//!        -40      0.010    455       1
+//!        -20      0.010    491       1
+//!          0      0.010    527       1
+//!         20      0.010    563       1
+//!         40      0.010    599       1
+//!         60      0.000    623       2
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -14,7 +22,10 @@ use sinew::{BladeDefinition, BodyDefinition, Result, Values, World, WorldDefinit
 const SIZE: f32 = 0.1;
 
 fn main() -> Result<()> {
-    let mut world = World::new(WorldDefinition::default())?;
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        ..WorldDefinition::default()
+    })?;
     let mesh = Mesh::cloth([SIZE, SIZE], [20, 20])?;
     let sheet = world.create_body(&BodyDefinition {
         positions: &mesh.positions,
@@ -34,7 +45,7 @@ fn main() -> Result<()> {
     body.pin_box(low.with_x(0.49 * SIZE), high)?;
 
     // An upright edge behind the sheet, which moves through it.
-    let mut blade = BladeDefinition::new([0.02 * Vec3::NEG_Y, 0.02 * Vec3::Y]);
+    let mut blade = BladeDefinition::new([0.06 * Vec3::NEG_Y, 0.06 * Vec3::Y]);
     blade.pose.position = vec3(0.003, 0.0, -0.06);
     let blade = world.create_blade(&blade)?;
 

@@ -13,4 +13,6 @@ mod mesh;
 mod snapshots;
 mod solver;
 mod stability;
+#[path = "stability/quick.rs"]
+mod stability_quick;
 mod world;

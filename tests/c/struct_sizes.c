@@ -1,5 +1,5 @@
 /* Every function that takes a struct with a struct_size refuses a size that no header gave it, by the argument's name and that size, and
- * takes the right one then. tests/header.rs sees to it that none is left out. */
+ * takes the right one then. tests/project/header.rs sees to it that none is left out. */
 #include "check.h"
 
 #include <stdint.h>

@@ -7,6 +7,7 @@ mod abi;
 mod c_programs;
 mod cxx;
 mod engines;
+mod examples;
 mod header;
 mod install;
 mod layering;

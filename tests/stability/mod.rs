@@ -1,6 +1,6 @@
 //! The table of stability: every case with every solver, every storage and every step, through the public API.
 //!
-//! `quick.rs` takes a part of it, `benches/stability.rs` all of it. Whatever a case does, no number is ever
+//! `quick.rs`, a module of `tests/library.rs`, takes a part of it, `benches/stability.rs` all of it. Whatever a case does, no number is ever
 //! other than finite, the energy is never above what was put in (`ledger.rs`), one thread and two lead to the same state,
 //! and a step that is refused has changed nothing.
 
@@ -8,8 +8,6 @@ mod bad_starts;
 mod frames;
 mod ledger;
 pub mod long_runs;
-#[cfg(test)]
-mod quick;
 mod ratios;
 mod setup;
 mod statics;

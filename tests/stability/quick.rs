@@ -2,7 +2,7 @@
 //! for each step.
 //! `cargo bench --bench stability` takes all of it.
 
-use super::{CASES, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
+use crate::stability::{CASES, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
 use sinew::Solver;
 
 /// Tries a line of the table; what is not as it should be is told together.
@@ -100,7 +100,7 @@ fn what_is_pending_is_told() {
 
 /// A few seconds of long runs.
 mod long_runs {
-    use super::super::long_runs::{Activity, found, quick};
+    use crate::stability::long_runs::{Activity, found, quick};
     use glam::Vec3;
     use sinew::Solver;
 
