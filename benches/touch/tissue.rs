@@ -309,7 +309,7 @@ fn heap(count: usize, with: bool) -> Result<Crowd, Error> {
         let [x, z] = [index % side, index / side % side].map(|place| 0.05 * (place as f32 - 0.5 * (side as f32 - 1.0)));
         let layer = (index / side / side) as f32;
         // Each layer stands askew on the one below.
-        let askew = 0.008 * if layer as usize % 2 == 0 { 1.0 } else { -1.0 };
+        let askew = 0.008 * if (layer as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
         crowd.add(&mesh, Vec3::new(x + askew, 0.03 + 0.05 * layer, z - askew), &definition)?;
     }
     Ok(crowd)

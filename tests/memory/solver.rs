@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::allocator;
-use crate::support::{solid, tissue};
+use crate::support::solid;
 use sinew::mesh::Mesh;
 use sinew::{
     BodyDefinition, Detection, Material, Shape, Solver, Storage, ToolDefinition, Values, World, WorldDefinition,
