@@ -38,7 +38,7 @@ impl Body {
             are_heavier: scaling.step() > 0.0,
         };
         let rates = self.damping.as_ref().map(|damping| damping.rates());
-        scaling.relieve(&self.masses, rates, |node| {
+        scaling.relieve(&*self.springs, &self.masses, rates, |node| {
             elements.carried_at_rest(node, in_use.inverse(node))
         });
         let (_, masses_for) = fewer_substeps(self, request, 0.0)?;

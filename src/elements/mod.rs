@@ -54,6 +54,8 @@ pub(crate) struct Elements {
     settled: f32,
     /// The highest rate of damping of the springs at their nodes, 1/s.
     most_damped: f32,
+    /// What the bounds at rest leave out, because it does not grow with how elements are deformed, 1/s².
+    of_springs: f32,
     /// About how stiff the elements at each node are together, N/m.
     stiffnesses: Vec<f32>,
     /// Room for a number per node.
@@ -77,6 +79,7 @@ saved!(Elements {
     highest,
     settled,
     most_damped,
+    of_springs,
     stiffnesses,
     carried,
     rates_known,
@@ -215,6 +218,7 @@ impl Elements {
             highest: f32::INFINITY,
             settled: f32::INFINITY,
             most_damped: 0.0,
+            of_springs: 0.0,
             rates_known: false,
             offsets: Offsets::default(),
         };

@@ -7,6 +7,9 @@
 //! `c = lambda + 2 mu gamma`. Where an element is deformed by R U, its form is that of the ways `U R^T u_a`, and with the cofactors of U for what
 //! keeps volume: `Groups::forces` has what c becomes of that, and of stress. What a node and its springs carry over its mass bounds the squares
 //! of frequencies. No pinned corner goes any way: it is left out.
+//!
+//! Springs grow no stiffer with that, so a part P of their bound is the same for all elements: with E of a node's elements and S of its springs,
+//! `S + s E` is at most `P + s max(E, E + S - P)` where the elements are s times as stiff, s at least 1. P is such that this is exact at rest.
 
 use glam::{DMat3, DVec3};
 
@@ -65,11 +68,21 @@ impl Elements {
         let mut carried = std::mem::take(&mut self.carried);
         carried.fill(0.0);
         self.add_carried(masses, |node, more| carried[node] += more as f32);
+        let of_springs = |node| rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
+        let (mut of_elements, mut of_both) = (0.0_f32, 0.0_f32);
         self.most_damped = 0.0;
         for (node, carried) in carried.iter_mut().enumerate() {
-            let of_springs = rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
+            let of_springs = of_springs(node);
             self.most_damped = self.most_damped.max(of_springs.most_damped);
-            *carried = *carried * masses.inverse(node) + of_springs.stiffest;
+            *carried *= masses.inverse(node);
+            of_elements = of_elements.max(*carried);
+            of_both = of_both.max(*carried + of_springs.stiffest);
+        }
+        self.of_springs = of_both - of_elements;
+        if of_both > of_elements {
+            for (node, carried) in carried.iter_mut().enumerate() {
+                *carried += (of_springs(node).stiffest - self.of_springs).max(0.0);
+            }
         }
         self.parts.iter_mut().for_each(|part| part.set_rates(&carried));
         self.carried = carried;
@@ -85,7 +98,8 @@ impl Elements {
         });
     }
 
-    /// What a node carries at rest with its springs, given its inverse mass, where bounds at rest are known.
+    /// What a node carries at rest, with springs as far as they are stiffer than what all nodes are taken to have, given its inverse mass, where
+    /// bounds at rest are known.
     pub fn carried_at_rest(&self, node: usize, inverse_mass: f32) -> Carried {
         let mut carried = Carried::default();
         if inverse_mass > 0.0 {
@@ -125,7 +139,7 @@ impl Elements {
                 let inverse_mass = masses.inverse(node as usize);
                 let carried = self.carried_at_rest(node as usize, inverse_mass);
                 let limit = Rates {
-                    stiffest: 2.0 * stiffening as f32 * carried.stiffness * inverse_mass,
+                    stiffest: self.of_springs + 2.0 * stiffening as f32 * carried.stiffness * inverse_mass,
                     most_damped: 2.0 * carried.damping * inverse_mass,
                 }
                 .limit();
@@ -174,9 +188,11 @@ impl Elements {
         self.rates_of(self.settled)
     }
 
-    fn rates_of(&self, stiffest: f32) -> Rates {
-        let most_damped = self.most_damped;
-        let rates = Rates { stiffest, most_damped };
+    fn rates_of(&self, highest: f32) -> Rates {
+        let rates = Rates {
+            stiffest: self.of_springs + highest,
+            most_damped: self.most_damped,
+        };
         self.memory
             .as_ref()
             .map_or(rates, |memory| memory.viscosity.rates(rates))

@@ -428,15 +428,10 @@ pub(super) fn relieve_squeezed(
 }
 
 /// In how many substeps a step may be taken before masses are made for elements as they are deformed: in as many as are allowed, but in tissue that
-/// resists blades, which squeeze the cells about their edges, in no more than so many times as at rest. Not with springs beside the elements: those
-/// would need the mass of others.
+/// resists blades, which squeeze the cells about their edges, in no more than so many times as at rest.
 fn unrelieved(body: &Body, request: &StepRequest) -> u32 {
     let resists = body.toughness().is_some_and(|toughness| toughness > 0.0);
-    match body
-        .scaling
-        .as_ref()
-        .filter(|_| resists && body.springs.spring_count() == 0)
-    {
+    match body.scaling.as_ref().filter(|_| resists) {
         Some(scaling) => as_count(SQUEEZED * scaling.unscaled_at_rest(request.dt)).min(request.max_substeps),
         None => request.max_substeps,
     }

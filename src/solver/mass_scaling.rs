@@ -90,7 +90,8 @@ impl Sliver {
 
     /// The mass that makes a substep of `step` seconds stable, kg.
     fn needs(&self, step: f64) -> f64 {
-        step * (0.5 * step * f64::from(self.stiffness) * f64::from(self.growth) + f64::from(self.damping))
+        let more = (f64::from(self.growth) - 1.0) * f64::from(self.beside.stiffness);
+        step * (0.5 * step * (f64::from(self.stiffness) + more) + f64::from(self.damping))
     }
 
     /// By how much it is heavier than as the last step ended, kg.
@@ -284,8 +285,14 @@ impl MassScaling {
         Some(&mut self.growths)
     }
 
-    /// Takes in what was filled in, with what each node carries at rest. Masses are made for it when they are made next.
-    pub fn relieve(&mut self, masses: &[f32], rates: Option<&[f32]>, at_rest: impl Fn(usize) -> Carried) {
+    /// Takes in what was filled in, with what each node carries at rest beside its springs. Masses are made for it when they are made next.
+    pub fn relieve(
+        &mut self,
+        springs: &dyn Springs,
+        masses: &[f32],
+        rates: Option<&[f32]>,
+        at_rest: impl Fn(usize) -> Carried,
+    ) {
         let listed = self.slivers.len();
         let mut next = 0;
         for (node, &mass) in masses.iter().enumerate() {
@@ -298,11 +305,12 @@ impl MassScaling {
                 next += 1;
             } else if mass > 0.0 && self.slivers.len() < self.slivers.capacity() {
                 let rate = rates.map_or(0.0, |rates| rates[node]);
-                let sliver = Sliver {
+                let mut sliver = Sliver {
                     growth,
                     settled_growth: None,
                     ..Sliver::new(node as u32, at_rest(node), rate)
                 };
+                sliver.add_up(springs);
                 if sliver.needs(self.complete_to) > f64::from(mass) {
                     self.slivers.push(sliver);
                 }

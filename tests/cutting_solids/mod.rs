@@ -10,6 +10,7 @@ mod random;
 mod refused;
 mod rings;
 mod shapes;
+mod stable;
 mod strokes;
 mod sutures;
 mod tearing;

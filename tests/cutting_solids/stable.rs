@@ -1,0 +1,57 @@
+//! Cuts leave substeps about as long as they were: no copy of a node carries more for its mass than nodes about it did.
+
+use std::f32::consts::TAU;
+
+use glam::{Quat, Vec3};
+use sinew::cutting::Sweep;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model, Values, World, WorldDefinition};
+
+use super::block::Random;
+use super::motion::kept;
+
+#[test]
+fn hundreds_of_cuts_of_elements_leave_substeps_as_long_as_they_were() {
+    let organ = Mesh::organ(0.12, 0.006).unwrap();
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        ..Default::default()
+    })
+    .unwrap();
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &organ.positions,
+            tetrahedra: &organ.tetrahedra,
+            masses: Values::Uniform(1e-4),
+            // What is added would hide what a cut does.
+            mass_scaling: 0.0,
+            spare_nodes: 60_000,
+            stiffnesses: Values::Uniform(0.0),
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                young_modulus: 3000.0,
+                poisson_ratio: 0.3,
+                ..Default::default()
+            }),
+            ..Default::default()
+        })
+        .unwrap();
+    let whole = kept(&world, body).mass;
+    let first = world.step(1e-5).unwrap().stable_substep;
+    let mut random = Random(12345);
+    for cut in 0..400 {
+        let at = organ.positions[(random.next() * organ.positions.len() as f64) as usize];
+        let turn = Quat::from_rotation_y(random.between(0.0, TAU)) * Quat::from_rotation_z(random.between(0.0, TAU));
+        let edge = |x: f32| [-0.005, 0.005].map(|z| at + turn * Vec3::new(x, 0.0, z));
+        let (start, end) = (edge(-0.005), edge(0.005));
+        world.cut(body, &Sweep { start, end }).unwrap();
+        if cut % 10 == 9 {
+            let stable = world.step(1e-5).unwrap().stable_substep;
+            assert!(stable > 0.999 * first, "after {cut} cuts: {stable} of {first} s");
+        }
+    }
+    let now = kept(&world, body).mass;
+    assert!((now / whole - 1.0).abs() < 1e-6, "{now} of {whole} kg");
+    let nodes = world.body(body).unwrap().positions().len();
+    assert!(nodes > 2 * organ.positions.len(), "{nodes} nodes");
+}
