@@ -417,16 +417,16 @@ fn tissue_without_toughness_is_cut_where_a_sweep_would_cut_it() {
 
 #[test]
 fn whatever_is_asked_of_it_stays_finite() {
-    whatever_is_asked_of_it_stays_finite_of(|mass| mass == 1.0);
+    whatever_is_asked_of_it_stays_finite_of(|step| step < 0.05);
 }
 
 #[test]
 #[ignore = "long"]
-fn whatever_is_asked_of_it_stays_finite_whatever_it_weighs() {
+fn whatever_is_asked_of_it_stays_finite_at_every_step() {
     whatever_is_asked_of_it_stays_finite_of(|_| true);
 }
 
-/// With sheets of these masses, kg/m².
+/// With these steps, s; long ones take long.
 fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
     for (stiffness, dt, stride, mass, solver) in [
         (1e9, 1e-3, 1e-3, 1.0, Solver::Verlet),
@@ -439,7 +439,7 @@ fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
         (1e38, 1e-3, 0.003, 1.0, Solver::Verlet),
     ]
     .into_iter()
-    .filter(|case| is_tried(case.3))
+    .filter(|case| is_tried(case.1))
     {
         let sheet = Sheet {
             cells: 8,
