@@ -6,9 +6,13 @@ check:
     cargo clippy --lib -- -D warnings
     cargo test --test project -- header:: readme:: layering:: words::
 
-# All tests, from Rust and C.
+# The tests, from Rust and C, without the long ones.
 test *ARGS:
     cargo test {{ARGS}}
+
+# The long tests alone.
+long *ARGS:
+    cargo test {{ARGS}} -- --ignored
 
 # The full gate; installs missing Debian packages when run as root.
 gate:

@@ -417,6 +417,17 @@ fn tissue_without_toughness_is_cut_where_a_sweep_would_cut_it() {
 
 #[test]
 fn whatever_is_asked_of_it_stays_finite() {
+    whatever_is_asked_of_it_stays_finite_of(|step| step < 0.05);
+}
+
+#[test]
+#[ignore = "long"]
+fn whatever_is_asked_of_it_stays_finite_at_every_step() {
+    whatever_is_asked_of_it_stays_finite_of(|_| true);
+}
+
+/// With these steps, s; long ones take long.
+fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
     for (stiffness, dt, stride, mass, solver) in [
         (1e9, 1e-3, 1e-3, 1.0, Solver::Verlet),
         (1e9, 0.1, 1.0, 1.0, Solver::Verlet),
@@ -426,7 +437,10 @@ fn whatever_is_asked_of_it_stays_finite() {
         (1e9, 1e-4, 1e-3, 1e-4, Solver::Verlet),
         (1e-9, 1e-2, 0.01, 1.0, Solver::Verlet),
         (1e38, 1e-3, 0.003, 1.0, Solver::Verlet),
-    ] {
+    ]
+    .into_iter()
+    .filter(|case| is_tried(case.1))
+    {
         let sheet = Sheet {
             cells: 8,
             is_held: false,

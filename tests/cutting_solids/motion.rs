@@ -198,9 +198,19 @@ pub const CUTS: [[[f32; 2]; 3]; 4] = [
 
 #[test]
 fn cuts_in_motion_keep_mass_momentum_and_energy() {
+    cuts_in_motion_keep_mass_momentum_and_energy_of(&[Storage::Packed]);
+}
+
+#[test]
+#[ignore = "long"]
+fn cuts_in_motion_keep_mass_momentum_and_energy_in_every_storage() {
+    cuts_in_motion_keep_mass_momentum_and_energy_of(&[Storage::Packed, Storage::FastLink, Storage::DynamicBulk]);
+}
+
+fn cuts_in_motion_keep_mass_momentum_and_energy_of(storages: &[Storage]) {
     for matter in MATTER {
         for solver in SOLVERS {
-            for storage in [Storage::Packed, Storage::FastLink, Storage::DynamicBulk] {
+            for &storage in storages {
                 if storage != Storage::Packed && (solver == Solver::Newton || matter == Matter::Elements) {
                     continue;
                 }

@@ -85,7 +85,7 @@ impl Compiler {
             .arg(source)
             .args(["-x", "none", "-o"])
             .arg(&program);
-        let library = Library::get();
+        let library = (build.library)();
         match build.link {
             Link::Shared => command
                 .arg(library.shared())
@@ -105,30 +105,35 @@ enum Link {
 /// One way of building the programs, in a folder of its own: the tests run side by side.
 struct Build {
     name: &'static str,
+    library: fn() -> &'static Library,
     link: Link,
     options: &'static [&'static str],
 }
 
 const SHARED: Build = Build {
     name: "shared",
+    library: Library::get,
     link: Link::Shared,
     options: &[],
 };
 
 const STATIC: Build = Build {
     name: "static",
+    library: Library::release,
     link: Link::Static,
     options: &[],
 };
 
 const SANITIZED: Build = Build {
     name: "sanitized",
+    library: Library::release,
     link: Link::Shared,
     options: &["-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
 };
 
 const CHECKED: Build = Build {
     name: "valgrind",
+    library: Library::release,
     link: Link::Shared,
     options: &[],
 };
@@ -164,6 +169,7 @@ fn run_all(programs: impl Iterator<Item = Command> + Send) {
         while let Some(mut program) = next() {
             program
                 .env_remove("LD_LIBRARY_PATH")
+                .env("TMPDIR", env!("CARGO_TARGET_TMPDIR"))
                 .current_dir(env!("CARGO_TARGET_TMPDIR"));
             failures.extend(failure(&mut program));
         }
@@ -195,6 +201,7 @@ fn programs_run_with_the_shared_library() {
 }
 
 #[test]
+#[ignore = "long"]
 fn programs_run_with_the_static_library() {
     // What compilers make of the programs does not depend on the library: one for each language links it.
     let of = |language: &str| Compiler::installed().find(move |compiler| compiler.language == language);
@@ -354,6 +361,7 @@ fn sanitizers_work(compiler: &Compiler) -> bool {
 }
 
 #[test]
+#[ignore = "long"]
 fn sanitizers_find_nothing() {
     let Some(compiler) = Compiler::installed().find(|compiler| sanitizers_work(compiler)) else {
         return skip("the sanitizers, which no compiler here has");
@@ -367,6 +375,7 @@ fn sanitizers_find_nothing() {
 }
 
 #[test]
+#[ignore = "long"]
 fn valgrind_finds_nothing() {
     if !installed("valgrind") {
         return skip("valgrind, which is not installed");

@@ -81,7 +81,7 @@ fn scenes() -> Vec<PathBuf> {
 
 /// The hash after each of so many frames of every scene, with the portable kernel and no browser.
 fn native_hashes(frames: &str) -> String {
-    let library = Library::get();
+    let library = Library::release();
     let program = folder().join("web_native");
     succeed(
         Command::new("cc")
@@ -113,6 +113,7 @@ fn native_hashes(frames: &str) -> String {
 }
 
 #[test]
+#[ignore = "long"]
 fn every_scene_gives_the_bits_of_the_portable_kernel() {
     let Some(page) = page() else { return };
     const FRAMES: &str = "60";
@@ -134,6 +135,7 @@ fn every_scene_gives_the_bits_of_the_portable_kernel() {
 }
 
 #[test]
+#[ignore = "long"]
 fn the_page_is_small_enough_to_be_sent() {
     let Some(page) = page() else { return };
     let files = std::fs::read_dir(page)
@@ -144,6 +146,7 @@ fn the_page_is_small_enough_to_be_sent() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_browser_drags_and_cuts() {
     let Some(page) = page() else { return };
     let Some(browser) = ["chromium", "chromium-browser", "google-chrome"]

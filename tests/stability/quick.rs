@@ -1,28 +1,27 @@
-//! The table of stability, a part of it: each case with each solver at each step (with NEWTON at one), and one of the storages
-//! for each step.
+//! The table of stability, a part of it: each case with each solver at one step, which changes from case to case; in a long test at
+//! each step (with NEWTON at one). Each step has one of the storages.
 //! `cargo bench --bench stability` takes all of it.
 
 use crate::stability::{CASES, PENDING, SOLVERS, STEPS, STORAGES, Setup, Stop, Tier, Verdict};
 use sinew::Solver;
 
-/// Tries a line of the table; what is not as it should be is told together.
-fn check(name: &str) {
+/// Tries a line of the table at all these steps; what is not as it should be is told together.
+fn check(name: &str, steps: usize) {
     let place = CASES
         .iter()
         .position(|case| case.name == name)
         .expect("a line of the table");
     let case = &CASES[place];
     let mut wrong = Vec::new();
-    for solver in SOLVERS {
-        for (index, step) in STEPS.into_iter().enumerate() {
-            // NEWTON is slow: one of the steps for each line.
-            if solver == Solver::Newton && (place + index) % STEPS.len() != 0 {
-                continue;
-            }
+    for (solver, first) in SOLVERS.into_iter().zip([place, place + 2, 5 * place]) {
+        // NEWTON is slow: one of the steps for each line.
+        let steps = if solver == Solver::Newton { 1 } else { steps };
+        for index in 0..steps {
+            let index = (first + index) % STEPS.len();
             let setup = Setup {
                 solver,
                 storage: STORAGES[(place + index) % STORAGES.len()],
-                step,
+                step: STEPS[index],
                 tier: Tier::Quick,
             };
             let verdict = Verdict::of(case, &setup);
@@ -36,7 +35,24 @@ fn check(name: &str) {
 
 macro_rules! lines {
     ($($test:ident: $name:literal,)*) => {
-        $(#[test] fn $test() { check($name); })*
+        $(
+            #[test]
+            fn $test() {
+                check($name, 1);
+            }
+        )*
+
+        mod at_every_step {
+            use super::{STEPS, check};
+
+            $(
+                #[test]
+                #[ignore = "long"]
+                fn $test() {
+                    check($name, STEPS.len());
+                }
+            )*
+        }
 
         #[test]
         fn every_line_of_the_table_is_tried() {
@@ -104,9 +120,11 @@ mod long_runs {
     use glam::Vec3;
     use sinew::Solver;
 
-    fn check(solver: Solver) {
+    /// Every so manieth row.
+    fn check(solver: Solver, every: usize) {
         let mut wrong = Vec::new();
-        for (row, seconds) in quick().into_iter().filter(|(row, _)| row.solver == solver) {
+        let rows = quick().into_iter().filter(|(row, _)| row.solver == solver);
+        for (row, seconds) in rows.step_by(every) {
             let outcome = row.run(seconds, f64::INFINITY, &mut |_| {});
             if outcome.has_failed() {
                 wrong.push(format!("{row}: {outcome}"));
@@ -117,17 +135,29 @@ mod long_runs {
 
     #[test]
     fn verlet() {
-        check(Solver::Verlet);
+        check(Solver::Verlet, 4);
     }
 
     #[test]
     fn implicit() {
-        check(Solver::Implicit);
+        check(Solver::Implicit, 4);
     }
 
     #[test]
     fn newton() {
-        check(Solver::Newton);
+        check(Solver::Newton, 1);
+    }
+
+    #[test]
+    #[ignore = "long"]
+    fn every_row_of_verlet() {
+        check(Solver::Verlet, 1);
+    }
+
+    #[test]
+    #[ignore = "long"]
+    fn every_row_of_implicit() {
+        check(Solver::Implicit, 1);
     }
 
     /// Whether a check finds a change of the velocities.

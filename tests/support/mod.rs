@@ -61,6 +61,13 @@ pub fn installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
+/// cargo, in the crate's own folder.
+pub fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(root());
+    cargo
+}
+
 /// What a command says that does not succeed.
 pub fn failure(command: &mut Command) -> Option<String> {
     match command.output() {
@@ -83,7 +90,7 @@ pub fn succeed(command: &mut Command) -> Output {
     }
 }
 
-/// The release build of the library.
+/// The library as programs in C link it.
 pub struct Library {
     /// The folder that holds it under all its names.
     pub folder: PathBuf,
@@ -92,10 +99,19 @@ pub struct Library {
 }
 
 impl Library {
-    /// Built once: what `cargo test` leaves in `target/<profile>` may be of another build.
+    /// What `cargo test` built for the tests, with its assertions.
     pub fn get() -> &'static Self {
         static LIBRARY: OnceLock<Library> = OnceLock::new();
-        LIBRARY.get_or_init(Self::build)
+        // Of an example, cargo takes the library that the tests have; by itself it would be built again, as what only tests depend on
+        // may choose other features of what the library depends on.
+        let profile: &[&str] = if cfg!(debug_assertions) { &[] } else { &["--release"] };
+        LIBRARY.get_or_init(|| Self::build("tested", &[&["--example", "cloth"], profile].concat()))
+    }
+
+    /// The release build, as it is delivered. It takes minutes: for long tests.
+    pub fn release() -> &'static Self {
+        static LIBRARY: OnceLock<Library> = OnceLock::new();
+        LIBRARY.get_or_init(|| Self::build("release", &["--release", "--lib"]))
     }
 
     /// The shared library.
@@ -108,16 +124,17 @@ impl Library {
         self.folder.join("libsinew.a")
     }
 
-    fn build() -> Self {
+    /// By cargo, which knows best whether there is anything to build: what is in `target/` may be of another build.
+    fn build(name: &str, options: &[&str]) -> Self {
         let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
         let target = scratch.parent().expect("the target folder");
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        succeed(
-            Command::new(cargo)
-                .args(["build", "--release", "--lib", "--target-dir"])
+        let output = succeed(
+            cargo()
+                .args(["build", "--message-format", "json", "--target-dir"])
                 .arg(target)
-                .current_dir(root()),
+                .args(options),
         );
+        let told = String::from_utf8_lossy(&output.stdout);
         // The crate brings no native libraries of its own: they are those of a crate with nothing in it.
         let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
         let output = succeed(
@@ -137,7 +154,7 @@ impl Library {
             .split_whitespace()
             .map(str::to_owned)
             .collect();
-        let folder = scratch.join("library");
+        let folder = scratch.join("library").join(name);
         std::fs::create_dir_all(&folder).expect("the target directory can be written");
         #[cfg(unix)]
         for (name, built) in [
@@ -145,9 +162,13 @@ impl Library {
             ("libsinew.so.0.1", "libsinew.so"),
             ("libsinew.a", "libsinew.a"),
         ] {
+            let mut files = told.split('"').filter(|word| word.ends_with(&format!("/{built}")));
+            let file = files
+                .next_back()
+                .unwrap_or_else(|| panic!("cargo names {built}:\n{told}"));
             let link = folder.join(name);
             let _ = std::fs::remove_file(&link);
-            std::os::unix::fs::symlink(target.join("release").join(built), &link).expect("a link to the library");
+            std::os::unix::fs::symlink(file, &link).expect("a link to the library");
         }
         Self {
             folder,
