@@ -6,6 +6,8 @@ mod changed;
 mod detection_exact;
 mod doors;
 mod dynamic;
+mod entangled;
+mod flush;
 mod friction;
 mod grasp;
 mod hard;

@@ -22,6 +22,19 @@ const WHOLE: Clearance = Clearance {
     nearest: f32::INFINITY,
 };
 
+impl Clearance {
+    fn settle(&mut self) {
+        *self = Self {
+            allowed: if self.nearest == f32::INFINITY || self.allowed == f32::INFINITY {
+                f32::INFINITY
+            } else {
+                self.allowed.max(self.nearest)
+            },
+            nearest: f32::INFINITY,
+        };
+    }
+}
+
 /// The clearances of one surface.
 #[derive(Debug)]
 pub(super) struct Clearances {
@@ -80,17 +93,19 @@ impl Clearances {
         }
     }
 
-    /// Gives back what a part has moved away since it was reduced, once all that is near has been seen.
-    pub fn settle(&mut self) {
-        for known in self.corners.iter_mut().chain(&mut self.edges) {
-            *known = Clearance {
-                allowed: if known.nearest == f32::INFINITY || known.allowed == f32::INFINITY {
-                    f32::INFINITY
-                } else {
-                    known.allowed.max(known.nearest)
-                },
-                nearest: f32::INFINITY,
-            };
+    /// Gives back what a part has moved away since it was reduced, once all that is near has been seen. Edges that pass through tissue are near
+    /// whatever was seen: those that were made so touch it, others keep what they have.
+    pub fn settle(&mut self, pierces: &[bool]) {
+        self.corners.iter_mut().for_each(Clearance::settle);
+        for (number, edge) in self.edges.iter_mut().enumerate() {
+            if pierces.get(number).copied().unwrap_or(false) {
+                edge.nearest = f32::INFINITY;
+                if self.is_new {
+                    edge.allowed = 0.0;
+                }
+            } else {
+                edge.settle();
+            }
         }
         self.is_new = false;
     }

@@ -9,6 +9,7 @@ mod bonds;
 mod change;
 mod clearances;
 mod crossing;
+mod entangled;
 mod groups;
 mod images;
 mod islands;
@@ -23,6 +24,7 @@ mod wound;
 pub(crate) use self::bonds::{Bonds, Bound, Lead, Thread, are_one, distance};
 pub(crate) use self::change::{SkinChange, SurfaceToBe};
 use self::clearances::Clearances;
+use self::entangled::Entangled;
 use self::groups::Groups;
 use self::islands::{Islands, Reach};
 use self::link::Link;
@@ -100,6 +102,8 @@ pub(crate) struct Tissue {
     skins: Vec<Option<Skin>>,
     /// Likewise, of bodies that meet others.
     clearances: Vec<Option<Clearances>>,
+    /// Bodies that were made through each other.
+    entangled: Entangled,
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
@@ -117,6 +121,7 @@ saved!(Tissue {
     islands,
     skins,
     clearances,
+    entangled,
     links,
     known,
     pushes,
@@ -132,6 +137,7 @@ impl Tissue {
         self.add_images(&mut skin)?;
         self.islands.make_place(place)?;
         self.groups.make_place(place)?;
+        self.entangled.reserve(self.skins.iter().flatten().count())?;
         let more = ROOM * skin.room;
         let room = self.room() + more;
         self.links.try_reserve(room.saturating_sub(self.links.len()))?;
@@ -199,6 +205,7 @@ impl Tissue {
 
     /// A body meets no tissue any more; what is attached of it stays so.
     pub fn shed(&mut self, place: usize) {
+        self.entangled.leave(place);
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }
@@ -319,14 +326,42 @@ impl Tissue {
                 if let (Some(first), Some(second)) = (bodies.at(a), bodies.at(b))
                     && meet_each_other(first, second)
                 {
-                    for pair in [[a, b], [b, a]] {
-                        count = count.saturating_add(self.mark_crossings(bodies, pair));
+                    let of_pair = [[a, b], [b, a]].map(|pair| self.mark_crossings(bodies, pair));
+                    count = of_pair.into_iter().fold(count, u32::saturating_add);
+                    if !at_end {
+                        self.entangle([a, b], of_pair != [0; 2]);
                     }
                 }
             }
         }
         self.islands = islands;
         count
+    }
+
+    /// Has two open surfaces that were made through each other let go, and those that no longer cross keep each other off again, from as near as
+    /// they are.
+    fn entangle(&mut self, pair: [usize; 2], cross: bool) {
+        let [Some(Some(first)), Some(Some(second))] = pair.map(|place| self.skins.get(place)) else {
+            return;
+        };
+        let Ok([Some(kept_a), Some(kept_b)]) = self.clearances.get_disjoint_mut(pair) else {
+            return;
+        };
+        if !cross {
+            if self.entangled.has(pair) {
+                self.entangled.remove(pair);
+                (kept_a.is_new, kept_b.is_new) = (true, true);
+            }
+            return;
+        }
+        let are_open = !first.is_closed && !second.is_closed;
+        if are_open && (kept_a.is_new || kept_b.is_new) {
+            // Surfaces that lie flush on each other cross by rounding.
+            let depth = first.least_thickness().min(second.least_thickness());
+            if crossing::is_deep(first, second, depth) || crossing::is_deep(second, first, depth) {
+                self.entangled.add(pair);
+            }
+        }
     }
 
     /// Marks the edges of the first of two bodies, or of one, that pass through triangles of the second: how many there are.
@@ -568,7 +603,7 @@ impl Tissue {
 
     /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
     fn search<'a>(
-        skins: &'a [Option<Skin>],
+        (skins, entangled): (&'a [Option<Skin>], &Entangled),
         [a, b]: [usize; 2],
         bodies: &Slots<Body>,
         moment: &Moment,
@@ -581,7 +616,7 @@ impl Tissue {
         let both = [bodies.at(a)?, bodies.at(b)?];
         let radius = radius(&first, &second, both)?;
         let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
-        is_looked_at.then(|| Search {
+        (is_looked_at && !entangled.has([a, b])).then(|| Search {
             parties: [first, second],
             dt: moment.duration,
             radius,
@@ -592,7 +627,7 @@ impl Tissue {
 
     /// The same of a pair that is not found in images.
     fn search_by_distance<'a>(
-        skins: &'a [Option<Skin>],
+        skins: (&'a [Option<Skin>], &Entangled),
         pair: [usize; 2],
         bodies: &Slots<Body>,
         moment: &Moment,
@@ -603,11 +638,15 @@ impl Tissue {
     /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
     fn know_pairs(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
         let Self {
-            skins, pairs, islands, ..
+            skins,
+            entangled,
+            pairs,
+            islands,
+            ..
         } = self;
         let mut all = islands.pairs(island).enumerate();
         let holds = all.all(|(number, pair)| {
-            let search = Self::search_by_distance(skins, pair, bodies, moment);
+            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
             search.is_none_or(|search| pairs.holds(number, &search))
         });
         if holds {
@@ -621,7 +660,7 @@ impl Tissue {
         if pairs.can_be_found() {
             pairs.begin();
             let added = islands.pairs(island).try_for_each(|pair| {
-                let search = Self::search_by_distance(skins, pair, bodies, moment);
+                let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
                 pairs.add(search.as_ref())
             });
             if added.is_none() {
@@ -636,6 +675,7 @@ impl Tissue {
         let Self {
             skins,
             clearances,
+            entangled,
             links,
             known,
             pushes,
@@ -651,7 +691,7 @@ impl Tissue {
         let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
         let of_two = islands.pairs(island).enumerate();
         for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
-            let Some(mut search) = Self::search(skins, [a, b], bodies, moment) else {
+            let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
                 continue;
             };
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
@@ -695,7 +735,8 @@ impl Tissue {
         if measures {
             for &place in islands.members(island) {
                 if let Some(Some(kept)) = clearances.get_mut(place as usize) {
-                    kept.settle();
+                    let skin = skins.get(place as usize).and_then(Option::as_ref);
+                    kept.settle(skin.map_or(&[], |skin| &skin.pierces));
                 }
             }
         }

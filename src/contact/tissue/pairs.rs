@@ -217,8 +217,7 @@ impl Pairs {
             let segment = still(ends);
             self.gather(number, |see| {
                 second.skin.near(&here, within, |triangle| {
-                    let owned = second.skin.owned(triangle).into_iter().filter(|&other| other != NONE);
-                    for other in owned.filter(|&other| !second.skin.pierces[other as usize]) {
+                    for other in second.skin.owned(triangle).into_iter().filter(|&other| other != NONE) {
                         let apart = distance(search, second, &segment, &second.skin.edges[other as usize]);
                         see(other, apart, within);
                     }

@@ -214,9 +214,10 @@ impl Search<'_> {
                 touched = Some((distance, triangle, found));
             }
         });
-        // What was made within another is led out as far as its thickness asks for.
+        // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
+        let flush = of_nodes.skin.least_thickness().min(of_faces.skin.least_thickness());
         let nearest_there = match behind {
-            Some(_) if self.measures == Measure::Reductions => f32::INFINITY,
+            Some(_) if self.measures == Measure::Reductions && nearest.0 > flush => f32::INFINITY,
             Some(_) => 0.0,
             None => front,
         };
@@ -273,7 +274,11 @@ impl Search<'_> {
         let mut nearest = f32::INFINITY;
         let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
         let mut see_edges = |edges: [u32; 3]| {
-            for other in second.skin.sound(edges) {
+            for (other, pierces) in second.skin.edges_of(edges) {
+                // Of what passes through tissue there is no telling which side it belongs to; it is near all the same.
+                if pierces && self.measures == Measure::Nothing {
+                    continue;
+                }
                 if self.is_of_one()
                     && (other <= edge
                         || other.iter().any(|node| edge.contains(node))
@@ -289,6 +294,9 @@ impl Search<'_> {
                     continue;
                 }
                 nearest = nearest.min(start);
+                if pierces {
+                    continue;
+                }
                 let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
                 let Some((found, clearance)) = met else {
                     continue;

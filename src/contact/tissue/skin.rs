@@ -516,11 +516,10 @@ impl Skin {
         self.owned[triangle]
     }
 
-    /// Those of these edges that do not pass through tissue: of the others there is no telling which side they belong to.
-    pub fn sound(&self, edges: [u32; 3]) -> impl Iterator<Item = [u32; 2]> + '_ {
+    /// These edges, and whether they pass through tissue.
+    pub fn edges_of(&self, edges: [u32; 3]) -> impl Iterator<Item = ([u32; 2], bool)> + '_ {
         let edges = edges.into_iter().filter(|&edge| edge != NONE);
-        let edges = edges.map(|edge| edge as usize).filter(|&edge| !self.pierces[edge]);
-        edges.map(|edge| self.edges[edge])
+        edges.map(|edge| (self.edges[edge as usize], self.pierces[edge as usize]))
     }
 }
 
