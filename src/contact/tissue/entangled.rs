@@ -1,7 +1,7 @@
 //! Open surfaces that were made through each other.
 //!
 //! Nothing tells which side of an open surface what crosses it belongs to. Contact beside the crossing would keep both in each other for good. So the
-//! two keep nothing off until they are out of each other. Rapier lets go of what is near a crossing likewise.
+//! two keep nothing off until they are out of each other.
 
 use crate::base::{Result, memory};
 use crate::codec::saved;
