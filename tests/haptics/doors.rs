@@ -161,7 +161,7 @@ fn what_a_hand_did_can_be_done_again() {
 
 #[test]
 fn whatever_a_device_says_is_answered_with_numbers() {
-    answers_with_numbers(60);
+    answers_with_numbers(30);
 }
 
 #[test]
