@@ -3,9 +3,8 @@
 
 use glam::Vec3;
 
-use crate::base::{Error, Result};
+use crate::base::{Result, above_zero, not_negative};
 use crate::body::Body;
-use crate::def::not_negative;
 use crate::soa::{TILE, tile_count};
 use crate::world::World;
 
@@ -86,11 +85,7 @@ impl World {
         not_negative("normal_length", definition.normal_length)?;
         not_negative("force_scale", definition.force_scale)?;
         let full = definition.full_strain;
-        if !(full > 0.0 && full.is_finite()) {
-            return Err(Error::invalid(format!(
-                "full_strain is {full}: must be above 0 and finite"
-            )));
-        }
+        above_zero("full_strain", full)?;
         for body in self.bodies() {
             if definition.sleeping {
                 draw_sleeping(body, canvas);

@@ -23,11 +23,11 @@ mod tear;
 
 use glam::{Quat, Vec3};
 
-use crate::base::{Error, Profile, Result, StateHasher, memory};
+use crate::base::{Error, Profile, Result, StateHasher, memory, not_negative};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
-use crate::def::{Anchor, BodyDefinition, CollisionFilter, finite_vector, not_negative};
+use crate::def::{Anchor, BodyDefinition, CollisionFilter, finite_vector};
 use crate::ids::{AttachmentId, BodyId, SlotId, Slots, ToolId};
 use crate::readers::Clock;
 use crate::simd::{ChosenKernel, Kernel};

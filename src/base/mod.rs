@@ -4,8 +4,10 @@ mod error;
 mod hash;
 pub(crate) mod memory;
 mod profile;
+mod ranges;
 pub(crate) mod symbolic_perturbation;
 
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
 pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};
+pub(crate) use ranges::{above_zero, not_negative};

@@ -1,8 +1,7 @@
 //! Regions of a body made stiffer or softer, larger or smaller, between steps.
 
 use super::Body;
-use crate::base::{Error, Result, memory};
-use crate::def::not_negative;
+use crate::base::{Error, Result, above_zero, memory, not_negative};
 use crate::soa::{Region, Scale};
 use crate::springs::{Change, Link};
 
@@ -21,11 +20,7 @@ impl Body {
     /// that it is no number. [`Error::OutOfMemory`].
     pub fn scale_region(&mut self, nodes: &[u32], stiffness: f32, length: f32) -> Result<()> {
         not_negative("stiffness_factor", stiffness)?;
-        if !(length > 0.0 && length.is_finite()) {
-            return Err(Error::invalid(format!(
-                "length_factor is {length}: must be above 0 and finite"
-            )));
-        }
+        above_zero("length_factor", length)?;
         let mut own = memory::reserved(nodes.len())?;
         for (index, &node) in nodes.iter().enumerate() {
             self.check_node(&format_args!("nodes[{index}]"), node)?;

@@ -11,9 +11,9 @@ use super::exact::pierced::WayOut;
 use super::image_space::LayeredImage;
 use super::ridges::Ridges;
 
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Error, Result, StateHasher, memory, not_negative};
 use crate::codec::{Reader, Saved, Writer, shape_of_name};
-use crate::def::{Detection, not_negative};
+use crate::def::Detection;
 use crate::geometry::Bounds;
 use crate::mesh::ClosedSurface;
 

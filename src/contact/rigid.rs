@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 
 use super::contacts::Load;
 use super::tool::{Form, Pose};
-use crate::base::{Error, Result, StateHasher};
+use crate::base::{Error, Result, StateHasher, above_zero};
 use crate::codec::saved;
 use crate::def::finite_vector;
 use crate::geometry::rotation::turned;
@@ -90,11 +90,7 @@ saved!(Rigid {
 impl MassProperties {
     /// Of a shape that is filled evenly, kg/m³ (Eberly, Polyhedral Mass Properties, 2002, for meshes); refused where it has no end.
     pub(crate) fn of(form: &Form, density: f32) -> Result<Self> {
-        if !(density > 0.0 && density.is_finite()) {
-            return Err(Error::invalid(format!(
-                "density is {density}: must be above 0 and finite"
-            )));
-        }
+        above_zero("density", density)?;
         let (volume, center, inertia) = match form {
             Form::HalfSpace => {
                 return Err(Error::invalid("tool is a plane: a plane has no mass"));

@@ -9,9 +9,9 @@ use super::limit::Reach;
 use super::mesh_solid::MeshSolid;
 use super::rigid::Rigid;
 use super::rounded;
-use crate::base::{Error, Result, StateHasher};
+use crate::base::{Error, Result, StateHasher, above_zero, not_negative};
 use crate::codec::{saved, saved_enum};
-use crate::def::{CollisionFilter, Detection, check_reach, finite_vector, not_negative};
+use crate::def::{CollisionFilter, Detection, check_reach, finite_vector};
 use crate::geometry::rotation::{turn_between, turned};
 use crate::mesh::FURTHEST;
 
@@ -201,10 +201,8 @@ const SLENDEREST: f32 = 1e4;
 impl Tool {
     pub fn new(definition: &ToolDefinition) -> Result<Self> {
         let positive = |name: &str, value: f32| {
-            if value > 0.0 && value.is_finite() {
-                return check_reach(name, value);
-            }
-            Err(Error::invalid(format!("{name} is {value}: must be above 0 and finite")))
+            above_zero(name, value)?;
+            check_reach(name, value)
         };
         not_negative("friction", definition.friction)?;
         not_negative("resolution", definition.resolution)?;

@@ -8,7 +8,7 @@ use super::Sleep;
 use super::SpringLaw;
 use super::Tearing;
 use super::{Material, Model, Viscosity, Yielding};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, memory, not_negative};
 
 /// One value for all, or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -506,15 +506,6 @@ pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {
             vectors[node]
         ))),
     }
-}
-
-pub(crate) fn not_negative(name: &str, value: f32) -> Result<()> {
-    if value >= 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!(
-        "{name} is {value}: must be at least 0 and finite"
-    )))
 }
 
 /// Checks `values` of which each must be finite and at least 0; `name` in the singular.

@@ -1,7 +1,6 @@
 //! What meets what, and what a body asks of contact.
 
-use super::not_negative;
-use crate::base::{Error, Result, StateHasher};
+use crate::base::{Error, Result, StateHasher, not_negative};
 use crate::codec::{saved, saved_enum};
 use crate::mesh::FURTHEST;
 

@@ -1,7 +1,7 @@
 //! A material by a laboratory's numbers.
 
-use super::{BodyDefinition, Values, not_negative};
-use crate::base::{Error, Result};
+use super::{BodyDefinition, Values};
+use crate::base::{Error, Result, above_zero, not_negative};
 
 /// How a material's numbers become forces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,12 +55,7 @@ pub struct Material {
 impl Material {
     /// Refuses numbers out of their ranges, and what a definition may not give beside a material.
     pub(crate) fn check(&self, definition: &BodyDefinition) -> Result<()> {
-        if !(self.young_modulus > 0.0 && self.young_modulus.is_finite()) {
-            return Err(Error::invalid(format!(
-                "young_modulus is {} Pa: must be above 0 and finite",
-                self.young_modulus
-            )));
-        }
+        above_zero("young_modulus", self.young_modulus)?;
         not_negative("density", self.density)?;
         not_negative("thickness", self.thickness)?;
         match self.model {

@@ -17,7 +17,7 @@ pub use anchor::{Anchor, SurfacePoint};
 pub use body::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use body::{
     MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite, finite_vector,
-    finite_vectors, node_indices, not_negative,
+    finite_vectors, node_indices,
 };
 pub use choice::{ChoiceReason, LimitKind, SolverChoice, SubstepLimit};
 pub(crate) use contact::check_reach;

@@ -1,7 +1,6 @@
 //! When a body sleeps, and what of it can be set later.
 
-use super::not_negative;
-use crate::base::{Error, Result};
+use crate::base::{Result, above_zero, not_negative};
 use crate::codec::saved;
 
 /// When tissue at rest is left alone.
@@ -40,12 +39,7 @@ impl Default for Sleep {
 impl Sleep {
     pub(crate) fn check(&self) -> Result<()> {
         not_negative("sleep_speed", self.speed)?;
-        if !(self.time > 0.0 && self.time.is_finite()) {
-            return Err(Error::invalid(format!(
-                "sleep_time is {}: must be above 0 and finite",
-                self.time
-            )));
-        }
+        above_zero("sleep_time", self.time)?;
         Ok(())
     }
 }

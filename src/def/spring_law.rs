@@ -1,6 +1,6 @@
 //! How springs stiffen as they are stretched.
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, above_zero};
 use crate::codec::saved_enum;
 
 /// How the pull of springs grows with their strain e, the part by which they are longer than at rest: `k L0` times what is here, k being
@@ -38,19 +38,11 @@ const STEEPEST: f32 = 13.8;
 impl SpringLaw {
     /// Refuses numbers out of their ranges.
     pub(crate) fn check(&self) -> Result<()> {
-        let above_zero = |name: &str, value: f32| {
-            if value > 0.0 && value.is_finite() {
-                return Ok(());
-            }
-            Err(Error::invalid(format!(
-                "{name} of spring_law is {value}: must be above 0 and finite"
-            )))
-        };
         match *self {
             SpringLaw::Linear => Ok(()),
             SpringLaw::Exponential { steepness, limit } => {
-                above_zero("steepness", steepness)?;
-                above_zero("limit", limit)?;
+                above_zero("steepness of spring_law", steepness)?;
+                above_zero("limit of spring_law", limit)?;
                 if steepness * limit > STEEPEST {
                     return Err(Error::invalid(format!(
                         "steepness of spring_law is {steepness} and limit {limit}: their product must be at most {STEEPEST}"
@@ -63,7 +55,7 @@ impl SpringLaw {
                 cubic,
                 limit,
             } => {
-                above_zero("limit", limit)?;
+                above_zero("limit of spring_law", limit)?;
                 if !(quadratic * quadratic <= 3.0 * cubic && cubic.is_finite()) {
                     return Err(Error::invalid(format!(
                         "quadratic of spring_law is {quadratic} and cubic {cubic}: quadratic² must be at most 3 cubic, and finite, \

@@ -2,8 +2,7 @@
 
 use super::BodyDefinition;
 use super::Model;
-use super::not_negative;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, not_negative};
 use crate::codec::{saved, saved_enum};
 
 /// When a body tears.

@@ -1,8 +1,7 @@
 //! Viscosity: an arm beside what is elastic, a spring and a dashpot in a row (the standard linear solid; Zener 1948), or the dashpot
 //! alone (Kelvin and Voigt).
 
-use super::not_negative;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, not_negative};
 use crate::codec::saved;
 use crate::soa::Rates;
 

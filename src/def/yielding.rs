@@ -1,7 +1,6 @@
 //! Yielding: what is deformed beyond a strain stays so.
 
-use super::not_negative;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, not_negative};
 
 /// From which strain on springs, and tetrahedra that are elements, take a set: they are at rest elsewhere from then on (perfect
 /// plasticity).

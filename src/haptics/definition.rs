@@ -1,7 +1,6 @@
 //! What a haptic handle is to be.
 
-use crate::base::{Error, Result};
-use crate::def::not_negative;
+use crate::base::{Error, Result, above_zero, not_negative};
 use crate::ids::ToolId;
 
 use super::six::Six;
@@ -59,10 +58,7 @@ impl HapticDefinition {
 
     /// As a coupling at this lever, m.
     pub(crate) fn coupling(&self, lever: f64) -> Result<Coupling> {
-        let positive = |name: &str, value: f32| match value > 0.0 && value.is_finite() {
-            true => Ok(f64::from(value)),
-            false => Err(Error::invalid(format!("{name} is {value}: must be above 0 and finite"))),
-        };
+        let positive = |name: &str, value: f32| above_zero(name, value).map(|()| f64::from(value));
         let limit = |name: &str, value: f32| match value {
             0.0 => Ok(f64::INFINITY),
             value if value > 0.0 => Ok(f64::from(value)),

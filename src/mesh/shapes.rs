@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::tidy::NO_NODE;
 use super::{Mesh, boundary, cell_boundary};
-use crate::base::memory;
+use crate::base::{above_zero, memory};
 use crate::{Error, Result};
 
 /// The tetrahedra of a cell, by its corners x + 2 y + 4 z: one in the middle and four at its corners. Cells that share a
@@ -78,11 +78,7 @@ impl Mesh {
     /// Errors: those of [`Mesh::cloth`].
     pub fn lattice(edge: f32, cells: [u32; 3]) -> Result<Mesh> {
         check_node_count(&cells)?;
-        if !(edge.is_finite() && edge > 0.0) {
-            return Err(Error::invalid(format!(
-                "edge is {edge} m: it must be finite and above 0"
-            )));
-        }
+        above_zero("edge", edge)?;
         let [xs, ys, zs] = [("x", 0), ("y", 1), ("z", 2)]
             .map(|(name, along)| axis(name, f64::from(edge) * f64::from(cells[along]), cells[along]));
         let mut mesh = Mesh {

@@ -20,9 +20,9 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::parting::Parting;
 use super::stencils::{Law, SeePart, Stencil, Stencils};
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, memory, not_negative};
 use crate::codec::saved;
-use crate::def::{BodyDefinition, not_negative};
+use crate::def::BodyDefinition;
 use crate::soa::NodeOrder;
 
 /// Hinges: the two nodes of the edge, then those opposite.

@@ -8,9 +8,9 @@ use glam::{DMat3, DVec3};
 use super::Term;
 use super::stencils::{Law, Stencils, directed, lengthening, of_springs};
 use super::strings::Tension;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, memory, not_negative};
 use crate::codec::saved;
-use crate::def::{BodyDefinition, Spring, not_negative};
+use crate::def::{BodyDefinition, Spring};
 use crate::soa::NodeOrder;
 
 /// What springs do beyond a strain, over their stiffness; shapes are their rest lengths, m.

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::resistance::Knot;
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Error, Result, StateHasher, above_zero, memory};
 use crate::body::{CutReport, Stroke};
 use crate::codec::saved;
 use crate::contact::{Lead, Pose};
@@ -197,11 +197,7 @@ impl Blade {
         if edge[0] == edge[1] {
             return Err(Error::invalid(format!("edge has both ends at {}", edge[0])));
         }
-        if !(stiffness > 0.0 && stiffness.is_finite()) {
-            return Err(Error::invalid(format!(
-                "stiffness is {stiffness}: must be above 0 and finite"
-            )));
-        }
+        above_zero("stiffness", stiffness)?;
         Ok(Self {
             edge,
             stiffness: f64::from(stiffness),

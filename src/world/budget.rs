@@ -10,7 +10,7 @@
 use std::time::Instant;
 
 use super::{StepReport, World};
-use crate::base::{Error, Result, check_clock};
+use crate::base::{Error, Result, above_zero, check_clock};
 
 /// How often a step is tried over a shorter time, because its motion needs shorter substeps than were known.
 const TRIES: u32 = 16;
@@ -76,9 +76,7 @@ impl World {
     /// [`Error::InvalidArgument`]: `dt` or `work` is out of its range. [`Error::Unsupported`]: the world has fixed substeps or a tolerance.
     /// [`Error::Unstable`]: as [`World::step`]; nothing has moved then, and nothing is added to what is left.
     pub fn step_with_budget(&mut self, dt: f32, work: u32) -> Result<BudgetReport> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
-        }
+        above_zero("dt", dt)?;
         if work == 0 {
             return Err(Error::invalid("work is 0: must be at least 1"));
         }
@@ -124,11 +122,7 @@ impl World {
     /// # Errors
     /// As [`World::step_with_budget`]; [`Error::InvalidArgument`]: `seconds` is out of its range; [`Error::Unsupported`]: the platform has no clock.
     pub fn step_within(&mut self, dt: f32, seconds: f64) -> Result<BudgetReport> {
-        if !(seconds > 0.0 && seconds.is_finite()) {
-            return Err(Error::invalid(format!(
-                "seconds is {seconds}: must be above 0 and finite"
-            )));
-        }
+        above_zero("seconds", seconds)?;
         check_clock("step_within")?;
         let work = self.pace.work(seconds);
         let start = Instant::now();

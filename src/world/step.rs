@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::World;
 use super::rest::{rest_islands, rouse_groups, wake_islands};
-use crate::base::{Count, Error, Result, Stage, Stopwatch};
+use crate::base::{Count, Error, Result, Stage, Stopwatch, above_zero};
 use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
@@ -102,9 +102,7 @@ impl World {
     /// [`Error::InvalidArgument`]: `dt` is out of its range. [`Error::Unstable`]: some body needs more substeps than are
     /// allowed. Nothing has moved then, pending forces and poses stay pending.
     pub fn step(&mut self, dt: f32) -> Result<StepReport> {
-        if !(dt > 0.0 && dt.is_finite()) {
-            return Err(Error::invalid(format!("dt is {dt}: must be above 0 and finite")));
-        }
+        above_zero("dt", dt)?;
         let watch = self.begin_profile();
         let result = self.take_step(dt);
         watch.stop(self.profile.as_deref(), Stage::Step);

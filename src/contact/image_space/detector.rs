@@ -9,7 +9,7 @@ use super::projection::{Frame, LARGEST_IMAGE, Projection};
 use super::surface::{Placed, Surface};
 use super::traced::{find_points, trace_edges};
 use super::volume::add_volume;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, above_zero};
 
 /// From where bodies are looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,11 +88,7 @@ impl ImageSpace {
     /// finite, room for no pixels, no crossings or more than 2^24 pixels; [`Error::OutOfMemory`].
     pub fn new(definition: &ImageSpaceDefinition, surfaces: &[&Surface]) -> Result<Self> {
         let pixel = definition.pixel;
-        if !(pixel > 0.0 && pixel.is_finite()) {
-            return Err(Error::invalid(format!(
-                "pixel is {pixel} m: must be above 0 and finite"
-            )));
-        }
+        above_zero("pixel", pixel)?;
         if definition.pixels == 0 || u64::from(definition.pixels) > LARGEST_IMAGE {
             return Err(Error::invalid(format!(
                 "pixels is {}: must be 1 to {LARGEST_IMAGE}",

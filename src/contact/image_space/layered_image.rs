@@ -6,7 +6,7 @@ use super::covered::nearest_covered;
 use super::layers::{Crossing, Layers};
 use super::projection::{Frame, Projection};
 use super::surface;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, above_zero, memory};
 use crate::contact::distance::closest_on_triangle;
 use crate::contact::exact::coarse::{Coarse, Sample};
 use crate::geometry::Bounds;
@@ -159,11 +159,7 @@ impl LayeredImage {
     /// have more than 2^24 pixels, a position that is not finite, an index out of range, a surface that is not closed;
     /// [`Error::OutOfMemory`].
     pub fn new(positions: &[Vec3], triangles: &[[u32; 3]], pixel: f32) -> Result<Self> {
-        if !(pixel > 0.0 && pixel.is_finite()) {
-            return Err(Error::invalid(format!(
-                "pixel is {pixel} m: must be above 0 and finite"
-            )));
-        }
+        above_zero("pixel", pixel)?;
         surface::check(positions.len(), triangles)?;
         surface::check_positions(positions)?;
         if !mesh::is_closed(triangles)? {

@@ -7,6 +7,7 @@ mod stl;
 mod tetgen;
 mod vtk;
 
+use crate::base::above_zero;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
@@ -46,11 +47,7 @@ pub enum MeshFormat {
 /// [`Error::OutOfMemory`].
 pub fn load(path: impl AsRef<Path>, format: MeshFormat, scale: f32) -> Result<LoadedMesh> {
     let path = path.as_ref();
-    if !(scale.is_finite() && scale > 0.0) {
-        return Err(Error::invalid(format!(
-            "scale is {scale}: it must be finite and above 0"
-        )));
-    }
+    above_zero("scale", scale)?;
     let mut raw = match format {
         MeshFormat::Auto => return load(path, format_of(path)?, scale),
         MeshFormat::TetGen => tetgen::read(path)?,

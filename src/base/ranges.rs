@@ -1,0 +1,22 @@
+//! What arguments that are numbers are refused for.
+
+use std::fmt::Display;
+
+use super::{Error, Result};
+
+/// Refuses what is not above 0 and finite.
+pub(crate) fn above_zero<N: Display + Copy + Into<f64>>(name: &str, value: N) -> Result<()> {
+    in_range(name, value, |value| value > 0.0, "above 0 and finite")
+}
+
+/// Refuses what is not at least 0 and finite.
+pub(crate) fn not_negative<N: Display + Copy + Into<f64>>(name: &str, value: N) -> Result<()> {
+    in_range(name, value, |value| value >= 0.0, "at least 0 and finite")
+}
+
+fn in_range<N: Display + Copy + Into<f64>>(name: &str, value: N, holds: fn(f64) -> bool, range: &str) -> Result<()> {
+    if holds(value.into()) && value.into().is_finite() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{name} is {value}: must be {range}")))
+}
