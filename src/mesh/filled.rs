@@ -4,7 +4,7 @@ use glam::{DVec3, IVec3};
 
 use super::stuffing::{Lattice, Site, Stuffing};
 use super::{ClosedSurface, Mesh, boundary, tetrahedron_volume, tidy};
-use crate::base::{above_zero, memory};
+use crate::base::memory;
 use crate::geometry::Bounds;
 use crate::geometry::predicates::pierce;
 use crate::geometry::tree::Tree;
@@ -24,7 +24,11 @@ impl Mesh {
     /// [`Error::InvalidArgument`]: a position is not finite, an index that of no node, the surface open, inside out or without a volume; the
     /// spacing not finite and above 0, so fine that `u32` cannot count the nodes, or so coarse that nothing is filled. [`Error::OutOfMemory`].
     pub fn filled(surface: &Mesh, spacing: f32) -> Result<Mesh> {
-        above_zero("spacing", spacing)?;
+        if !(spacing.is_normal() && spacing > 0.0) {
+            return Err(Error::invalid(format!(
+                "spacing is {spacing} m: it must be finite and above 0"
+            )));
+        }
         let given = Mesh {
             positions: memory::copied(&surface.positions)?,
             triangles: memory::copied(&surface.triangles)?,

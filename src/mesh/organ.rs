@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::stuffing::{Lattice, Stuffing};
 use super::{Mesh, boundary, is_closed, tetrahedron_volume};
-use crate::base::{above_zero, memory};
+use crate::base::memory;
 use crate::{Error, Result};
 
 /// The largest spacing, in lengths of the organ: coarser, its thin lobe is lost.
@@ -23,7 +23,11 @@ impl Mesh {
     /// show the shape, or one so fine that `u32` cannot count the nodes; [`Error::OutOfMemory`].
     pub fn organ(length: f32, spacing: f32) -> Result<Mesh> {
         for (name, value) in [("length", length), ("spacing", spacing)] {
-            above_zero(name, value)?;
+            if !(value.is_normal() && value > 0.0) {
+                return Err(Error::invalid(format!(
+                    "{name} is {value} m: it must be finite and above 0"
+                )));
+            }
         }
         let relative = f64::from(spacing) / f64::from(length);
         if relative > COARSEST {
