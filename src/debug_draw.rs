@@ -80,7 +80,7 @@ impl World {
     /// Draws what the definition asks for, as the last step left it. It allocates nothing and changes nothing.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a length or the scale is out of its range. Nothing is drawn then.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): a length or the scale is out of its range. Nothing is drawn then.
     pub fn debug_draw(&self, definition: &DebugDrawDefinition, canvas: &mut dyn DebugCanvas) -> Result<()> {
         not_negative("normal_length", definition.normal_length)?;
         not_negative("force_scale", definition.force_scale)?;
