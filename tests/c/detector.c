@@ -398,9 +398,9 @@ static void a_definition_is_refused_by_name(void)
     REFUSED_DEF(SINEW_STATUS_UNSUPPORTED, "DISTANCE_FIELD", def.detection = SINEW_DETECTION_DISTANCE_FIELD);
     REFUSED_DEF(INVALID, "detection is 9", def.detection = 9);
     REFUSED_DEF(INVALID, "form is 2", def.form = 2);
-    REFUSED_DEF(INVALID, "pixel is 0 m", def.pixel = 0);
-    REFUSED_DEF(INVALID, "pixel is -1 m", def.pixel = -1);
-    REFUSED_DEF(INVALID, "pixel is NaN m", def.pixel = NAN);
+    REFUSED_DEF(INVALID, "pixel is 0:", def.pixel = 0);
+    REFUSED_DEF(INVALID, "pixel is -1:", def.pixel = -1);
+    REFUSED_DEF(INVALID, "pixel is NaN:", def.pixel = NAN);
     REFUSED_DEF(INVALID, "direction is", def.direction[1] = NAN);
     REFUSED_DEF(INVALID, "direction is", def.direction[2] = INFINITY);
     REFUSED_DEF(INVALID, "pixels is 0", def.pixels = 0);

@@ -44,7 +44,7 @@ const MAY_IMPORT: &[Row] = &[
     ("query", &["base", "ids", "geometry", "def", "contact", "body", "world"]),
     ("detection", &["contact"]),
     ("picture", &["base", "ids", "mesh", "def", "raster", "contact", "body", "world"]),
-    ("debug_draw", &["base", "soa", "def", "body", "world"]),
+    ("debug_draw", &["base", "soa", "body", "world"]),
     ("capi", &["base", "simd", "ids", "threads", "mesh", "def", "strain", "raster", "material", "cutting", "contact",
         "readers", "solver", "body", "world", "haptics", "embedding", "query", "detection", "picture", "debug_draw"]),
 ];
