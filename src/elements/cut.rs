@@ -226,8 +226,7 @@ impl Elements {
             self.stiffnesses[node as usize] = stiffness as f32;
             let of_springs = rates_anywhere(node as usize, springs, masses).unwrap_or(Rates::ZERO);
             self.most_damped = self.most_damped.max(of_springs.most_damped);
-            self.carried[node as usize] =
-                carried as f32 * masses.inverse(node as usize) + (of_springs.stiffest - self.of_springs).max(0.0);
+            self.carried[node as usize] = carried as f32 * masses.inverse(node as usize) + self.beyond_all(of_springs);
         }
         for &node in nodes {
             for cell in cells_at(node) {
@@ -248,9 +247,15 @@ impl Elements {
         let free = corners.map(|corner| inverse_masses[corner as usize] > 0.0);
         let carried = super::rates::carried(self.law, &rest, free);
         let of_node = corners.iter().zip(carried).find(|(corner, _)| **corner == node);
-        let known = corners.iter().filter(|_| self.rates_known);
-        let highest = known.fold(0.0, |most: f32, &corner| most.max(self.carried[corner as usize]));
-        let highest = self.of_springs + highest;
+        let highest = if self.rates_known {
+            self.of_springs
+                + corners
+                    .map(|corner| self.carried[corner as usize])
+                    .into_iter()
+                    .fold(0.0, f32::max)
+        } else {
+            0.0
+        };
         (of_node.map_or(0.0, |(_, carried)| carried), f64::from(highest))
     }
 

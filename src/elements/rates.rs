@@ -69,19 +69,20 @@ impl Elements {
         carried.fill(0.0);
         self.add_carried(masses, |node, more| carried[node] += more as f32);
         let of_springs = |node| rates_anywhere(node, springs, masses).unwrap_or(Rates::ZERO);
-        let (mut of_elements, mut of_both) = (0.0_f32, 0.0_f32);
+        let (mut of_elements, mut of_both, mut stiffest) = (0.0_f32, 0.0_f32, 0.0_f32);
         self.most_damped = 0.0;
         for (node, carried) in carried.iter_mut().enumerate() {
             let of_springs = of_springs(node);
             self.most_damped = self.most_damped.max(of_springs.most_damped);
+            stiffest = stiffest.max(of_springs.stiffest);
             *carried *= masses.inverse(node);
             of_elements = of_elements.max(*carried);
             of_both = of_both.max(*carried + of_springs.stiffest);
         }
         self.of_springs = of_both - of_elements;
-        if of_both > of_elements {
+        if stiffest > self.of_springs {
             for (node, carried) in carried.iter_mut().enumerate() {
-                *carried += (of_springs(node).stiffest - self.of_springs).max(0.0);
+                *carried += self.beyond_all(of_springs(node));
             }
         }
         self.parts.iter_mut().for_each(|part| part.set_rates(&carried));
@@ -186,6 +187,11 @@ impl Elements {
     /// The same with the nodes at the current state.
     pub fn settled_rates(&self) -> Rates {
         self.rates_of(self.settled)
+    }
+
+    /// What springs of a node have beyond what all nodes are taken to have, 1/s².
+    pub(super) fn beyond_all(&self, of_springs: Rates) -> f32 {
+        (of_springs.stiffest - self.of_springs).max(0.0)
     }
 
     fn rates_of(&self, highest: f32) -> Rates {

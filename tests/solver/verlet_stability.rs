@@ -5,7 +5,7 @@
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
 use glam::{DVec3, Quat, Vec3};
-use sinew::{BodyDefinition, Error, Solver, Storage, WorldDefinition};
+use sinew::{BodyDefinition, Error, Material, Model, Solver, Storage, Values, World, WorldDefinition};
 
 const SHADOW: f64 = 1.0 / (1.0 - 0.8 * 0.8);
 const FRAME: f32 = 1.0 / 60.0;
@@ -595,4 +595,58 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
             "{stretch} times as long: {found} of {allowed}"
         );
     }
+}
+
+/// Two tetrahedra apart, the larger so much stiffer that its bound at rest is above that of the smaller with its springs. Where the smaller is
+/// stretched, its springs count all the same: the substep is no longer than for the smaller alone.
+#[test]
+fn springs_count_beside_stiffer_elements_elsewhere() {
+    let corners = |edge: f32, at: f32| [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| edge * p + at * Vec3::X);
+    let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    let stable = |positions: &[Vec3], moved: &[Vec3], stiffness: f32| {
+        let cells: Vec<[u32; 4]> = (0..positions.len() as u32 / 4)
+            .map(|cell| [0, 1, 2, 3].map(|corner| 4 * cell + corner))
+            .collect();
+        let mut world = World::new(FREE).expect("a world");
+        let body = world
+            .create_body(&BodyDefinition {
+                positions,
+                tetrahedra: &cells,
+                springs: Some(&edges),
+                stiffnesses: Values::Uniform(stiffness),
+                masses: Values::Uniform(1e-3),
+                material: Some(Material {
+                    model: Model::Tetrahedra,
+                    young_modulus: 1e4,
+                    poisson_ratio: 0.3,
+                    ..Default::default()
+                }),
+                mass_scaling: 0.0,
+                ..Default::default()
+            })
+            .expect("a body");
+        world
+            .body_mut(body)
+            .expect("a body")
+            .set_positions(moved)
+            .expect("places");
+        world.step(1e-7).expect("a step").stable_substep
+    };
+    let bound = |stable: f32| 1.0 / (stable * stable);
+    let (edge, stretched) = (0.01, 2.0);
+    let small = corners(edge, 0.0);
+    // As stiff as the elements, and with them just below what the larger one has.
+    let of_elements = bound(stable(&small, &small, 0.0));
+    let of_springs = bound(stable(&small, &small, 1.0)) - of_elements;
+    let stiffness = of_elements / of_springs;
+    let larger = 1.05 * edge * bound(stable(&small, &small, stiffness)) / of_elements;
+    let large = corners(larger, 1.0);
+    let moved = small.map(|p| stretched * p);
+    let alone = stable(&small, &moved, stiffness);
+    assert!(
+        alone < 0.9 * stable(&large, &large, 0.0),
+        "the smaller one was to bound substeps"
+    );
+    let together = stable(&[small, large].concat(), &[moved, large].concat(), stiffness);
+    assert!(together < 1.001 * alone, "{together} s, alone {alone}");
 }
