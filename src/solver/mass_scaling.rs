@@ -285,7 +285,7 @@ impl MassScaling {
         Some(&mut self.growths)
     }
 
-    /// Takes in what was filled in, with what each node carries at rest beside its springs. Masses are made for it when they are made next.
+    /// Takes in what was filled in, with what bounds each node at rest (`Elements::carried_at_rest`). Masses are made for it when they are made next.
     pub fn relieve(
         &mut self,
         springs: &dyn Springs,

@@ -5,19 +5,16 @@ use std::f32::consts::TAU;
 use glam::{Quat, Vec3};
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Material, Model, Values};
 
 use super::block::Random;
 use super::motion::kept;
+use crate::support::tissue::world;
 
 #[test]
 fn hundreds_of_cuts_of_elements_leave_substeps_as_long_as_they_were() {
     let organ = Mesh::organ(0.12, 0.006).unwrap();
-    let mut world = World::new(WorldDefinition {
-        gravity: Vec3::ZERO,
-        ..Default::default()
-    })
-    .unwrap();
+    let mut world = world(Vec3::ZERO);
     let body = world
         .create_body(&BodyDefinition {
             positions: &organ.positions,

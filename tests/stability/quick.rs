@@ -13,6 +13,7 @@ fn check(name: &str, steps: usize) {
         .expect("a line of the table");
     let case = &CASES[place];
     let mut wrong = Vec::new();
+    // Five steps on from line to line is one back: STEPS has six.
     for (solver, first) in SOLVERS.into_iter().zip([place, place + 2, 5 * place]) {
         // NEWTON is slow: one of the steps for each line.
         let steps = if solver == Solver::Newton { 1 } else { steps };
@@ -120,7 +121,7 @@ mod long_runs {
     use glam::Vec3;
     use sinew::Solver;
 
-    /// Every so manieth row.
+    /// Tries one row of every `every`.
     fn check(solver: Solver, every: usize) {
         let mut wrong = Vec::new();
         let rows = quick().into_iter().filter(|(row, _)| row.solver == solver);

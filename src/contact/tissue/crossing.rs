@@ -51,8 +51,8 @@ pub(super) fn mark(
 /// Whether an edge of `first` passes through a triangle of `second` by more than `depth`, m.
 pub(super) fn is_deep(first: &Skin, second: &Skin, depth: f32) -> bool {
     let shift = shift(first, second);
-    let crossing = first.edges.iter().zip(&first.pierces).filter(|(_, pierces)| **pierces);
-    crossing.into_iter().any(|(edge, _)| {
+    let mut crossing = first.edges.iter().zip(&first.pierces).filter(|(_, pierces)| **pierces);
+    crossing.any(|(edge, _)| {
         let ends = edge.map(|node| first.starts.get(node as usize) + shift);
         let mut passes = false;
         second.near(&Bounds::of(ends.into_iter()), 0.0, |triangle| {

@@ -36,9 +36,10 @@ impl Entangled {
         }
     }
 
-    /// These two are out of each other.
-    pub fn remove(&mut self, pair: [usize; 2]) {
-        self.0.retain(|known| *known != named(pair));
+    /// These two are out of each other: whether they were in each other before.
+    pub fn remove(&mut self, pair: [usize; 2]) -> bool {
+        let place = self.0.binary_search(&named(pair));
+        place.map(|place| self.0.remove(place)).is_ok()
     }
 
     /// The body at this place is gone.

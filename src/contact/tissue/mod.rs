@@ -348,8 +348,7 @@ impl Tissue {
             return;
         };
         if !cross {
-            if self.entangled.has(pair) {
-                self.entangled.remove(pair);
+            if self.entangled.remove(pair) {
                 (kept_a.is_new, kept_b.is_new) = (true, true);
             }
             return;

@@ -7,11 +7,11 @@ mod stl;
 mod tetgen;
 mod vtk;
 
-use crate::base::above_zero;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use super::tidy::{LoadedMesh, NO_NODE, RawMesh};
+use crate::base::above_zero;
 use crate::{Error, Result};
 use scanner::Scanner;
 
