@@ -441,10 +441,11 @@ impl Contacts {
         self.loads.is_empty() || self.candidates.near().is_empty()
     }
 
-    /// Shows each node that a tool gave something to, and along what normal; with friction `None`: all of its motion.
-    pub fn show_touched(&self, mut see: impl FnMut(usize, Option<Vec3>)) {
-        for constraint in &self.constraints {
-            if constraint.given() != Vec3::ZERO {
+    /// Shows each node that a tool gave something to, and along what normal; with friction `None`: all of its motion. Where motion is
+    /// smooth those are left out that had it in the last equation too.
+    pub fn show_touched(&self, is_smooth: bool, mut see: impl FnMut(usize, Option<Vec3>)) {
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            if constraint.given() != Vec3::ZERO && !(is_smooth && self.holds.lasts(index)) {
                 for &node in constraint.nodes() {
                     see(node as usize, (constraint.friction == 0.0).then_some(constraint.normal));
                 }
@@ -455,6 +456,52 @@ impl Contacts {
                 contact.node as usize,
                 (contact.friction == 0.0).then_some(contact.normal),
             );
+        }
+    }
+
+    /// Whether all tools that the body meets are round or planes, and without friction.
+    pub fn are_plain(&self, tools: &[ToolPath]) -> bool {
+        met(tools, self.filter).all(|tool| tool.mesh().is_none() && tool.friction == 0.0)
+    }
+
+    /// What contacts gave beside what the equation of a substep of so many seconds had them do, and what they gave in all, N s.
+    pub fn beyond_holds(&self, substep: f64) -> [f64; 2] {
+        let (mut beyond, mut all) = (0.0, 0.0);
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            let given = constraint.given().as_dvec3().length();
+            let held = if index < self.holds.len() {
+                self.holds.found(index).1 * substep
+            } else {
+                0.0
+            };
+            beyond += (given - held).abs();
+            all += given;
+        }
+        let of_nodes: f64 = self
+            .nodes
+            .iter()
+            .map(|contact| contact.given().as_dvec3().length())
+            .sum();
+        [beyond + of_nodes, all + of_nodes]
+    }
+
+    /// Makes what tools received in a long substep of so many seconds the mean over it: an equation knows the forces at its end, and those at
+    /// its start are those of the last.
+    pub fn average_loads(&mut self, tools: &[ToolPath], substep: f64) {
+        let Self {
+            holds,
+            constraints,
+            loads,
+            ..
+        } = self;
+        holds.show_last(|slot, force, arm| {
+            if let Some(place) = tools.iter().position(|tool| tool.slot == slot) {
+                loads[place].add(force * (0.5 * substep), arm);
+            }
+        });
+        for (index, constraint) in constraints.iter().enumerate().take(holds.len()) {
+            let (meets, force, _) = holds.found(index);
+            loads[constraint.tool].add(meets.normal * (0.5 * substep * force), constraint.arm);
         }
     }
 

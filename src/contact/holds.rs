@@ -42,6 +42,8 @@ struct Hold {
     /// Whether it may pull: where it pushed before, the first solution takes it for one that goes on, though a node that were left
     /// alone might go away from the tool for once.
     holds_on: bool,
+    /// Whether it pushed in the last equation.
+    lasts: bool,
     /// What acts on the tissue with the nodes where they were last.
     answer: Answer,
     /// Whether it pushed when it was last asked.
@@ -60,6 +62,7 @@ saved!(Hold {
     multiplier,
     kept,
     holds_on,
+    lasts,
     answer,
     pushed
 });
@@ -103,13 +106,19 @@ struct Push {
     tip: u8,
     /// N
     force: f64,
+    /// Away from the tool.
+    normal: Vec3,
+    /// From the tool's position, m.
+    arm: Vec3,
 }
 
 saved!(Push {
     slot,
     feature,
     tip,
-    force
+    force,
+    normal,
+    arm
 });
 
 /// The contacts of a body with all tools in the equation in progress.
@@ -164,6 +173,8 @@ impl Holds {
                     feature,
                     tip: if is_whole { constraint.tip } else { 0 },
                     force: hold.answer.force,
+                    normal: hold.answer.meets.normal.as_vec3(),
+                    arm: constraint.arm,
                 });
             }
         }
@@ -177,6 +188,13 @@ impl Holds {
             }
             is_same
         });
+    }
+
+    /// Shows what acted on each tool at the end of the last equation: its place in the world, the force, N, and where, m from its position.
+    pub(super) fn show_last(&self, mut see: impl FnMut(usize, DVec3, Vec3)) {
+        for push in &self.last {
+            see(push.slot, -push.normal.as_dvec3() * push.force, push.arm);
+        }
     }
 
     /// The step that was begun last is current now.
@@ -206,6 +224,8 @@ impl Holds {
                 .for_each(|&node| hasher.write_u64(node.into()));
             hasher.write_u64(push.tip.into());
             hasher.write_u64(push.force.to_bits());
+            hasher.write_floats(&push.normal.to_array());
+            hasher.write_floats(&push.arm.to_array());
         }
     }
 
@@ -248,6 +268,7 @@ impl Holds {
                 multiplier: 0.0,
                 kept: f64::from(1.0 - constraint.give),
                 holds_on: false,
+                lasts: false,
                 answer: Answer::default(),
                 pushed: false,
             };
@@ -273,6 +294,7 @@ impl Holds {
             if let Ok(place) = self.last.binary_search_by_key(&key, Push::key) {
                 hold.multiplier = hold.kept * self.last[place].force;
                 hold.holds_on = true;
+                hold.lasts = true;
             }
             self.holds.push(hold);
         }
@@ -346,6 +368,11 @@ impl Holds {
             hold.pushed = pushes;
         }
         changed
+    }
+
+    /// Whether contact number `index` is one of the equation that pushed in the last one too.
+    pub(super) fn lasts(&self, index: usize) -> bool {
+        self.holds.get(index).is_some_and(|hold| hold.lasts)
     }
 
     /// Whether a contact pushes.

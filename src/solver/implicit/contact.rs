@@ -12,13 +12,29 @@ use crate::body::{Body, Mobility};
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
 use crate::soa::{Vectors, tile_count, tile_nodes};
+use crate::solver::attempt::StepRequest;
 use crate::solver::kick::look;
 
 /// The longest step near a tool, s.
 pub(super) const LONGEST: f64 = 1e-3;
 
+/// With a smaller budget than this short parts would have too few products each to be solved.
+const SMALL: u32 = 256;
+
+/// Whether a part longer than that may be tried: an equation knows where the surfaces of round tools and planes go, and nothing of
+/// friction. What comes near on the way ends up to some micrometres inside, so a budget that is enough for short parts is used for them.
+pub(super) fn may_be_long(body: &Body, implicit: &Implicit, request: &StepRequest) -> bool {
+    let is_alone = request.dynamic.is_empty() && request.neighbor_speed.is_none() && body.bindings.is_none();
+    let is_plain = |contacts: &Contacts| contacts.are_plain(request.tools);
+    let is_iterated = implicit.newton.is_none() && implicit.budget < SMALL;
+    is_iterated && !implicit.is_attached && is_alone && body.contacts.as_deref().is_some_and(is_plain)
+}
+
 /// How far an open contact may be to belong to an equation, as a part of the body's extent.
 const SLACK: f32 = 0.002;
+
+/// The same for a long step: what it does not foresee is stopped as far as a straight way tells, and may end a little inside.
+const LONG_SLACK: f32 = 0.01;
 
 /// Whether a tool was near when the body was last looked at.
 pub(super) fn is_near(body: &Body) -> bool {
@@ -29,12 +45,13 @@ impl Substep<'_> {
     /// Finds the contacts that belong to the equation. What they do begins and ends within a step, so that it is one of order 1
     /// where there are some.
     pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Self {
-        if self.step > LONGEST || !is_near(body) {
+        if !is_near(body) || self.is_long() && !may_be_long(body, implicit, self.request) {
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.clear();
             }
             return *self;
         }
+        let place = implicit.place(self.is_first);
         let Some(means) = &mut implicit.means else {
             return *self;
         };
@@ -45,6 +62,18 @@ impl Substep<'_> {
             &*state.velocities
         };
         means.copy_from(velocities);
+        let carried = self.carried() as f32;
+        if carried != 0.0 && self.is_long() {
+            // Where a formula of order 2 has nodes without a push, as velocities that lead there.
+            let history = &implicit.histories[place];
+            let [part, rate] = [self.time() / self.step, 1.0 / self.step].map(|factor| factor as f32);
+            let of_history = history.ways.axes().into_iter().zip(history.gains.axes());
+            for (means, (ways, gains)) in means.axes_mut().into_iter().zip(of_history) {
+                for (mean, (way, gain)) in means.iter_mut().zip(ways.iter().zip(gains)) {
+                    *mean = carried * rate * way + part * (*mean + carried * gain);
+                }
+            }
+        }
         for pin in body.pins.iter() {
             pin.put_among(means, pin.travel / self.request.dt);
         }
@@ -60,17 +89,41 @@ impl Substep<'_> {
         });
         // Nor is a dynamic tool's impulse on a node one that goes on.
         let is_of_order_1 = |contacts: &Contacts| !contacts.holds.is_empty() || contacts.has_dynamic();
-        if !body.contacts.as_deref().is_some_and(is_of_order_1) {
+        if self.is_long() || !body.contacts.as_deref().is_some_and(is_of_order_1) {
             return *self;
         }
         self.of_order_1()
     }
 
-    /// Whether contacts do what the nodes at them need, as far as is asked for.
+    /// Whether the equation of a long part did what contacts had to do, so that tissue knew of it all along.
+    fn is_foreseen(&self, contacts: &Contacts, pushes: &Vectors, residuals: &Vectors) -> bool {
+        /// What may be given after the equation, and what its contacts may lack, as a part of what they do.
+        const BEYOND: f64 = 0.05;
+        const MISSING: f64 = 0.2;
+        let push = |node: usize| pushes.get(node).as_dvec3();
+        let residual = |node: usize| residuals.get(node).as_dvec3();
+        let [beyond, all] = contacts.beyond_holds(self.step);
+        beyond <= BEYOND * all
+            && contacts.holds.missing(push) <= MISSING
+            && contacts.holds.imbalance(residual) <= MISSING
+    }
+
+    /// Whether it is longer than a step that contacts need not know of.
+    pub(super) fn is_long(&self) -> bool {
+        self.step > LONGEST
+    }
+
+    /// Whether contacts do what the nodes at them need, as far as is asked for, and in a long step what their multipliers ask for.
     pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit) -> bool {
+        /// What long steps may lack, as a part of what contacts do: a frame later it is there.
+        const MISSING: f64 = 0.01;
+        let Some(contacts) = body.contacts.as_deref().filter(|contacts| !contacts.holds.is_empty()) else {
+            return true;
+        };
         let residual = |node: usize| implicit.residuals.get(node).as_dvec3();
-        let imbalance = |contacts: &Contacts| contacts.holds.imbalance(residual);
-        body.contacts.as_deref().map_or(0.0, imbalance) <= f64::from(implicit.accuracy)
+        let push = |node: usize| implicit.pushes.get(node).as_dvec3();
+        contacts.holds.imbalance(residual) <= f64::from(implicit.accuracy)
+            && !(self.is_long() && contacts.holds.missing(push) > MISSING)
     }
 
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which
@@ -102,7 +155,8 @@ impl Substep<'_> {
         let profile = self.request.profile;
         let watch = Stopwatch::start(profile);
         let neighbor_speed = self.request.neighbor_speed;
-        let slack = SLACK * body.extent() + self.step as f32 * neighbor_speed.unwrap_or(0.0);
+        let part = if self.is_long() { LONG_SLACK } else { SLACK };
+        let slack = part * body.extent() + self.step as f32 * neighbor_speed.unwrap_or(0.0);
         let Some(contacts) = &mut body.contacts else {
             return;
         };
@@ -149,6 +203,7 @@ impl Substep<'_> {
 
     /// Lets tools stop the nodes that would enter them.
     pub(super) fn meet(&self, body: &mut Body, implicit: &mut Implicit) -> End {
+        let may_stand = !self.is_long() || may_be_long(body, implicit, self.request);
         let Some(means) = &mut implicit.means else {
             return End::Fine;
         };
@@ -162,7 +217,7 @@ impl Substep<'_> {
         if contacts.are_far() {
             return End::Fine;
         }
-        if self.step > LONGEST {
+        if self.is_long() && !(may_stand && self.is_foreseen(contacts, &implicit.pushes, &implicit.residuals)) {
             return End::Near;
         }
         let history = &mut implicit.histories[next];
@@ -183,16 +238,29 @@ impl Substep<'_> {
                 }
             }
         }
-        // What a tool gives is no gain that will go on.
-        contacts.show_touched(|node, normal| {
+        // What a tool gives is no gain that will go on, unless it gave it before: then motion is smooth.
+        let is_smooth = self.is_long() && implicit.taken.carried != 0.0;
+        let state = body.state.substep();
+        contacts.show_touched(is_smooth, |node, normal| {
             let gain = history.gains.get(node);
             let left = normal.map_or(Vec3::ZERO, |normal| gain.reject_from_normalized(normal));
             history.gains.set(node, left);
+            if let Some(normal) = normal.filter(|_| is_smooth) {
+                // Who is stopped goes on as the tool does; order 2 would have it rebound.
+                let velocity = state.velocities.get(node);
+                let more = (history.ways.get(node) * per_step - velocity).project_onto_normalized(normal);
+                state.velocities.set(node, velocity + more);
+            }
         });
         for pin in body.pins.partial() {
             pin.put_among(&mut history.gains, Vec3::ZERO);
         }
         history.energy = None;
+        if self.is_long()
+            && let Some(contacts) = &mut body.contacts
+        {
+            contacts.average_loads(self.request.tools, self.step);
+        }
         if body.state.next_is_finite() {
             End::Fine
         } else {

@@ -17,6 +17,9 @@ use crate::threads::{Items, Team};
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 200;
 
+/// What the contacts of a long step may take beyond its budget, at most: twice as many products, or so many.
+const MORE: u32 = 64;
+
 /// What may be missing of a correction where other contacts push than before it, as a fraction of its size: others will after it.
 const OTHER: f64 = 0.3;
 
@@ -111,7 +114,12 @@ impl Substep<'_> {
         let tolerated = 0.1 * f64::from(self.request.tolerance) * part * part;
         let absolute = tolerated.powi(2) * all_inertia;
         let relative = f64::from(implicit.accuracy).powi(2);
-        let whole_budget = self.budget(implicit);
+        let mut whole_budget = self.budget(implicit);
+        let mut more = if self.is_long() {
+            (2 * whole_budget).min(MORE)
+        } else {
+            0
+        };
         let mut products = 0;
         let mut size = 0.0;
         let mut error = f64::INFINITY;
@@ -147,6 +155,9 @@ impl Substep<'_> {
             vain = if is_in_vain { vain + 1 } else { 0 };
             let is_stuck = vain > 2;
             error = remaining;
+            if products >= whole_budget && !self.is_balanced(body, implicit) {
+                whole_budget += std::mem::take(&mut more);
+            }
             let budget = whole_budget - products.min(whole_budget);
             // What all nodes do together may be less than what rounding does to stiff springs: a solution is tried in any case.
             let is_tried = iteration > 0 || square == 0.0;

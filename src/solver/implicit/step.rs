@@ -29,7 +29,7 @@ pub(super) struct Formula {
     /// t, s.
     time: f64,
     /// c: what part of the last way and of the last gain goes on.
-    carried: f64,
+    pub carried: f64,
 }
 
 saved!(Formula { time, carried });
@@ -82,27 +82,41 @@ pub(in crate::solver) fn run(
             .max(1.0);
         let short = short.min(f64::from(u32::MAX / 4 / substeps)) as u32;
         let mut is_near = contact::is_near(body);
-        if is_near {
+        let is_long = contact::may_be_long(body, &implicit, request);
+        if is_near && !is_long {
             parts = short;
         }
         implicit.grant(substeps.saturating_mul(parts));
         let mut cuts = 0;
         loop {
-            if is_near && short > 1 && substeps * short > request.most_parts() {
+            if is_near && short > 1 && parts >= short && substeps * short > request.most_parts() {
                 body.implicit = Some(implicit);
                 return Err(TooLong {
                     stable_substep: contact::LONGEST as f32,
                 });
             }
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
-            let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS;
+            // What a small budget does not solve in so many parts it does not solve in more.
+            let is_spent = is_long && cuts > 0 && whole[0] / 4 > implicit.budget;
+            let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
+            let may_be_shorter = is_long && parts < short && contact::is_near(body);
             end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
             match end {
                 End::Fine => break,
+                // Then there was nothing near before, and the equation knew of nothing.
+                End::Near if is_long && !is_near => is_near = true,
                 End::Near => {
                     is_near = true;
-                    parts = parts.max(short);
+                    parts = if is_long {
+                        shorter(parts, short)
+                    } else {
+                        parts.max(short)
+                    };
                     implicit.grant(substeps.saturating_mul(parts));
+                }
+                End::Gained | End::NotFinite if may_be_shorter => {
+                    parts = shorter(parts, short);
+                    implicit.grant_again(substeps.saturating_mul(parts));
                 }
                 End::Gained | End::NotFinite if is_last_resort => break,
                 End::Gained | End::NotFinite => {
@@ -120,11 +134,23 @@ pub(in crate::solver) fn run(
     Ok((substeps.saturating_mul(parts), taken))
 }
 
+/// In how many parts a step is tried near tools that was not solved in so many, and that may be taken in `short`.
+fn shorter(parts: u32, short: u32) -> u32 {
+    let next = parts.saturating_mul(4);
+    if next < short / 2 { next } else { short }
+}
+
 impl Implicit {
     /// Lets a step of so many parts have its share for each.
     fn grant(&mut self, parts: u32) {
         let share = (self.budget.min(self.allowed) / SHARE).max(1);
         self.left = self.left.max(share.saturating_mul(parts));
+    }
+
+    /// The same where longer parts were tried before: a small budget is there again.
+    fn grant_again(&mut self, parts: u32) {
+        self.left = self.left.max(self.budget.min(self.allowed).min(SHARE));
+        self.grant(parts);
     }
 }
 
@@ -310,6 +336,11 @@ impl Substep<'_> {
         } else {
             End::NotFinite
         }
+    }
+
+    /// t of its formula, s.
+    pub(super) fn time(&self) -> f64 {
+        self.formula.time
     }
 
     /// c of its formula.
