@@ -365,6 +365,11 @@ impl Candidates {
         }
     }
 
+    /// The nodes of all features that are near.
+    pub fn corner_nodes(&self) -> impl Iterator<Item = usize> {
+        self.corners.iter().map(|corner| corner.node as usize)
+    }
+
     /// The corners of a feature that is near; `None` where all are on one side of the room: then it does not come there.
     #[inline]
     pub fn corners(&self, feature: Feature) -> Option<Corners> {

@@ -196,12 +196,12 @@ impl Constraint {
     }
 
     /// The same contact after an equation has been solved with it: its nodes meet the tool thus, with these velocities, and have
-    /// received the impulse, N s. What is left open, m, may still be closed within `duration` seconds.
+    /// received an impulse along the normal and one of friction, N s. What is left open, m, may still be closed within `duration` seconds.
     pub fn after(
         &self,
         meets: &Meets,
-        (impulse, open): (f32, f32),
-        duration: f32,
+        (impulse, friction_impulse): (f32, Vec3),
+        (open, duration): (f32, f32),
         velocities: &Vectors,
         (supports, mobility, held): (&Supports, &Mobility, [BVec3; MOST]),
     ) -> Self {
@@ -221,6 +221,7 @@ impl Constraint {
             after.arm += (after.normal - self.normal) * radius;
         }
         after.impulse = impulse;
+        after.friction_impulse = friction_impulse;
         after.give = 0.0;
         let velocity = after.velocity(velocities).dot(after.normal);
         after.least_speed = velocity - open.max(0.0) / duration;

@@ -459,23 +459,19 @@ impl Contacts {
         }
     }
 
-    /// Whether all tools that the body meets are round or planes, and without friction.
-    pub fn are_plain(&self, tools: &[ToolPath]) -> bool {
-        met(tools, self.filter).all(|tool| tool.mesh().is_none() && tool.friction == 0.0)
-    }
-
     /// What contacts gave beside what the equation of a substep of so many seconds had them do, and what they gave in all, N s.
     pub fn beyond_holds(&self, substep: f64) -> [f64; 2] {
         let (mut beyond, mut all) = (0.0, 0.0);
         for (index, constraint) in self.constraints.iter().enumerate() {
-            let given = constraint.given().as_dvec3().length();
+            let given = constraint.given().as_dvec3();
             let held = if index < self.holds.len() {
-                self.holds.found(index).1 * substep
+                let (meets, force, _) = self.holds.found(index);
+                (meets.normal * force + self.holds.drag(index)) * substep
             } else {
-                0.0
+                DVec3::ZERO
             };
-            beyond += (given - held).abs();
-            all += given;
+            beyond += (given - held).length();
+            all += given.length();
         }
         let of_nodes: f64 = self
             .nodes
@@ -501,7 +497,8 @@ impl Contacts {
         });
         for (index, constraint) in constraints.iter().enumerate().take(holds.len()) {
             let (meets, force, _) = holds.found(index);
-            loads[constraint.tool].add(meets.normal * (0.5 * substep * force), constraint.arm);
+            let of_end = meets.normal * force + holds.drag(index);
+            loads[constraint.tool].add(of_end * (0.5 * substep), constraint.arm);
         }
     }
 
@@ -519,16 +516,20 @@ impl Contacts {
     }
 
     /// Finds the contacts that the equation of the substep is to know of: all that may touch with these velocities, or are open by
-    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m.
-    pub fn foresee(&mut self, mut meeting: Meeting, stiffness_of: impl Fn(usize) -> f32) {
+    /// no more than the slack. `stiffness_of` tells how stiff a node is, N/m; `drags`: friction belongs to the equation too.
+    /// `false`: something goes too far to tell.
+    pub fn foresee(&mut self, mut meeting: Meeting, drags: bool, stiffness_of: impl Fn(usize) -> f32) -> bool {
         self.holds.clear();
         self.clear_contacts();
         if meeting.tools.is_empty() {
-            return;
+            return true;
         }
         self.find_candidates(&meeting);
-        if self.candidates.near().is_empty() || self.needed_slices(&meeting) > 1 {
-            return;
+        if self.candidates.near().is_empty() {
+            return true;
+        }
+        if self.needed_slices(&meeting) > 1 {
+            return false;
         }
         let slice = Slice::ahead(&meeting);
         let (start, end) = (meeting.start, meeting.end);
@@ -536,8 +537,9 @@ impl Contacts {
         self.constraints.truncate(HELD);
         let way = |node: usize| meeting.velocities.get(node) * meeting.substep;
         let slot = |place: usize| meeting.tools[place].slot;
-        let over = (meeting.substep, meeting.bindings);
+        let over = (meeting.substep, meeting.bindings, drags);
         self.holds.begin(&self.constraints, slot, over, stiffness_of, way);
+        true
     }
 
     /// Gives the impulses that keep the body out of the tools, and moves what they touch.
@@ -612,16 +614,23 @@ impl Contacts {
     fn take_up(&mut self, meeting: &Meeting) {
         for (index, constraint) in self.constraints.iter_mut().enumerate() {
             let (meets, force, open) = self.holds.found(index);
-            let given = force as f32 * meeting.substep;
+            let given = (
+                force as f32 * meeting.substep,
+                self.holds.drag(index).as_vec3() * meeting.substep,
+            );
             let supports = Supports::of(constraint.feature, meeting.bindings);
             let answering = (&supports, &meeting.mobility, meeting.held_axes(&supports));
             *constraint = constraint.after(
                 &meets,
-                (given, if force > 0.0 { 0.0 } else { open as f32 }),
-                meeting.substep,
+                given,
+                (if force > 0.0 { 0.0 } else { open as f32 }, meeting.substep),
                 meeting.velocities,
                 answering,
             );
+            if self.holds.drags(index) {
+                // What is left of it would stop light nodes that slip: the equation knows better.
+                constraint.friction = 0.0;
+            }
         }
     }
 
@@ -807,14 +816,26 @@ impl Contacts {
             };
             let travel = (tool.speed(meeting.dt) + meeting.fastest) * meeting.substep;
             let wanted = (travel / (sweep.thickness * SLICE_TRAVEL)).ceil();
-            if wanted > slices {
-                let reached = meeting.bounds().extended(meeting.fastest * meeting.substep);
-                if reached.overlaps(&sweep.bounds) {
-                    slices = wanted;
-                }
+            if wanted <= slices {
+                continue;
+            }
+            let reached = meeting.bounds().extended(meeting.fastest * meeting.substep);
+            if reached.overlaps(&sweep.bounds) {
+                let travel = self.closing_speed(meeting, tool) * meeting.substep;
+                slices = slices.max((travel / (sweep.thickness * SLICE_TRAVEL)).ceil().min(wanted));
             }
         }
         (slices as u32).clamp(1, SLICES)
+    }
+
+    /// How fast what is near moves against the tool at most, m/s.
+    fn closing_speed(&self, meeting: &Meeting, tool: &ToolPath) -> f32 {
+        let motion = tool.motion(meeting.start, meeting.end, meeting.dt, meeting.origin);
+        let speeds = self.candidates.corner_nodes().map(|node| {
+            let arm = meeting.vector(meeting.positions, node) - motion.centre;
+            (meeting.vector(meeting.velocities, node) - motion.velocity - motion.spin.cross(arm)).length()
+        });
+        speeds.fold(0.0, f32::max) + tool.stray_speed(meeting.dt)
     }
 
     fn find_candidates(&mut self, meeting: &Meeting) {

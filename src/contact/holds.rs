@@ -2,8 +2,9 @@
 //! tissue into the tool first and only then have it stopped, with too small a force.
 //!
 //! An augmented Lagrangian (Hestenes 1969, Powell 1969): each contact pushes with a multiplier and a stiffness, and never pulls;
-//! what it has come to do becomes its multiplier. As long as multipliers stay there is a convex function to minimise. Friction, and
-//! what is left of a penetration, is a matter of contact's own impulses.
+//! what it has come to do becomes its multiplier. As long as multipliers stay there is a convex function to minimise. In long steps
+//! [friction](super::grip) belongs to it too; in short ones friction, and in all what is left of a penetration, is a matter of contact's
+//! own impulses.
 
 use std::ops::Range;
 
@@ -12,6 +13,7 @@ use glam::{DVec3, Vec3};
 use super::constraint::Constraint;
 use super::features::Feature;
 use super::gauge::{Gauge, Meets};
+use super::grip::{Grip, Grips, add};
 use super::supports::{MOST, Supports, Ties};
 use crate::base::{Result, StateHasher};
 use crate::body::Bindings;
@@ -48,6 +50,8 @@ struct Hold {
     answer: Answer,
     /// Whether it pushed when it was last asked.
     pushed: bool,
+    /// The friction of its nodes.
+    grips: [Option<usize>; MOST],
 }
 
 saved!(Hold {
@@ -64,7 +68,8 @@ saved!(Hold {
     holds_on,
     lasts,
     answer,
-    pushed
+    pushed,
+    grips
 });
 
 /// What a contact does.
@@ -106,6 +111,8 @@ struct Push {
     tip: u8,
     /// N
     force: f64,
+    /// What friction does, N.
+    drag: DVec3,
     /// Away from the tool.
     normal: Vec3,
     /// From the tool's position, m.
@@ -117,6 +124,7 @@ saved!(Push {
     feature,
     tip,
     force,
+    drag,
     normal,
     arm
 });
@@ -132,6 +140,7 @@ pub(crate) struct Holds {
     /// What contacts did before the equation in progress, and before the step; both in the order of tools, features and tips.
     last: Vec<Push>,
     settled: Vec<Push>,
+    grips: Grips,
 }
 
 saved!(Holds {
@@ -139,7 +148,8 @@ saved!(Holds {
     shares,
     order,
     last,
-    settled
+    settled,
+    grips
 });
 
 impl Holds {
@@ -152,19 +162,21 @@ impl Holds {
         for pushes in [&mut self.last, &mut self.settled] {
             pushes.try_reserve(count.saturating_sub(pushes.len()))?;
         }
-        Ok(())
+        self.grips.reserve(shares)
     }
 
     /// Begins a step anew.
     pub fn begin_step(&mut self) {
         self.clear();
         self.last.clone_from(&self.settled);
+        self.grips.begin_step();
     }
 
     /// What contacts do now is what the next equation begins with: of these.
     pub(super) fn remember(&mut self, constraints: &[Constraint], slot_of: impl Fn(usize) -> usize) {
+        self.grips.remember();
         self.last.clear();
-        for (hold, constraint) in self.holds.iter().zip(constraints) {
+        for (index, (hold, constraint)) in self.holds.iter().zip(constraints).enumerate() {
             if hold.answer.force > 0.0 {
                 let feature = constraint.feature.part(hold.answer.meets.weights);
                 let is_whole = feature.nodes().len() == constraint.feature.nodes().len();
@@ -173,6 +185,7 @@ impl Holds {
                     feature,
                     tip: if is_whole { constraint.tip } else { 0 },
                     force: hold.answer.force,
+                    drag: self.drag(index),
                     normal: hold.answer.meets.normal.as_vec3(),
                     arm: constraint.arm,
                 });
@@ -185,6 +198,7 @@ impl Holds {
             let is_same = again.key() == first.key();
             if is_same {
                 first.force += again.force;
+                first.drag += again.drag;
             }
             is_same
         });
@@ -193,18 +207,20 @@ impl Holds {
     /// Shows what acted on each tool at the end of the last equation: its place in the world, the force, N, and where, m from its position.
     pub(super) fn show_last(&self, mut see: impl FnMut(usize, DVec3, Vec3)) {
         for push in &self.last {
-            see(push.slot, -push.normal.as_dvec3() * push.force, push.arm);
+            see(push.slot, -(push.normal.as_dvec3() * push.force + push.drag), push.arm);
         }
     }
 
     /// The step that was begun last is current now.
     pub fn settle(&mut self) {
         self.settled.clone_from(&self.last);
+        self.grips.settle();
     }
 
     /// Nothing is known any more of what contacts did.
     pub fn forget(&mut self) {
         self.settled.clear();
+        self.grips.forget();
     }
 
     /// A tool at this place in the world is gone.
@@ -212,6 +228,7 @@ impl Holds {
         for pushes in [&mut self.last, &mut self.settled] {
             pushes.retain(|push| push.slot != slot);
         }
+        self.grips.forget_tool(slot);
     }
 
     /// What the next step depends on.
@@ -224,9 +241,14 @@ impl Holds {
                 .for_each(|&node| hasher.write_u64(node.into()));
             hasher.write_u64(push.tip.into());
             hasher.write_u64(push.force.to_bits());
+            push.drag
+                .to_array()
+                .iter()
+                .for_each(|part| hasher.write_u64(part.to_bits()));
             hasher.write_floats(&push.normal.to_array());
             hasher.write_floats(&push.arm.to_array());
         }
+        self.grips.hash(hasher);
     }
 
     pub fn is_empty(&self) -> bool {
@@ -241,15 +263,16 @@ impl Holds {
         self.holds.clear();
         self.shares.clear();
         self.order.clear();
+        self.grips.clear();
     }
 
     /// Begins anew with these contacts over `duration` seconds, of nodes that are as stiff as `stiffness_of` tells, N/m; infinite
-    /// where they are held. Without a push each node goes the way of `way_of`.
+    /// where they are held. Without a push each node goes the way of `way_of`. Friction belongs to them where `drags` says so.
     pub(super) fn begin(
         &mut self,
         constraints: &[Constraint],
         slot_of: impl Fn(usize) -> usize,
-        (duration, bindings): (f32, Option<&Bindings>),
+        (duration, bindings, drags): (f32, Option<&Bindings>, bool),
         stiffness_of: impl Fn(usize) -> f32,
         way_of: impl Fn(usize) -> Vec3,
     ) {
@@ -271,14 +294,31 @@ impl Holds {
                 lasts: false,
                 answer: Answer::default(),
                 pushed: false,
+                grips: [None; MOST],
             };
             let mut softness = 0.0;
             let mut free = [DVec3::ZERO; MOST];
             for (place, &node) in supports.nodes().iter().enumerate() {
                 let share = constraint.shares[place];
+                let (stiffness, way) = (stiffness_of(node as usize), way_of(node as usize));
                 hold.nodes[place] = node;
-                free[place] = constraint.starts[place].as_dvec3() + way_of(node as usize).as_dvec3();
-                softness += share * share / stiffness_of(node as usize);
+                free[place] = constraint.starts[place].as_dvec3() + way.as_dvec3();
+                softness += share * share / stiffness;
+                if drags && constraint.friction > 0.0 && share > 0.0 && stiffness.is_finite() {
+                    let part = f64::from(share);
+                    self.grips.add(Grip {
+                        node,
+                        tool: constraint.tool,
+                        slot: slot_of(constraint.tool),
+                        friction: constraint.friction.into(),
+                        normal: constraint.normal.as_dvec3() * part,
+                        slip: (way - constraint.surface_velocity * duration).as_dvec3() * part,
+                        stiffness: f64::from(STIFFER * constraint.firmness * stiffness),
+                        kept: hold.kept,
+                        pressed: part,
+                        ..Grip::default()
+                    });
+                }
                 self.shares.push(Share {
                     node,
                     hold: self.holds.len() as u32,
@@ -298,6 +338,17 @@ impl Holds {
             }
             self.holds.push(hold);
         }
+        self.grips.begin();
+        for (hold, constraint) in self.holds.iter_mut().zip(constraints) {
+            let of_nodes = hold.grips.iter_mut().zip(&hold.nodes).zip(constraint.shares);
+            for ((grip, &node), share) in of_nodes.take(hold.count) {
+                *grip = self.grips.place(node, constraint.tool);
+                if let Some(place) = *grip {
+                    self.grips.press(place, hold.multiplier * f64::from(share));
+                }
+            }
+        }
+        self.grips.limit();
         self.shares.sort_unstable_by_key(|share| (share.node, share.hold));
         self.order.extend(
             constraints
@@ -312,10 +363,25 @@ impl Holds {
         for hold in &mut self.holds {
             hold.answer = hold.answer_to(&push_of);
         }
+        self.press_grips();
+        self.grips.drag(push_of);
+    }
+
+    /// Has friction know what presses each node.
+    fn press_grips(&mut self) {
+        self.grips.lift();
+        for hold in &self.holds {
+            for (grip, share) in hold.grips.iter().zip(hold.answer.shares) {
+                if let &Some(place) = grip {
+                    self.grips.press(place, hold.answer.force.max(0.0) * share);
+                }
+            }
+        }
     }
 
     /// From now on no contact pulls.
     pub fn let_go(&mut self) {
+        self.grips.let_go();
         for hold in &mut self.holds {
             hold.holds_on = false;
             if hold.answer.force < 0.0 {
@@ -337,6 +403,7 @@ impl Holds {
             missing += (force - hold.answer.force).abs();
             all += hold.answer.force;
         }
+        missing += self.grips.missing(push_of);
         if missing > 0.0 { missing / all } else { 0.0 }
     }
 
@@ -349,6 +416,8 @@ impl Holds {
             hold.answer = hold.answer_to(&push_of);
             hold.share_out(&hold.answer, hold.answer.force - before, &mut add);
         }
+        self.press_grips();
+        self.grips.improve(push_of, add);
     }
 
     /// What the residuals lack of balance along the contacts' normals, as a part of what those do.
@@ -444,6 +513,10 @@ impl Holds {
                     *entry += more;
                 }
             }
+            let [x, y, z] = self.grips.stiffness(shares[0].node).to_cols_array_2d();
+            for (entry, more) in block.iter_mut().zip([x[0], y[1], z[2], y[2], z[0], x[1]]) {
+                *entry += more;
+            }
             if block[0] + block[1] + block[2] > 0.0 {
                 see(shares[0].node as usize, block);
             }
@@ -460,6 +533,7 @@ impl Holds {
             let force = meets.normal * (force * shares[share.place]);
             add(to, share.node as usize - nodes.start, force.as_vec3());
         }
+        self.grips.add_forces(nodes, to);
     }
 
     /// Adds the product of the contacts' stiffness with `vector_of` each node to those of these nodes: the product of both.
@@ -469,7 +543,7 @@ impl Holds {
         vector_of: impl Fn(usize) -> Vec3,
         to: &mut [&mut [f32]; 3],
     ) -> f64 {
-        let mut sum = 0.0;
+        let mut sum = self.grips.add_products(nodes, &vector_of, to);
         for share in self.shares_of(nodes) {
             let hold = &self.holds[share.hold as usize];
             if hold.answer.force != 0.0 {
@@ -491,13 +565,28 @@ impl Holds {
             hold.answer.force * (hold.weighted(way_of) - beyond)
         };
         let pressed = self.holds.iter().filter(|hold| hold.answer.force > 0.0);
-        pressed.map(work).sum()
+        pressed.map(work).sum::<f64>() + self.grips.work(way_of)
     }
 
     /// How contact number `index` meets its tool with the nodes where they were last, what it does, N, and how far it is open, m.
     pub(super) fn found(&self, index: usize) -> (Meets, f64, f64) {
         let Hold { answer, least, .. } = &self.holds[index];
         (answer.meets, answer.force, answer.meets.gap - least)
+    }
+
+    /// What friction of contact number `index` does: what that of its nodes does, as far as it presses them, N.
+    pub(super) fn drag(&self, index: usize) -> DVec3 {
+        let hold = &self.holds[index];
+        let of_nodes = hold.grips.iter().zip(hold.answer.shares);
+        let force = hold.answer.force.max(0.0);
+        let drags =
+            of_nodes.filter_map(|(grip, share)| grip.map(|place| self.grips.per_force(place) * (force * share)));
+        drags.sum()
+    }
+
+    /// Whether friction of contact number `index` belongs to the equation.
+    pub(super) fn drags(&self, index: usize) -> bool {
+        self.holds[index].grips.iter().any(Option::is_some)
     }
 
     /// How much deeper than it may be contact number `index` is with its nodes at these positions, m; 0 where it does not push, or gives
@@ -638,11 +727,5 @@ impl Shared for [f64; MOST] {
         for (sum, other) in self.iter_mut().zip(other) {
             *sum += other * part;
         }
-    }
-}
-
-fn add(to: &mut [&mut [f32]; 3], place: usize, vector: Vec3) {
-    for (axis, value) in to.iter_mut().zip(vector.to_array()) {
-        axis[place] += value;
     }
 }

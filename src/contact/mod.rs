@@ -13,6 +13,7 @@ mod edges;
 pub(crate) mod exact;
 mod features;
 mod gauge;
+mod grip;
 mod holds;
 pub(crate) mod image_space;
 mod impulses;

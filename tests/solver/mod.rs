@@ -3,6 +3,7 @@
 mod auto;
 mod budget;
 mod implicit;
+mod implicit_budget_near_tools;
 mod implicit_motion;
 mod implicit_press;
 mod implicit_spheres;

@@ -21,13 +21,12 @@ pub(super) const LONGEST: f64 = 1e-3;
 /// With a smaller budget than this short parts would have too few products each to be solved.
 const SMALL: u32 = 256;
 
-/// Whether a part longer than that may be tried: an equation knows where the surfaces of round tools and planes go, and nothing of
-/// friction. What comes near on the way ends up to some micrometres inside, so a budget that is enough for short parts is used for them.
+/// Whether a part longer than that may be tried. What comes near on the way ends up to some micrometres inside, so a budget that is enough
+/// for short parts is used for them.
 pub(super) fn may_be_long(body: &Body, implicit: &Implicit, request: &StepRequest) -> bool {
     let is_alone = request.dynamic.is_empty() && request.neighbor_speed.is_none() && body.bindings.is_none();
-    let is_plain = |contacts: &Contacts| contacts.are_plain(request.tools);
     let is_iterated = implicit.newton.is_none() && implicit.budget < SMALL;
-    is_iterated && !implicit.is_attached && is_alone && body.contacts.as_deref().is_some_and(is_plain)
+    is_iterated && !implicit.is_attached && is_alone && body.contacts.is_some()
 }
 
 /// How far an open contact may be to belong to an equation, as a part of the body's extent.
@@ -43,17 +42,17 @@ pub(super) fn is_near(body: &Body) -> bool {
 
 impl Substep<'_> {
     /// Finds the contacts that belong to the equation. What they do begins and ends within a step, so that it is one of order 1
-    /// where there are some.
-    pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Self {
+    /// where there are some. `None`: they are too far from their places for a long one.
+    pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Option<Self> {
         if !is_near(body) || self.is_long() && !may_be_long(body, implicit, self.request) {
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.clear();
             }
-            return *self;
+            return Some(*self);
         }
         let place = implicit.place(self.is_first);
         let Some(means) = &mut implicit.means else {
-            return *self;
+            return Some(*self);
         };
         let state = body.state.substep();
         let velocities = if self.is_first {
@@ -78,9 +77,11 @@ impl Substep<'_> {
             pin.put_among(means, pin.travel / self.request.dt);
         }
         let per_mass = 1.0 / (self.step * self.step);
+        let is_long = self.is_long();
+        let mut is_told = true;
         self.contact(body, means, |contacts, meeting, stiffness_of| {
             let inverse_masses = meeting.mobility.inverse_masses;
-            contacts.foresee(meeting, |node| {
+            is_told = contacts.foresee(meeting, is_long, |node| {
                 if inverse_masses[node] == 0.0 {
                     return f32::INFINITY;
                 }
@@ -89,10 +90,14 @@ impl Substep<'_> {
         });
         // Nor is a dynamic tool's impulse on a node one that goes on.
         let is_of_order_1 = |contacts: &Contacts| !contacts.holds.is_empty() || contacts.has_dynamic();
-        if self.is_long() || !body.contacts.as_deref().is_some_and(is_of_order_1) {
-            return *self;
+        if self.is_long() {
+            return is_told.then_some(*self);
         }
-        self.of_order_1()
+        if body.contacts.as_deref().is_some_and(is_of_order_1) {
+            Some(self.of_order_1())
+        } else {
+            Some(*self)
+        }
     }
 
     /// Whether the equation of a long part did what contacts had to do, so that tissue knew of it all along.
@@ -113,17 +118,16 @@ impl Substep<'_> {
         self.step > LONGEST
     }
 
-    /// Whether contacts do what the nodes at them need, as far as is asked for, and in a long step what their multipliers ask for.
-    pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit) -> bool {
-        /// What long steps may lack, as a part of what contacts do: a frame later it is there.
-        const MISSING: f64 = 0.01;
+    /// Whether contacts do what the nodes at them need, as far as is asked for, and in a long step what their multipliers ask for, but for this
+    /// part.
+    pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit, lacking: f64) -> bool {
         let Some(contacts) = body.contacts.as_deref().filter(|contacts| !contacts.holds.is_empty()) else {
             return true;
         };
         let residual = |node: usize| implicit.residuals.get(node).as_dvec3();
         let push = |node: usize| implicit.pushes.get(node).as_dvec3();
         contacts.holds.imbalance(residual) <= f64::from(implicit.accuracy)
-            && !(self.is_long() && contacts.holds.missing(push) > MISSING)
+            && !(self.is_long() && contacts.holds.missing(push) > lacking)
     }
 
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which
@@ -242,14 +246,14 @@ impl Substep<'_> {
         let is_smooth = self.is_long() && implicit.taken.carried != 0.0;
         let state = body.state.substep();
         contacts.show_touched(is_smooth, |node, normal| {
+            let along = |vector: Vec3| normal.map_or(vector, |normal| vector.project_onto_normalized(normal));
             let gain = history.gains.get(node);
-            let left = normal.map_or(Vec3::ZERO, |normal| gain.reject_from_normalized(normal));
-            history.gains.set(node, left);
-            if let Some(normal) = normal.filter(|_| is_smooth) {
+            history.gains.set(node, gain - along(gain));
+            if is_smooth {
                 // Who is stopped goes on as the tool does; order 2 would have it rebound.
                 let velocity = state.velocities.get(node);
-                let more = (history.ways.get(node) * per_step - velocity).project_onto_normalized(normal);
-                state.velocities.set(node, velocity + more);
+                let more = history.ways.get(node) * per_step - velocity;
+                state.velocities.set(node, velocity + along(more));
             }
         });
         for pin in body.pins.partial() {

@@ -17,8 +17,13 @@ use crate::threads::{Items, Team};
 /// Linearised equations solved in a step at most.
 const NEWTON: u32 = 200;
 
-/// What the contacts of a long step may take beyond its budget, at most: twice as many products, or so many.
-const MORE: u32 = 64;
+/// What the contacts of a long step may take beyond its budget, in budgets: where they lack something, and beside that where they lack much,
+/// which short parts would cost more. And no more products than that.
+const MORE: [u32; 2] = [2, 4];
+const MOST_MORE: u32 = 64;
+
+/// What contacts of a long step lack then, as a part of what they do: a frame later little is there.
+const LACKING: [f64; 2] = [0.01, 0.05];
 
 /// What may be missing of a correction where other contacts push than before it, as a fraction of its size: others will after it.
 const OTHER: f64 = 0.3;
@@ -115,11 +120,10 @@ impl Substep<'_> {
         let absolute = tolerated.powi(2) * all_inertia;
         let relative = f64::from(implicit.accuracy).powi(2);
         let mut whole_budget = self.budget(implicit);
-        let mut more = if self.is_long() {
-            (2 * whole_budget).min(MORE)
-        } else {
-            0
-        };
+        let mut more = MORE.map(|budgets| (budgets * whole_budget).min(MOST_MORE));
+        if !self.is_long() {
+            more = [0; 2];
+        }
         let mut products = 0;
         let mut size = 0.0;
         let mut error = f64::INFINITY;
@@ -155,13 +159,16 @@ impl Substep<'_> {
             vain = if is_in_vain { vain + 1 } else { 0 };
             let is_stuck = vain > 2;
             error = remaining;
-            if products >= whole_budget && !self.is_balanced(body, implicit) {
-                whole_budget += std::mem::take(&mut more);
+            for (more, missing) in more.iter_mut().zip(LACKING) {
+                if products >= whole_budget && !self.is_balanced(body, implicit, missing) {
+                    whole_budget += std::mem::take(more);
+                }
             }
             let budget = whole_budget - products.min(whole_budget);
             // What all nodes do together may be less than what rounding does to stiff springs: a solution is tried in any case.
             let is_tried = iteration > 0 || square == 0.0;
-            let is_found = is_tried && error <= absolute.max(relative * size) && self.is_balanced(body, implicit);
+            let is_found =
+                is_tried && error <= absolute.max(relative * size) && self.is_balanced(body, implicit, LACKING[0]);
             is_solved = is_found || is_stuck;
             if is_solved || budget == 0 || !error.is_finite() {
                 break;
@@ -214,7 +221,10 @@ impl Substep<'_> {
                     pin.put_among(residuals, Vec3::ZERO);
                 }
             }
-            if gone == 1.0 && solved.size.max(solved.error) <= relative * size && self.is_balanced(body, implicit) {
+            if gone == 1.0
+                && solved.size.max(solved.error) <= relative * size
+                && self.is_balanced(body, implicit, LACKING[0])
+            {
                 error = solved.error;
                 is_solved = true;
                 break;

@@ -97,7 +97,7 @@ pub(in crate::solver) fn run(
             }
             let whole = [substeps.saturating_mul(parts), middle.saturating_mul(parts)];
             // What a small budget does not solve in so many parts it does not solve in more.
-            let is_spent = is_long && cuts > 0 && whole[0] / 4 > implicit.budget;
+            let is_spent = is_near && cuts > 0 && whole[0] / 4 > implicit.budget;
             let is_last_resort = cuts == CUTS || whole[0].saturating_mul(4) > PARTS || is_spent;
             let may_be_shorter = is_long && parts < short && contact::is_near(body);
             end = run_in_parts(body, &mut implicit, request, whole, is_last_resort, team);
@@ -316,7 +316,10 @@ impl Substep<'_> {
 
     fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
         body.foresee(self.step);
-        self.foreseeing(body, implicit).take_formula(body, implicit, before)
+        match self.foreseeing(body, implicit) {
+            Some(foreseeing) => foreseeing.take_formula(body, implicit, before),
+            None => End::Near,
+        }
     }
 
     fn take_formula(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {

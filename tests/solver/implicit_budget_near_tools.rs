@@ -1,0 +1,125 @@
+//! IMPLICIT with few iterations beside a tool: a frame is one equation with contacts and friction in it, takes no more work than
+//! a few budgets, and the tool feels what VERLET has it feel.
+
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+
+use crate::support::solid::ball;
+
+const CELL: f32 = 0.005;
+const CELLS: [u32; 3] = [14, 5, 14];
+const RADIUS: f32 = 0.02;
+const FRAME: f32 = 1.0 / 60.0;
+const DEPTH: f32 = 0.003;
+const ASIDE: f32 = 0.004;
+const BUDGET: u32 = 16;
+/// Frames of each leg: pressed, dragged aside, at rest.
+const LEG: usize = 20;
+
+/// Of a frame.
+struct Felt {
+    /// N
+    force: Vec3,
+    products: u32,
+}
+
+/// What a tool feels that is pressed into a block, dragged aside, and stays there.
+fn drag(solver: Solver, model: Model, shape: Shape, friction: f32) -> Vec<Felt> {
+    let size = CELLS.map(|count| count as f32 * CELL);
+    let mesh = Mesh::block(size, CELLS).expect("a block");
+    let mut world = World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        max_substeps: 1000,
+        ..Default::default()
+    })
+    .expect("a world");
+    let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
+    let body = world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            node_dampings: Values::Uniform(200.0 * node_mass),
+            material: Some(Material {
+                model,
+                young_modulus: 10e3,
+                poisson_ratio: if model == Model::Springs { 0.25 } else { 0.3 },
+                density: 1000.0,
+                ..Default::default()
+            }),
+            solver,
+            iterations: if solver == Solver::Implicit { BUDGET } else { 0 },
+            ..Default::default()
+        })
+        .expect("a body");
+    let top = 0.5 * size[1];
+    let below = (0..).zip(&mesh.positions).filter(|(_, place)| place.y < -0.99 * top);
+    let below: Vec<u32> = below.map(|(node, _)| node).collect();
+    crate::support::tissue::pin_all(&mut world, body, &below);
+    // Beside the mesh's symmetry.
+    let at = |aside: f32, depth: f32| Vec3::new(0.3 * CELL + aside, top + RADIUS - depth, 0.1 * CELL);
+    let tool = world
+        .create_tool(&ToolDefinition {
+            friction,
+            pose: Pose {
+                position: at(0.0, -5e-4),
+                ..Pose::IDENTITY
+            },
+            ..ToolDefinition::new(shape)
+        })
+        .expect("a tool");
+    (1..=3 * LEG)
+        .map(|frame| {
+            let [pressed, dragged] = [frame, frame.saturating_sub(LEG)].map(|frame| frame.min(LEG) as f32 / LEG as f32);
+            let depth = (DEPTH + 5e-4) * pressed - 5e-4;
+            world.set_pose(tool, at(ASIDE * dragged, depth), None).expect("a pose");
+            let step = world.step(FRAME).expect("a step");
+            assert_eq!(step.bodies_restored, 0);
+            Felt {
+                force: world.wrench(tool).expect("a tool").0,
+                products: world.body(body).expect("the body").solver_report().iterations,
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_tool_feels_what_it_should_with_few_iterations() {
+    let round = ball(RADIUS, 2);
+    let mesh = Shape::Mesh {
+        positions: &round.positions,
+        triangles: &round.triangles,
+    };
+    let sphere = Shape::Sphere { radius: RADIUS };
+    let mut failures = Vec::new();
+    for (name, shape, model, friction) in [
+        ("sphere", sphere, Model::Springs, 0.0),
+        ("sphere", sphere, Model::Springs, 0.3),
+        ("sphere", sphere, Model::Tetrahedra, 0.3),
+        ("mesh", mesh, Model::Tetrahedra, 0.3),
+    ] {
+        let right = drag(Solver::Verlet, model, shape, friction);
+        let found = drag(Solver::Implicit, model, shape, friction);
+        let largest = right.iter().map(|felt| felt.force.length()).fold(0.0, f32::max);
+        assert!(largest > 0.2, "{name}: nothing to be measured, {largest} N");
+        let mut sums = [0.0; 2];
+        for (frame, (found, right)) in found.iter().zip(&right).enumerate() {
+            let off = (found.force - right.force).length() / largest;
+            sums = [sums[0] + off, sums[1] + found.products as f32];
+            // Where the tool is led aside all of a sudden, more nodes stick or slip than the last frame tells.
+            if off > 0.06 || found.products > 9 * BUDGET {
+                failures.push(format!(
+                    "{name}, {model:?}, friction {friction}, frame {frame}: {} N, {} N is right, {} products",
+                    found.force, right.force, found.products
+                ));
+            }
+        }
+        let [off, products] = sums.map(|sum| sum / found.len() as f32);
+        if off > 0.012 || products > 3.0 * BUDGET as f32 {
+            failures.push(format!(
+                "{name}, {model:?}, friction {friction}: off by {off} of the largest force, {products} products a frame"
+            ));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
