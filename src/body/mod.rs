@@ -612,7 +612,7 @@ impl Body {
     /// Makes room for contacts within equations, where it has such.
     fn reserve_holds(&mut self) -> Result<()> {
         if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
-            implicit.reserve_contacts(contacts.reserve_holds()?)?;
+            implicit.reserve_contacts(contacts.reserve_holds(implicit.has_small_budget())?)?;
             if self.node_room > 0 {
                 implicit.reserve_nodes(self.node_room)?;
             }

@@ -272,10 +272,10 @@ impl Contacts {
         self.holds.begin_step();
     }
 
-    /// Makes room for contacts within equations, where the body has such: for how many.
-    pub fn reserve_holds(&mut self) -> Result<usize> {
+    /// Makes room for contacts within equations, where the body has such, and if `drags` for their friction: for how many.
+    pub fn reserve_holds(&mut self, drags: bool) -> Result<usize> {
         let count = self.together.min(HELD);
-        self.holds.reserve(count)?;
+        self.holds.reserve(count, drags)?;
         Ok(count)
     }
 
@@ -831,11 +831,13 @@ impl Contacts {
     /// How fast what is near moves against the tool at most, m/s.
     fn closing_speed(&self, meeting: &Meeting, tool: &ToolPath) -> f32 {
         let motion = tool.motion(meeting.start, meeting.end, meeting.dt, meeting.origin);
-        let speeds = self.candidates.corner_nodes().map(|node| {
-            let arm = meeting.vector(meeting.positions, node) - motion.centre;
-            (meeting.vector(meeting.velocities, node) - motion.velocity - motion.spin.cross(arm)).length()
-        });
-        speeds.fold(0.0, f32::max) + tool.stray_speed(meeting.dt)
+        let speeds = self
+            .candidates
+            .corner_nodes()
+            .map(|node| (meeting.vector(meeting.velocities, node) - motion.velocity).length());
+        // Turning counts by the tool's furthest point: an arc is taken for its chord.
+        let turning = (tool.speed(meeting.dt) - motion.velocity.length()).max(0.0);
+        speeds.fold(turning, |fastest, speed| fastest.max(speed + turning))
     }
 
     fn find_candidates(&mut self, meeting: &Meeting) {

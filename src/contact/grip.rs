@@ -153,24 +153,31 @@ impl Grips {
         self.grips.clear();
     }
 
-    /// Adds a part of one: parts of the same node and tool become one in [`Grips::begin`].
-    pub fn add(&mut self, part: Grip) {
-        self.grips.push(part);
+    /// Adds `part` of one, as far as there is room: those of the same node and tool become one in [`Grips::begin`]. Its normal and slip are
+    /// those of its contact.
+    pub fn add(&mut self, part: f64, grip: Grip) {
+        let place = self.grips.partition_point(|known| known.key() < grip.key());
+        let is_known = self.grips.get(place).is_some_and(|known| known.key() == grip.key());
+        if !is_known {
+            if self.grips.len() == self.grips.capacity() {
+                return;
+            }
+            let none = Grip {
+                normal: DVec3::ZERO,
+                slip: DVec3::ZERO,
+                ..grip
+            };
+            self.grips.insert(place, none);
+        }
+        let known = &mut self.grips[place];
+        known.normal += grip.normal * part;
+        known.slip += grip.slip * part;
+        known.pressed += part;
+        known.kept = known.kept.min(grip.kept);
     }
 
-    /// Makes one of all parts of a node and a tool, each with the normal and the slip of its contact times its share, which `pressed` is at first.
+    /// Makes each the mean of what was added, and has it begin with what it did last.
     pub fn begin(&mut self) {
-        self.grips.sort_by_key(|grip| (grip.node, grip.tool));
-        self.grips.dedup_by(|again, first| {
-            let is_same = (again.node, again.tool) == (first.node, first.tool);
-            if is_same {
-                first.normal += again.normal;
-                first.slip += again.slip;
-                first.pressed += again.pressed;
-                first.kept = first.kept.min(again.kept);
-            }
-            is_same
-        });
         for grip in &mut self.grips {
             grip.slip /= grip.pressed;
             grip.normal = grip.normal.normalize_or_zero();
@@ -186,9 +193,7 @@ impl Grips {
 
     /// Where that of a node and a tool is.
     pub fn place(&self, node: u32, tool: usize) -> Option<usize> {
-        self.grips
-            .binary_search_by_key(&(node, tool), |grip| (grip.node, grip.tool))
-            .ok()
+        self.grips.binary_search_by_key(&(node, tool), Grip::key).ok()
     }
 
     /// Nothing presses any node.
@@ -305,6 +310,10 @@ impl Dragged {
 }
 
 impl Grip {
+    fn key(&self) -> (u32, usize) {
+        (self.node, self.tool)
+    }
+
     fn across(&self, vector: DVec3) -> DVec3 {
         vector - self.normal * vector.dot(self.normal)
     }

@@ -153,8 +153,8 @@ saved!(Holds {
 });
 
 impl Holds {
-    /// Makes room for so many contacts.
-    pub fn reserve(&mut self, count: usize) -> Result<()> {
+    /// Makes room for so many contacts, and for friction of as many nodes if that belongs to them.
+    pub fn reserve(&mut self, count: usize, drags: bool) -> Result<()> {
         self.holds.try_reserve(count.saturating_sub(self.holds.len()))?;
         let shares = MOST * count;
         self.shares.try_reserve(shares.saturating_sub(self.shares.len()))?;
@@ -162,7 +162,7 @@ impl Holds {
         for pushes in [&mut self.last, &mut self.settled] {
             pushes.try_reserve(count.saturating_sub(pushes.len()))?;
         }
-        self.grips.reserve(shares)
+        self.grips.reserve(if drags { count } else { 0 })
     }
 
     /// Begins a step anew.
@@ -305,19 +305,18 @@ impl Holds {
                 free[place] = constraint.starts[place].as_dvec3() + way.as_dvec3();
                 softness += share * share / stiffness;
                 if drags && constraint.friction > 0.0 && share > 0.0 && stiffness.is_finite() {
-                    let part = f64::from(share);
-                    self.grips.add(Grip {
+                    let grip = Grip {
                         node,
                         tool: constraint.tool,
                         slot: slot_of(constraint.tool),
                         friction: constraint.friction.into(),
-                        normal: constraint.normal.as_dvec3() * part,
-                        slip: (way - constraint.surface_velocity * duration).as_dvec3() * part,
+                        normal: constraint.normal.as_dvec3(),
+                        slip: (way - constraint.surface_velocity * duration).as_dvec3(),
                         stiffness: f64::from(STIFFER * constraint.firmness * stiffness),
                         kept: hold.kept,
-                        pressed: part,
                         ..Grip::default()
-                    });
+                    };
+                    self.grips.add(share.into(), grip);
                 }
                 self.shares.push(Share {
                     node,

@@ -307,11 +307,6 @@ impl ToolPath {
         };
         travel / self.lasts(dt) as f32
     }
-
-    /// How fast it may leave its line, m/s.
-    pub(super) fn stray_speed(&self, dt: f32) -> f32 {
-        self.strays / self.lasts(dt) as f32
-    }
 }
 
 /// What a tool sweeps over a step.

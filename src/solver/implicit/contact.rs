@@ -25,8 +25,7 @@ const SMALL: u32 = 256;
 /// for short parts is used for them.
 pub(super) fn may_be_long(body: &Body, implicit: &Implicit, request: &StepRequest) -> bool {
     let is_alone = request.dynamic.is_empty() && request.neighbor_speed.is_none() && body.bindings.is_none();
-    let is_iterated = implicit.newton.is_none() && implicit.budget < SMALL;
-    is_iterated && !implicit.is_attached && is_alone && body.contacts.is_some()
+    implicit.has_small_budget() && !implicit.is_attached && is_alone && body.contacts.is_some()
 }
 
 /// How far an open contact may be to belong to an equation, as a part of the body's extent.
@@ -274,6 +273,11 @@ impl Substep<'_> {
 }
 
 impl Implicit {
+    /// Whether it takes long steps beside tools.
+    pub fn has_small_budget(&self) -> bool {
+        self.newton.is_none() && self.budget < SMALL
+    }
+
     /// How fast a node goes on its way in the substep that was just solved, m/s.
     pub fn mean(&self, node: usize) -> Vec3 {
         let history = &self.histories[1 - self.settled];

@@ -121,7 +121,8 @@ impl Substep<'_> {
         let relative = f64::from(implicit.accuracy).powi(2);
         let mut whole_budget = self.budget(implicit);
         let mut more = MORE.map(|budgets| (budgets * whole_budget).min(MOST_MORE));
-        if !self.is_long() {
+        // A caller that bounds the work of a step has it bounded.
+        if !self.is_long() || implicit.allowed < u32::MAX {
             more = [0; 2];
         }
         let mut products = 0;
