@@ -84,6 +84,18 @@ pub const SCENES: [Row; 16] = [
         20,
         60,
     ),
+    (
+        "jaw in an organ, springs, IMPLICIT",
+        |with| organ(SPRINGS_16, with, jaw),
+        20,
+        60,
+    ),
+    (
+        "jaw in an organ, tetrahedra, IMPLICIT",
+        |with| organ(TETRAHEDRA_16, with, jaw),
+        20,
+        60,
+    ),
 ];
 
 type Tissue = (Model, Solver, u32);
