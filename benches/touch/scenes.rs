@@ -12,7 +12,7 @@ use crate::scene::{Scene, at, ramp, turned};
 /// A scene with a tool or without, the frame from which the tool touches, and how many frames there are.
 pub type Row = (&'static str, fn(bool) -> Result<Scene, Error>, usize, usize);
 
-pub const SCENES: [Row; 16] = [
+pub const SCENES: [Row; 18] = [
     (
         "ball pressed into a cloth, 41 x 41",
         |with| pressed(40, with, ball),
