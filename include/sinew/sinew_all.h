@@ -457,7 +457,7 @@ typedef struct sinew_body_def {
   /// IMPLICIT, NEWTON: largest number of matrix-vector products per step, at most 1,000,000. 0
   /// (default) is 1000 for IMPLICIT, where a product costs about one VERLET substep, and 100,000
   /// for NEWTON. Each part of a subdivided step gets at least 1/32 of it. If less than 256, a step
-  /// beside a tool may take seven times as many, at most 128 more.
+  /// beside a tool may take seven times as many, at most 128 more, before it is subdivided.
   uint32_t iterations;
   /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1. It bounds the error
   /// relative to the displacement that forces cause in the step. 0 is 0.01 for IMPLICIT, 1e-6 for

@@ -122,7 +122,7 @@ pub struct sinew_body_def {
     ///
     /// 0 (default) is 1000 for IMPLICIT, where a product costs about one VERLET substep, and 100,000 for NEWTON.
     /// Each part of a subdivided step gets at least 1/32 of it. If less than 256, a step beside a tool may take seven
-    /// times as many, at most 128 more.
+    /// times as many, at most 128 more, before it is subdivided.
     pub iterations: u32,
     /// IMPLICIT, NEWTON: relative tolerance of the linear solve, 1e-6 to 1.
     ///

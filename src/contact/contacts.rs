@@ -465,8 +465,7 @@ impl Contacts {
         for (index, constraint) in self.constraints.iter().enumerate() {
             let given = constraint.given().as_dvec3();
             let held = if index < self.holds.len() {
-                let (meets, force, _) = self.holds.found(index);
-                (meets.normal * force + self.holds.drag(index)) * substep
+                self.holds.force(index) * substep
             } else {
                 DVec3::ZERO
             };
@@ -496,9 +495,7 @@ impl Contacts {
             }
         });
         for (index, constraint) in constraints.iter().enumerate().take(holds.len()) {
-            let (meets, force, _) = holds.found(index);
-            let of_end = meets.normal * force + holds.drag(index);
-            loads[constraint.tool].add(of_end * (0.5 * substep), constraint.arm);
+            loads[constraint.tool].add(holds.force(index) * (0.5 * substep), constraint.arm);
         }
     }
 

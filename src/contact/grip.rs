@@ -153,8 +153,8 @@ impl Grips {
         self.grips.clear();
     }
 
-    /// Adds `part` of one, as far as there is room: those of the same node and tool become one in [`Grips::begin`]. Its normal and slip are
-    /// those of its contact.
+    /// Adds `part` of one with the normal and the slip of its contact to that of the same node and tool, which is new as long as there is
+    /// room: `pressed` is the sum of the parts until [`Grips::begin`].
     pub fn add(&mut self, part: f64, grip: Grip) {
         let place = self.grips.partition_point(|known| known.key() < grip.key());
         let is_known = self.grips.get(place).is_some_and(|known| known.key() == grip.key());

@@ -573,6 +573,12 @@ impl Holds {
         (answer.meets, answer.force, answer.meets.gap - least)
     }
 
+    /// What contact number `index` does to the tissue with its friction, N.
+    pub(super) fn force(&self, index: usize) -> DVec3 {
+        let Answer { meets, force, .. } = &self.holds[index].answer;
+        meets.normal * *force + self.drag(index)
+    }
+
     /// What friction of contact number `index` does: what that of its nodes does, as far as it presses them, N.
     pub(super) fn drag(&self, index: usize) -> DVec3 {
         let hold = &self.holds[index];

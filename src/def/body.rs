@@ -182,7 +182,7 @@ pub struct BodyDefinition<'a> {
     /// [`Solver::Implicit`], [`Solver::Newton`]: the most products with the matrix of its equation in a step; 0: 1000, or
     /// 100 000 with [`Solver::Newton`]. Where a tool or a tolerance cuts the step, a
     /// thirty-second of it for each part at least. With fewer than 256 a step beside a tool may take seven times as many, at most 128
-    /// more.
+    /// more, before it is cut.
     pub iterations: u32,
     /// [`Solver::Implicit`], [`Solver::Newton`]: what may be missing of the solution of a step's equation, as a part of what forces
     /// change in the step; from 1e-6 to 1; 0: 0.01, or 1e-6 with [`Solver::Newton`].

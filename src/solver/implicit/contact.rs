@@ -1,7 +1,8 @@
 //! Tools and an implicit step: contacts that can be foreseen belong to its equation, and then the nodes that would still enter
 //! a tool are stopped.
 //!
-//! What is not foreseen is not known to the springs before the next step, so near tools steps are short.
+//! What is not foreseen is not known to the springs before the next step, so near tools steps are short, or taken again where much was
+//! not foreseen.
 
 use glam::Vec3;
 
@@ -206,7 +207,7 @@ impl Substep<'_> {
 
     /// Lets tools stop the nodes that would enter them.
     pub(super) fn meet(&self, body: &mut Body, implicit: &mut Implicit) -> End {
-        let may_stand = !self.is_long() || may_be_long(body, implicit, self.request);
+        let may_stand = may_be_long(body, implicit, self.request);
         let Some(means) = &mut implicit.means else {
             return End::Fine;
         };
