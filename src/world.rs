@@ -219,10 +219,11 @@ impl World {
     /// Lets a body that asks for it meet tissue.
     fn join_tissue(&mut self, id: SlotId) -> Result<()> {
         let place = self.bodies.place(id)?;
-        let body = self.bodies.get(id)?;
+        let body = self.bodies.get_mut(id)?;
         if !body.meets_tissue() {
             return Ok(());
         }
+        body.reserve_pressed()?;
         make_walks(&mut self.walks, place)?;
         memory::get_or_box(&mut self.tissue)?.join(place, body)
     }

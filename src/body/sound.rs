@@ -14,6 +14,7 @@ impl Body {
             && self.springs.node_count() == count
             && (0..count).all(|node| self.springs_lead_to(node, count))
             && self.order.is_sound(count)
+            && self.implicit.as_ref().is_none_or(|implicit| implicit.is_sound(count))
             && self.state.is_sound(count)
             && self.pins.are_sound(count)
             && self.published.positions().len() == count

@@ -157,6 +157,40 @@ impl Body {
         }
     }
 
+    /// Makes room for what other tissue presses it with.
+    pub(crate) fn reserve_pressed(&mut self) -> Result<()> {
+        if self.implicit.is_none() {
+            return Ok(());
+        }
+        let none = [self.zeros()?, self.zeros()?];
+        if let Some(implicit) = &mut self.implicit {
+            implicit.add_pressed(none);
+        }
+        Ok(())
+    }
+
+    /// Takes from an implicit body again what an equation took to press it, before contacts give what they have to.
+    pub(crate) fn release_pressed(&mut self, duration: f32) {
+        let Some(implicit) = &mut self.implicit else {
+            return;
+        };
+        let state = self.state.substep();
+        implicit.release_pressed(&self.inverse_masses, self.damping.as_ref(), |node, given| {
+            state.velocities.set(node, state.velocities.get(node) - given);
+            let place = state.next_positions.get(node) - given * duration;
+            state.next_positions.set(node, place);
+        });
+    }
+
+    /// Has the next equation of an implicit body know what a contact gave to a node, N s.
+    pub(crate) fn press(&mut self, node: u32, impulse: Vec3) {
+        let free = self.answer_of(node).cmpgt(Vec3::ZERO);
+        if let Some(implicit) = &mut self.implicit {
+            let impulse = Vec3::select(free, impulse, Vec3::ZERO);
+            implicit.press(node as usize, impulse, self.damping.as_ref());
+        }
+    }
+
     /// Moves a node at the end of a substep, without giving it speed.
     pub(crate) fn part_substep(&mut self, node: usize, way: Vec3) {
         let next_positions = self.state.substep().next_positions;

@@ -100,6 +100,7 @@ impl World {
         it.wake();
         let joined = if it.meets_tissue() {
             make_walks(&mut self.walks, place)
+                .and_then(|()| it.reserve_pressed())
                 .and_then(|()| memory::get_or_box(&mut self.tissue))
                 .and_then(|tissue| tissue.join(place, it))
         } else {

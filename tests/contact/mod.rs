@@ -12,6 +12,7 @@ mod friction;
 mod grasp;
 mod hard;
 mod image_space;
+mod implicit_pairs;
 mod limit;
 mod mesh;
 mod mesh_momentum;

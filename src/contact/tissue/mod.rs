@@ -424,6 +424,7 @@ impl Tissue {
             if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place))
                 && moment.concerns(body)
             {
+                body.release_pressed(moment.duration);
                 skin.follow(body, moment.duration);
             }
         }
@@ -448,7 +449,11 @@ impl Tissue {
                         let node = node as usize;
                         let velocity = skin.velocities.get(node);
                         skin.given = skin.given.with(velocity);
-                        body.nudge(node, velocity, link.given() * (sign * part), moment);
+                        let impulse = link.given() * (sign * part);
+                        body.nudge(node, velocity, impulse, moment);
+                        if moment.drifts {
+                            body.press(node as u32, impulse);
+                        }
                     }
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::iterations::show_held;
 use super::step::Substep;
-use super::{End, Implicit};
+use super::{End, History, Implicit};
 use crate::body::{Body, Pins};
 use crate::codec::saved;
 use crate::contact::Contacts;
@@ -112,7 +112,7 @@ impl Substep<'_> {
         );
         let next = 1 - implicit.settled;
         let elastic = implicit.elastic(body, true, next, self.team);
-        let work = self.work(body, &implicit.histories[next].ways);
+        let work = self.work(body, &implicit.histories[next]);
         let after = elastic.plus(kinetic);
         let allowed = before.total.energy + work + before.credit;
         let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).energy;
@@ -141,7 +141,7 @@ impl Substep<'_> {
             &body.pins,
             body.kernel,
         );
-        let work = self.work(body, &implicit.histories[next].ways);
+        let work = self.work(body, &implicit.histories[next]);
         let state = body.state.substep();
         let history = &mut implicit.histories[next];
         if let Some(total) = known
@@ -215,8 +215,10 @@ impl Substep<'_> {
             });
     }
 
-    /// What gravity, forces from outside and tools did on these ways, J.
-    fn work(&self, body: &Body, ways: &Vectors) -> f64 {
+    /// What gravity, forces from outside, tools and other tissue did on these ways, J.
+    fn work(&self, body: &Body, history: &History) -> f64 {
+        let ways = &history.ways;
+        let pressed = history.pressing();
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node));
         let mut work = body.contacts.as_deref().map_or(0.0, held);
@@ -230,7 +232,7 @@ impl Substep<'_> {
                         free: &body.inverse_masses,
                     });
             }
-            if let Some(applied) = applied {
+            for applied in applied.into_iter().chain(pressed) {
                 let free = &body.inverse_masses;
                 work += body.kernel.run(Weighted {
                     weights: applied.axes()[axis],

@@ -54,6 +54,7 @@ impl Substep<'_> {
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
         let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
+        let pressed = implicit.histories[1 - implicit.settled].pressing();
         let rates = body.damping.as_ref().map(|damping| damping.rates());
         let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
         let motion = Motion {
@@ -95,6 +96,13 @@ impl Substep<'_> {
                     pushes: pushes.slices(nodes.clone()),
                     residuals: &mut residuals,
                 });
+                if let Some(pressed) = pressed {
+                    kernel.run(Add {
+                        factor: 1.0,
+                        from: pressed.slices(nodes.clone()),
+                        to: residuals.each_mut().map(|axis| &mut **axis),
+                    });
+                }
                 if let Some(holds) = holds {
                     holds.add_forces(&nodes, &mut residuals);
                 }

@@ -16,6 +16,7 @@ mod estimate;
 mod gradient;
 mod iterations;
 mod loops;
+mod pressed;
 mod rigid;
 mod step;
 
@@ -37,6 +38,7 @@ use coarse::Coarse;
 use energy::Total;
 use estimate::Spectrum;
 use gradient::Partial;
+use pressed::Pressed;
 use step::Formula;
 
 /// What rounding makes of a coordinate, as a fraction of the body's extent.
@@ -57,6 +59,8 @@ pub(crate) struct History {
     energy: Option<Total>,
     /// What was lost not long ago, and may come back: the energy of a step's formula is not quite this one.
     pub credit: f64,
+    /// What other tissue presses it with, where it meets some.
+    pressed: Option<Pressed>,
 }
 
 saved!(History {
@@ -65,7 +69,8 @@ saved!(History {
     remainders,
     step,
     energy,
-    credit
+    credit,
+    pressed
 });
 
 /// How a substep ended.
@@ -89,6 +94,7 @@ impl History {
             step: 0.0,
             energy: None,
             credit: 0.0,
+            pressed: None,
         })
     }
 }
@@ -308,6 +314,9 @@ impl Implicit {
             for vectors in [&mut history.ways, &mut history.gains] {
                 vectors.reserve(count)?;
             }
+            if let Some(pressed) = &mut history.pressed {
+                pressed.reserve(count)?;
+            }
         }
         self.pushes.reserve(count)?;
         if let Some(means) = &mut self.means {
@@ -330,11 +339,19 @@ impl Implicit {
         memory::reserve(&mut self.partials, tile_count(count))
     }
 
+    /// Whether what it keeps of the last step belongs to so many nodes.
+    pub fn is_sound(&self, count: usize) -> bool {
+        self.histories.iter().all(|history| history.is_sound(count))
+    }
+
     /// Adds nodes, for which there is room, up to so many in all; NEWTON has been made roomier.
     pub fn grow(&mut self, count: usize) {
         for history in &mut self.histories {
             history.ways.grow(count);
             history.gains.grow(count);
+            if let Some(pressed) = &mut history.pressed {
+                pressed.grow(count);
+            }
         }
         self.prepared = 0.0;
         self.pushes.grow(count);
@@ -519,6 +536,9 @@ impl Implicit {
         let history = &mut self.histories[self.settled];
         history.step = 0.0;
         history.remainders.clear();
+        if let Some(pressed) = &mut history.pressed {
+            pressed.forget();
+        }
         if let Some(newton) = &mut self.newton {
             newton.forget_remainders(self.settled);
         }
@@ -538,6 +558,7 @@ impl Implicit {
 
     /// What the next step depends on beside the state.
     pub fn hash(&self, hasher: &mut StateHasher) {
+        let history = &self.histories[self.settled];
         let History {
             ways,
             gains,
@@ -545,7 +566,8 @@ impl Implicit {
             step,
             energy,
             credit,
-        } = &self.histories[self.settled];
+            pressed: _,
+        } = history;
         for vector in ways.iter().chain(gains.iter()).chain(remainders.iter()) {
             hasher.write_floats(&vector.to_array());
         }
@@ -554,6 +576,9 @@ impl Implicit {
         hasher.write_u64(energy.to_bits());
         hasher.write_u64(size.to_bits());
         hasher.write_u64(credit.to_bits());
+        for force in history.pressing().into_iter().flat_map(Vectors::iter) {
+            hasher.write_floats(&force.to_array());
+        }
         hasher.write_u64(u64::from(self.order) << 32 | u64::from(self.budget));
         if let Some(newton) = &self.newton {
             newton.hash(self.settled, hasher);

@@ -201,6 +201,8 @@ fn take_part(
         team,
     };
     body.lead_grasps(request.tools, [substep.start, substep.end]);
+    let is_together = request.neighbor_speed.is_some() && body.meets_tissue();
+    implicit.recall_pressed(substep.is_first, is_together);
     let end = substep.take_safely(body, implicit, is_last_resort);
     if end != End::Fine {
         return end;
@@ -571,6 +573,7 @@ impl Substep<'_> {
             gravity: self.request.gravity,
             end: self.end,
             ways: &implicit.histories[from].ways,
+            pressed: implicit.histories[to].pressing(),
             from,
             to,
             budget: self.budget(implicit),

@@ -25,6 +25,8 @@ pub(in crate::solver) struct Aimed<'a> {
     pub end: f64,
     /// How far each node went in the last step.
     pub ways: &'a Vectors,
+    /// What other tissue presses with, N.
+    pub pressed: Option<&'a Vectors>,
     /// Which remainders belong to the positions now, and to those at the end.
     pub from: usize,
     pub to: usize,
@@ -95,7 +97,7 @@ impl Newton {
             equation.masses[node] = mass;
             equation.inertia[node] = (mass * rate + damping) * rate;
             equation.loads[node] -= velocity * damping;
-            if let Some(applied) = applied {
+            for applied in applied.into_iter().chain(aimed.pressed) {
                 equation.loads[node] += applied.get(node).as_dvec3();
             }
         }

@@ -1,0 +1,159 @@
+//! IMPLICIT bodies that press each other: their equations know of it, and nothing else comes of it.
+
+use glam::{DVec3, Vec3};
+use sinew::mesh::Mesh;
+use sinew::{
+    BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, Values, World, WorldDefinition,
+};
+
+use crate::support::tissue::{body, kinetic, momentum, moved, pin_all, pin_forces, total_energy};
+
+const FRAME: f32 = 1.0 / 60.0;
+const SIZE: [f32; 3] = [0.06, 0.03, 0.06];
+const CELLS: [u32; 3] = [6, 3, 6];
+/// kg/m³
+const DENSITY: f32 = 1060.0;
+
+const MEETS: BodyContact = BodyContact {
+    with_bodies: true,
+    ..BodyContact::NOTHING
+};
+
+fn world() -> World {
+    World::new(WorldDefinition {
+        gravity: Vec3::ZERO,
+        max_substeps: 100_000,
+        ..Default::default()
+    })
+    .expect("a world")
+}
+
+/// A block of soft tetrahedra; mirrored: upside down, so that two of them are each other's images.
+fn block(world: &mut World, solver: Solver, height: f32, mirrored: bool, damping: f32) -> (BodyId, Mesh) {
+    let mut mesh = Mesh::block(SIZE, CELLS).expect("a block");
+    if mirrored {
+        mesh.positions.iter_mut().for_each(|place| place.y = -place.y);
+        mesh.tetrahedra.iter_mut().for_each(|corners| corners.swap(1, 2));
+    }
+    let mesh = moved(mesh, Vec3::Y * height);
+    let node_mass = DENSITY * SIZE.iter().product::<f32>() / mesh.positions.len() as f32;
+    let id = world
+        .create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            masses: Values::Uniform(node_mass),
+            node_dampings: Values::Uniform(damping * node_mass),
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                young_modulus: 5400.0,
+                poisson_ratio: 0.3,
+                ..Default::default()
+            }),
+            solver,
+            contact: MEETS,
+            ..Default::default()
+        })
+        .expect("a body");
+    (id, mesh)
+}
+
+fn far_nodes(mesh: &Mesh, is_far: impl Fn(f32) -> bool) -> Vec<u32> {
+    let nodes = (0..).zip(&mesh.positions).filter(|(_, place)| is_far(place.y));
+    nodes.map(|(node, _)| node).collect()
+}
+
+/// Two blocks between pinned plates that come 4 mm closer than the blocks are high, and apart again: what the lower plate feels then, N.
+fn pressed(solver: Solver, dt: f32) -> [f64; 2] {
+    let mut world = world();
+    let (lower, below) = block(&mut world, solver, -0.5 * SIZE[1], false, 30.0);
+    let (upper, above) = block(&mut world, solver, 0.5 * SIZE[1] + 2e-4, true, 30.0);
+    let ground = far_nodes(&below, |y| y < -0.999 * SIZE[1]);
+    let plate = far_nodes(&above, |y| y > SIZE[1] + 1.9e-4);
+    pin_all(&mut world, lower, &ground);
+    pin_all(&mut world, upper, &plate);
+    let lead = |world: &mut World, seconds: f32, from: f32, to: f32| {
+        let steps = (seconds / dt) as usize;
+        for step in 1..=steps {
+            let way = from + (to - from) * step as f32 / steps as f32;
+            for &node in &plate {
+                let place = above.positions[node as usize] - Vec3::Y * way;
+                world
+                    .body_mut(upper)
+                    .expect("a body")
+                    .move_pin(node, place)
+                    .expect("a pin");
+            }
+            world.step(dt).expect("a step");
+        }
+    };
+    lead(&mut world, 0.6, 0.0, 4.2e-3);
+    lead(&mut world, 0.6, 4.2e-3, 4.2e-3);
+    let together = pin_forces(&world, lower, &ground).y;
+    lead(&mut world, 0.2, 4.2e-3, -5e-3);
+    lead(&mut world, 0.6, -5e-3, -5e-3);
+    [together, pin_forces(&world, lower, &ground).y]
+}
+
+#[test]
+fn tissue_pressed_on_tissue_bears_what_it_should() {
+    // Of two mirrored blocks each bears what one does against a smooth plane: from finite elements in double precision, N.
+    const RIGHT: f64 = 1.3394;
+    for (solver, dt, within) in [
+        (Solver::Verlet, FRAME, 0.005),
+        (Solver::Implicit, FRAME, 0.015),
+        (Solver::Implicit, 4e-3, 0.015),
+    ] {
+        let [together, apart] = pressed(solver, dt);
+        let off = together.abs() / RIGHT - 1.0;
+        assert!(off.abs() < within, "{solver:?}, {dt} s: {together} N");
+        assert!(apart.abs() < 1e-3 * RIGHT, "{solver:?}, {dt} s: {apart} N once apart");
+    }
+}
+
+#[test]
+fn implicit_bodies_that_collide_keep_their_momentum_and_gain_no_energy() {
+    let mut world = world();
+    let (lower, mesh) = block(&mut world, Solver::Implicit, -0.5 * SIZE[1] - 1e-3, false, 0.0);
+    let (upper, _) = block(&mut world, Solver::Implicit, 0.5 * SIZE[1] + 1e-3, true, 0.0);
+    let nodes = mesh.positions.len();
+    let node_mass = DENSITY * SIZE.iter().product::<f32>() / nodes as f32;
+    world
+        .body_mut(lower)
+        .expect("a body")
+        .set_velocities(&vec![Vec3::new(0.05, 0.3, 0.0); nodes])
+        .expect("velocities");
+    let all = |world: &World| -> (DVec3, f64) {
+        let [one, other] = [lower, upper].map(|id| (momentum(body(world, id), node_mass), total_energy(world, id)));
+        (one.0 + other.0, one.1 + other.1)
+    };
+    let (start, energy) = all(&world);
+    for frame in 0..60 {
+        world.step(FRAME).expect("a step");
+        let (now, left) = all(&world);
+        let lost = (now - start).length() / start.length();
+        assert!(lost < 1e-4, "frame {frame}: {lost} of the momentum");
+        assert!(left < 1.001 * energy, "frame {frame}: {left} J of {energy} J");
+    }
+    assert!(kinetic(&world, upper) > 0.1 * energy, "it never touched");
+}
+
+#[test]
+fn implicit_bodies_that_lie_on_each_other_stay_calm() {
+    let mut world = World::new(WorldDefinition {
+        max_substeps: 100_000,
+        ..Default::default()
+    })
+    .expect("a world");
+    world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a floor");
+    let (lower, _) = block(&mut world, Solver::Implicit, 0.5 * SIZE[1], false, 2.0);
+    let (upper, _) = block(&mut world, Solver::Implicit, 1.5 * SIZE[1], true, 2.0);
+    let mass = 2.0 * f64::from(DENSITY * SIZE.iter().product::<f32>());
+    for frame in 0..1200 {
+        world.step(FRAME).expect("a step");
+        if frame > 600 {
+            let kinetic = kinetic(&world, lower) + kinetic(&world, upper);
+            let speed = (2.0 * kinetic / mass).sqrt();
+            assert!(speed < 5e-3, "frame {frame}: {speed} m/s");
+        }
+    }
+}
