@@ -3,7 +3,8 @@
 //! A spring's stiffness is at most `k n n^T + k max(0, 1 - L0/L) (I - n n^T)`: along it, and across it where it is
 //! stretched. With `q(x_i - x_j) <= (1 + t) q(x_i) + (1 + 1/t) q(x_j)` for each such form and t = m_i/m_j, the squares
 //! of the body's frequencies are at most the largest eigenvalue of any node's 3x3 matrix
-//! `sum_j (1/m_i + 1/m_j) K_ij`: exact for two masses, and for a long chain or a grid of equal ones. The same sum over
+//! `sum_j (1/m_i + 1/m_j) K_ij`: exact for two masses, and for a long chain or a grid of equal ones. Any t holds; here it is between
+//! 1/4 and 4, or a heavy node with many light neighbours, as cuts make them, would have a bound far above any frequency. The same sum over
 //! the dampings bounds the rates of damping, and `h < 2 / (sqrt(omega² + delta²/4) + delta/2)` is leapfrog's limit with
 //! both (Belytschko, Liu, Moran 2000, section 6.2.1, with zeta = delta / 2 omega).
 
@@ -162,7 +163,7 @@ impl Stability {
         let node = tightest?;
         let (mut other, mut stiffest) = (node, -1.0);
         springs.visit(node, &mut |link| {
-            let inverse_mass = masses.inverse(node) + masses.inverse(link.neighbour as usize);
+            let inverse_mass = masses.of_spring(masses.inverse(node), link.neighbour as usize);
             let stiffness = (link.stiffness + link.damping / shortest) * inverse_mass;
             if stiffness > stiffest {
                 (other, stiffest) = (link.neighbour as usize, stiffness);
@@ -305,7 +306,7 @@ impl Sums {
         springs.visit(node, &mut |link| {
             let neighbour = link.neighbour as usize;
             let (length, direction) = separation(node, neighbour, positions.get(neighbour) - position);
-            let inverse_mass = inverse_mass + masses.inverse(neighbour);
+            let inverse_mass = masses.of_spring(inverse_mass, neighbour);
             let stiffness = link.stiffness * inverse_mass;
             sums.anywhere.stiffest += stiffness;
             // Stretched to twice its rest length a spring is half as stiff across as along, and so on: only the rest

@@ -309,7 +309,7 @@ pub(crate) fn rates_anywhere(node: usize, springs: &dyn Springs, masses: &Masses
         let inverse_mass = if masses.are_heavier {
             2.0 * inverse_mass
         } else {
-            inverse_mass + masses.inverse(link.neighbour as usize)
+            masses.of_spring(inverse_mass, link.neighbour as usize)
         };
         rates.stiffest += link.stiffness * inverse_mass;
         rates.most_damped += link.damping * inverse_mass;
