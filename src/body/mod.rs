@@ -790,6 +790,7 @@ impl Body {
         self.clear_pending();
         self.follow_nodes();
         self.publish(team);
+        self.published.commit();
         self.follow();
     }
 

@@ -160,7 +160,7 @@ impl Body {
     /// Makes room for what other tissue presses it with.
     pub(crate) fn reserve_pressed(&mut self) -> Result<()> {
         if self.implicit.is_none() {
-            return Ok(());
+            return self.published.reserve_stopped(self.node_room.max(self.node_count()));
         }
         let none = [self.zeros()?, self.zeros()?];
         if let Some(implicit) = &mut self.implicit {
@@ -175,7 +175,8 @@ impl Body {
             return;
         };
         let state = self.state.substep();
-        implicit.release_pressed(&self.inverse_masses, self.damping.as_ref(), |node, given| {
+        let rates = self.damping.as_ref().map(|damping| damping.rates());
+        implicit.release_pressed(&self.inverse_masses, rates, |node, given| {
             state.velocities.set(node, state.velocities.get(node) - given);
             let place = state.next_positions.get(node) - given * duration;
             state.next_positions.set(node, place);
@@ -187,7 +188,8 @@ impl Body {
         let free = self.answer_of(node).cmpgt(Vec3::ZERO);
         if let Some(implicit) = &mut self.implicit {
             let impulse = Vec3::select(free, impulse, Vec3::ZERO);
-            implicit.press(node as usize, impulse, self.damping.as_ref());
+            let rates = self.damping.as_ref().map(|damping| damping.rates());
+            implicit.press(node as usize, impulse, rates);
         }
     }
 

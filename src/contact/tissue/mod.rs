@@ -475,6 +475,23 @@ impl Tissue {
         }
     }
 
+    /// Has nodes of VERLET bodies that implicit ones stop be seen as fast as they are now, before their last half kick.
+    pub fn show_stopped(&self, bodies: &mut Slots<Body>) {
+        for link in self.links.iter().filter(|link| link.presses()) {
+            let are_implicit = link
+                .sides
+                .map(|side| bodies.at(side.body).is_some_and(|body| body.implicit.is_some()));
+            for index in 0..2 {
+                if !are_implicit[index]
+                    && are_implicit[1 - index]
+                    && let Some(body) = bodies.at_mut(link.sides[index].body)
+                {
+                    link.movers(index).for_each(|(node, _)| body.show_stopped(node));
+                }
+            }
+        }
+    }
+
     /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
     pub fn fastest(&self, island: usize, bodies: &Slots<Body>, fall: f32) -> f32 {
         let members = self.islands.members(island).iter();
@@ -616,9 +633,13 @@ impl Tissue {
             let skin = skins.get(place)?.as_ref()?;
             Some(Party { place, skin })
         };
-        let (first, second) = (party(a)?, party(b)?);
         let both = [bodies.at(a)?, bodies.at(b)?];
+        let (mut first, mut second) = (party(a)?, party(b)?);
         let radius = radius(&first, &second, both)?;
+        // Each edge of the first meets one edge of the second: of a long edge across short ones, that would be one of many.
+        if second.skin.short < first.skin.short {
+            std::mem::swap(&mut first, &mut second);
+        }
         let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
         (is_looked_at && !entangled.has([a, b])).then(|| Search {
             parties: [first, second],
@@ -698,6 +719,7 @@ impl Tissue {
             let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
                 continue;
             };
+            let [a, b] = search.parties.map(|party| party.place);
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
                 continue;
             };

@@ -14,6 +14,12 @@ use crate::geometry::Bounds;
 /// seen most squarely.
 const SAME: f32 = 1e-4;
 
+/// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble.
+const FACES: usize = 3;
+
+/// A face that a corner meets: how far away it is, its number, where they meet and how far they keep apart.
+type Touched = (f32, usize, (Separation, Clearance));
+
 /// A body in a search, by its place in the world.
 #[derive(Clone, Copy)]
 pub(super) struct Party<'a> {
@@ -175,7 +181,7 @@ impl Search<'_> {
         };
         let mut least = f32::INFINITY;
         let mut front = f32::INFINITY;
-        let mut touched: Option<(f32, usize, (Separation, Clearance))> = None;
+        let mut touched: [Option<Touched>; FACES] = [None; FACES];
         // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
         let mut nearest = (f32::INFINITY, 0.0_f32);
         let mut behind: Option<(usize, Separation)> = None;
@@ -208,10 +214,11 @@ impl Search<'_> {
             let is_closer =
                 |(least, known, _): (f32, usize, _)| distance < least || distance == least && triangle < known;
             if height >= 0.0
-                && touched.is_none_or(is_closer)
+                && let Some(place) = touched.iter().position(|known| known.is_none_or(is_closer))
                 && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
             {
-                touched = Some((distance, triangle, found));
+                touched[place..].rotate_right(1);
+                touched[place] = Some((distance, triangle, found));
             }
         });
         // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
@@ -224,13 +231,20 @@ impl Search<'_> {
         self.measure(kept, Part::Corner(corner), nearest_there);
         // On the wrong side it is led out, or let out where it is deep.
         let is_behind = behind.is_some();
-        let closest = match behind {
-            Some((triangle, start)) => {
-                (nearest.0 < self.radius.max(depth)).then_some((triangle, (start, Clearance::of(radius))))
+        if let Some((triangle, start)) = behind {
+            let is_near = nearest.0 < self.radius.max(depth);
+            touched = [None; FACES];
+            touched[0] = is_near.then_some((nearest.0, triangle, (start, Clearance::of(radius))));
+        }
+        for place in 0..FACES {
+            let Some((_, triangle, (found, clearance))) = touched[place] else {
+                break;
+            };
+            let is_shared =
+                |(_, _, (other, _)): &Touched| (other.offset - found.offset).length() <= SAME * found.offset.length();
+            if touched[..place].iter().flatten().any(is_shared) {
+                continue;
             }
-            None => touched.map(|(_, triangle, found)| (triangle, found)),
-        };
-        if let Some((triangle, (found, clearance))) = closest {
             let nodes = of_faces.skin.triangles[triangle];
             let sides = [
                 Side {

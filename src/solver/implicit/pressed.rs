@@ -9,7 +9,6 @@ use glam::Vec3;
 
 use super::{History, Implicit};
 use crate::base::Result;
-use crate::body::NodeDamping;
 use crate::codec::saved;
 use crate::soa::Vectors;
 
@@ -88,11 +87,12 @@ impl Implicit {
         }
     }
 
-    /// Takes what the forces of the last equation gave from nodes with these masses again: by how much each becomes slower, m/s.
+    /// Takes what the forces of the last equation gave from nodes with these masses and rates of damping again: by how much each becomes slower,
+    /// m/s.
     pub fn release_pressed(
         &mut self,
         inverse_masses: &[f32],
-        damping: Option<&NodeDamping>,
+        rates: Option<&[f32]>,
         mut show: impl FnMut(usize, Vec3),
     ) {
         let history = &mut self.histories[1 - self.settled];
@@ -104,7 +104,7 @@ impl Implicit {
             if force == Vec3::ZERO {
                 continue;
             }
-            let undamped = damping.map_or(1.0, |damping| 1.0 + damping.rates()[node] * self.latest);
+            let undamped = rates.map_or(1.0, |rates| 1.0 + rates[node] * self.latest);
             let given = force * (self.latest * inverse_mass / undamped);
             history.ways.set(node, history.ways.get(node) - given * self.latest);
             history.gains.set(node, Vec3::ZERO);
@@ -116,10 +116,10 @@ impl Implicit {
     }
 
     /// Contacts gave this to a node, N s, and press on.
-    pub fn press(&mut self, node: usize, impulse: Vec3, damping: Option<&NodeDamping>) {
+    pub fn press(&mut self, node: usize, impulse: Vec3, rates: Option<&[f32]>) {
         let latest = self.latest;
         if let Some(pressed) = &mut self.histories[1 - self.settled].pressed {
-            let undamped = damping.map_or(1.0, |damping| 1.0 + damping.rates()[node] * latest);
+            let undamped = rates.map_or(1.0, |rates| 1.0 + rates[node] * latest);
             let force = pressed.forces.get(node) + impulse * (SUSTAINED * undamped / latest);
             pressed.forces.set(node, force.clamp(Vec3::MIN, Vec3::MAX));
             pressed.acts = true;
