@@ -790,7 +790,6 @@ impl Body {
         self.clear_pending();
         self.follow_nodes();
         self.publish(team);
-        self.published.commit();
         self.follow();
     }
 

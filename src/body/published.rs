@@ -24,12 +24,9 @@ pub(super) struct Published {
     velocities: OnceLock<Vec<Vec3>>,
     /// Where velocities are written next, while there are none. Locked by who asks for them alone.
     blank: Mutex<Vec<Vec3>>,
-    /// Nodes, by their own numbers, that implicit tissue stops, and how fast they were before the last half kick of the step, m/s; and those of
-    /// the step that is tried.
-    stopped: [Vec<(u32, Vec3)>; 2],
 }
 
-/// Positions, and what is stopped: velocities are written again when they are asked for.
+/// Positions: velocities are written again when they are asked for.
 impl Saved for Published {
     const SHAPE: u64 = Vec::<Vec3>::SHAPE;
     const LEAST: usize = Vec::<Vec3>::LEAST;
@@ -39,11 +36,9 @@ impl Saved for Published {
             positions,
             velocities: _,
             blank: _,
-            stopped,
         } = self;
         to.needs(positions.capacity() * size_of::<Vec3>());
         positions.save(to);
-        stopped.save(to);
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
@@ -54,7 +49,6 @@ impl Saved for Published {
             positions,
             velocities: OnceLock::new(),
             blank: Mutex::new(blank),
-            stopped: Saved::load(from)?,
         })
     }
 }
@@ -65,39 +59,7 @@ impl Published {
             positions: memory::filled(Vec3::ZERO, node_count)?,
             velocities: OnceLock::new(),
             blank: Mutex::new(memory::filled(Vec3::ZERO, node_count)?),
-            stopped: Default::default(),
         })
-    }
-
-    /// Makes room for so many nodes that implicit tissue stops.
-    pub fn reserve_stopped(&mut self, node_count: usize) -> Result<()> {
-        let [of_last, of_tried] = &mut self.stopped;
-        memory::reserve(of_last, node_count)?;
-        memory::reserve(of_tried, node_count)
-    }
-
-    /// Has a node that implicit tissue stops be seen with this velocity after the step that is tried, m/s.
-    fn stop(&mut self, node: u32, velocity: Vec3) {
-        let stopped = &mut self.stopped[1];
-        if stopped.len() == stopped.capacity() {
-            stopped.sort_unstable_by_key(|stopped| stopped.0);
-            stopped.dedup_by_key(|stopped| stopped.0);
-        }
-        if stopped.len() < stopped.capacity() {
-            stopped.push((node, velocity));
-        }
-    }
-
-    /// The step that was tried is taken.
-    pub fn commit(&mut self) {
-        self.forget_velocities();
-        self.stopped.swap(0, 1);
-    }
-
-    /// Whether what is stopped are some of so many nodes.
-    pub fn is_sound(&self, node_count: usize) -> bool {
-        let mut stopped = self.stopped.iter().flatten();
-        self.positions.len() == node_count && stopped.all(|&(node, _)| (node as usize) < node_count)
     }
 
     /// Makes room for so many nodes in all.
@@ -143,7 +105,6 @@ impl Published {
 
     /// To be called when velocities change.
     pub fn forget_velocities(&mut self) {
-        self.stopped[0].clear();
         if let Some(velocities) = self.velocities.take() {
             *self.blank.get_mut().unwrap_or_else(PoisonError::into_inner) = velocities;
         }
@@ -177,26 +138,11 @@ impl Body {
             if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
                 put(0..self.node_count(), self.state.velocities().axes());
             }
-            for &(node, velocity) in &self.published.stopped[0] {
-                to[self.order.caller(node) as usize] = velocity;
-            }
             for bound in self.bindings.iter().flat_map(Bindings::iter) {
                 let velocity = bound.of(|node| to[self.order.caller(node as u32) as usize]);
                 to[self.order.caller(bound.node) as usize] = velocity;
             }
         })
-    }
-
-    /// Has a node be seen as fast as it is now after the step that is tried: implicit tissue stops it, but not the last half kick of a step, which
-    /// is undone in the next.
-    pub(crate) fn show_stopped(&mut self, node: u32) {
-        let velocity = self.state.newest().1.get(node as usize);
-        self.published.stop(node, velocity);
-    }
-
-    /// Nothing is stopped yet in the step that is to be tried.
-    pub(crate) fn begin_showing(&mut self) {
-        self.published.stopped[1].clear();
     }
 
     /// Where velocities are when they have been asked for.

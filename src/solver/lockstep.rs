@@ -236,7 +236,6 @@ impl Together<'_> {
                 check_beside_springs(body, substep)
             })?;
         }
-        tissue.show_stopped(bodies);
         moment.drifts = false;
         moment.begins = false;
         tissue.bonds.load(bodies);

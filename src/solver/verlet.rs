@@ -326,7 +326,6 @@ pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &
 /// Starts the step over, from what is current.
 pub(crate) fn begin(body: &mut Body, request: &StepRequest) {
     body.state.begin();
-    body.begin_showing();
     body.recall();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);

@@ -138,13 +138,7 @@ fn implicit_bodies_that_collide_keep_their_momentum_and_gain_no_energy() {
 }
 
 #[test]
-fn what_lies_on_an_implicit_body_stays_calm() {
-    for solver in [Solver::Implicit, Solver::Verlet] {
-        lie(solver);
-    }
-}
-
-fn lie(solver: Solver) {
+fn implicit_bodies_that_lie_on_each_other_stay_calm() {
     let mut world = World::new(WorldDefinition {
         max_substeps: 100_000,
         ..Default::default()
@@ -152,21 +146,21 @@ fn lie(solver: Solver) {
     .expect("a world");
     world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a floor");
     let (lower, _) = block(&mut world, Solver::Implicit, 0.5 * SIZE[1], false, 2.0);
-    let (upper, _) = block(&mut world, solver, 1.5 * SIZE[1], true, 2.0);
+    let (upper, _) = block(&mut world, Solver::Implicit, 1.5 * SIZE[1], true, 2.0);
     let mass = 2.0 * f64::from(DENSITY * SIZE.iter().product::<f32>());
     for frame in 0..420 {
         world.step(FRAME).expect("a step");
         if frame > 300 {
             let kinetic = kinetic(&world, lower) + kinetic(&world, upper);
             let speed = (2.0 * kinetic / mass).sqrt();
-            assert!(speed < 3e-3, "{solver:?}, frame {frame}: {speed} m/s");
+            assert!(speed < 3e-3, "frame {frame}: {speed} m/s");
         }
     }
 }
 
-/// Every node is seen as fast as it goes: over a step the two differ by no more than a node that swings gains in half of it.
+/// Where contacts of a corner with faces, or of a long edge with short ones, took turns, the block was never at rest.
 #[test]
-fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble() {
+fn a_block_under_a_sheet_over_its_corners_comes_to_rest() {
     let mut world = World::new(WorldDefinition {
         max_substeps: 100_000,
         ..Default::default()
@@ -205,28 +199,14 @@ fn a_sheet_over_the_corners_of_an_implicit_block_does_not_tremble() {
         contact: contact(0.05),
         ..Default::default()
     };
-    let ids = [below, above].map(|definition| world.create_body(&definition).expect("a body"));
-    let places = |world: &World, id| body(world, id).positions().to_vec();
+    let [block, _sheet] = [below, above].map(|definition| world.create_body(&definition).expect("a body"));
     for frame in 0..240 {
-        let before = ids.map(|id| places(&world, id));
         world.step(FRAME).expect("a step");
-        if frame < 200 {
-            continue;
-        }
-        for (id, before) in ids.into_iter().zip(&before) {
-            let it = body(&world, id);
-            for (node, (velocity, (now, before))) in it
-                .velocities()
-                .iter()
-                .zip(it.positions().iter().zip(before))
-                .enumerate()
-            {
-                let off = (*velocity - (*now - *before) / FRAME).length();
-                assert!(
-                    off < 5e-3,
-                    "frame {frame}, node {node} of {id:?}: {velocity} m/s, off by {off}"
-                );
-            }
-        }
+        let speeds = body(&world, block)
+            .velocities()
+            .iter()
+            .map(|velocity| velocity.length());
+        let fastest = speeds.fold(0.0, f32::max);
+        assert!(frame < 200 || fastest < 1e-3, "frame {frame}: {fastest} m/s");
     }
 }

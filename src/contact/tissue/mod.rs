@@ -475,23 +475,6 @@ impl Tissue {
         }
     }
 
-    /// Has nodes of VERLET bodies that implicit ones stop be seen as fast as they are now, before their last half kick.
-    pub fn show_stopped(&self, bodies: &mut Slots<Body>) {
-        for link in self.links.iter().filter(|link| link.presses()) {
-            let are_implicit = link
-                .sides
-                .map(|side| bodies.at(side.body).is_some_and(|body| body.implicit.is_some()));
-            for index in 0..2 {
-                if !are_implicit[index]
-                    && are_implicit[1 - index]
-                    && let Some(body) = bodies.at_mut(link.sides[index].body)
-                {
-                    link.movers(index).for_each(|(node, _)| body.show_stopped(node));
-                }
-            }
-        }
-    }
-
     /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
     pub fn fastest(&self, island: usize, bodies: &Slots<Body>, fall: f32) -> f32 {
         let members = self.islands.members(island).iter();
