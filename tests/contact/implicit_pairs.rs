@@ -2,11 +2,9 @@
 
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
-use sinew::{
-    BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, Values, World, WorldDefinition,
-};
+use sinew::{BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, Values, World};
 
-use crate::support::tissue::{body, kinetic, momentum, moved, pin_all, pin_forces, total_energy};
+use crate::support::tissue::{body, kinetic, momentum, moved, pin_all, pin_forces, total_energy, world};
 
 const FRAME: f32 = 1.0 / 60.0;
 const SIZE: [f32; 3] = [0.06, 0.03, 0.06];
@@ -19,13 +17,11 @@ const MEETS: BodyContact = BodyContact {
     ..BodyContact::NOTHING
 };
 
-fn world() -> World {
-    World::new(WorldDefinition {
-        gravity: Vec3::ZERO,
-        max_substeps: 100_000,
-        ..Default::default()
-    })
-    .expect("a world")
+/// A world with gravity and a floor.
+fn floor() -> World {
+    let mut world = world(Vec3::Y * -9.81);
+    world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a floor");
+    world
 }
 
 /// A block of soft tetrahedra; mirrored: upside down, so that two of them are each other's images.
@@ -64,7 +60,7 @@ fn far_nodes(mesh: &Mesh, is_far: impl Fn(f32) -> bool) -> Vec<u32> {
 
 /// Two blocks between pinned plates that come 4 mm closer than the blocks are high, and apart again: what the lower plate feels then, N.
 fn pressed(solver: Solver, dt: f32) -> [f64; 2] {
-    let mut world = world();
+    let mut world = world(Vec3::ZERO);
     let (lower, below) = block(&mut world, solver, -0.5 * SIZE[1], false, 30.0);
     let (upper, above) = block(&mut world, solver, 0.5 * SIZE[1] + 2e-4, true, 30.0);
     let ground = far_nodes(&below, |y| y < -0.999 * SIZE[1]);
@@ -112,7 +108,7 @@ fn tissue_pressed_on_tissue_bears_what_it_should() {
 
 #[test]
 fn implicit_bodies_that_collide_keep_their_momentum_and_gain_no_energy() {
-    let mut world = world();
+    let mut world = world(Vec3::ZERO);
     let (lower, mesh) = block(&mut world, Solver::Implicit, -0.5 * SIZE[1] - 1e-3, false, 0.0);
     let (upper, _) = block(&mut world, Solver::Implicit, 0.5 * SIZE[1] + 1e-3, true, 0.0);
     let nodes = mesh.positions.len();
@@ -139,12 +135,7 @@ fn implicit_bodies_that_collide_keep_their_momentum_and_gain_no_energy() {
 
 #[test]
 fn implicit_bodies_that_lie_on_each_other_stay_calm() {
-    let mut world = World::new(WorldDefinition {
-        max_substeps: 100_000,
-        ..Default::default()
-    })
-    .expect("a world");
-    world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a floor");
+    let mut world = floor();
     let (lower, _) = block(&mut world, Solver::Implicit, 0.5 * SIZE[1], false, 2.0);
     let (upper, _) = block(&mut world, Solver::Implicit, 1.5 * SIZE[1], true, 2.0);
     let mass = 2.0 * f64::from(DENSITY * SIZE.iter().product::<f32>());
@@ -161,12 +152,7 @@ fn implicit_bodies_that_lie_on_each_other_stay_calm() {
 /// Where contacts of a corner with faces, or of a long edge with short ones, took turns, the block was never at rest.
 #[test]
 fn a_block_under_a_sheet_over_its_corners_comes_to_rest() {
-    let mut world = World::new(WorldDefinition {
-        max_substeps: 100_000,
-        ..Default::default()
-    })
-    .expect("a world");
-    world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a floor");
+    let mut world = floor();
     let block = moved(Mesh::block([1.0; 3], [2; 3]).expect("a block"), Vec3::Y * 0.6);
     let cloth = moved(Mesh::cloth([1.8; 2], [15; 2]).expect("a cloth"), Vec3::Y * 1.25);
     let contact = |thickness| BodyContact {

@@ -104,8 +104,7 @@ impl Implicit {
             if force == Vec3::ZERO {
                 continue;
             }
-            let undamped = rates.map_or(1.0, |rates| 1.0 + rates[node] * self.latest);
-            let given = force * (self.latest * inverse_mass / undamped);
+            let given = force * (self.latest * inverse_mass / undamped(rates, node, self.latest));
             history.ways.set(node, history.ways.get(node) - given * self.latest);
             history.gains.set(node, Vec3::ZERO);
             show(node, given);
@@ -119,10 +118,15 @@ impl Implicit {
     pub fn press(&mut self, node: usize, impulse: Vec3, rates: Option<&[f32]>) {
         let latest = self.latest;
         if let Some(pressed) = &mut self.histories[1 - self.settled].pressed {
-            let undamped = rates.map_or(1.0, |rates| 1.0 + rates[node] * latest);
+            let undamped = undamped(rates, node, latest);
             let force = pressed.forces.get(node) + impulse * (SUSTAINED * undamped / latest);
             pressed.forces.set(node, force.clamp(Vec3::MIN, Vec3::MAX));
             pressed.acts = true;
         }
     }
+}
+
+/// What an equation divides the speed by that a force gives to a node in a step, for its damping.
+fn undamped(rates: Option<&[f32]>, node: usize, step: f32) -> f32 {
+    rates.map_or(1.0, |rates| 1.0 + rates[node] * step)
 }
