@@ -778,7 +778,7 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.commit();
         }
-        self.published.forget_velocities();
+        self.published.commit();
         for pin in self.pins.iter_mut() {
             pin.force = pin.held((pin.force_sum / f64::from(substeps)).as_vec3());
             pin.closing_share = carry.closing.map_or(0.0, |_| 0.5 / substeps as f32);

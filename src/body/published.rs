@@ -7,10 +7,10 @@ use glam::{DVec3, Vec3};
 
 use super::{Bindings, Body};
 use crate::base::{Result, memory};
-use crate::codec::{Reader, Saved, Writer};
+use crate::codec::{Reader, Saved, Writer, saved};
 use crate::geometry::Bounds;
 use crate::simd::{Loops, prefetch};
-use crate::soa::{TILE, tile_count, tile_nodes};
+use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
 use crate::solver::show_closed;
 use crate::threads::{Items, Team, Tiles};
 
@@ -24,9 +24,21 @@ pub(super) struct Published {
     velocities: OnceLock<Vec<Vec3>>,
     /// Where velocities are written next, while there are none. Locked by who asks for them alone.
     blank: Mutex<Vec<Vec3>>,
+    /// Of bodies that may press others: of the last step, and of the one that is tried.
+    early: Option<[Early; 2]>,
 }
 
-/// Positions: velocities are written again when they are asked for.
+/// Velocities from before the last half kick of a step.
+#[derive(Debug)]
+struct Early {
+    velocities: Vectors,
+    /// Whether callers see these.
+    is_seen: bool,
+}
+
+saved!(Early { velocities, is_seen });
+
+/// Positions, and early velocities: others are written again when they are asked for.
 impl Saved for Published {
     const SHAPE: u64 = Vec::<Vec3>::SHAPE;
     const LEAST: usize = Vec::<Vec3>::LEAST;
@@ -36,9 +48,11 @@ impl Saved for Published {
             positions,
             velocities: _,
             blank: _,
+            early,
         } = self;
         to.needs(positions.capacity() * size_of::<Vec3>());
         positions.save(to);
+        early.save(to);
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
@@ -49,6 +63,7 @@ impl Saved for Published {
             positions,
             velocities: OnceLock::new(),
             blank: Mutex::new(blank),
+            early: Saved::load(from)?,
         })
     }
 }
@@ -59,7 +74,22 @@ impl Published {
             positions: memory::filled(Vec3::ZERO, node_count)?,
             velocities: OnceLock::new(),
             blank: Mutex::new(memory::filled(Vec3::ZERO, node_count)?),
+            early: None,
         })
+    }
+
+    /// The step that was tried is taken.
+    pub fn commit(&mut self) {
+        self.clear_velocities();
+        if let Some(early) = &mut self.early {
+            early.swap(0, 1);
+        }
+    }
+
+    /// Whether it is of so many nodes.
+    pub fn is_sound(&self, node_count: usize) -> bool {
+        let mut early = self.early.iter().flatten();
+        self.positions.len() == node_count && early.all(|early| early.velocities.len() == node_count)
     }
 
     /// Makes room for so many nodes in all.
@@ -67,6 +97,9 @@ impl Published {
         self.forget_velocities();
         let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
         memory::reserve(blank, node_count)?;
+        for early in self.early.iter_mut().flatten() {
+            early.velocities.reserve(node_count)?;
+        }
         memory::reserve(&mut self.positions, node_count)
     }
 
@@ -75,6 +108,9 @@ impl Published {
         self.forget_velocities();
         let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
         blank.resize(node_count, Vec3::ZERO);
+        for early in self.early.iter_mut().flatten() {
+            early.velocities.grow(node_count);
+        }
         self.positions.resize(node_count, Vec3::ZERO);
     }
 
@@ -88,7 +124,7 @@ impl Published {
 
     /// The list of positions, and another as long that holds nothing while velocities were not asked for.
     fn lists_mut(&mut self) -> [&mut [Vec3]; 2] {
-        self.forget_velocities();
+        self.clear_velocities();
         let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
         [&mut self.positions, blank]
     }
@@ -105,6 +141,14 @@ impl Published {
 
     /// To be called when velocities change.
     pub fn forget_velocities(&mut self) {
+        self.clear_velocities();
+        if let Some([early, _]) = &mut self.early {
+            early.is_seen = false;
+        }
+    }
+
+    /// Has velocities be written again when they are asked for.
+    fn clear_velocities(&mut self) {
         if let Some(velocities) = self.velocities.take() {
             *self.blank.get_mut().unwrap_or_else(PoisonError::into_inner) = velocities;
         }
@@ -135,7 +179,9 @@ impl Body {
                 }
             };
             let closing = self.carry.closing;
-            if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
+            if let Some([Early { velocities, is_seen: true }, _]) = &self.published.early {
+                put(0..self.node_count(), velocities.axes());
+            } else if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
                 put(0..self.node_count(), self.state.velocities().axes());
             }
             for bound in self.bindings.iter().flat_map(Bindings::iter) {
@@ -143,6 +189,35 @@ impl Body {
                 to[self.order.caller(bound.node) as usize] = velocity;
             }
         })
+    }
+
+    /// Makes room for velocities from before the last half kick of a step.
+    pub(super) fn reserve_early(&mut self) -> Result<()> {
+        if self.published.early.is_none() {
+            let early = [self.zeros()?, self.zeros()?];
+            self.published.early = Some(early.map(|velocities| Early {
+                velocities,
+                is_seen: false,
+            }));
+        }
+        Ok(())
+    }
+
+    /// Has callers see the velocities that it has now, before the last half kick of the step that is tried, once that is taken.
+    pub(crate) fn show_early(&mut self) {
+        if let Some([_, early]) = &mut self.published.early
+            && !early.is_seen
+        {
+            early.velocities.copy_from(self.state.newest().1);
+            early.is_seen = true;
+        }
+    }
+
+    /// Has callers see the velocities at the end of the step that is to be tried.
+    pub(crate) fn show_late(&mut self) {
+        if let Some([_, early]) = &mut self.published.early {
+            early.is_seen = false;
+        }
     }
 
     /// Where velocities are when they have been asked for.

@@ -17,7 +17,7 @@ impl Body {
             && self.implicit.as_ref().is_none_or(|implicit| implicit.is_sound(count))
             && self.state.is_sound(count)
             && self.pins.are_sound(count)
-            && self.published.positions().len() == count
+            && self.published.is_sound(count)
             && self.surveys.len() == tiles
             && self.tile_sums.len() == tiles
             && self.boxes.len() == tiles

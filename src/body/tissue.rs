@@ -157,10 +157,10 @@ impl Body {
         }
     }
 
-    /// Makes room for what other tissue presses it with.
+    /// Makes room for what it keeps of contacts with other tissue.
     pub(crate) fn reserve_pressed(&mut self) -> Result<()> {
         if self.implicit.is_none() {
-            return Ok(());
+            return self.reserve_early();
         }
         let none = [self.zeros()?, self.zeros()?];
         if let Some(implicit) = &mut self.implicit {

@@ -236,6 +236,7 @@ impl Together<'_> {
                 check_beside_springs(body, substep)
             })?;
         }
+        tissue.show_early(bodies);
         moment.drifts = false;
         moment.begins = false;
         tissue.bonds.load(bodies);

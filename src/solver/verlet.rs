@@ -326,6 +326,7 @@ pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &
 /// Starts the step over, from what is current.
 pub(crate) fn begin(body: &mut Body, request: &StepRequest) {
     body.state.begin();
+    body.show_late();
     body.recall();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);

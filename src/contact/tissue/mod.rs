@@ -475,6 +475,22 @@ impl Tissue {
         }
     }
 
+    /// Has VERLET bodies that press implicit ones be seen as fast as they are now, before their last half kick: nothing stops that.
+    pub fn show_early(&self, bodies: &mut Slots<Body>) {
+        for link in self.links.iter().filter(|link| link.presses()) {
+            let places = link.sides.map(|side| side.body);
+            let are_implicit = places.map(|place| bodies.at(place).is_some_and(|body| body.implicit.is_some()));
+            for index in 0..2 {
+                if !are_implicit[index]
+                    && are_implicit[1 - index]
+                    && let Some(body) = bodies.at_mut(places[index])
+                {
+                    body.show_early();
+                }
+            }
+        }
+    }
+
     /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
     pub fn fastest(&self, island: usize, bodies: &Slots<Body>, fall: f32) -> f32 {
         let members = self.islands.members(island).iter();
