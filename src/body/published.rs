@@ -179,7 +179,16 @@ impl Body {
                 }
             };
             let closing = self.carry.closing;
-            if let Some([Early { velocities, is_seen: true }, _]) = &self.published.early {
+            if let Some(
+                [
+                    Early {
+                        velocities,
+                        is_seen: true,
+                    },
+                    _,
+                ],
+            ) = &self.published.early
+            {
                 put(0..self.node_count(), velocities.axes());
             } else if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
                 put(0..self.node_count(), self.state.velocities().axes());

@@ -134,7 +134,10 @@ fn collide(solver: Solver) {
         let (now, left) = all(&world);
         let lost = (now - start).length() / start.length();
         assert!(lost < 1e-4, "{solver:?}, frame {frame}: {lost} of the momentum");
-        assert!(left < 1.001 * energy, "{solver:?}, frame {frame}: {left} J of {energy} J");
+        assert!(
+            left < 1.001 * energy,
+            "{solver:?}, frame {frame}: {left} J of {energy} J"
+        );
     }
     assert!(kinetic(&world, upper) > 0.1 * energy, "{solver:?}: it never touched");
 }

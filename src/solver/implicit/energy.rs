@@ -23,6 +23,9 @@ const LANES: usize = 16;
 /// What was lost may come back, as far as it is no more than this part of the energy there is.
 const CREDIT: f64 = 0.1;
 
+/// What steps may have gained in all, as a part of that energy: rounding, and what the formula of order 2 has of its own.
+const DEBT: f64 = 2e-4;
+
 /// Kinetic and elastic energy.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Total {
@@ -39,6 +42,7 @@ saved!(Total { energy, size });
 pub(super) struct Before {
     /// The pins are already where the step leads them.
     total: Total,
+    /// What was lost and may come back, or below 0 what was gained and is to be lost again, J.
     credit: f64,
 }
 
@@ -114,15 +118,17 @@ impl Substep<'_> {
         let elastic = implicit.elastic(body, true, next, self.team);
         let work = self.work(body, &implicit.histories[next]);
         let after = elastic.plus(kinetic);
-        let allowed = before.total.energy + work + before.credit;
+        let has = before.total.energy + work;
         let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).energy;
         if !(after.energy.is_finite() && after.size.is_finite() && work.is_finite()) {
             return End::NotFinite;
         }
+        let is_rounding = after.energy <= has + rounding && !self.may_be_of_order_1(implicit);
         let history = &mut implicit.histories[next];
         history.energy = Some(after);
-        history.credit = (allowed - after.energy).clamp(0.0, CREDIT * (after.size + work.abs()));
-        if after.energy <= allowed + rounding {
+        let size = after.size + work.abs();
+        history.credit = (has + before.credit - after.energy).min(CREDIT * size);
+        if history.credit >= -DEBT * size || is_rounding {
             End::Fine
         } else {
             End::Gained

@@ -141,7 +141,7 @@ impl Substep<'_> {
         let is_held = held.all();
         self.place(body, implicit);
         self.residual(body, implicit);
-        let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
+        let (mut gone, mut vain) = (0.0, 0);
         let mut square = 0.0;
         for iteration in 0..NEWTON {
             self.stiffen(body, implicit);
@@ -151,12 +151,6 @@ impl Substep<'_> {
                 .is_some_and(|contacts| contacts.holds.have_changed());
             implicit.corrections.clear();
             square = implicit.precondition(body, 0.0, self.team).first;
-            // What a solution has left of it is rounding.
-            if gone >= 1.0 && square <= noise.square {
-                error = solved_error.max(noise.error);
-                is_solved = true;
-                break;
-            }
             if square <= FINE * noise.square {
                 self.refine(body, implicit);
                 square = implicit.precondition(body, 0.0, self.team).first;
@@ -196,7 +190,6 @@ impl Substep<'_> {
             if implicit.stiffened.is_empty() {
                 implicit.wear(solved.products);
             }
-            solved_error = solved.error;
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.let_go();
             }

@@ -13,21 +13,24 @@ impl Implicit {
     /// Adds to the pushes the shift and the turn that take the sum and the torque off the residual of nodes at `positions`, as far as
     /// nothing holds the body along these axes.
     pub(super) fn balance(&mut self, positions: &Vectors, held: BVec3) {
-        let (mut mass, mut centre, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO);
-        let nodes = || self.inertia.iter().zip(positions.iter()).zip(self.residuals.iter());
-        for ((&inertia, position), residual) in nodes() {
+        let (mut mass, mut centre, mut push, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for (node, &inertia) in self.inertia.iter().enumerate() {
             let inertia = f64::from(inertia);
             mass += inertia;
-            centre += position.as_dvec3() * inertia;
-            sum += residual.as_dvec3();
+            centre += positions.get(node).as_dvec3() * inertia;
+            push += self.pushes.get(node).as_dvec3() * inertia;
+            sum += self.residuals.get(node).as_dvec3();
         }
         centre /= mass;
-        let mut torque = DVec3::ZERO;
-        for ((_, position), residual) in nodes() {
-            torque += (position.as_dvec3() - centre).cross(residual.as_dvec3());
+        push /= mass;
+        let (mut torque, mut moments) = (DVec3::ZERO, DMat3::ZERO);
+        for (node, &inertia) in self.inertia.iter().enumerate() {
+            let arm = positions.get(node).as_dvec3() - centre;
+            torque += arm.cross(self.residuals.get(node).as_dvec3());
+            // The turn moves the nodes on which inertia acts, too.
+            let aim = arm - (self.pushes.get(node).as_dvec3() - push);
+            moments += moment(aim, arm) * f64::from(inertia);
         }
-        let moments =
-            moments(nodes().map(|((&inertia, position), _)| (f64::from(inertia), position.as_dvec3() - centre)));
         let shift = DVec3::select(held, DVec3::ZERO, sum / mass);
         let turn = turn(moments, torque, held);
         for node in 0..positions.len() {
@@ -110,11 +113,14 @@ impl Substep<'_> {
 fn moments(nodes: impl Iterator<Item = (f64, DVec3)>) -> DMat3 {
     let mut moments = DMat3::ZERO;
     for (mass, arm) in nodes {
-        let outer = DMat3::from_cols(arm * arm.x, arm * arm.y, arm * arm.z);
-        let square = DMat3::from_diagonal(DVec3::splat(arm.length_squared()));
-        moments += (square - outer) * mass;
+        moments += moment(arm, arm) * mass;
     }
     moments
+}
+
+/// The matrix that takes `w` to `a x (w x b)`.
+fn moment(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_diagonal(DVec3::splat(a.dot(b))) - DMat3::from_cols(b * a.x, b * a.y, b * a.z)
 }
 
 /// How a body with these moments turns by this torque or angular momentum, about what axes these that are held leave it.

@@ -281,9 +281,7 @@ impl Substep<'_> {
         let before = self.energy_before(body, implicit);
         let SolverReport { error, converged, .. } = implicit.report;
         let mut end = self.take(body, implicit, before);
-        // What a later substep began with has been written over: then the whole step is taken again.
-        let has_history = self.formula.carried != 0.0;
-        if matches!(end, End::Gained | End::NotFinite) && has_history && self.is_first && implicit.left > 0 {
+        if matches!(end, End::Gained | End::NotFinite) && self.may_be_of_order_1(implicit) {
             (implicit.report.error, implicit.report.converged) = (error, converged);
             end = self.of_order_1().take(body, implicit, before);
         }
@@ -306,6 +304,12 @@ impl Substep<'_> {
         }
         watch.stop(self.request.profile, Stage::Solver);
         end
+    }
+
+    /// Whether the step can be taken again by implicit Euler, and was not. What a later substep began with has been written over: then the whole
+    /// step is taken again.
+    pub(super) fn may_be_of_order_1(&self, implicit: &Implicit) -> bool {
+        self.formula.carried != 0.0 && self.is_first && implicit.left > 0
     }
 
     /// The same step by implicit Euler.

@@ -5,8 +5,10 @@ use std::fmt;
 /// Excess energy over the energy put in.
 const ENERGY: f64 = 1e-3;
 
-/// Change of momentum over the sum of the magnitudes of the nodal momenta.
+/// Change of momentum over the sum of the magnitudes of the nodal momenta, in so many steps. It is a sum of rounding errors, and grows
+/// as a random walk does.
 const MOMENTUM: f64 = 1e-5;
+const STEPS: f64 = 36_000.0;
 
 /// Relative change of angular momentum.
 const ANGULAR_MOMENTUM: f64 = 2e-3;
@@ -103,7 +105,11 @@ impl Figures {
     pub fn wrong(&self) -> Vec<String> {
         let mut wrong = self.faults.clone();
         let bounds = [
-            ("momentum", self.momentum, MOMENTUM),
+            (
+                "momentum",
+                self.momentum,
+                MOMENTUM * (self.steps as f64 / STEPS).sqrt().max(1.0),
+            ),
             ("angular momentum", self.angular_momentum, ANGULAR_MOMENTUM),
             ("not at rest", self.kinetic, KINETIC),
             ("frequency", self.frequency.map(|[own, _]| own.abs()), FREQUENCY),

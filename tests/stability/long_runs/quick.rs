@@ -58,10 +58,13 @@ pub fn quick() -> Vec<(Row, f64)> {
         damped(implicit(lattice, Hanging, FRAME, 110.0)),
         implicit(small, Pushed, FRAME, 3.0),
         implicit(small, Spinning, FRAME, 5.0),
+        // What rounding was taken to add was a thousandth after 160 s.
+        implicit(matter(SmallOrgan, Young, Nothing), Spinning, 1.0 / 30.0, 170.0),
         implicit(balloon, Spinning, 1.0 / 120.0, 5.0),
         implicit(matter(Gallbladder, Young, Nothing), Plucked, 1e-3, 0.0),
         implicit(elements, Plucked, 1e-3, 0.0),
         implicit(springs, Plucked, FRAME, 0.0),
+        implicit(small, Plucked, 1.0 / 30.0, 0.0),
         newton(small, Hanging, FRAME, 2.0),
         newton(small, Spinning, FRAME, 3.0),
     ]
