@@ -143,23 +143,17 @@ fn collide(solver: Solver) {
 }
 
 #[test]
-fn what_lies_on_an_implicit_body_stays_calm() {
-    for solver in [Solver::Implicit, Solver::Verlet] {
-        lie(solver);
-    }
-}
-
-fn lie(solver: Solver) {
+fn implicit_bodies_that_lie_on_each_other_stay_calm() {
     let mut world = floor();
     let (lower, _) = block(&mut world, Solver::Implicit, 0.5 * SIZE[1], false, 2.0);
-    let (upper, _) = block(&mut world, solver, 1.5 * SIZE[1], true, 2.0);
+    let (upper, _) = block(&mut world, Solver::Implicit, 1.5 * SIZE[1], true, 2.0);
     let mass = 2.0 * f64::from(DENSITY * SIZE.iter().product::<f32>());
-    for frame in 0..420 {
+    for frame in 0..300 {
         world.step(FRAME).expect("a step");
-        if frame > 300 {
+        if frame > 200 {
             let kinetic = kinetic(&world, lower) + kinetic(&world, upper);
             let speed = (2.0 * kinetic / mass).sqrt();
-            assert!(speed < 3e-3, "{solver:?}, frame {frame}: {speed} m/s");
+            assert!(speed < 3e-3, "frame {frame}: {speed} m/s");
         }
     }
 }

@@ -128,7 +128,7 @@ impl Substep<'_> {
         history.energy = Some(after);
         let size = after.size + work.abs();
         history.credit = (has + before.credit - after.energy).min(CREDIT * size);
-        if history.credit >= -DEBT * size || is_rounding {
+        if history.credit >= -(DEBT * size + rounding) || is_rounding {
             End::Fine
         } else {
             End::Gained

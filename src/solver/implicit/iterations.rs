@@ -31,6 +31,9 @@ const OTHER: f64 = 0.3;
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
 
+/// What rounded forces leave where it is taken off what rounded positions do, as a part of that. Contacts make more of it.
+const QUIET: f64 = 1e-4;
+
 /// Up to so many times what rounding leaves, what it makes of the residual is taken off again: beyond that it does not count.
 const FINE: f64 = 1e4;
 
@@ -141,7 +144,7 @@ impl Substep<'_> {
         let is_held = held.all();
         self.place(body, implicit);
         self.residual(body, implicit);
-        let (mut gone, mut vain) = (0.0, 0);
+        let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
         let mut square = 0.0;
         for iteration in 0..NEWTON {
             self.stiffen(body, implicit);
@@ -151,9 +154,20 @@ impl Substep<'_> {
                 .is_some_and(|contacts| contacts.holds.have_changed());
             implicit.corrections.clear();
             square = implicit.precondition(body, 0.0, self.team).first;
-            if square <= FINE * noise.square {
+            // What a solution has left of it is rounding.
+            let is_touched = body
+                .contacts
+                .as_deref()
+                .is_some_and(|contacts| !contacts.holds.is_empty());
+            let rounding = if is_touched { noise.square } else { QUIET * noise.square };
+            if square <= FINE * noise.square && (gone < 1.0 || square > rounding) {
                 self.refine(body, implicit);
                 square = implicit.precondition(body, 0.0, self.team).first;
+            }
+            if gone >= 1.0 && square <= rounding {
+                error = solved_error.max(noise.error);
+                is_solved = true;
+                break;
             }
             implicit.spectrum.begin();
             let remaining = square * implicit.spectrum.factor();
@@ -190,21 +204,26 @@ impl Substep<'_> {
             if implicit.stiffened.is_empty() {
                 implicit.wear(solved.products);
             }
+            solved_error = solved.error;
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.let_go();
             }
             // Where the correction itself is no more than rounding, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
             let is_small = solved.size <= f64::max(absolute, noise.error)
-                && solved.error <= absolute.max(relative * f64::max(size, solved.size));
-            if is_small && is_held && implicit.stiffened.is_empty() {
+                && solved.error <= absolute.max(relative * f64::max(size, solved.size))
+                && implicit.stiffened.is_empty();
+            if is_small && is_held {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
+            } else {
+                gone = self.go(body, implicit, solved.work);
+            }
+            if is_small {
                 error = solved.error;
                 is_solved = true;
                 break;
             }
-            gone = self.go(body, implicit, solved.work);
             size = f64::max(size, gone * gone * solved.size);
             let push = |node: usize| implicit.pushes.get(node).as_dvec3();
             // Before that, what contacts do is not what it will be, and would grow with each multiplier made of it.

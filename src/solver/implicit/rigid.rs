@@ -9,26 +9,37 @@ use super::step::Substep;
 use crate::body::Body;
 use crate::soa::Vectors;
 
+/// What forces move the nodes in a step, as a part of the size of the body, beyond which it changes much.
+const MOST_CHANGE: f64 = 0.1;
+
 impl Implicit {
     /// Adds to the pushes the shift and the turn that take the sum and the torque off the residual of nodes at `positions`, as far as
     /// nothing holds the body along these axes.
     pub(super) fn balance(&mut self, positions: &Vectors, held: BVec3) {
-        let (mut mass, mut centre, mut push, mut sum) = (0.0, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let of = |vectors: &Vectors, node: usize| vectors.get(node).as_dvec3();
+        let (mut mass, mut sum, mut means, mut squares) = (0.0, DVec3::ZERO, [DVec3::ZERO; 2], [0.0; 2]);
         for (node, &inertia) in self.inertia.iter().enumerate() {
             let inertia = f64::from(inertia);
             mass += inertia;
-            centre += positions.get(node).as_dvec3() * inertia;
-            push += self.pushes.get(node).as_dvec3() * inertia;
-            sum += self.residuals.get(node).as_dvec3();
+            sum += of(&self.residuals, node);
+            for (at, vectors) in [positions, &self.pushes].into_iter().enumerate() {
+                means[at] += of(vectors, node) * inertia;
+                squares[at] += of(vectors, node).length_squared() * inertia;
+            }
         }
-        centre /= mass;
-        push /= mass;
+        let [centre, push] = means.map(|mean| mean / mass);
+        let [size, change] = [0, 1].map(|at| squares[at] / mass - (means[at] / mass).length_squared());
+        // The turn moves the nodes on which inertia acts, too. Where the body changes much in the step, that would be no good equation.
+        let is_known = change < MOST_CHANGE * MOST_CHANGE * size;
         let (mut torque, mut moments) = (DVec3::ZERO, DMat3::ZERO);
         for (node, &inertia) in self.inertia.iter().enumerate() {
-            let arm = positions.get(node).as_dvec3() - centre;
-            torque += arm.cross(self.residuals.get(node).as_dvec3());
-            // The turn moves the nodes on which inertia acts, too.
-            let aim = arm - (self.pushes.get(node).as_dvec3() - push);
+            let arm = of(positions, node) - centre;
+            torque += arm.cross(of(&self.residuals, node));
+            let aim = if is_known {
+                arm - (of(&self.pushes, node) - push)
+            } else {
+                arm
+            };
             moments += moment(aim, arm) * f64::from(inertia);
         }
         let shift = DVec3::select(held, DVec3::ZERO, sum / mass);

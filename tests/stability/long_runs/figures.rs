@@ -5,10 +5,9 @@ use std::fmt;
 /// Excess energy over the energy put in.
 const ENERGY: f64 = 1e-3;
 
-/// Change of momentum over the sum of the magnitudes of the nodal momenta, in so many steps. It is a sum of rounding errors, and grows
-/// as a random walk does.
+/// Change of momentum over the sum of the magnitudes of the nodal momenta, and how much more rounding adds in a substep at most.
 const MOMENTUM: f64 = 1e-5;
-const STEPS: f64 = 36_000.0;
+const ROUNDING: f64 = 1e-10;
 
 /// Relative change of angular momentum.
 const ANGULAR_MOMENTUM: f64 = 2e-3;
@@ -104,12 +103,9 @@ impl Figures {
     /// The checks that failed.
     pub fn wrong(&self) -> Vec<String> {
         let mut wrong = self.faults.clone();
+        let momentum = MOMENTUM + ROUNDING * self.steps as f64 * f64::from(self.substeps);
         let bounds = [
-            (
-                "momentum",
-                self.momentum,
-                MOMENTUM * (self.steps as f64 / STEPS).sqrt().max(1.0),
-            ),
+            ("momentum", self.momentum, momentum),
             ("angular momentum", self.angular_momentum, ANGULAR_MOMENTUM),
             ("not at rest", self.kinetic, KINETIC),
             ("frequency", self.frequency.map(|[own, _]| own.abs()), FREQUENCY),
