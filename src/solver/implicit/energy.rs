@@ -124,10 +124,12 @@ impl Substep<'_> {
             return End::NotFinite;
         }
         let is_rounding = after.energy <= has + rounding && !self.may_be_of_order_1(implicit);
+        // Attached bodies are never of order 2.
+        let most_credit = if implicit.is_attached { 0.0 } else { CREDIT };
         let history = &mut implicit.histories[next];
         history.energy = Some(after);
         let size = after.size + work.abs();
-        history.credit = (has + before.credit - after.energy).min(CREDIT * size);
+        history.credit = (has + before.credit - after.energy).min(most_credit * size);
         if history.credit >= -(DEBT * size + rounding) || is_rounding {
             End::Fine
         } else {

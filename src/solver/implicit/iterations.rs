@@ -31,7 +31,8 @@ const OTHER: f64 = 0.3;
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
 
-/// What rounded forces leave where it is taken off what rounded positions do, as a part of that. Contacts make more of it.
+/// What rounded forces leave where it is taken off what rounded positions do, as a part of that. Contacts make more of it, and so it is where nothing
+/// moves.
 const QUIET: f64 = 1e-4;
 
 /// Up to so many times what rounding leaves, what it makes of the residual is taken off again: beyond that it does not count.
@@ -144,7 +145,7 @@ impl Substep<'_> {
         let is_held = held.all();
         self.place(body, implicit);
         self.residual(body, implicit);
-        let (mut gone, mut vain, mut solved_error) = (0.0, 0, 0.0_f64);
+        let (mut gone, mut vain, mut solved_error, mut is_small) = (0.0, 0, 0.0_f64, false);
         let mut square = 0.0;
         for iteration in 0..NEWTON {
             self.stiffen(body, implicit);
@@ -159,7 +160,8 @@ impl Substep<'_> {
                 .contacts
                 .as_deref()
                 .is_some_and(|contacts| !contacts.holds.is_empty());
-            let rounding = if is_touched { noise.square } else { QUIET * noise.square };
+            let share = if is_touched || is_small { 1.0 } else { QUIET };
+            let rounding = share * noise.square;
             if square <= FINE * noise.square && (gone < 1.0 || square > rounding) {
                 self.refine(body, implicit);
                 square = implicit.precondition(body, 0.0, self.team).first;
@@ -210,20 +212,16 @@ impl Substep<'_> {
             }
             // Where the correction itself is no more than rounding, there is no need to look at what it led to: but what
             // nothing holds is to keep its momentum.
-            let is_small = solved.size <= f64::max(absolute, noise.error)
-                && solved.error <= absolute.max(relative * f64::max(size, solved.size))
-                && implicit.stiffened.is_empty();
-            if is_small && is_held {
+            is_small = solved.size <= f64::max(absolute, noise.error)
+                && solved.error <= absolute.max(relative * f64::max(size, solved.size));
+            if is_small && is_held && implicit.stiffened.is_empty() {
                 add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
                 self.place(body, implicit);
-            } else {
-                gone = self.go(body, implicit, solved.work);
-            }
-            if is_small {
                 error = solved.error;
                 is_solved = true;
                 break;
             }
+            gone = self.go(body, implicit, solved.work);
             size = f64::max(size, gone * gone * solved.size);
             let push = |node: usize| implicit.pushes.get(node).as_dvec3();
             // Before that, what contacts do is not what it will be, and would grow with each multiplier made of it.
