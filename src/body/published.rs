@@ -139,6 +139,12 @@ impl Published {
         })
     }
 
+    /// The early velocities, where callers see those.
+    fn early_seen(&self) -> Option<&Vectors> {
+        let [early, _] = self.early.as_ref()?;
+        early.is_seen.then_some(&early.velocities)
+    }
+
     /// To be called when velocities change.
     pub fn forget_velocities(&mut self) {
         self.clear_velocities();
@@ -179,17 +185,8 @@ impl Body {
                 }
             };
             let closing = self.carry.closing;
-            if let Some(
-                [
-                    Early {
-                        velocities,
-                        is_seen: true,
-                    },
-                    _,
-                ],
-            ) = &self.published.early
-            {
-                put(0..self.node_count(), velocities.axes());
+            if let Some(early) = self.published.early_seen() {
+                put(0..self.node_count(), early.axes());
             } else if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
                 put(0..self.node_count(), self.state.velocities().axes());
             }

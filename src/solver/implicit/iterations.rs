@@ -31,8 +31,8 @@ const OTHER: f64 = 0.3;
 /// What is left may be rounding, as far as it is no more than so many times what rounding is taken to leave.
 const NEARLY: f64 = 100.0;
 
-/// What rounded forces leave where it is taken off what rounded positions do, as a part of that. Contacts make more of it, and so it is where nothing
-/// moves.
+/// What rounded forces leave, as a part of what rounded positions do: that much is left once the latter is taken off. It is more where contacts
+/// hold nodes, and does not count where nothing moves.
 const QUIET: f64 = 1e-4;
 
 /// Up to so many times what rounding leaves, what it makes of the residual is taken off again: beyond that it does not count.
@@ -147,6 +147,10 @@ impl Substep<'_> {
         self.residual(body, implicit);
         let (mut gone, mut vain, mut solved_error, mut is_small) = (0.0, 0, 0.0_f64, false);
         let mut square = 0.0;
+        let has_holds = body
+            .contacts
+            .as_deref()
+            .is_some_and(|contacts| !contacts.holds.is_empty());
         for iteration in 0..NEWTON {
             self.stiffen(body, implicit);
             let is_other = body
@@ -156,12 +160,7 @@ impl Substep<'_> {
             implicit.corrections.clear();
             square = implicit.precondition(body, 0.0, self.team).first;
             // What a solution has left of it is rounding.
-            let is_touched = body
-                .contacts
-                .as_deref()
-                .is_some_and(|contacts| !contacts.holds.is_empty());
-            let share = if is_touched || is_small { 1.0 } else { QUIET };
-            let rounding = share * noise.square;
+            let rounding = if has_holds || is_small { 1.0 } else { QUIET } * noise.square;
             if square <= FINE * noise.square && (gone < 1.0 || square > rounding) {
                 self.refine(body, implicit);
                 square = implicit.precondition(body, 0.0, self.team).first;
