@@ -3,9 +3,9 @@
 use glam::Vec3;
 
 use super::closest::Closest;
-use super::mesh_solid::MeshSolid;
-
 use super::distance::{closest_of_segments, closest_on_segment, closest_on_triangle};
+use super::mesh_solid::MeshSolid;
+use crate::geometry::Bounds;
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
 pub(super) const TOUCHING: f32 = 1e-4;
@@ -71,7 +71,19 @@ impl Segment {
     }
 }
 
+impl Separation {
+    /// Whether two edges come closest between their ends.
+    pub fn is_across(&self) -> bool {
+        self.inside && self.along > 0.0 && self.along < 1.0
+    }
+}
+
 impl Corners {
+    /// The box about them as the substep begins.
+    pub fn bounds(&self) -> Bounds {
+        Bounds::of(self.points[..self.count].iter().copied())
+    }
+
     /// Of a node.
     pub fn of_node(point: Vec3, step: Vec3) -> Self {
         Self {
@@ -161,6 +173,27 @@ impl Corners {
             gap = separation.offset.length() - segment.radius;
         }
         Some(separation)
+    }
+
+    /// The separation that decides what they do to each other in a substep, and whether they only come closer than `ahead` beyond the radius, m,
+    /// without touching; `None` where not even that. Of what moves less than `ahead` that is the separation as the substep begins.
+    pub fn meet(&self, start: Separation, segment: &Segment, ahead: f32) -> Option<(Separation, bool)> {
+        let closing = self.closing(segment);
+        let gap = start.offset.length() - segment.radius;
+        if !(gap <= closing + ahead) {
+            return None;
+        }
+        if closing <= ahead {
+            return Some((start, gap > closing));
+        }
+        if let Some(touch) = self.approach_from(start, segment, 0.0) {
+            return Some((touch, false));
+        }
+        let wider = Segment {
+            radius: segment.radius + ahead,
+            ..*segment
+        };
+        self.approach_from(start, &wider, 0.0).map(|found| (found, true))
     }
 
     /// The same for what a mesh encloses, in whose own frame the corners are: also when that is, a fraction of the substep. They touch

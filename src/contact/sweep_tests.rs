@@ -39,7 +39,14 @@ impl Query {
             steps: ends.map(|point| steps[point]),
             radius: radius * self.longest_edge(),
         };
-        corners.approach(&segment, 0.0).is_some()
+        let found = corners.approach(&segment, 0.0).is_some();
+        // What also tells what only comes near misses none of it.
+        for ahead in [0.0, 0.02, 1.0] {
+            let start = corners.separation(&segment, 0.0);
+            let met = corners.meet(start, &segment, ahead * self.longest_edge());
+            assert!(met.is_some() || !found, "{ahead} of an edge ahead");
+        }
+        found
     }
 
     /// How far the sides come at most in the step, against each other.

@@ -493,6 +493,45 @@ fn thicknesses_that_overlap_part_nothing() {
     }
 }
 
+/// A contact gives an impulse that closes the next gap within the same substep: it has to be found although nothing went there when it began.
+#[test]
+fn what_is_pushed_on_meets_the_next_in_the_same_substep() {
+    let meshes = [0, 1, 2, 3].map(|place| block(0.04, 3, Vec3::new(0.0411 * place as f32, 0.001 * place as f32, 0.0)));
+    for speed in [0.5, 1.0] {
+        let mut world = world(Vec3::ZERO);
+        let ids = meshes
+            .each_ref()
+            .map(|mesh| put(&mut world, mesh, BLOCK, Solver::Verlet, CONTACT));
+        throw(&mut world, ids[0], Vec3::new(speed, 0.0, 0.0));
+        let mass = BLOCK.mass / meshes[0].positions.len() as f32;
+        let energy = |world: &World| ids.iter().map(|&id| total_energy(world, id)).sum::<f64>();
+        let start = energy(&world);
+        for index in 0..100 {
+            let what = format!("{speed} m/s, step {index}");
+            assert_eq!(step(&mut world, 1e-3).crossings, 0, "{what}");
+            for place in 0..3 {
+                let [left, right] = [place, place + 1];
+                let deep = inside(&world, ids[left], &meshes[right], ids[right])
+                    + inside(&world, ids[right], &meshes[left], ids[left]);
+                assert_eq!(deep, 0, "{what}, blocks {left} and {right}");
+            }
+            let now = energy(&world);
+            assert!(now <= start * (1.0 + 1e-3), "{what}: {now} J of {start}");
+            let momentum = ids.iter().map(|&id| momentum(body(&world, id), mass)).sum::<DVec3>();
+            let given = f64::from(BLOCK.mass * speed);
+            assert!(
+                (momentum.x / given - 1.0).abs() < 1e-6,
+                "{what}: {momentum} of {given} kg m/s"
+            );
+        }
+        let last = momentum(body(&world, ids[3]), mass).x;
+        assert!(
+            last > 0.25 * f64::from(BLOCK.mass * speed),
+            "{speed} m/s: the last one got {last} kg m/s"
+        );
+    }
+}
+
 #[test]
 fn blocks_that_are_thrown_at_each_other_gain_no_energy() {
     blocks_that_are_thrown_at_each_other_gain_no_energy_of(&[3.0]);

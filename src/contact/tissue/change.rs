@@ -293,9 +293,15 @@ impl Skin {
             return;
         };
         changing.roles.resize(change.node_count, 0);
-        for vectors in [Some(&mut self.starts), Some(&mut self.velocities), self.firsts.as_mut()]
-            .into_iter()
-            .flatten()
+        for vectors in [
+            Some(&mut self.starts),
+            Some(&mut self.velocities),
+            Some(&mut self.expected),
+            Some(&mut self.changes),
+            self.firsts.as_mut(),
+        ]
+        .into_iter()
+        .flatten()
         {
             vectors.grow(change.node_count);
         }

@@ -425,7 +425,7 @@ impl Tissue {
                 && moment.concerns(body)
             {
                 body.release_pressed(moment.duration);
-                skin.follow(body, moment.duration);
+                skin.follow(body, moment.duration, moment.begins);
             }
         }
         self.pairs.advance(self.islands.pairs(island), &self.skins);
@@ -442,6 +442,14 @@ impl Tissue {
 
     fn stop_what_meets(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         let have_acted = self.solve(island, bodies, moment);
+        for &place in self.islands.members(island) {
+            let place = place as usize;
+            if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at_mut(place))
+                && moment.concerns(body)
+            {
+                skin.remember(body);
+            }
+        }
         for link in &self.links {
             for (index, (side, sign)) in link.sides.iter().zip([1.0, -1.0]).enumerate() {
                 if let (Some(skin), Some(body)) = (&mut self.skins[side.body], bodies.at_mut(side.body)) {
@@ -554,9 +562,12 @@ impl Tissue {
             let known = self.links.len();
             if has_begun {
                 self.go_on(island, bodies, moment);
+                if self.has_foreseen(island, bodies, moment) {
+                    break;
+                }
             }
             let watch = Stopwatch::start(moment.profile);
-            self.find(island, bodies, moment, moment.begins && !has_begun);
+            self.find(island, bodies, moment, has_begun);
             watch.stop(moment.profile, Stage::NarrowPhase);
             watch.take_off(moment.profile, Stage::ContactSolver);
             if self.links.len() == known && (has_begun || !self.bonds.act()) {
@@ -606,6 +617,16 @@ impl Tissue {
         }
     }
 
+    /// Whether what may meet where impulses have led nodes was found before they acted.
+    fn has_foreseen(&self, island: usize, bodies: &Slots<Body>, moment: &Moment) -> bool {
+        let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
+        let mut all = of_one.chain(self.islands.pairs(island));
+        all.all(|pair| {
+            let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
+            search.is_none_or(|search| search.has_foreseen())
+        })
+    }
+
     /// Moves what began too close apart, without giving it speed.
     fn part(&self, bodies: &mut Slots<Body>, duration: f32) {
         for link in self.links.iter().filter(|link| link.depth > 0.0) {
@@ -640,11 +661,14 @@ impl Tissue {
             std::mem::swap(&mut first, &mut second);
         }
         let is_looked_at = both.into_iter().all(|body| moment.concerns(body));
+        let [own, others] = [first.skin, second.skin];
         (is_looked_at && !entangled.has([a, b])).then(|| Search {
             parties: [first, second],
             dt: moment.duration,
             radius,
-            in_images: a != b && meet_in_images(first.skin, second.skin),
+            ahead: own.ahead().min(others.ahead()),
+            motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
+            in_images: a != b && meet_in_images(own, others),
             measures: Measure::Nothing,
         })
     }
@@ -693,8 +717,9 @@ impl Tissue {
         }
     }
 
-    /// Adds the contacts that are not known yet, of those that meet.
-    fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment, measures: bool) {
+    /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
+    fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment, again: bool) {
+        let measures = moment.begins && !again;
         self.know_pairs(island, bodies, moment);
         let Self {
             skins,
@@ -718,6 +743,9 @@ impl Tissue {
             let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
                 continue;
             };
+            if again && search.has_foreseen() {
+                continue;
+            }
             let [a, b] = search.parties.map(|party| party.place);
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {
                 continue;

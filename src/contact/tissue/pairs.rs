@@ -1,7 +1,8 @@
 //! What of two bodies is near each other, kept from substep to substep of a step, until they may have come nearer than was looked for (Verlet 1967).
 //!
-//! Beside each corner and edge stands how far the bodies may move against each other before anything can reach it: until then it is passed over.
-//! A substep so examines what touches and next to nothing else. What is found is a matter of distances alone: a search by the trees finds the same.
+//! Beside each corner and edge, and each feature near it, stands how far the bodies may move against each other before these can touch: until then they
+//! are passed over. A substep so examines what touches and next to nothing else. What is found is a matter of distances alone: a search by the trees
+//! finds the same.
 
 use glam::Vec3;
 
@@ -23,6 +24,17 @@ const ROOM: usize = 4;
 
 /// What rounding may take from distances, as a part of them.
 const ROUNDING: f32 = 1e-3;
+
+/// A feature of the other body near a corner or an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    /// A triangle near a corner, an edge near an edge.
+    pub feature: u32,
+    /// How far apart they were when they were last compared, together with how far the bodies had moved by then, m.
+    pub apart: f32,
+}
+
+saved!(Near { feature, apart });
 
 /// A corner or an edge, and what of the other body is near it.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +80,7 @@ pub(super) struct Pairs {
     is_full: bool,
     lists: Vec<List>,
     runs: Vec<Run>,
-    features: Vec<u32>,
+    features: Vec<Near>,
 }
 
 saved!(Pairs {
@@ -82,14 +94,14 @@ saved!(Pairs {
 /// The list of one pair, to be gone through.
 pub(super) struct Known<'a> {
     pub runs: [&'a mut [Run]; 3],
-    pub features: &'a [u32],
+    pub features: &'a mut [Near],
     pub moved: f32,
 }
 
 impl Run {
     /// What is near it, of all features that are listed.
-    pub fn of<'a>(&self, features: &'a [u32]) -> &'a [u32] {
-        &features[self.first as usize..self.end as usize]
+    pub fn of<'a>(&self, features: &'a mut [Near]) -> &'a mut [Near] {
+        &mut features[self.first as usize..self.end as usize]
     }
 }
 
@@ -175,7 +187,7 @@ impl Pairs {
         let (of_first, of_second) = corners.split_at_mut(a);
         Some(Known {
             runs: [of_first, of_second, edges],
-            features: &self.features,
+            features: &mut self.features,
             moved: list.moved,
         })
     }
@@ -236,14 +248,14 @@ impl Pairs {
         near(&mut |feature, apart, within| {
             if apart <= within {
                 nearest = nearest.min(apart);
-                has_room = has_room && put(features, feature).is_some();
+                has_room = has_room && put(features, Near { feature, apart }).is_some();
             }
         });
         if !has_room {
             return None;
         }
         if self.features.len() > first {
-            self.features[first..].sort_unstable();
+            self.features[first..].sort_unstable_by_key(|near| near.feature);
             let run = Run {
                 number: number as u32,
                 first: first as u32,
@@ -259,26 +271,23 @@ impl Pairs {
 impl Search<'_> {
     /// How far apart anything is at most that can meet, m.
     pub fn reach(&self) -> f32 {
+        if self.is_of_one() {
+            return self.reach_of_edges();
+        }
         let depths = self.parties.map(|party| party.skin.depth());
-        self.radius.max(depths[0]).max(depths[1]) + self.motion()
+        (self.radius + self.ahead).max(depths[0]).max(depths[1]) + self.motion
     }
 
     /// The same of edges: none is led out of a body.
     pub fn reach_of_edges(&self) -> f32 {
-        self.radius + self.motion()
-    }
-
-    /// How far anything of one body goes against anything of the other at most, m.
-    fn motion(&self) -> f32 {
-        let [a, b] = self.parties.map(|party| party.skin);
-        a.spread + b.spread + (a.drift - b.drift).length() * self.dt
+        self.radius + self.ahead + self.motion
     }
 
     /// How much further away than that is listed, m.
     fn margin(&self) -> f32 {
         let [a, b] = self.parties.map(|party| party.skin.short);
         let short = a.min(b);
-        (SUBSTEPS * self.motion()).clamp(LEAST_MARGIN * short, MOST_MARGIN * short)
+        (SUBSTEPS * self.motion).clamp(LEAST_MARGIN * short, MOST_MARGIN * short)
     }
 }
 

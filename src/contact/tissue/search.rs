@@ -5,8 +5,9 @@ use glam::Vec3;
 
 use super::clearances::{Clearances, Part};
 use super::link::Side;
-use super::pairs::Known;
+use super::pairs::{Known, Near};
 use super::skin::{Clearance, NONE, PARTED, Skin};
+use super::wound::Wound;
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::geometry::Bounds;
 
@@ -17,8 +18,9 @@ const SAME: f32 = 1e-4;
 /// A corner meets so many faces at most. With the closest alone, a corner in a fold would be pushed out of one face into the next, and tremble.
 const FACES: usize = 3;
 
-/// A face that a corner meets: how far away it is, its number, where they meet and how far they keep apart.
-type Touched = (f32, usize, (Separation, Clearance));
+/// A face that a corner meets, or an edge that an edge meets: whether it only comes near, how far away it is, which it is, where they meet and how far
+/// they keep apart.
+type Met<Feature> = (bool, f32, Feature, (Separation, Clearance));
 
 /// A body in a search, by its place in the world.
 #[derive(Clone, Copy)]
@@ -40,19 +42,21 @@ pub(super) struct Touch {
 }
 
 /// Where those features come from that may be near a corner or an edge.
-#[derive(Clone, Copy)]
 enum From<'a> {
     /// Trees or images.
     Search,
-    /// They are known: triangles near a corner, edges near an edge.
-    Known(&'a [u32]),
+    /// They are known: triangles near a corner, edges near an edge, and how far the bodies have moved since these were listed, m.
+    Known(&'a mut [Near], f32),
 }
 
-/// A search over a step of `dt` seconds for what comes closer than `radius`, m.
+/// A search over a step of `dt` seconds for what comes closer than `radius`, m, and for what comes within `ahead` of that, m: impulses may lead it there.
 pub(super) struct Search<'a> {
     pub parties: [Party<'a>; 2],
     pub dt: f32,
     pub radius: f32,
+    pub ahead: f32,
+    /// How far anything of one party goes against anything of the other at most, m.
+    pub motion: f32,
     /// Whether they find each other in images.
     pub in_images: bool,
     pub measures: Measure,
@@ -81,7 +85,7 @@ impl Search<'_> {
                 (others, [second, first], of_second),
             ] {
                 for run in runs.iter_mut().filter(|run| run.apart - moved <= reach) {
-                    let from = From::Known(run.of(features));
+                    let from = From::Known(run.of(features), moved);
                     let corner = run.number as usize;
                     let parties = [of_nodes, of_faces];
                     run.apart = moved + self.node_with_faces(parties, corner, from, kept.as_deref_mut(), &mut see);
@@ -89,7 +93,7 @@ impl Search<'_> {
             }
             let reach = self.reach_of_edges();
             for run in edges.iter_mut().filter(|run| run.apart - moved <= reach) {
-                let (from, edge) = (From::Known(run.of(features)), run.number as usize);
+                let (from, edge) = (From::Known(run.of(features), moved), run.number as usize);
                 run.apart = moved + self.edge_with_edges(edge, from, of_first.as_deref_mut(), &mut see);
             }
             return;
@@ -107,34 +111,38 @@ impl Search<'_> {
         }
     }
 
+    /// Whether all that may meet now, as impulses have led the nodes, was found before they acted.
+    pub fn has_foreseen(&self) -> bool {
+        let [first, second] = self.parties.map(|party| party.skin);
+        let is_open = self.is_of_one() && first.wound().is_some_and(Wound::is_open);
+        !is_open && first.strayed + second.strayed <= self.ahead
+    }
+
     pub(super) fn is_of_one(&self) -> bool {
         self.parties[0].place == self.parties[1].place
     }
 
     /// Shows the triangles that a corner, by its place among those of its surface, comes within `reach` of on its way through a box; those that are
-    /// seen there where they are to be found in images.
+    /// seen there where they are to be found in images. Answers how far any of them is, m, at least, as `see` tells of each.
     fn near_corner(
         &self,
         (corner, from): (usize, From),
         skin: &Skin,
         bounds: &Bounds,
         reach: f32,
-        mut see: impl FnMut(usize),
-    ) {
-        if let From::Known(triangles) = from {
-            triangles.iter().for_each(|&triangle| see(triangle as usize));
-            return;
+        mut see: impl FnMut(usize) -> f32,
+    ) -> f32 {
+        if let From::Known(triangles, moved) = from {
+            return nearest_of(triangles, (moved, self.reach()), |triangle| see(triangle as usize));
         }
+        let mut least = f32::INFINITY;
+        let see = |triangle| least = least.min(see(triangle));
         match &skin.images {
             _ if self.is_of_one() => skin.near_itself(corner, bounds, reach + skin.spread, see),
             Some(images) if self.in_images => images.near(skin, bounds, reach, see),
             _ => skin.near(bounds, reach, see),
         }
-    }
-
-    /// Whether parts of one surface begin too far apart to meet in the step.
-    fn is_far(&self, skin: &Skin, distance: f32) -> bool {
-        self.is_of_one() && distance > self.radius + 2.0 * skin.spread
+        least
     }
 
     /// How far a part of a surface keeps from another body, m.
@@ -179,27 +187,30 @@ impl Search<'_> {
             steps: [step; 2],
             radius,
         };
-        let mut least = f32::INFINITY;
         let mut front = f32::INFINITY;
-        let mut touched: [Option<Touched>; FACES] = [None; FACES];
+        let mut touched: [Option<Met<usize>>; FACES] = [None; FACES];
         // Of a closed surface: how far the nearest face is, how squarely it is seen, and whether from behind.
         let mut nearest = (f32::INFINITY, 0.0_f32);
         let mut behind: Option<(usize, Separation)> = None;
         let around = Bounds::of([place, place + step].into_iter());
         let is_solid = of_faces.skin.is_closed && !self.is_of_one();
         let depth = if is_solid { of_faces.skin.depth() } else { 0.0 };
-        let reach = self.radius.max(depth) + of_faces.skin.spread;
-        self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
+        let reach = (self.radius + self.ahead).max(depth) + of_faces.skin.spread;
+        let far = self.reach();
+        let near = Bounds::of([place].into_iter()).extended(far);
+        let least = self.near_corner((corner, from), of_faces.skin, &around, reach, |triangle| {
             let nodes = of_faces.skin.triangles[triangle];
             if self.is_of_one() && (nodes.contains(&node) || of_faces.skin.are_of_wound([node; 2], &nodes)) {
-                return;
+                return f32::INFINITY;
             }
             let corners = self.corners(of_faces, &nodes);
+            if !near.overlaps(&corners.bounds()) {
+                return far;
+            }
             let start = corners.separation(&segment, 0.0);
             let distance = start.offset.length();
-            least = least.min(distance);
-            if self.is_far(of_faces.skin, distance) {
-                return;
+            if distance > far {
+                return distance;
             }
             let height = if is_solid { height(&corners, &start) } else { 0.0 };
             if height >= 0.0 {
@@ -211,15 +222,18 @@ impl Search<'_> {
                 nearest = (distance, height.abs());
                 behind = (height < 0.0).then_some((triangle, start));
             }
-            let is_closer =
-                |(least, known, _): (f32, usize, _)| distance < least || distance == least && triangle < known;
             if height >= 0.0
-                && let Some(place) = touched.iter().position(|known| known.is_none_or(is_closer))
-                && let Some(found) = self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
+                && let Some((found, is_ahead)) =
+                    self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
             {
-                touched[place..].rotate_right(1);
-                touched[place] = Some((distance, triangle, found));
+                let order = (is_ahead, distance, triangle);
+                let is_closer = |(is_ahead, least, known, _): Met<usize>| order < (is_ahead, least, known);
+                if let Some(place) = touched.iter().position(|known| known.is_none_or(is_closer)) {
+                    touched[place..].rotate_right(1);
+                    touched[place] = Some((is_ahead, distance, triangle, found));
+                }
             }
+            distance
         });
         // What was made within another is led out as far as its thickness asks for; what lies flush on it by rounding touches it.
         let flush = of_nodes.skin.least_thickness().min(of_faces.skin.least_thickness());
@@ -234,14 +248,15 @@ impl Search<'_> {
         if let Some((triangle, start)) = behind {
             let is_near = nearest.0 < self.radius.max(depth);
             touched = [None; FACES];
-            touched[0] = is_near.then_some((nearest.0, triangle, (start, Clearance::of(radius))));
+            touched[0] = is_near.then_some((false, nearest.0, triangle, (start, Clearance::of(radius))));
         }
         for place in 0..FACES {
-            let Some((_, triangle, (found, clearance))) = touched[place] else {
+            let Some((_, _, triangle, (found, clearance))) = touched[place] else {
                 break;
             };
-            let is_shared =
-                |(_, _, (other, _)): &Touched| (other.offset - found.offset).length() <= SAME * found.offset.length();
+            let is_shared = |(_, _, _, (other, _)): &Met<usize>| {
+                (other.offset - found.offset).length() <= SAME * found.offset.length()
+            };
             if touched[..place].iter().flatten().any(is_shared) {
                 continue;
             }
@@ -284,10 +299,13 @@ impl Search<'_> {
             steps: ways.map(|(_, step)| step),
             radius: self.radius_of(kept.as_deref(), Part::Edge(index)),
         };
+        let far = self.reach_of_edges();
+        let near = Bounds::of(segment.ends.into_iter()).extended(far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
-        let mut closest: Option<(f32, [u32; 2], (Separation, Clearance))> = None;
+        let mut closest: Option<Met<[u32; 2]>> = None;
         let mut see_edges = |edges: [u32; 3]| {
+            let mut least = f32::INFINITY;
             for (other, pierces) in second.skin.edges_of(edges) {
                 // Of what passes through tissue there is no telling which side it belongs to; it is near all the same.
                 if pierces && self.measures == Measure::Nothing {
@@ -301,33 +319,36 @@ impl Search<'_> {
                     continue;
                 }
                 let corners = self.corners(second, &other);
+                if !near.overlaps(&corners.bounds()) {
+                    least = least.min(far);
+                    continue;
+                }
                 let from_start = corners.separation(&segment, 0.0);
                 let start = from_start.offset.length();
                 least = least.min(start);
-                if self.is_far(second.skin, start) {
-                    continue;
-                }
                 nearest = nearest.min(start);
-                if pierces {
+                if pierces || start > far {
                     continue;
                 }
                 let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
-                let Some((found, clearance)) = met else {
+                let Some(((found, clearance), is_ahead)) = met else {
                     continue;
                 };
                 // At an end of either it is a node that meets.
-                if found.inside && found.along > 0.0 && found.along < 1.0 {
-                    let is_closer =
-                        |(least, known, _): (f32, [u32; 2], _)| start < least || start == least && other < known;
-                    if closest.is_none_or(is_closer) {
-                        closest = Some((start, other, (found, clearance)));
-                    }
+                let order = (is_ahead, start, other);
+                if found.is_across() && closest.is_none_or(|(known, least, edge, _)| order < (known, least, edge)) {
+                    closest = Some((is_ahead, start, other, (found, clearance)));
                 }
             }
+            least
         };
-        let reach = self.radius + second.skin.spread;
+        let reach = self.radius + self.ahead + second.skin.spread;
         match &second.skin.images {
-            _ if let From::Known(others) = from => others.iter().for_each(|&other| see_edges([other, NONE, NONE])),
+            _ if let From::Known(others, moved) = from => {
+                least = nearest_of(others, (moved, self.reach_of_edges()), |other| {
+                    see_edges([other, NONE, NONE])
+                });
+            }
             Some(images) if self.in_images => {
                 // The box about all of a long edge is mostly beside it.
                 let [from, to] = segment.ends;
@@ -337,14 +358,14 @@ impl Search<'_> {
                     let places = shares.map(|share| segment.at(share)).into_iter().flatten();
                     let (skin, around) = (second.skin, Bounds::of(places));
                     images.near(skin, &around, reach, |triangle| {
-                        see_edges(images.edges_near(skin, triangle, &around, reach));
+                        least = least.min(see_edges(images.edges_near(skin, triangle, &around, reach)));
                     });
                 }
             }
             _ => {
                 let around = Bounds::of(ways.into_iter().flat_map(|(place, step)| [place, place + step]));
                 let skin = second.skin;
-                let see = |triangle| see_edges(skin.owned(triangle));
+                let see = |triangle| least = least.min(see_edges(skin.owned(triangle)));
                 if self.is_of_one() {
                     skin.near_edge(index, &around, reach + skin.spread, see);
                 } else {
@@ -353,7 +374,7 @@ impl Search<'_> {
             }
         }
         self.measure(kept, Part::Edge(index), nearest);
-        if let Some((_, other, (found, clearance))) = closest {
+        if let Some((_, _, other, (found, clearance))) = closest {
             let sides = [
                 Side {
                     body: first.place,
@@ -371,22 +392,22 @@ impl Search<'_> {
         least
     }
 
-    /// Where a node or an edge comes too close to a face or an edge, and how far they keep apart.
+    /// Where a node or an edge comes too close to a face or an edge, how far they keep apart, and whether it only comes near.
     fn approach(
         &self,
         skin: &Skin,
         (nodes, segment): ([u32; 2], &Segment),
         (others, corners): (&[u32], &Corners),
         start: Separation,
-    ) -> Option<(Separation, Clearance)> {
-        let found = corners.approach_from(start, segment, 0.0)?;
+    ) -> Option<((Separation, Clearance), bool)> {
+        let (found, is_ahead) = corners.meet(start, segment, self.ahead)?;
         if !self.is_of_one() {
-            return Some((found, Clearance::of(segment.radius)));
+            return Some(((found, Clearance::of(segment.radius)), is_ahead));
         }
         let clearance = skin.keeps(nodes, (others, found.weights), self.radius)?;
         // Without a thickness what a cut has parted keeps as far apart as all else does.
         if clearance == Clearance::of(self.radius) {
-            return Some((found, clearance));
+            return Some(((found, clearance), is_ahead));
         }
         // What was one place has no side yet.
         let radius = clearance.radius;
@@ -394,7 +415,8 @@ impl Search<'_> {
             return None;
         }
         let segment = Segment { radius, ..*segment };
-        Some((corners.approach_from(start, &segment, 0.0)?, clearance))
+        let (found, is_ahead) = corners.meet(start, &segment, self.ahead)?;
+        Some(((found, clearance), is_ahead))
     }
 
     /// Shows what meets in this direction, of sides that keep so far apart, and in coordinates so far apart.
@@ -433,7 +455,7 @@ impl Search<'_> {
     pub(super) fn way(&self, party: Party, node: u32, shift: Vec3, drift: Vec3) -> (Vec3, Vec3) {
         let node = node as usize;
         let place = party.skin.starts.get(node) + shift;
-        (place, (party.skin.velocities.get(node) - drift) * self.dt)
+        (place, (party.skin.expected.get(node) - drift) * self.dt)
     }
 
     /// The corners of an edge or a face in its own body's coordinates, and how far they leave its drift.
@@ -448,6 +470,18 @@ impl Search<'_> {
         }
         corners
     }
+}
+
+/// Shows those features that may be within `reach` after bodies have moved so far, m, and remembers how far they are: how far any is, at least.
+fn nearest_of(all: &mut [Near], (moved, reach): (f32, f32), mut see: impl FnMut(u32) -> f32) -> f32 {
+    let mut least = f32::INFINITY;
+    for near in all {
+        if near.apart - moved <= reach {
+            near.apart = moved + see(near.feature);
+        }
+        least = least.min(near.apart - moved);
+    }
+    least
 }
 
 /// How far above a face what is compared with it begins, m; below 0 on its inner side.

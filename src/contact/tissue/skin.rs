@@ -39,13 +39,19 @@ pub(crate) struct Skin {
     /// Where nodes are as a step or substep begins, in the body's coordinates, and how fast they go through it, m/s.
     pub starts: Vectors,
     pub velocities: Vectors,
-    /// The middle of these velocities, m/s, and how far any node leaves that, m.
+    /// How fast they are expected to go once contacts have acted, m/s: where they meet is searched for with these velocities.
+    pub expected: Vectors,
+    /// How much faster contacts made them in the last substep of the same step, m/s.
+    pub(super) changes: Vectors,
+    /// The middle of the expected velocities, m/s, and how far any node leaves that, m.
     pub drift: Vec3,
     pub spread: f32,
     /// The box of all ways that nodes have gone since they were looked at last, m.
     pub moved: Bounds,
     /// The box of all velocities that were given.
     pub given: Bounds,
+    /// How far impulses lead any node from where it was expected in the substep, m.
+    pub strayed: f32,
     /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
     pub short: f32,
     /// How far it reached along an axis at first, m.
@@ -82,10 +88,13 @@ saved!(Skin {
     origin,
     starts,
     velocities,
+    expected,
+    changes,
     drift,
     spread,
     moved,
     given,
+    strayed,
     short,
     extent,
     firsts,
@@ -110,6 +119,9 @@ const LED_OUT: f32 = 0.5;
 
 /// With itself a surface keeps off no further than this part of its short edges, or neighbours would meet.
 const WITH_ITSELF: f32 = 0.5;
+
+/// What comes this part of a short edge nearer than it may touch is found too: impulses of the same substep may lead it there.
+const AHEAD: f32 = 0.02;
 
 /// How far two features keep apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -207,10 +219,13 @@ impl Skin {
             origin: body.origin,
             starts: body.zeros()?,
             velocities: body.zeros()?,
+            expected: body.zeros()?,
+            changes: body.zeros()?,
             drift: Vec3::ZERO,
             spread: 0.0,
             moved: Bounds::EMPTY,
             given: Bounds::EMPTY,
+            strayed: 0.0,
             triangles,
             changing,
             nearby: None,
@@ -313,6 +328,11 @@ impl Skin {
         LEAST_THICKNESS * self.short
     }
 
+    /// How near what meets it is found in a substep, m beyond what it keeps off: with another surface the less of both.
+    pub fn ahead(&self) -> f32 {
+        AHEAD * self.short
+    }
+
     /// How deep an edge is to pass through a triangle of the same body to be on its other side, m: where a cut has parted them they touch.
     pub fn crossing_depth(&self, edge: [u32; 2], triangle: &[u32]) -> f64 {
         let is_parted = |first: u32| edge.iter().chain(triangle).any(|&node| node >= first);
@@ -343,8 +363,11 @@ impl Skin {
         })
     }
 
-    /// Takes a substep of `duration` seconds as it is to be.
-    pub fn follow(&mut self, body: &mut Body, duration: f32) {
+    /// Takes a substep of `duration` seconds, the first one of a step or not, as it is to be.
+    pub fn follow(&mut self, body: &mut Body, duration: f32, begins: bool) {
+        if begins {
+            self.changes.clear();
+        }
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
         let state = body.state.substep();
@@ -380,13 +403,30 @@ impl Skin {
             let velocity = bound.of(|node| self.velocities.get(node));
             self.velocities.set(bound.node as usize, velocity);
         }
-        let ways = self
-            .nodes
-            .iter()
-            .map(|&node| self.velocities.get(node as usize) - self.drift);
-        let ways = Bounds::of(ways);
-        self.spread = self.spread.max(duration * ways.magnitudes().length());
+        let (mut all, mut strayed) = (Bounds::EMPTY, 0.0_f32);
+        for &node in &self.nodes {
+            let node = node as usize;
+            let velocity = self.velocities.get(node);
+            strayed = strayed.max(velocity.distance_squared(self.expected.get(node)));
+            self.expected.set(node, velocity);
+            all = all.with(velocity - self.drift);
+        }
+        self.strayed = duration * strayed.sqrt();
+        self.spread = self.spread.max(duration * all.magnitudes().length());
         self.know_nearby(&body.contact);
+    }
+
+    /// Remembers what contacts have changed in a substep, before the body knows of it.
+    pub fn remember(&mut self, body: &mut Body) {
+        let movers = self.changing.iter().flat_map(|changing| &changing.movers);
+        for &node in self.nodes.iter().chain(movers) {
+            let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
+            if bindings.is_none_or(|bindings| bindings.get(node).is_none()) {
+                let node = node as usize;
+                let change = self.velocities.get(node) - body.mean_velocity(node);
+                self.changes.set(node, change);
+            }
+        }
     }
 
     /// Has what is near itself known, or the trees where it is, so far as it is looked for.
@@ -397,7 +437,7 @@ impl Skin {
         let is_open = self.wound().is_some_and(Wound::is_open);
         let border = if is_open { self.wound_border() } else { 0.0 };
         let radius = self.radius_with_itself(contact).unwrap_or(0.0);
-        let apart = radius.max(border) + 2.0 * self.spread;
+        let apart = radius.max(border) + self.ahead() + 2.0 * self.spread;
         if !nearby.holds(self, apart) {
             self.fit();
             nearby.find(self, apart, radius);
@@ -468,17 +508,23 @@ impl Skin {
             self.starts.set(node as usize, start);
             self.velocities.set(node as usize, velocity);
         }
+        let changes = &self.changes;
         let bindings = bindings.filter(|_| self.changing.is_some());
         let bound = |node: u32| bindings.and_then(|bindings| bindings.get(node));
         for &node in &self.nodes {
-            let (start, velocity) = match bound(node) {
-                None => motion_of(node as usize),
-                Some(bound) => [bound.of(|node| motion_of(node).0), bound.of(|node| motion_of(node).1)].into(),
+            let ((start, velocity), change) = match bound(node) {
+                None => (motion_of(node as usize), changes.get(node as usize)),
+                Some(bound) => (
+                    (bound.of(|node| motion_of(node).0), bound.of(|node| motion_of(node).1)),
+                    bound.of(|node| changes.get(node)),
+                ),
             };
+            let expected = velocity + change;
             moved = moved.with(start - self.starts.get(node as usize));
             self.starts.set(node as usize, start);
             self.velocities.set(node as usize, velocity);
-            all = all.with(velocity);
+            self.expected.set(node as usize, expected);
+            all = all.with(expected);
         }
         self.moved = moved;
         self.drift = 0.5 * (all.min + all.max);
