@@ -175,19 +175,19 @@ impl Corners {
         Some(separation)
     }
 
-    /// The separation that decides what they do to each other in a substep, and whether they only come closer than `ahead` beyond the radius, m,
-    /// without touching; `None` where not even that. Of what moves less than `ahead` that is the separation as the substep begins.
+    /// The separation when they first touch, or else where they come closer than `ahead` beyond the radius, m, and whether they do not touch; `None`
+    /// where not even that.
     pub fn meet(&self, start: Separation, segment: &Segment, ahead: f32) -> Option<(Separation, bool)> {
         let closing = self.closing(segment);
         let gap = start.offset.length() - segment.radius;
         if !(gap <= closing + ahead) {
             return None;
         }
-        if closing <= ahead {
-            return Some((start, gap > closing));
-        }
         if let Some(touch) = self.approach_from(start, segment, 0.0) {
             return Some((touch, false));
+        }
+        if gap <= ahead {
+            return Some((start, true));
         }
         let wider = Segment {
             radius: segment.radius + ahead,

@@ -50,7 +50,7 @@ pub(crate) struct Skin {
     pub moved: Bounds,
     /// The box of all velocities that were given.
     pub given: Bounds,
-    /// How far impulses lead any node from where it was expected in the substep, m.
+    /// How far impulses have led any node from where it was expected in the substep, m, one time after the other.
     pub strayed: f32,
     /// How long its short edges were at first, m: but for a twentieth all are longer. Those without length do not count.
     pub short: f32,
@@ -368,6 +368,7 @@ impl Skin {
         if begins {
             self.changes.clear();
         }
+        self.strayed = 0.0;
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
         let state = body.state.substep();
@@ -411,7 +412,7 @@ impl Skin {
             self.expected.set(node, velocity);
             all = all.with(velocity - self.drift);
         }
-        self.strayed = duration * strayed.sqrt();
+        self.strayed += duration * strayed.sqrt();
         self.spread = self.spread.max(duration * all.magnitudes().length());
         self.know_nearby(&body.contact);
     }
