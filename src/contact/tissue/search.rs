@@ -7,7 +7,6 @@ use super::clearances::{Clearances, Part};
 use super::link::Side;
 use super::pairs::{Known, Near};
 use super::skin::{Clearance, NONE, PARTED, Skin};
-use super::wound::Wound;
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::geometry::Bounds;
 
@@ -111,11 +110,11 @@ impl Search<'_> {
         }
     }
 
-    /// Whether all that may meet now, as impulses have led the nodes, was found before they acted.
+    /// Whether all that may meet now, as impulses have led the nodes, was found before they acted. A surface between two of its own layers meets both, one
+    /// search after the other.
     pub fn has_foreseen(&self) -> bool {
-        let [first, second] = self.parties.map(|party| party.skin);
-        let is_open = self.is_of_one() && first.wound().is_some_and(Wound::is_open);
-        !is_open && first.strayed + second.strayed <= self.ahead
+        let strayed: f32 = self.parties.iter().map(|party| party.skin.strayed).sum();
+        !self.is_of_one() && strayed <= self.ahead
     }
 
     pub(super) fn is_of_one(&self) -> bool {
