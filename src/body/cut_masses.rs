@@ -164,7 +164,7 @@ impl Body {
     /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
     pub(super) fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
         self.forces_current = false;
-        self.carry.energy.forget();
+        self.carry.forget();
         self.wake();
         self.published.forget_velocities();
         self.scale_for_springs(nodes);

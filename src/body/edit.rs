@@ -270,7 +270,7 @@ impl Body {
         }
         self.forces_current = false;
         self.wake();
-        self.carry.energy.forget();
+        self.carry.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -312,7 +312,7 @@ impl Body {
             self.forces_current = false;
             self.wake();
             self.forget_rates();
-            self.carry.energy.forget();
+            self.carry.forget();
             if let Some(implicit) = &mut self.implicit {
                 implicit.forget_matrix();
             }
@@ -376,7 +376,7 @@ impl Body {
         self.forces_current = false;
         self.wake();
         self.forget_rates();
-        self.carry.energy.forget();
+        self.carry.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -427,7 +427,7 @@ impl Body {
 
     /// What it is made of has another energy where it is.
     pub(super) fn forget_energy(&mut self) {
-        self.carry.energy.forget();
+        self.carry.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_energy();
         }
@@ -436,7 +436,7 @@ impl Body {
     /// Other nodes move now.
     pub(super) fn forget_matrix(&mut self) {
         self.carry.stability = Stability::UNKNOWN;
-        self.carry.energy.forget();
+        self.carry.forget();
         self.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
@@ -486,7 +486,7 @@ impl Body {
         let own = self.order.own(node) as usize;
         self.state.velocities_mut().set(own, velocity);
         self.published.forget_velocities();
-        self.carry.energy.forget();
+        self.carry.forget();
         if self.springs.damped() {
             self.forces_current = false;
             self.wake();

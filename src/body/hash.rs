@@ -81,6 +81,7 @@ impl Body {
         }
         hasher.write_floats(&[self.carry.masses_for]);
         self.carry.energy.hash(hasher);
+        self.carry.pace.hash(hasher);
         for sliver in self.scaling.iter().flat_map(|scaling| scaling.slivers()) {
             hasher.write_u64(u64::from(sliver.node));
         }

@@ -76,7 +76,7 @@ use crate::ids::BodyId;
 use crate::material::Made;
 use crate::readers::Shown;
 use crate::solver::{
-    Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Stability, Sums, Survey, Watched, close,
+    Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Pace, Stability, Sums, Survey, Watched, close,
     write_records,
 };
 use crate::springs::{Springs, store};
@@ -329,6 +329,7 @@ impl Body {
                 closing: None,
                 masses_for: 0.0,
                 energy: EnergyAccount::UNKNOWN,
+                pace: Pace::UNKNOWN,
             },
             forces_current: false,
             forces_applied: false,
@@ -717,7 +718,7 @@ impl Body {
         self.wake();
         self.forces_current = false;
         self.carry.stability = Stability::UNKNOWN;
-        self.carry.energy.forget();
+        self.carry.forget();
         self.state.forget_remainders();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();

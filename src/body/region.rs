@@ -42,7 +42,7 @@ impl Body {
         scaled += terms.map_or(0, |terms| terms.scale(&region, scale));
         if scaled > 0 {
             self.forces_current = false;
-            self.carry.energy.forget();
+            self.carry.forget();
             self.wake();
             self.forget_rates();
             if let Some(implicit) = &mut self.implicit {

@@ -34,10 +34,10 @@ impl Body {
     /// then. Points that are bound to nodes do not count.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`]: a corner is not finite, `low` is above `high` along an axis, or a tool holds a node
+    /// [`Error::InvalidArgument`]: a corner is not finite, `min` is above `max` along an axis, or a tool holds a node
     /// of the box. [`Error::OutOfMemory`]. Then no node has changed.
-    pub fn pin_box(&mut self, low: Vec3, high: Vec3) -> Result<usize> {
-        let nodes = self.nodes_in(low, high)?;
+    pub fn pin_box(&mut self, min: Vec3, max: Vec3) -> Result<usize> {
+        let nodes = self.nodes_in(min, max)?;
         self.pin_nodes(&nodes)?;
         Ok(nodes.len())
     }
@@ -46,8 +46,8 @@ impl Body {
     ///
     /// # Errors
     /// As [`Body::pin_box`].
-    pub fn unpin_box(&mut self, low: Vec3, high: Vec3) -> Result<usize> {
-        let mut nodes = self.nodes_in(low, high)?;
+    pub fn unpin_box(&mut self, min: Vec3, max: Vec3) -> Result<usize> {
+        let mut nodes = self.nodes_in(min, max)?;
         nodes.retain(|&node| {
             let own = self.order.own(node);
             self.pins.get(own).is_some() && self.masses[own as usize] > 0.0
@@ -83,17 +83,17 @@ impl Body {
     }
 
     /// The nodes in a box that a pin can hold.
-    fn nodes_in(&self, low: Vec3, high: Vec3) -> Result<Vec<u32>> {
-        finite_vector("low", low)?;
-        finite_vector("high", high)?;
-        if !low.cmple(high).all() {
+    fn nodes_in(&self, min: Vec3, max: Vec3) -> Result<Vec<u32>> {
+        finite_vector("min", min)?;
+        finite_vector("max", max)?;
+        if !min.cmple(max).all() {
             return Err(Error::invalid(format!(
-                "low is {low}: must be at most high, which is {high}, along each axis"
+                "min is {min}: must be at most max, which is {max}, along each axis"
             )));
         }
         let mut nodes = Vec::new();
         for (node, position) in (0..).zip(self.positions()) {
-            if low.cmple(*position).all() && position.cmple(high).all() && !self.is_bound(node) {
+            if min.cmple(*position).all() && position.cmple(max).all() && !self.is_bound(node) {
                 memory::push(&mut nodes, node)?;
             }
         }

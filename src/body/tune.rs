@@ -94,7 +94,7 @@ impl Body {
         }
         self.measure_anew();
         self.forces_current = false;
-        self.carry.energy.forget();
+        self.carry.forget();
         self.wake();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();

@@ -6,6 +6,7 @@ use super::closing::ClosingKick;
 use super::energy_monitor::EnergyAccount;
 use super::gravity::GravityKicks;
 use super::implicit;
+use super::pace::Pace;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::base::Profile;
@@ -100,6 +101,7 @@ pub(crate) struct Carry {
     /// The substep that masses are made for, s; 0: they are as they are, and `stability` is that of the current positions.
     pub masses_for: f32,
     pub energy: EnergyAccount,
+    pub pace: Pace,
 }
 
 saved!(Carry {
@@ -107,10 +109,17 @@ saved!(Carry {
     gravity,
     closing,
     masses_for,
-    energy
+    energy,
+    pace
 });
 
 impl Carry {
+    /// A change from outside: the body has another energy, and may need fewer substeps.
+    pub fn forget(&mut self) {
+        self.energy.forget();
+        self.pace = Pace::UNKNOWN;
+    }
+
     /// The longest stable substep with the masses in use, s, where it is known.
     pub fn limit(&self) -> Option<f32> {
         if self.masses_for > 0.0 {
@@ -236,17 +245,20 @@ pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Nee
         };
     }
     let stable_substep = first_substep(body, &start, beside_springs);
-    match fewer_substeps(body, request, stable_substep) {
-        Some((substeps, masses_for)) => Need {
-            start: with_less_stability(start, stable_substep),
-            substeps: substeps.max(as_count(substeps_needed(request, beside_springs))),
+    let (needed, mut start, masses_for) = match fewer_substeps(body, request, stable_substep) {
+        Some((substeps, masses_for)) => (
+            substeps.max(as_count(substeps_needed(request, beside_springs))),
+            with_less_stability(start, stable_substep),
             masses_for,
-        },
-        None => Need {
-            start,
-            substeps: as_count(substeps_needed(request, stable_substep)),
-            masses_for: 0.0,
-        },
+        ),
+        None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
+    };
+    let substeps = start.pace.keep(needed, request.dt, request.max_substeps);
+    start.pace = start.pace.after(needed, request.dt);
+    Need {
+        start,
+        substeps,
+        masses_for,
     }
 }
 
@@ -339,9 +351,14 @@ fn run_stably(
             }
         }
         (attempt, was_tried) = (attempt + 1, true);
+        let needed = substeps;
+        let substeps = start.pace.keep(needed, request.dt, request.max_substeps);
         let substeps = refined(substeps, &start, request);
         match verlet::run(body, request, substeps, middle(substeps), start, masses_for, team) {
-            Ok(taken) => return Ok((substeps, taken)),
+            Ok(mut taken) => {
+                taken.carry.pace = start.pace.after(needed, request.dt);
+                return Ok((substeps, taken));
+            }
             Err(found) => {
                 stable_substep = stable_substep.min(found.stable_substep);
                 beside_springs = beside_springs.min(found.stable_substep);
@@ -458,6 +475,10 @@ fn run_to_tolerance(
     let mut substeps = substeps;
     let mut middle = middle(substeps);
     let mut carry = coarse;
+    let start = Carry {
+        pace: coarse.pace,
+        ..start
+    };
     let mut error = 0.0;
     compare(body, request, &carry);
     loop {

@@ -195,9 +195,9 @@ static void pins_of_many(void)
     MUST(sinew_world_get_state_hash(world, &before));
     REFUSED("nodes[1]", sinew_body_pin_nodes(world, cloth, wrong, 2));
     REFUSED("nodes[1]", sinew_body_unpin_nodes(world, cloth, wrong, 2));
-    REFUSED("low", sinew_body_pin_box(world, cloth, high, low, &count));
+    REFUSED("min", sinew_body_pin_box(world, cloth, high, low, &count));
     REFUSED("min", sinew_body_pin_box(world, cloth, NULL, high, &count));
-    REFUSED("high", sinew_body_unpin_box(world, cloth, low, not_a_number, &count));
+    REFUSED("max", sinew_body_unpin_box(world, cloth, low, not_a_number, &count));
     REFUSED("forces", sinew_body_get_pin_forces(world, cloth, forces, CLOTH_NODES - 1));
     REFUSED("masses", sinew_body_get_masses(world, cloth, masses, 1));
     REFUSED("normals", sinew_body_get_normals(world, cloth, NULL, CLOTH_NODES));
