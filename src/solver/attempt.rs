@@ -227,14 +227,32 @@ fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) 
     (start, beside_springs)
 }
 
-/// What a body needs for a step that it takes together with others.
+/// What a body needs for a step.
 pub(super) struct Need {
     pub start: Carry,
     pub substeps: u32,
     pub masses_for: f32,
 }
 
-/// What a step of VERLET needs by itself.
+impl Need {
+    /// That of a step which begins like this, with the longest stable substep and that of all but springs, s.
+    fn new(body: &Body, request: &StepRequest, start: Carry, stable_substep: f32, beside_springs: f32) -> Self {
+        match fewer_substeps(body, request, stable_substep) {
+            Some((substeps, masses_for)) => Self {
+                start: with_less_stability(start, stable_substep),
+                substeps: substeps.max(as_count(substeps_needed(request, beside_springs))),
+                masses_for,
+            },
+            None => Self {
+                start,
+                substeps: as_count(substeps_needed(request, stable_substep)),
+                masses_for: 0.0,
+            },
+        }
+    }
+}
+
+/// What a step of VERLET needs that a body takes together with others.
 pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Need {
     let (start, beside_springs) = prepare(body, request, team);
     if request.substeps > 0 {
@@ -245,21 +263,10 @@ pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Nee
         };
     }
     let stable_substep = first_substep(body, &start, beside_springs);
-    let (needed, mut start, masses_for) = match fewer_substeps(body, request, stable_substep) {
-        Some((substeps, masses_for)) => (
-            substeps.max(as_count(substeps_needed(request, beside_springs))),
-            with_less_stability(start, stable_substep),
-            masses_for,
-        ),
-        None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
-    };
-    let substeps = start.pace.keep(needed, request.dt, request.max_substeps);
-    start.pace = start.pace.after(needed, request.dt);
-    Need {
-        start,
-        substeps,
-        masses_for,
-    }
+    let mut need = Need::new(body, request, start, stable_substep, beside_springs);
+    need.start.pace = start.pace.after(need.substeps, request.dt);
+    need.substeps = start.pace.keep(need.substeps, request.dt, request.max_substeps);
+    need
 }
 
 /// How many substeps a step of VERLET takes with the nodes where they are.
@@ -316,52 +323,56 @@ fn run_stably(
 ) -> Result<(u32, Taken), TooLong> {
     let mut stable_substep = first_substep(body, &start, beside_springs);
     let mut beside_springs = beside_springs;
-    let (mut attempt, mut reliefs, mut was_tried) = (0, 0, false);
-    while attempt <= ATTEMPTS {
-        if attempt == ATTEMPTS {
+    let (mut attempt, mut reliefs, mut was_tried, mut guess) = (0, 0, false, 1.0);
+    loop {
+        if attempt >= ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
-            // Where elements, terms and cavities go there is no end to how stiff they may be.
-            stable_substep = anywhere.min(if body.has_more_than_springs() {
-                0.5 * stable_substep
+            if body.has_more_than_springs() {
+                // Where elements, terms and cavities go there is no end to how stiff they may be.
+                guess *= 0.5;
+                stable_substep = stable_substep.min(anywhere);
             } else {
-                anywhere
-            });
-            beside_springs *= 0.5;
-        }
-        let (substeps, start, masses_for) = match fewer_substeps(body, request, stable_substep) {
-            Some((substeps, masses_for)) => {
-                let needed = as_count(substeps_needed(request, beside_springs));
-                (
-                    substeps.max(needed),
-                    with_less_stability(start, stable_substep),
-                    masses_for,
-                )
+                stable_substep = anywhere;
             }
-            None => (as_count(substeps_needed(request, stable_substep)), start, 0.0),
-        };
-        if substeps > request.max_substeps || substeps == u32::MAX {
+        }
+        let known = Need::new(body, request, start, stable_substep, beside_springs);
+        if known.substeps > request.max_substeps || known.substeps == u32::MAX {
             reliefs += 1;
             match body.relieve(request, was_tried, team) {
                 Some(limit) if reliefs <= RELIEFS => {
-                    (attempt, beside_springs) = (0, limit);
+                    (attempt, guess, beside_springs) = (0, 1.0, limit);
                     stable_substep = first_substep(body, &start, limit);
                     continue;
                 }
                 _ => break,
             }
         }
+        let need = Need::new(body, request, start, guess * stable_substep, guess * beside_springs);
+        let is_last = need.substeps >= request.max_substeps || attempt >= ATTEMPTS && guess == 1.0;
         (attempt, was_tried) = (attempt + 1, true);
-        let needed = substeps;
-        let substeps = start.pace.keep(needed, request.dt, request.max_substeps);
+        let substeps = need.substeps.min(request.max_substeps);
+        let substeps = start.pace.keep(substeps, request.dt, request.max_substeps);
         let substeps = refined(substeps, &start, request);
-        match verlet::run(body, request, substeps, middle(substeps), start, masses_for, team) {
+        match verlet::run(
+            body,
+            request,
+            substeps,
+            middle(substeps),
+            need.start,
+            need.masses_for,
+            team,
+        ) {
             Ok(mut taken) => {
-                taken.carry.pace = start.pace.after(needed, request.dt);
+                // A guess says nothing of what the next steps need.
+                taken.carry.pace = start.pace.after(known.substeps, request.dt);
                 return Ok((substeps, taken));
             }
             Err(found) => {
                 stable_substep = stable_substep.min(found.stable_substep);
                 beside_springs = beside_springs.min(found.stable_substep);
+                if is_last && substeps_needed(request, stable_substep) <= f64::from(request.max_substeps) {
+                    break;
+                }
             }
         }
     }

@@ -27,7 +27,7 @@ use crate::base::StateHasher;
 use crate::body::{Body, Inertia};
 use crate::codec::saved;
 use crate::simd::Loops;
-use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
+use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::solver::write_records;
 use crate::threads::{Items, Team};
 
@@ -294,7 +294,7 @@ impl<'a> Account<'a> {
         let is_still = own <= 0.5 * open.free_mass * still * still;
         let account = &mut carry.energy;
         account.refine(if excess > 0.0 && !is_still {
-            slow_down(body, held, excess)
+            slow_down(body, held, excess, false)
         } else {
             0.0
         });
@@ -537,10 +537,16 @@ fn close(body: &mut Body, carry: &Carry, team: &Team) -> [f64; 2] {
 
 /// Takes this much kinetic energy off the newest velocities, J, or all there is that nothing conserves: how much it was. A body that nothing
 /// holds keeps its momentum and its angular momentum: it is its deformation that becomes slower.
-fn slow_down(body: &mut Body, held: BVec3, energy: f64) -> f64 {
-    let rigid = RigidMotion::of(body, held);
+/// `at_next`: the nodes are at the next positions.
+pub(super) fn slow_down(body: &mut Body, held: BVec3, energy: f64, at_next: bool) -> f64 {
+    let rigid = RigidMotion::of(body, held, at_next);
     let state = body.state.substep();
-    let (positions, velocities) = (state.positions, state.velocities);
+    let positions = if at_next {
+        &*state.next_positions
+    } else {
+        state.positions
+    };
+    let velocities = state.velocities;
     let inverse_masses = &body.inverse_masses;
     let mut own = 0.0;
     for node in (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0) {
@@ -568,7 +574,7 @@ pub(super) fn keep_energy(body: &mut Body, account: &mut EnergyAccount) {
     let state = body.state.substep();
     state.velocities.copy_from(state.first_velocities);
     let held = body.held_axes();
-    let rigid = RigidMotion::of(body, held);
+    let rigid = RigidMotion::of(body, held, false);
     let state = body.state.substep();
     let mut added = 0.0;
     for sliver in body.scaling.iter().flat_map(|scaling| scaling.slivers()) {
@@ -578,7 +584,7 @@ pub(super) fn keep_energy(body: &mut Body, account: &mut EnergyAccount) {
         added += 0.5 * f64::from(sliver.change()) * DVec3::select(held, DVec3::ZERO, velocity).length_squared();
     }
     if added > 0.0 {
-        slow_down(body, held, added);
+        slow_down(body, held, added, false);
     }
     account.lose((held == BVec3::TRUE).then_some((-added).max(0.0)));
 }
@@ -591,10 +597,15 @@ struct RigidMotion {
 }
 
 impl RigidMotion {
-    fn of(body: &mut Body, held: BVec3) -> Self {
+    fn of(body: &mut Body, held: BVec3, at_next: bool) -> Self {
         let inverse_masses = &body.inverse_masses;
         let state = body.state.substep();
-        let (positions, velocities): (&Vectors, &Vectors) = (state.positions, state.velocities);
+        let positions = if at_next {
+            &*state.next_positions
+        } else {
+            state.positions
+        };
+        let velocities = &*state.velocities;
         let nodes = || (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0);
         let mass_of = |node: usize| 1.0 / f64::from(inverse_masses[node]);
         let (mut mass, mut moment, mut momentum) = (0.0, DVec3::ZERO, DVec3::ZERO);

@@ -597,6 +597,53 @@ fn drawn_elements_take_substeps_near_what_their_law_allows() {
     }
 }
 
+/// An organ that is suddenly twice as long becomes stiffer within the first step than any of its forces say before. Where fewer substeps than are
+/// allowed would do, they are found.
+#[test]
+fn a_sudden_stretch_is_refused_only_where_it_needs_more_substeps_than_are_allowed() {
+    let mesh = sinew::mesh::Mesh::organ(0.15, 0.0187).expect("an organ");
+    let mut taken = 0;
+    for (stretch, dt) in [(1.5, 1.0 / 30.0), (2.0, FRAME), (2.0, 1.0 / 30.0), (3.0, FRAME)] {
+        let mut world = World::new(FREE).expect("a world");
+        let definition = BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model: Model::Tetrahedra,
+                young_modulus: 1e3,
+                poisson_ratio: 0.49,
+                density: 1000.0,
+                ..Default::default()
+            }),
+            element_law: sinew::ElementLaw::MooneyRivlin { ratio: 0.3 },
+            ..Default::default()
+        };
+        let id = world.create_body(&definition).expect("a body");
+        let body = world.body_mut(id).expect("the body");
+        let left = mesh.positions.iter().map(|place| place.x).fold(f32::INFINITY, f32::min);
+        body.pin_box(Vec3::splat(-9.0), Vec3::new(left + 0.0075, 9.0, 9.0))
+            .expect("pins");
+        let drawn: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|place| Vec3::new(left + (place.x - left) * stretch, place.y, place.z))
+            .collect();
+        body.set_positions(&drawn).expect("positions");
+        match world.step(dt) {
+            Ok(_) => taken += 1,
+            Err(Error::Unstable { report, allowed }) => {
+                let needed = dt / (0.8 * report.stable_substep);
+                assert!(
+                    needed > allowed as f32,
+                    "{stretch} times as long: {needed} substeps of {allowed}"
+                );
+            }
+            Err(error) => panic!("{stretch} times as long: {error}"),
+        }
+    }
+    assert!(taken >= 2, "only {taken} of the steps were taken");
+}
+
 /// Two tetrahedra apart, the larger so much stiffer that its bound at rest is above that of the smaller with its springs. Where the smaller is
 /// stretched, its springs count all the same: the substep is no longer than for the smaller alone.
 #[test]

@@ -10,6 +10,7 @@ use crate::elements::Elements;
 use crate::enclosed::Enclosed;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
+use crate::solver::energy_monitor::slow_down;
 use crate::solver::write_records;
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
@@ -137,10 +138,16 @@ impl Substep<'_> {
         }
     }
 
-    /// Takes off what was gained: first of the velocities; where that is not enough, nothing moves but the pins.
+    /// Takes off what was gained: first of the velocities within the body, then of all; where that is not enough, nothing moves but the pins.
     pub(super) fn slow_down(&self, body: &mut Body, implicit: &mut Implicit, before: Before) {
         let next = 1 - implicit.settled;
         let known = implicit.histories[next].energy;
+        let work = self.work(body, &implicit.histories[next]);
+        let excess = known.map(|total| total.energy - before.total.energy - work);
+        let taken = excess.filter(|excess| excess.is_finite()).map(|excess| {
+            let held = body.held_axes();
+            slow_down(body, held, excess.max(0.0), true)
+        });
         let state = body.state.substep();
         let kinetic = kinetic(
             state.velocities,
@@ -149,18 +156,15 @@ impl Substep<'_> {
             &body.pins,
             body.kernel,
         );
-        let work = self.work(body, &implicit.histories[next]);
-        let state = body.state.substep();
         let history = &mut implicit.histories[next];
-        if let Some(total) = known
-            && kinetic.is_finite()
-            && total.energy - kinetic <= before.total.energy + work
+        if let (Some(total), Some(excess), Some(taken)) = (known, excess, taken)
+            && excess - taken <= kinetic
         {
-            let factor = ((before.total.energy + work - (total.energy - kinetic)) / kinetic)
-                .clamp(0.0, 1.0)
-                .sqrt() as f32;
-            scale(state.velocities, factor);
-            history.energy = Some(total.plus(-kinetic * (1.0 - f64::from(factor * factor))));
+            let left = (excess - taken).max(0.0);
+            if left > 0.0 {
+                scale(state.velocities, (1.0 - left / kinetic).sqrt() as f32);
+            }
+            history.energy = Some(total.plus(-taken - left));
         } else {
             state.next_positions.copy_from(state.positions);
             for pin in body.pins.iter() {
