@@ -5,7 +5,7 @@ use super::tear::Torn;
 use super::{Body, CutReport};
 use crate::base::{Result, memory};
 use crate::contact::Skin;
-use crate::cutting::{CutMaterial, Limits, Load};
+use crate::cutting::{CutMaterial, Divided, Limits, Load};
 use crate::def::Withheld;
 
 impl Body {

@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::crossing::{End, meet};
 use super::cut::Cut;
-use super::surface::{NONE, SurfaceTriangle};
+use super::divided::NONE;
+use super::surface::SurfaceTriangle;
 use crate::base::{Result, memory};
 
 /// An edge as all of its triangles name it: from the lower vertex to the higher; if it has one triangle alone, as that has it. The sides of

@@ -145,4 +145,28 @@ impl Changes {
         }
         Ok(())
     }
+
+    /// Tells where the new vertices come from, which are numbered from `first` on: by the point and the first node of each, and the points of all
+    /// before the cut, if they were there.
+    pub(crate) fn list_sources(
+        &mut self,
+        first: u32,
+        at: impl Fn(u32) -> [u32; 2],
+        point_before: impl Fn(u32) -> u32,
+    ) -> Result<()> {
+        for (vertex, new) in (first..).zip(&self.vertices) {
+            let [point, node] = at(vertex);
+            if point == node {
+                continue;
+            }
+            let source = Source {
+                point,
+                sources: new.sources.map(&point_before),
+                weights: new.weights,
+            };
+            memory::push(&mut self.sources, source)?;
+        }
+        self.sources.sort_unstable_by_key(|source| source.point);
+        Ok(())
+    }
 }

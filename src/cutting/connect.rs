@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::cut::Cut;
-use super::surface::{NONE, SurfaceTriangle};
+use super::divided::NONE;
+use super::surface::SurfaceTriangle;
 use crate::base::Result;
 
 /// A way that is longer was led astray by a surface that is folded in its rest shape; the cut ends there.

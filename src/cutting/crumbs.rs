@@ -1,7 +1,8 @@
 //! Crumbs: pieces that only snapping would cut off.
 
 use super::cut::Cut;
-use super::surface::{NONE, SurfaceTriangle};
+use super::divided::NONE;
+use super::surface::SurfaceTriangle;
 use crate::base::{Result, memory};
 
 /// A piece with less area than this many squares of the snapping distance stays with what it was cut from: the blade goes round it on one side.

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::changes::Changes;
+use super::pieces::Parting;
 use super::surface::CutSurface;
 use crate::base::{Error, Result, memory};
 
@@ -20,6 +21,51 @@ impl Sweep {
     pub(crate) fn triangles(&self) -> [[Vec3; 3]; 2] {
         let ([a, b], [c, d]) = (self.start, self.end);
         [[a, b, d], [d, c, a]]
+    }
+
+    /// The numbers of the items whose box meets its own, of the corners of each.
+    pub(crate) fn near<const N: usize>(&self, items: impl Iterator<Item = [Vec3; N]>) -> Result<Vec<u32>> {
+        let (low, high) = bounds(&[self.start[0], self.start[1], self.end[0], self.end[1]]);
+        let mut near = Vec::new();
+        for (number, corners) in items.enumerate() {
+            let (from, to) = bounds(&corners);
+            if from.cmple(high).all() && low.cmple(to).all() {
+                memory::push(&mut near, number as u32)?;
+            }
+        }
+        Ok(near)
+    }
+
+    /// Refuses what no cut is made of: with items of a name and a count, of which `nodes_of` tells the nodes.
+    pub(crate) fn check<const N: usize>(
+        &self,
+        positions: &[Vec3],
+        node_count: u32,
+        candidates: &[u32],
+        (items, count): (&str, u32),
+        nodes_of: impl Fn(u32) -> [u32; N],
+    ) -> Result<()> {
+        if positions.len() != node_count as usize {
+            return Err(Error::invalid(format!(
+                "{} positions for {node_count} nodes",
+                positions.len()
+            )));
+        }
+        if let Some(end) = self.start.iter().chain(&self.end).find(|end| !end.is_finite()) {
+            return Err(Error::invalid(format!("an end of the blade is at {end}")));
+        }
+        for &item in candidates {
+            if item >= count {
+                return Err(Error::invalid(format!("candidate {item} of {count} {items}")));
+            }
+            for node in nodes_of(item) {
+                let place = positions[node as usize];
+                if !place.is_finite() {
+                    return Err(Error::invalid(format!("node {node} is at {place}")));
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -80,7 +126,9 @@ impl CutSurface {
     /// [`Error::InvalidArgument`] if there is not one position for each node, if one that is needed or the blade is not finite, or if a
     /// candidate is unknown; [`Error::Capacity`] beyond the limits; [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
-        self.check(sweep, positions, candidates)?;
+        let nodes_of = |triangle: u32| self.cells[self.triangles[triangle].cell].nodes;
+        let items = ("triangles", self.triangles.count());
+        sweep.check(positions, self.node_count(), candidates, items, nodes_of)?;
         self.begin();
         let cut = Cut {
             limits,
@@ -116,45 +164,8 @@ impl CutSurface {
 
     /// The triangles whose box meets the sweep's if nodes are at `positions`, found by going through all.
     pub fn near(&self, sweep: &Sweep, positions: &[Vec3]) -> Result<Vec<u32>> {
-        let corners = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
-        let (low, high) = bounds(&corners);
-        let mut near = Vec::new();
-        for (number, triangle) in self.triangles().iter().enumerate() {
-            let (from, to) = bounds(&triangle.corners.map(|corner| self.place(corner, positions)));
-            if from.cmple(high).all() && low.cmple(to).all() {
-                memory::push(&mut near, number as u32)?;
-            }
-        }
-        Ok(near)
-    }
-
-    fn check(&self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<()> {
-        if positions.len() != self.node_count() as usize {
-            return Err(Error::invalid(format!(
-                "{} positions for {} nodes",
-                positions.len(),
-                self.node_count()
-            )));
-        }
-        let ends = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
-        if let Some(end) = ends.iter().find(|end| !end.is_finite()) {
-            return Err(Error::invalid(format!("an end of the blade is at {end}")));
-        }
-        for &triangle in candidates {
-            let Some(triangle) = self.triangles().get(triangle as usize) else {
-                return Err(Error::invalid(format!(
-                    "candidate {triangle} of {} triangles",
-                    self.triangles.count()
-                )));
-            };
-            for node in self.cells[triangle.cell].nodes {
-                let place = positions[node as usize];
-                if !place.is_finite() {
-                    return Err(Error::invalid(format!("node {node} is at {place}")));
-                }
-            }
-        }
-        Ok(())
+        let place = |corner| self.place(corner, positions);
+        sweep.near(self.triangles().iter().map(|triangle| triangle.corners.map(place)))
     }
 }
 
@@ -171,8 +182,12 @@ impl Cut<'_> {
         self.carve(second, true, positions, &candidates)?;
         self.keep_crumbs()?;
         let cells = self.open()?;
-        let nodes = self.part_cells(&cells)?;
-        self.part_nodes(&nodes)?;
+        Parting {
+            body: &mut *self.surface,
+            limits: self.limits,
+            changes: &mut self.changes,
+        }
+        .part(&cells)?;
         self.finish()
     }
 
@@ -188,7 +203,7 @@ impl Cut<'_> {
     }
 }
 
-pub(crate) fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
+fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
     points
         .iter()
         .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &point| {

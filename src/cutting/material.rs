@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::changes::Changes;
 use super::cut::{Limits, Sweep};
+use super::divided::Divided;
 use super::met::Met;
 use super::solid::{CutSolid, SolidStroke};
 use super::surface::CutSurface;

@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::crossing::{End, meet};
 use super::cut::Sweep;
-use super::surface::{CutSurface, SNAP, SurfaceTriangle};
+use super::divided::SNAP;
+use super::surface::{CutSurface, SurfaceTriangle};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 

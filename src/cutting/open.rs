@@ -2,7 +2,7 @@
 
 use super::changes::{NewVertex, RimEdge};
 use super::cut::Cut;
-use super::surface::NONE;
+use super::divided::NONE;
 use crate::base::{Result, memory};
 
 impl Cut<'_> {

@@ -1,44 +1,55 @@
 //! Cells whose material fell into pieces are copied for each.
 
-use super::changes::PieceOfCell;
-use super::cut::Cut;
-use super::surface::{CutSurface, NONE, SurfaceCell};
+use super::changes::{Changes, PieceOfCell};
+use super::cut::Limits;
+use super::divided::{Cell, Divided, NONE};
 use super::union::Union;
 use crate::base::{Result, memory};
 
-impl Cut<'_> {
-    /// Copies each of the cells for each piece of its material but the largest. Returns the nodes of all of them.
-    pub(crate) fn part_cells(&mut self, cells: &[u32]) -> Result<Vec<u32>> {
+/// What parts cells and nodes once a cut has parted simplices.
+pub(crate) struct Parting<'a, const N: usize, D: Divided<N>> {
+    pub body: &'a mut D,
+    pub limits: Limits,
+    pub changes: &'a mut Changes,
+}
+
+impl<const N: usize, D: Divided<N>> Parting<'_, N, D> {
+    /// Copies each of the cells for each piece of its material but the largest, and then their nodes.
+    pub(crate) fn part(&mut self, cells: &[u32]) -> Result<()> {
         let mut nodes = Vec::new();
         let mut union = Union::default();
-        let mut drawn = Vec::new();
+        let mut inside = Vec::new();
         for &cell in cells {
-            for node in self.surface.cells[cell].nodes {
+            for node in self.body.cell(cell).nodes {
                 memory::push(&mut nodes, node)?;
             }
-            self.surface.drawn_in(cell, &mut drawn)?;
-            union.reset(drawn.len())?;
-            for (at, &triangle) in drawn.iter().enumerate() {
-                for neighbour in self.surface.triangles[triangle].neighbours {
-                    if let Ok(other) = drawn.binary_search(&neighbour) {
+            inside.clear();
+            for simplex in self.body.simplices_in(cell) {
+                memory::push(&mut inside, simplex)?;
+            }
+            inside.sort_unstable();
+            union.reset(inside.len())?;
+            for (at, &simplex) in inside.iter().enumerate() {
+                for neighbour in self.body.simplex(simplex).neighbours {
+                    if let Ok(other) = inside.binary_search(&neighbour) {
                         union.unite(at, other);
                     }
                 }
             }
             if !union.is_one() {
-                self.part_cell(cell, &drawn, &mut union)?;
+                self.part_cell(cell, &inside, &mut union)?;
             }
         }
         memory::sort_once(&mut nodes);
-        Ok(nodes)
+        self.part_nodes(&nodes)
     }
 
-    fn part_cell(&mut self, cell: u32, drawn: &[u32], union: &mut Union) -> Result<()> {
-        let whole = self.surface.cells[cell];
-        // The pieces, each by its lowest triangle, with the part of the cell that it has.
+    fn part_cell(&mut self, cell: u32, inside: &[u32], union: &mut Union) -> Result<()> {
+        let whole = self.body.cell(cell);
+        // The pieces, each by its lowest simplex, with the part of the cell that it has.
         let mut pieces = Vec::new();
-        for (at, &triangle) in drawn.iter().enumerate() {
-            let part = self.surface.part_of_cell(triangle);
+        for (at, &simplex) in inside.iter().enumerate() {
+            let part = self.body.part_of(simplex);
             let lowest = union.lowest(at);
             match pieces.iter_mut().find(|(of, _)| *of == lowest) {
                 Some((_, sum)) => *sum += part,
@@ -53,76 +64,56 @@ impl Cut<'_> {
             }
         }
         for (lowest, part) in pieces {
-            let area = whole.area * (part / sum);
+            let part = part / sum;
+            let left = Cell {
+                material: whole.material * part,
+                first: NONE,
+                ..whole
+            };
             let piece = if lowest == largest.0 {
-                self.surface
-                    .cells
-                    .edit(cell, |cell| (cell.area, cell.first) = (area, NONE))?;
+                self.body.set_cell(cell, left)?;
                 cell
             } else {
-                self.copy_cell(SurfaceCell {
-                    area,
-                    first: NONE,
-                    ..whole
-                })?
+                self.copy_cell(cell, left)?
             };
-            for (at, &triangle) in drawn.iter().enumerate().rev() {
+            for (at, &simplex) in inside.iter().enumerate().rev() {
                 if union.lowest(at) == lowest {
-                    let next = self.surface.cells[piece].first;
-                    self.surface
-                        .triangles
-                        .edit(triangle, |triangle| (triangle.cell, triangle.next) = (piece, next))?;
-                    self.surface.cells.edit(piece, |cell| cell.first = triangle)?;
+                    let it = self.body.cell(piece);
+                    self.body.move_simplex(simplex, piece, it.first)?;
+                    self.body.set_cell(piece, Cell { first: simplex, ..it })?;
                 }
             }
-            memory::push(
-                &mut self.changes.cells,
-                PieceOfCell {
-                    cell: piece,
-                    source: cell,
-                    part: part / sum,
-                },
-            )?;
+            let piece = PieceOfCell {
+                cell: piece,
+                source: cell,
+                part,
+            };
+            memory::push(&mut self.changes.cells, piece)?;
         }
         Ok(())
     }
 
-    /// Adds a cell at the nodes that it names.
-    fn copy_cell(&mut self, mut cell: SurfaceCell) -> Result<u32> {
-        let number = self.surface.cells.count();
-        self.limits.check("cells", number, u32::MAX)?;
-        for k in 0..3 {
-            cell.next[k] = self.surface.nodes[cell.nodes[k]].first;
-            self.surface
-                .nodes
-                .edit(cell.nodes[k], |node| node.first = 3 * number + k as u32)?;
+    /// Adds a cell like another at its nodes.
+    fn copy_cell(&mut self, like: u32, mut cell: Cell<N>) -> Result<u32> {
+        let number = self.body.cell_count();
+        self.limits.check("cells", number, u32::MAX / N as u32)?;
+        for (k, (&node, next)) in cell.nodes.iter().zip(&mut cell.next).enumerate() {
+            *next = self.body.nodes()[node].first;
+            let corner = N as u32 * number + k as u32;
+            self.body.nodes_mut().edit(node, |node| node.first = corner)?;
         }
-        self.surface.cells.push(cell)
+        self.body.add_cell(like, cell)
     }
 }
 
-impl CutSurface {
-    /// The triangles drawn in a cell, in ascending order.
-    pub(crate) fn drawn_in(&self, cell: u32, drawn: &mut Vec<u32>) -> Result<()> {
-        drawn.clear();
-        let mut triangle = self.cells[cell].first;
-        while triangle != NONE {
-            memory::push(drawn, triangle)?;
-            triangle = self.triangles[triangle].next;
+/// How many pieces simplices with these neighbours are, found by going through all.
+pub(crate) fn piece_count<const N: usize>(neighbours: impl ExactSizeIterator<Item = [u32; N]>) -> Result<u32> {
+    let (mut union, count) = (Union::default(), neighbours.len());
+    union.reset(count)?;
+    for (at, neighbours) in neighbours.enumerate() {
+        for neighbour in neighbours.into_iter().filter(|&neighbour| neighbour != NONE) {
+            union.unite(at, neighbour as usize);
         }
-        drawn.sort_unstable();
-        Ok(())
     }
-
-    /// How many pieces what is drawn has fallen into, found by going through all.
-    pub fn piece_count(&self) -> Result<u32> {
-        let mut union = Union::default();
-        union.reset(self.triangles().len())?;
-        for (at, triangle) in self.triangles().iter().enumerate() {
-            for neighbour in triangle.neighbours.into_iter().filter(|&neighbour| neighbour != NONE) {
-                union.unite(at, neighbour as usize);
-            }
-        }
-        Ok((0..self.triangles().len()).filter(|&at| union.lowest(at) == at).count() as u32)
-    }
+    Ok((0..count).filter(|&at| union.lowest(at) == at).count() as u32)
 }

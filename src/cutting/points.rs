@@ -1,9 +1,10 @@
 //! Numbers for what is drawn: of the vertices at a node one has that of the node, any other vertex has one of its own among nodes.
 
-use super::changes::{BoundPoint, Source};
+use super::changes::BoundPoint;
 use super::cut::Cut;
+use super::divided::{NONE, Node};
 use super::numbers::FreeNodes;
-use super::surface::{NONE, Node, SurfaceVertex};
+use super::surface::SurfaceVertex;
 use crate::base::{Result, memory};
 
 impl Cut<'_> {
@@ -53,29 +54,13 @@ impl Cut<'_> {
         self.changes.bound.sort_unstable_by_key(|bound| bound.point);
         memory::sort_once(&mut drawn);
         self.changes.list_copies(&drawn)?;
-        self.list_sources(&before)
-    }
-
-    fn list_sources(&mut self, before: &[(u32, SurfaceVertex)]) -> Result<()> {
-        let first = self.surface.vertices.count_before();
-        for (vertex, new) in (first..).zip(&self.changes.vertices) {
-            let it = self.surface.vertices[vertex];
-            if it.point == it.nodes[0] {
-                continue;
-            }
-            // Of a vertex that is at a copy now what it was at has the lower number.
-            let point_of = |vertex: u32| match before.binary_search_by_key(&vertex, |&(at, _)| at) {
-                Ok(place) => before[place].1.point,
-                Err(_) => self.surface.vertices[vertex].point,
-            };
-            let source = Source {
-                point: it.point,
-                sources: new.sources.map(point_of),
-                weights: new.weights,
-            };
-            memory::push(&mut self.changes.sources, source)?;
-        }
-        self.changes.sources.sort_unstable_by_key(|source| source.point);
-        Ok(())
+        // Of a vertex that is at a copy now what it was at has the lower number.
+        let vertices = &self.surface.vertices;
+        let point_before = |vertex: u32| match before.binary_search_by_key(&vertex, |&(at, _)| at) {
+            Ok(place) => before[place].1.point,
+            Err(_) => vertices[vertex].point,
+        };
+        let at = |vertex: u32| [vertices[vertex].point, vertices[vertex].nodes[0]];
+        self.changes.list_sources(vertices.count_before(), at, point_before)
     }
 }

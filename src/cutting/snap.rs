@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::cut::Cut;
-use super::surface::{NONE, SurfaceTriangle, turn};
+use super::divided::NONE;
+use super::surface::{SurfaceTriangle, turn};
 use crate::base::{Result, memory};
 
 impl Cut<'_> {

@@ -2,7 +2,8 @@
 
 use super::changes::NewVertex;
 use super::cut::Cut;
-use super::surface::{NONE, SurfaceTriangle, SurfaceVertex};
+use super::divided::NONE;
+use super::surface::{SurfaceTriangle, SurfaceVertex};
 use crate::base::{Result, memory};
 
 impl Cut<'_> {

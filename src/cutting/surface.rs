@@ -2,15 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
+use super::divided::{Cell, Divided, NONE, Node, SNAP, Simplex, divided, weighed};
+use super::pieces::piece_count;
 use super::tracked::Tracked;
 use crate::base::{Error, Result, memory};
 use crate::codec::saved;
-
-/// No triangle, or no corner.
-pub(crate) const NONE: u32 = u32::MAX;
-
-/// What is snapped lies within this part of a cell's shortest edge.
-pub(crate) const SNAP: f64 = 0.05;
 
 /// A triangle that is simulated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,29 +74,6 @@ saved!(SurfaceVertex {
     around
 });
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Node {
-    /// Of a point that is bound to others nothing is said here.
-    pub(crate) rest: Vec3,
-    /// The first of the cells' corners at it.
-    pub(crate) first: u32,
-}
-
-saved!(Node { rest, first });
-
-impl Node {
-    /// A point that is bound to others.
-    pub(crate) const BOUND: Self = Self {
-        rest: Vec3::ZERO,
-        first: NONE,
-    };
-
-    /// Whether it is such a point.
-    pub(crate) fn is_bound(&self) -> bool {
-        self.first == NONE
-    }
-}
-
 /// A surface that can be cut.
 #[derive(Clone, Debug)]
 pub struct CutSurface {
@@ -115,6 +88,20 @@ saved!(CutSurface {
     cells,
     triangles,
     vertices
+});
+
+divided!(CutSurface, 3, SurfaceCell { area }, triangles, {
+    const EDGES: &'static [[usize; 2]] = &[[0, 1], [1, 2], [2, 0]];
+    const SIDES: [&'static [usize]; 3] = [&[0, 1], &[1, 2], &[2, 0]];
+
+    fn part_of(&self, triangle: u32) -> f64 {
+        self.part_of_cell(triangle)
+    }
+
+    fn move_simplex(&mut self, triangle: u32, cell: u32, next: u32) -> Result<()> {
+        self.triangles
+            .edit(triangle, |triangle| (triangle.cell, triangle.next) = (cell, next))
+    }
 });
 
 impl CutSurface {
@@ -225,16 +212,16 @@ impl CutSurface {
 
     /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
     pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
-        let vertex = &self.vertices[vertex];
-        if vertex.weights[0] == 1.0 {
-            return positions[vertex.nodes[0] as usize];
+        let (nodes, weights) = self.bonds(vertex);
+        if weights[0] == 1.0 {
+            return positions[nodes[0] as usize];
         }
-        weighed(vertex, |node| positions[node as usize]).as_vec3()
+        weighed((nodes, weights), |node| positions[node as usize]).as_vec3()
     }
 
     /// Where a vertex is in the rest shape.
     pub fn rest_place(&self, vertex: u32) -> DVec3 {
-        weighed(&self.vertices[vertex], |node| self.nodes[node].rest)
+        weighed(self.bonds(vertex), |node| self.nodes[node].rest)
     }
 
     /// Where a point of a cell, by weights of its corners, is in the rest shape.
@@ -266,23 +253,19 @@ impl CutSurface {
         corners.map(|corner| self.vertices[corner].point)
     }
 
+    /// How many pieces what is drawn has fallen into, found by going through all.
+    pub fn piece_count(&self) -> Result<u32> {
+        piece_count(self.triangles().iter().map(|triangle| triangle.neighbours))
+    }
+
     /// A third of the material of the cells at a node, m².
     pub fn area_at(&self, node: u32) -> f64 {
-        self.cells_at(node).map(|cell| cell.area / 3.0).sum()
+        self.cells_at(node).map(|cell| self.cells[cell].area / 3.0).sum()
     }
 
     /// Whether two nodes are corners of one cell.
     pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
-        self.cells_at(a).any(|cell| cell.nodes.contains(&b))
-    }
-
-    pub(crate) fn cells_at(&self, node: u32) -> impl Iterator<Item = &SurfaceCell> {
-        let next = |&corner: &u32| {
-            let next = self.cells[corner / 3].next[corner as usize % 3];
-            (next != NONE).then_some(next)
-        };
-        let first = Some(self.nodes[node].first).filter(|&corner| corner != NONE);
-        std::iter::successors(first, next).map(|corner| &self.cells[corner / 3])
+        self.cells_at(a).any(|cell| self.cells[cell].nodes.contains(&b))
     }
 
     /// The area of a triangle in the rest shape.
@@ -379,13 +362,6 @@ fn join_neighbours(triangles: &mut [SurfaceTriangle]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn weighed(vertex: &SurfaceVertex, place: impl Fn(u32) -> Vec3) -> DVec3 {
-    (0..3)
-        .filter(|&k| vertex.weights[k] != 0.0)
-        .map(|k| vertex.weights[k] * place(vertex.nodes[k]).as_dvec3())
-        .sum()
 }
 
 /// The area of a triangle.

@@ -3,7 +3,8 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::cut::Sweep;
-use super::surface::{CutSurface, NONE, SurfaceTriangle};
+use super::divided::{Divided, NONE};
+use super::surface::{CutSurface, SurfaceTriangle};
 use crate::base::{Result, memory};
 
 /// How far beside a side of a triangle a way may go, as a part of how far it goes along it, to be taken for one along the side.
@@ -67,12 +68,9 @@ impl CutSurface {
     /// The vertex at the third node of a cell of two, of those that will do; that next to the middle between them in the rest shape.
     pub(crate) fn vertex_between(&self, nodes: [u32; 2], will_do: impl Fn(u32) -> bool) -> Result<Option<u32>> {
         let mut nearest: Option<(f64, u32)> = None;
-        for cell in self.cells_at(nodes[0]).filter(|cell| cell.nodes.contains(&nodes[1])) {
-            for node in cell
-                .nodes
-                .into_iter()
-                .filter(|node| !nodes.contains(node) && will_do(*node))
-            {
+        let cells = self.cells_at(nodes[0]).map(|cell| self.cells[cell].nodes);
+        for cell in cells.filter(|cell| cell.contains(&nodes[1])) {
+            for node in cell.into_iter().filter(|node| !nodes.contains(node) && will_do(*node)) {
                 let Some(vertex) = self.vertex_of(node)? else {
                     continue;
                 };
@@ -89,7 +87,7 @@ impl CutSurface {
     pub(crate) fn vertex_of(&self, node: u32) -> Result<Option<u32>> {
         let mut seen = Vec::new();
         for cell in self.cells_at(node) {
-            self.list_vertices(cell.first, &mut seen)?;
+            self.list_vertices(self.cells[cell].first, &mut seen)?;
         }
         let is_there = |&vertex: &u32| self.node_of(vertex) == Some(node);
         Ok(seen.into_iter().filter(is_there).min())
@@ -121,7 +119,7 @@ impl CutSurface {
         let mut beside = Vec::new();
         for node in triangles.iter().flat_map(|&triangle| self.nodes_under(triangle)) {
             for cell in self.cells_at(node) {
-                memory::push(&mut beside, cell.first)?;
+                memory::push(&mut beside, self.cells[cell].first)?;
             }
         }
         memory::sort_once(&mut beside);
@@ -236,7 +234,7 @@ impl CutSurface {
         let mut seen = Vec::new();
         for node in nodes {
             for cell in self.cells_at(node) {
-                self.list_vertices(cell.first, &mut seen)?;
+                self.list_vertices(self.cells[cell].first, &mut seen)?;
             }
         }
         memory::sort_once(&mut seen);

@@ -5,13 +5,9 @@ use glam::{DVec3, Vec3};
 use super::sever::{Mark, Stroke};
 use crate::base::{Result, memory};
 use crate::codec::{saved, saved_enum};
+use crate::cutting::divided::{Cell, Divided, NONE, Node, Simplex, divided, weighed};
+use crate::cutting::pieces::piece_count;
 use crate::cutting::tracked::Tracked;
-
-/// No tetrahedron, no triangle, or no corner.
-pub(crate) const NONE: u32 = u32::MAX;
-
-/// What is snapped lies within this part of a cell's shortest edge.
-pub(crate) const SNAP: f64 = 0.05;
 
 /// The corners of the face opposite each corner, counterclockwise seen from outside.
 pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
@@ -129,29 +125,6 @@ saved!(SolidVertex {
     other_mark
 });
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Node {
-    /// Of a point that is bound to others nothing is said here.
-    pub(crate) rest: Vec3,
-    /// The first of the cells' corners at it.
-    pub(crate) first: u32,
-}
-
-saved!(Node { rest, first });
-
-impl Node {
-    /// A point that is bound to others.
-    pub(crate) const BOUND: Self = Self {
-        rest: Vec3::ZERO,
-        first: NONE,
-    };
-
-    /// Whether it is such a point.
-    pub(crate) fn is_bound(&self) -> bool {
-        self.first == NONE
-    }
-}
-
 /// A solid that can be cut.
 #[derive(Clone, Debug)]
 pub struct CutSolid {
@@ -176,6 +149,27 @@ saved!(CutSolid {
     strokes,
     stroke,
     before
+});
+
+divided!(CutSolid, 4, SolidCell { volume }, tetrahedra, {
+    const EDGES: &'static [[usize; 2]] = &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    const SIDES: [&'static [usize]; 4] = [&FACES[0], &FACES[1], &FACES[2], &FACES[3]];
+
+    fn part_of(&self, tetrahedron: u32) -> f64 {
+        self.tetrahedra[tetrahedron].volume
+    }
+
+    fn move_simplex(&mut self, tetrahedron: u32, cell: u32, next: u32) -> Result<()> {
+        let Tetrahedron {
+            cell: before, drawn, ..
+        } = self.tetrahedra[tetrahedron];
+        self.tetrahedra
+            .edit(tetrahedron, |it| (it.cell, it.next) = (cell, next))?;
+        for triangle in drawn.into_iter().filter(|&drawn| cell != before && drawn != NONE) {
+            self.triangles.edit(triangle, |triangle| triangle.cell = cell)?;
+        }
+        Ok(())
+    }
 });
 
 impl CutSolid {
@@ -222,16 +216,16 @@ impl CutSolid {
 
     /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
     pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
-        let vertex = &self.vertices[vertex];
-        if vertex.weights[0] == 1.0 {
-            return positions[vertex.nodes[0] as usize];
+        let (nodes, weights) = self.bonds(vertex);
+        if weights[0] == 1.0 {
+            return positions[nodes[0] as usize];
         }
-        weighed(vertex, |node| positions[node as usize]).as_vec3()
+        weighed((nodes, weights), |node| positions[node as usize]).as_vec3()
     }
 
     /// Where a vertex is in the rest shape.
     pub fn rest_place(&self, vertex: u32) -> DVec3 {
-        weighed(&self.vertices[vertex], |node| self.nodes[node].rest)
+        weighed(self.bonds(vertex), |node| self.nodes[node].rest)
     }
 
     /// The weights of a vertex, by the corners of a cell that it lies in.
@@ -247,15 +241,17 @@ impl CutSolid {
 
     /// A quarter of the material of the cells at a node, m³.
     pub fn volume_at(&self, node: u32) -> f64 {
-        self.corners_at(node)
-            .map(|corner| self.cells[corner / 4].volume / 4.0)
-            .sum()
+        self.cells_at(node).map(|cell| self.cells[cell].volume / 4.0).sum()
     }
 
     /// Whether two nodes are corners of one cell.
     pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
-        self.corners_at(a)
-            .any(|corner| self.cells[corner / 4].nodes.contains(&b))
+        self.cells_at(a).any(|cell| self.cells[cell].nodes.contains(&b))
+    }
+
+    /// How many pieces the material has fallen into, found by going through all.
+    pub fn piece_count(&self) -> Result<u32> {
+        piece_count(self.tetrahedra().iter().map(|tetrahedron| tetrahedron.neighbours))
     }
 
     /// The corners of a triangle, by their numbers among nodes.
@@ -264,25 +260,11 @@ impl CutSolid {
         corners.map(|corner| self.vertices[corner].point)
     }
 
-    /// The cells at a node.
-    pub(crate) fn cells_at(&self, node: u32) -> impl Iterator<Item = u32> {
-        self.corners_at(node).map(|corner| corner / 4)
-    }
-
-    /// The cells' corners at a node.
-    pub(crate) fn corners_at(&self, node: u32) -> impl Iterator<Item = u32> {
-        let next = |&corner: &u32| Some(self.cells[corner / 4].next[corner as usize % 4]).filter(|&next| next != NONE);
-        let first = Some(self.nodes[node].first).filter(|&corner| corner != NONE);
-        std::iter::successors(first, next)
-    }
-
     /// The tetrahedra that fill a cell, in ascending order.
     pub fn tetrahedra_in(&self, cell: u32, inside: &mut Vec<u32>) -> Result<()> {
         inside.clear();
-        let mut tetrahedron = self.cells[cell].first;
-        while tetrahedron != NONE {
+        for tetrahedron in self.simplices_in(cell) {
             memory::push(inside, tetrahedron)?;
-            tetrahedron = self.tetrahedra[tetrahedron].next;
         }
         inside.sort_unstable();
         Ok(())
@@ -373,11 +355,4 @@ impl CutSolid {
         let other = self.tetrahedra[across].corners;
         (0..3).find(|&k| !corners.contains(&other[k])).unwrap_or(3)
     }
-}
-
-fn weighed(vertex: &SolidVertex, place: impl Fn(u32) -> Vec3) -> DVec3 {
-    (0..4)
-        .filter(|&k| vertex.weights[k] != 0.0)
-        .map(|k| vertex.weights[k] * place(vertex.nodes[k]).as_dvec3())
-        .sum()
 }

@@ -2,9 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::body::{CutSolid, FACES, Face, NONE, Node, SNAP, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
+use super::body::{CutSolid, FACES, Face, SolidCell, SolidTriangle, SolidVertex, Tetrahedron};
 use super::sever::{Mark, Stroke};
 use crate::base::{Error, Result, memory};
+use crate::cutting::divided::{NONE, Node, SNAP};
 use crate::cutting::tracked::Tracked;
 
 impl CutSolid {

@@ -2,11 +2,11 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::body::NONE;
 use super::crossing::Swept;
 use super::cut::Cut;
 use super::sever::Plane;
 use crate::base::{Result, memory};
+use crate::cutting::divided::NONE;
 
 /// An edge that is crossed.
 struct Crossed {

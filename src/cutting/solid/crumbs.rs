@@ -2,9 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::body::{Face, NONE};
+use super::body::Face;
 use super::cut::Cut;
 use crate::base::{Result, memory};
+use crate::cutting::divided::NONE;
 
 /// A piece between cuts that are nearer to each other, in snapping distances, is a crumb.
 const THIN: f64 = 3.0;

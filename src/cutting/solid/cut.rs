@@ -4,9 +4,10 @@ use glam::Vec3;
 
 use super::body::CutSolid;
 use super::crossing::Swept;
-use crate::base::{Error, Result, memory};
+use crate::base::{Result, memory};
 use crate::cutting::changes::Changes;
-use crate::cutting::cut::{Limits, Sweep, bounds};
+use crate::cutting::cut::{Limits, Sweep};
+use crate::cutting::pieces::Parting;
 
 /// A cut that is being made.
 pub(crate) struct Cut<'a> {
@@ -41,7 +42,10 @@ impl CutSolid {
     /// [`Error::InvalidArgument`] if there is not one position for each node, if one that is needed or the blade is not finite, or if a
     /// candidate is unknown; [`Error::Capacity`] beyond the limits; [`Error::OutOfMemory`]. Then nothing has changed.
     pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
-        self.check(sweep, positions, candidates)?;
+        let items = ("cells", self.cells.count());
+        sweep.check(positions, self.node_count(), candidates, items, |cell| {
+            self.cells[cell].nodes
+        })?;
         self.begin();
         let cut = Cut {
             limits,
@@ -82,45 +86,8 @@ impl CutSolid {
 
     /// The cells whose box meets the sweep's if nodes are at `positions`, found by going through all.
     pub fn near(&self, sweep: &Sweep, positions: &[Vec3]) -> Result<Vec<u32>> {
-        let corners = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
-        let (low, high) = bounds(&corners);
-        let mut near = Vec::new();
-        for (number, cell) in self.cells().iter().enumerate() {
-            let (from, to) = bounds(&cell.nodes.map(|node| positions[node as usize]));
-            if from.cmple(high).all() && low.cmple(to).all() {
-                memory::push(&mut near, number as u32)?;
-            }
-        }
-        Ok(near)
-    }
-
-    fn check(&self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<()> {
-        if positions.len() != self.node_count() as usize {
-            return Err(Error::invalid(format!(
-                "{} positions for {} nodes",
-                positions.len(),
-                self.node_count()
-            )));
-        }
-        let ends = [sweep.start[0], sweep.start[1], sweep.end[0], sweep.end[1]];
-        if let Some(end) = ends.iter().find(|end| !end.is_finite()) {
-            return Err(Error::invalid(format!("an end of the blade is at {end}")));
-        }
-        for &cell in candidates {
-            let Some(cell) = self.cells().get(cell as usize) else {
-                return Err(Error::invalid(format!(
-                    "candidate {cell} of {} cells",
-                    self.cells.count()
-                )));
-            };
-            for node in cell.nodes {
-                let place = positions[node as usize];
-                if !place.is_finite() {
-                    return Err(Error::invalid(format!("node {node} is at {place}")));
-                }
-            }
-        }
-        Ok(())
+        let place = |node| positions[node as usize];
+        sweep.near(self.cells().iter().map(|cell| cell.nodes.map(place)))
     }
 }
 
@@ -143,8 +110,12 @@ impl Cut<'_> {
     /// Opens faces that are ready, and what follows from that.
     pub(crate) fn finish(mut self, faces: &[(u32, usize)]) -> Result<Changes> {
         let cells = self.open(faces)?;
-        let nodes = self.part_cells(&cells)?;
-        self.part_nodes(&nodes)?;
+        Parting {
+            body: &mut *self.solid,
+            limits: self.limits,
+            changes: &mut self.changes,
+        }
+        .part(&cells)?;
         // The lists that only the end can tell.
         self.changes.triangles = self.solid.triangles.touched()?;
         self.number_points()?;

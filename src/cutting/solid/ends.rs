@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::body::{CutSolid, SNAP};
+use super::body::CutSolid;
 use crate::cutting::cut::Sweep;
+use crate::cutting::divided::SNAP;
 use crate::cutting::material::CutEnd;
 
 impl CutSolid {

@@ -3,9 +3,10 @@
 //! A severed face of which no corner parts cannot gape. It stays closed, like one that hangs on to the others by a corner alone, until the blade has
 //! gone on.
 
-use super::body::{CutSolid, Face, NONE};
+use super::body::{CutSolid, Face};
 use super::cut::Cut;
 use crate::base::{Result, memory};
+use crate::cutting::divided::NONE;
 use crate::cutting::union::Union;
 
 /// A tetrahedron and which of its faces.

@@ -2,10 +2,11 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::body::{CutSolid, Face, NONE, SNAP};
+use super::body::{CutSolid, Face};
 use super::reach::Band;
 use crate::base::{Result, memory};
 use crate::cutting::cut::Sweep;
+use crate::cutting::divided::{NONE, SNAP};
 use crate::cutting::met::Met;
 
 /// A triangle that is cut by the four sides of a tetrahedron has no more corners.

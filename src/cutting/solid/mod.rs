@@ -10,12 +10,11 @@
 //! it; cells whose tetrahedra are neighbours share the nodes that move the face between them.
 //!
 //! A cut goes through these stages: `carve` finds and splits (with `crossing`, `split`) and marks vertices as being on the blade, `sever` finds the
-//! faces on its way, `crumbs` and `manifold` those of them that can open yet, `open` opens them, `pieces` and `copies` part cells and nodes.
+//! faces on its way, `crumbs` and `manifold` those of them that can open yet, `open` opens them; cells and nodes are parted as those of surfaces are.
 
 mod body;
 mod build;
 mod carve;
-mod copies;
 mod crossing;
 mod crumbs;
 mod cut;
@@ -23,8 +22,6 @@ mod ends;
 mod manifold;
 mod met;
 mod open;
-mod parted;
-mod pieces;
 mod points;
 mod reach;
 mod sever;

@@ -1,9 +1,10 @@
 //! The material opens along severed faces: they are drawn, and vertices are doubled where what lies about them falls apart.
 
-use super::body::{Face, NONE, SolidTriangle};
+use super::body::{Face, SolidTriangle};
 use super::cut::Cut;
 use crate::base::{Result, memory};
 use crate::cutting::changes::{CutFace, NewVertex, RimEdge};
+use crate::cutting::divided::NONE;
 use crate::cutting::union::Union;
 
 impl Cut<'_> {

@@ -1,9 +1,10 @@
 //! Numbers for the material's vertices, drawn or not: of those at a node one has that of the node, any other has one of its own among nodes.
 
-use super::body::{NONE, Node, SolidVertex};
+use super::body::SolidVertex;
 use super::cut::Cut;
 use crate::base::{Result, memory};
-use crate::cutting::changes::{BoundPoint, Source};
+use crate::cutting::changes::BoundPoint;
+use crate::cutting::divided::{NONE, Node};
 use crate::cutting::numbers::FreeNodes;
 
 impl Cut<'_> {
@@ -57,25 +58,13 @@ impl Cut<'_> {
         self.changes.bound.sort_unstable_by_key(|bound| bound.point);
         memory::sort_once(&mut at_nodes);
         self.changes.list_copies(&at_nodes)?;
-        let first = self.solid.vertices.count_before();
-        for (vertex, new) in (first..).zip(&self.changes.vertices) {
-            let it = self.solid.vertices[vertex];
-            if it.point == it.nodes[0] {
-                continue;
-            }
-            // Of a vertex that is at a copy now what it was at has the lower number.
-            let point_of = |vertex: u32| match before.binary_search_by_key(&vertex, |&(at, _)| at) {
-                Ok(place) => before[place].1.point,
-                Err(_) => self.solid.vertices[vertex].point,
-            };
-            let source = Source {
-                point: it.point,
-                sources: new.sources.map(point_of),
-                weights: new.weights,
-            };
-            memory::push(&mut self.changes.sources, source)?;
-        }
-        self.changes.sources.sort_unstable_by_key(|source| source.point);
-        Ok(())
+        // Of a vertex that is at a copy now what it was at has the lower number.
+        let vertices = &self.solid.vertices;
+        let point_before = |vertex: u32| match before.binary_search_by_key(&vertex, |&(at, _)| at) {
+            Ok(place) => before[place].1.point,
+            Err(_) => vertices[vertex].point,
+        };
+        let at = |vertex: u32| [vertices[vertex].point, vertices[vertex].nodes[0]];
+        self.changes.list_sources(vertices.count_before(), at, point_before)
     }
 }

@@ -2,11 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
-use super::body::{CutSolid, Face, NONE, SolidVertex};
+use super::body::{CutSolid, Face, SolidVertex};
 use super::cut::Cut;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{saved, saved_enum};
 use crate::cutting::cut::Sweep;
+use crate::cutting::divided::NONE;
 
 /// Steps of the blade that go on from each other.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,11 @@
 //! Splitting an edge of the material: each tetrahedron about it is halved.
 
-use super::body::{Face, NONE, SolidTriangle, SolidVertex, Tetrahedron};
+use super::body::{Face, SolidTriangle, SolidVertex, Tetrahedron};
 use super::cut::Cut;
 use super::sever::Mark;
 use crate::base::{Result, memory};
 use crate::cutting::changes::NewVertex;
+use crate::cutting::divided::NONE;
 
 impl Cut<'_> {
     /// Splits an edge of a tetrahedron `along` of the way from its first end to its second. Each tetrahedron about it keeps the half at the first.

@@ -2,12 +2,13 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::body::{CutSolid, Face, NONE};
+use super::body::{CutSolid, Face};
 use super::cut::Cut;
 use super::sever::Stroke;
 use crate::base::{Result, memory};
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep};
+use crate::cutting::divided::{Divided, NONE};
 use crate::cutting::tear::Load;
 use crate::strain::eigenvalues;
 
@@ -17,18 +18,12 @@ const BESIDE: f64 = 1e-9;
 impl CutSolid {
     /// The vertex of the material that is at a node.
     pub(crate) fn vertex_of(&self, node: u32) -> Option<u32> {
-        let is_there = |&vertex: &u32| {
-            let vertex = &self.vertices[vertex];
-            vertex.weights[0] == 1.0 && vertex.nodes[0] == node
-        };
+        let is_there = |&vertex: &u32| self.is_at(vertex, node);
         let mut found = None;
         for cell in self.cells_at(node) {
-            let mut tetrahedron = self.cells[cell].first;
-            while tetrahedron != NONE {
-                let it = &self.tetrahedra[tetrahedron];
-                let vertex = it.corners.into_iter().filter(is_there).min();
+            for tetrahedron in self.simplices_in(cell) {
+                let vertex = self.tetrahedra[tetrahedron].corners.into_iter().filter(is_there).min();
                 found = [found, vertex].into_iter().flatten().min();
-                tetrahedron = it.next;
             }
         }
         found

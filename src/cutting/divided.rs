@@ -1,0 +1,162 @@
+//! What surfaces and solids have in common: cells of material that is divided into simplices, whose vertices nodes move.
+
+use glam::{DVec3, Vec3};
+
+use super::tracked::Tracked;
+use crate::base::Result;
+use crate::codec::saved;
+
+/// No simplex, or no corner.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// What is snapped lies within this part of a cell's shortest edge.
+pub(crate) const SNAP: f64 = 0.05;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Node {
+    /// Of a point that is bound to others nothing is said here.
+    pub(crate) rest: Vec3,
+    /// The first of the cells' corners at it.
+    pub(crate) first: u32,
+}
+
+saved!(Node { rest, first });
+
+impl Node {
+    /// A point that is bound to others.
+    pub(crate) const BOUND: Self = Self {
+        rest: Vec3::ZERO,
+        first: NONE,
+    };
+
+    /// Whether it is such a point.
+    pub(crate) fn is_bound(&self) -> bool {
+        self.first == NONE
+    }
+}
+
+/// A cell: its nodes, its material, m² or m³, its first simplex, and for each of its nodes the next corner at the node.
+#[derive(Clone, Copy)]
+pub(crate) struct Cell<const N: usize> {
+    pub nodes: [u32; N],
+    pub material: f64,
+    pub first: u32,
+    pub next: [u32; N],
+}
+
+/// A triangle or tetrahedron: its corners, what lies across its sides, its cell, and the next simplex of that.
+#[derive(Clone, Copy)]
+pub(crate) struct Simplex<const N: usize> {
+    pub corners: [u32; N],
+    pub neighbours: [u32; N],
+    pub cell: u32,
+    pub next: u32,
+}
+
+/// Cells with N nodes, of which corner k of cell c has the number N c + k. Their material is divided into simplices with N corners.
+pub(crate) trait Divided<const N: usize> {
+    /// The corners of each edge of a cell.
+    const EDGES: &'static [[usize; 2]];
+    /// The corners of the side that each of a simplex's neighbours lies across.
+    const SIDES: [&'static [usize]; N];
+
+    fn nodes(&self) -> &Tracked<Node>;
+    fn nodes_mut(&mut self) -> &mut Tracked<Node>;
+    fn cell_count(&self) -> u32;
+    fn cell(&self, cell: u32) -> Cell<N>;
+    fn set_cell(&mut self, cell: u32, to: Cell<N>) -> Result<()>;
+    /// Adds a cell with what is not named here from another.
+    fn add_cell(&mut self, like: u32, cell: Cell<N>) -> Result<u32>;
+    fn simplex(&self, simplex: u32) -> Simplex<N>;
+    /// How much of the material of its cell a simplex has, to compare with others in the cell.
+    fn part_of(&self, simplex: u32) -> f64;
+    /// A simplex belongs to a cell now, before the simplex `next`.
+    fn move_simplex(&mut self, simplex: u32, cell: u32, next: u32) -> Result<()>;
+    /// The nodes that move a vertex, and how much each does.
+    fn bonds(&self, vertex: u32) -> ([u32; N], [f64; N]);
+    fn bind(&mut self, vertex: u32, nodes: [u32; N]) -> Result<()>;
+
+    /// The cells' corners at a node.
+    fn corners_at(&self, node: u32) -> impl Iterator<Item = u32> {
+        let known = |corner: u32| (corner != NONE).then_some(corner);
+        let next = move |&corner: &u32| known(self.cell(corner / N as u32).next[corner as usize % N]);
+        std::iter::successors(known(self.nodes()[node].first), next)
+    }
+
+    /// The cells at a node.
+    fn cells_at(&self, node: u32) -> impl Iterator<Item = u32> {
+        self.corners_at(node).map(|corner| corner / N as u32)
+    }
+
+    /// The simplices of a cell, that added last first.
+    fn simplices_in(&self, cell: u32) -> impl Iterator<Item = u32> {
+        let known = |simplex: u32| (simplex != NONE).then_some(simplex);
+        let next = move |&simplex: &u32| known(self.simplex(simplex).next);
+        std::iter::successors(known(self.cell(cell).first), next)
+    }
+
+    /// Whether a vertex is at a node.
+    fn is_at(&self, vertex: u32, node: u32) -> bool {
+        let (nodes, weights) = self.bonds(vertex);
+        weights[0] == 1.0 && nodes[0] == node
+    }
+}
+
+/// Implements [`Divided`] for a body that can be cut, with what is particular to it.
+macro_rules! divided {
+    ($body:ident, $corners:literal, $cell:ident { $material:ident }, $simplices:ident, { $($own:tt)* }) => {
+        impl Divided<$corners> for $body {
+            $($own)*
+
+            fn nodes(&self) -> &Tracked<Node> {
+                &self.nodes
+            }
+
+            fn nodes_mut(&mut self) -> &mut Tracked<Node> {
+                &mut self.nodes
+            }
+
+            fn cell_count(&self) -> u32 {
+                self.cells.count()
+            }
+
+            fn cell(&self, cell: u32) -> Cell<$corners> {
+                let $cell { nodes, $material: material, first, next, .. } = self.cells[cell];
+                Cell { nodes, material, first, next }
+            }
+
+            fn set_cell(&mut self, cell: u32, to: Cell<$corners>) -> Result<()> {
+                let Cell { nodes, material: $material, first, next } = to;
+                self.cells.edit(cell, |cell| *cell = $cell { nodes, $material, first, next, ..*cell })
+            }
+
+            fn add_cell(&mut self, like: u32, cell: Cell<$corners>) -> Result<u32> {
+                let Cell { nodes, material: $material, first, next } = cell;
+                self.cells.push($cell { nodes, $material, first, next, ..self.cells[like] })
+            }
+
+            fn simplex(&self, simplex: u32) -> Simplex<$corners> {
+                let it = &self.$simplices[simplex];
+                Simplex { corners: it.corners, neighbours: it.neighbours, cell: it.cell, next: it.next }
+            }
+
+            fn bonds(&self, vertex: u32) -> ([u32; $corners], [f64; $corners]) {
+                (self.vertices[vertex].nodes, self.vertices[vertex].weights)
+            }
+
+            fn bind(&mut self, vertex: u32, nodes: [u32; $corners]) -> Result<()> {
+                self.vertices.edit(vertex, |vertex| vertex.nodes = nodes)
+            }
+        }
+    };
+}
+
+pub(crate) use divided;
+
+/// The place that nodes at these places give by weights.
+pub(crate) fn weighed<const N: usize>((nodes, weights): ([u32; N], [f64; N]), place: impl Fn(u32) -> Vec3) -> DVec3 {
+    (0..N)
+        .filter(|&k| weights[k] != 0.0)
+        .map(|k| weights[k] * place(nodes[k]).as_dvec3())
+        .sum()
+}
