@@ -1,15 +1,13 @@
 //! Contact in image space, against brute force in `f64`.
 
-use std::collections::HashMap;
-
-use crate::support::solid::real;
+use crate::support::solid::{ball, real};
 use glam::{DVec3, Quat, Vec3};
 use sinew::Error;
 use sinew::detection::exact::Exact;
 use sinew::detection::image_space::{
     Form, ImageSpace, ImageSpaceDefinition, LayeredImage, Overlap, Placed, Surface, Views,
 };
-use sinew::mesh::ClosedSurface;
+use sinew::mesh::{ClosedSurface, Mesh};
 
 /// Half the diagonal of a pixel: how far a point can be from the ray in the middle of its pixel.
 const HALF_DIAGONAL: f64 = 0.7072;
@@ -49,43 +47,11 @@ struct Shape {
 }
 
 impl Shape {
-    /// An icosahedron of radius 1, each triangle cut in four so many times, its nodes on the sphere.
+    /// Of radius 1.
     fn sphere(cuts: u32) -> Self {
-        let golden = (1.0 + 5.0_f32.sqrt()) / 2.0;
-        let mut positions = Vec::new();
-        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
-            positions.extend([Vec3::new(a, b, 0.0), Vec3::new(0.0, a, b), Vec3::new(b, 0.0, a)]);
-        }
-        let mut triangles = Vec::new();
-        for i in 0..12_u32 {
-            for j in 0..12 {
-                for k in 0..12 {
-                    let [a, b, c] = [i, j, k].map(|node| positions[node as usize]);
-                    let joined = [a.distance(b), b.distance(c), c.distance(a)]
-                        .iter()
-                        .all(|l| (l - 2.0).abs() < 1e-3);
-                    if joined && i < j && i < k && (b - a).cross(c - a).dot(a) > 0.0 {
-                        triangles.push([i, j, k]);
-                    }
-                }
-            }
-        }
-        for _ in 0..cuts {
-            let mut middles = HashMap::new();
-            let mut smaller = Vec::new();
-            for [a, b, c] in triangles {
-                let mut middle = |from: u32, to: u32| {
-                    *middles.entry((from.min(to), from.max(to))).or_insert_with(|| {
-                        positions.push((positions[from as usize] + positions[to as usize]) / 2.0);
-                        positions.len() as u32 - 1
-                    })
-                };
-                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-                smaller.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-            }
-            triangles = smaller;
-        }
-        positions.iter_mut().for_each(|p| *p = p.normalize());
+        let Mesh {
+            positions, triangles, ..
+        } = ball(1.0, cuts);
         Self { positions, triangles }
     }
 

@@ -1,40 +1,10 @@
 //! Closed and curved surfaces, and blades in any position.
 
-use std::collections::BTreeMap;
-
-use super::sheet::{Body, Random, flat};
+use super::sheet::{Body, flat};
+use crate::support::random::Random;
+use crate::support::solid::octahedral_ball;
 use glam::{Vec3, vec3};
 use sinew::cutting::{Limits, Sweep};
-
-/// A sphere of radius 1: an octahedron of which each triangle is divided in four, so many times.
-fn sphere(times: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let mut places = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
-    let mut cells = vec![
-        [0, 1, 2],
-        [1, 3, 2],
-        [3, 4, 2],
-        [4, 0, 2],
-        [1, 0, 5],
-        [3, 1, 5],
-        [4, 3, 5],
-        [0, 4, 5],
-    ];
-    for _ in 0..times {
-        let mut middles = BTreeMap::new();
-        let mut finer = Vec::new();
-        for [a, b, c] in cells {
-            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b): (u32, u32)| {
-                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                    places.push((places[a as usize] + places[b as usize]).normalize());
-                    places.len() as u32 - 1
-                })
-            });
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        cells = finer;
-    }
-    (places, cells)
-}
 
 fn cut(body: &mut Body, start: [Vec3; 2], end: [Vec3; 2]) -> usize {
     let sweep = Sweep { start, end };
@@ -47,7 +17,7 @@ fn cut(body: &mut Body, start: [Vec3; 2], end: [Vec3; 2]) -> usize {
 #[test]
 fn a_blade_through_a_sphere_halves_it() {
     for z in [0.0, 0.1, -0.37] {
-        let mut body = Body::new(sphere(4), flat);
+        let mut body = Body::new(octahedral_ball(4), flat);
         cut(
             &mut body,
             [vec3(-2.0, -2.0, z), vec3(-2.0, 2.0, z)],
@@ -65,7 +35,7 @@ fn a_blade_through_a_sphere_halves_it() {
 
 #[test]
 fn a_blade_half_way_into_a_sphere_leaves_it_whole() {
-    let mut body = Body::new(sphere(4), flat);
+    let mut body = Body::new(octahedral_ball(4), flat);
     cut(
         &mut body,
         [vec3(-2.0, -2.0, 0.1), vec3(-2.0, 2.0, 0.1)],
@@ -83,7 +53,7 @@ fn a_blade_half_way_into_a_sphere_leaves_it_whole() {
 #[test]
 fn blades_in_any_position_break_nothing() {
     let mut random = Random(9);
-    let mut body = Body::new(sphere(4), flat);
+    let mut body = Body::new(octahedral_ball(4), flat);
     let before = body.worst_ratio();
     let mut point = |size: f32| {
         vec3(

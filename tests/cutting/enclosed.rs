@@ -5,43 +5,15 @@ use sinew::cutting::Sweep;
 use sinew::{BodyDefinition, Values, World, WorldDefinition};
 
 use super::motion::{SOLVERS, kept};
-
-/// An octahedron, each triangle divided in four so many times, on a sphere of 5 cm.
-fn ball(times: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
-    let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 1, 2],
-        [1, 3, 2],
-        [3, 4, 2],
-        [4, 0, 2],
-        [1, 0, 5],
-        [3, 1, 5],
-        [4, 3, 5],
-        [0, 4, 5],
-    ];
-    for _ in 0..times {
-        let mut middles = std::collections::BTreeMap::new();
-        let mut finer = Vec::new();
-        for [a, b, c] in triangles {
-            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
-                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                    points.push((points[a as usize] + points[b as usize]).normalize());
-                    points.len() as u32 - 1
-                })
-            });
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    (points.iter().map(|&point| 0.05 * point).collect(), triangles)
-}
+use crate::support::solid::octahedral_ball;
 
 #[test]
 fn a_balloon_that_is_pricked_has_no_pressure() {
     for solver in SOLVERS {
         for (pressure, squeezed) in [(0.0, 0.9), (50.0, 1.0)] {
             let what = format!("{solver:?}, {pressure} Pa");
-            let (rest, triangles) = ball(3);
+            let (rest, triangles) = octahedral_ball(3);
+            let rest: Vec<Vec3> = rest.iter().map(|place| 0.05 * *place).collect();
             let positions: Vec<Vec3> = rest.iter().map(|place| *place * squeezed).collect();
             let mut world = World::new(WorldDefinition {
                 gravity: Vec3::ZERO,

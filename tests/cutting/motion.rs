@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{Body, BodyDefinition, BodyId, Solver, Storage, Values, World, WorldDefinition};
 
-use super::sheet::{Random, unstructured};
+use super::sheet::unstructured;
+use crate::support::random::Random;
 
 const STORAGES: [Storage; 4] = [
     Storage::Packed,

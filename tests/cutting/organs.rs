@@ -7,7 +7,8 @@ use glam::{DVec3, Quat, Vec3, vec3};
 use sinew::cutting::{Limits, Sweep};
 use sinew::mesh::MeshFormat;
 
-use super::sheet::{Body, Random, flat, snap};
+use super::sheet::{Body, flat, snap};
+use crate::support::random::Random;
 
 /// Real surfaces, 10 long about the origin; said aloud where they are missing.
 type Surface = (Vec<Vec3>, Vec<[u32; 3]>);

@@ -1,6 +1,8 @@
 //! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
 
-use super::sheet::{Body, Random, far, flat, grid, snap, unstructured, wavy};
+use super::sheet::{Body, far, flat, grid, snap, unstructured, wavy};
+use crate::support::change_lists::Follower;
+use crate::support::random::Random;
 use glam::{Vec2, vec2, vec3};
 
 /// Rounds in which what seldom matters does.
@@ -79,7 +81,8 @@ fn a_thousand_cuts_in_a_row_of(count: usize) {
             let from = vec2(random.between(-1.0, side + 1.0), random.between(-1.0, side + 1.0));
             let way = Vec2::from_angle(random.between(0.0, 7.0)) * random.between(0.01, 8.0);
             // The wounds gape, and nodes go where they like.
-            for (place, &rest) in body.positions.iter_mut().zip(&body.rest) {
+            let Follower { positions, rest, .. } = &mut body.follower;
+            for (place, &rest) in positions.iter_mut().zip(&*rest) {
                 *place = wavy(rest) + 0.1 * vec3(random.between(-1.0, 1.0), random.between(-1.0, 1.0), 0.0);
             }
             body.cut(from, from + way);
@@ -89,7 +92,7 @@ fn a_thousand_cuts_in_a_row_of(count: usize) {
             }
         }
         let counts = [
-            body.simulated_count() as usize,
+            body.nodes_that_move(),
             body.surface.triangles().len(),
             body.surface.vertices().len(),
         ];

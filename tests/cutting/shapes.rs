@@ -149,9 +149,9 @@ fn a_small_loop_within_one_cell() {
         .collect();
     let mut body = Body::new((rest, cells), flat);
     body.cut_along(&circle[..8]);
-    assert_eq!((body.check(), body.simulated_count()), (1, 3));
+    assert_eq!((body.check(), body.nodes_that_move()), (1, 3));
     body.cut_along(&circle[7..]);
-    assert_eq!((body.check(), body.simulated_count()), (2, 6));
+    assert_eq!((body.check(), body.nodes_that_move()), (2, 6));
 }
 
 #[test]

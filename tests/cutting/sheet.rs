@@ -2,26 +2,14 @@
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
 
 use glam::{DVec3, Vec2, Vec3};
 use sinew::Error;
 use sinew::cutting::{Changes, CutSurface, Limits, Sweep};
 
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.next() as f32
-    }
-}
+use crate::support::change_lists::{Follower, Union};
+use crate::support::random::Random;
 
 /// A grid of `n` x `n` squares of side 1, each of two triangles, in the plane z = 0.
 pub fn grid(n: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
@@ -76,74 +64,27 @@ pub fn unstructured(n: usize, seed: u64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (rest, cells)
 }
 
-pub struct Spring {
-    pub stiffness: f64,
-    pub source: [u32; 2],
-}
+const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
-/// What a simulation and a renderer know: they see the surface only when it is made, and then change lists.
 pub struct Body {
     pub surface: CutSurface,
-    pub rest: Vec<Vec3>,
-    pub positions: Vec<Vec3>,
-    pub masses: Vec<f64>,
-    pub first_masses: Vec<f64>,
-    pub sources: Vec<u32>,
-    pub springs: BTreeMap<[u32; 2], Spring>,
-    pub first_springs: BTreeMap<[u32; 2], f64>,
-    pub triangles: Vec<[u32; 3]>,
-    /// Something that what is drawn carries: where it is in the rest shape.
-    pub carried: Vec<DVec3>,
-    pub bound: BTreeMap<u32, ([u32; 4], [f64; 4])>,
-    pub cell_sources: Vec<u32>,
-    pub first_areas: Vec<f64>,
-    pub deformation: fn(Vec3) -> Vec3,
+    pub follower: Follower,
 }
 
-fn ordered(nodes: [u32; 2]) -> [u32; 2] {
-    [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])]
+impl Deref for Body {
+    type Target = Follower;
+
+    fn deref(&self) -> &Follower {
+        &self.follower
+    }
 }
 
 impl Body {
-    /// Stiffness of springs by Van Gelder, masses by area, both made uneven.
-    pub fn new((rest, cells): (Vec<Vec3>, Vec<[u32; 3]>), deformation: fn(Vec3) -> Vec3) -> Self {
-        let surface = CutSurface::new(&rest, &cells).unwrap();
-        let mut random = Random(11);
-        let mut masses = vec![0.0; rest.len()];
-        let mut springs = BTreeMap::new();
-        for (cell, nodes) in surface.cells().iter().zip(&cells) {
-            for k in 0..3 {
-                masses[nodes[k] as usize] += cell.area / 3.0;
-                let edge = ordered([nodes[k], nodes[(k + 1) % 3]]);
-                let length = rest[edge[0] as usize].distance(rest[edge[1] as usize]) as f64;
-                *springs.entry(edge).or_insert(0.0) += cell.area / (length * length);
-            }
-        }
-        for mass in &mut masses {
-            *mass *= 0.9 + 0.2 * random.next();
-        }
-        for stiffness in springs.values_mut() {
-            *stiffness *= 0.9 + 0.2 * random.next();
-        }
-        Self {
-            positions: rest.iter().map(|&place| deformation(place)).collect(),
-            first_masses: masses.clone(),
-            masses,
-            sources: (0..rest.len() as u32).collect(),
-            first_springs: springs.clone(),
-            springs: springs
-                .into_iter()
-                .map(|(source, stiffness)| (source, Spring { stiffness, source }))
-                .collect(),
-            triangles: cells,
-            carried: rest.iter().map(|place| place.as_dvec3()).collect(),
-            bound: BTreeMap::new(),
-            cell_sources: (0..surface.cells().len() as u32).collect(),
-            first_areas: surface.cells().iter().map(|cell| cell.area).collect(),
-            rest,
-            surface,
-            deformation,
-        }
+    pub fn new((rest, triangles): (Vec<Vec3>, Vec<[u32; 3]>), deformation: fn(Vec3) -> Vec3) -> Self {
+        let surface = CutSurface::new(&rest, &triangles).unwrap();
+        let cells: Vec<_> = surface.cells().iter().map(|cell| (cell.nodes, cell.area)).collect();
+        let follower = Follower::new(rest, &cells, &EDGES, triangles, deformation);
+        Self { surface, follower }
     }
 
     /// Where the blade's edge stands upright at a point of the rest shape.
@@ -190,102 +131,19 @@ impl Body {
         }
     }
 
-    /// Takes over a change list, as a solver and a renderer do.
     pub fn apply(&mut self, changes: &Changes) {
-        let masses = self.masses.clone();
-        for piece in &changes.nodes {
-            let source = piece.source as usize;
-            if piece.node != piece.source {
-                assert_eq!(piece.node as usize, self.masses.len(), "new nodes are numbered on");
-                self.masses.push(0.0);
-                self.positions.push(self.positions[source]);
-                self.rest.push(self.rest[source]);
-                self.sources.push(self.sources[source]);
-            }
-            self.masses[piece.node as usize] = masses[source] * piece.part;
-        }
-        let before: Vec<(f64, [u32; 2])> = changes
-            .springs
-            .iter()
-            .map(|piece| {
-                (
-                    self.springs[&piece.source].stiffness,
-                    self.springs[&piece.source].source,
-                )
-            })
-            .collect();
-        for source in &changes.removed_springs {
-            assert!(self.springs.remove(source).is_some());
-        }
-        for (piece, (whole, source)) in changes.springs.iter().zip(before) {
-            assert!(piece.part > 0.0);
-            let spring = Spring {
-                stiffness: whole * piece.part,
-                source,
-            };
-            self.springs.insert(ordered(piece.nodes), spring);
-        }
-        for piece in &changes.cells {
-            let source = self.cell_sources[piece.source as usize];
-            if piece.cell as usize == self.cell_sources.len() {
-                self.cell_sources.push(source);
-            }
-            assert_eq!(self.cell_sources[piece.cell as usize], source);
-        }
-        for bound in &changes.bound {
-            let parts = || bound.nodes.iter().zip(bound.weights);
-            let place: DVec3 = parts()
-                .map(|(&node, weight)| weight * self.positions[node as usize].as_dvec3())
-                .sum();
-            if bound.point as usize == self.masses.len() {
-                self.masses.push(0.0);
-                self.positions.push(place.as_vec3());
-                self.rest.push(Vec3::NAN);
-                self.sources.push(u32::MAX);
-            }
-            assert_eq!(self.masses[bound.point as usize], 0.0);
-            self.bound.insert(bound.point, (bound.nodes, bound.weights));
-        }
-        assert_eq!(self.masses.len(), self.surface.node_count() as usize);
-        let known = self.carried.len();
-        self.carried.resize(self.masses.len(), DVec3::NAN);
-        for source in &changes.sources {
-            assert!(source.point as usize >= known && self.carried[source.point as usize].is_nan());
-            assert!(source.sources.iter().all(|&from| from < source.point));
-            let place = (0..3)
-                .map(|k| source.weights[k] * self.carried[source.sources[k] as usize])
-                .sum();
-            self.carried[source.point as usize] = place;
-        }
-        for &node in &changes.undrawn {
-            assert!(node as usize >= known && self.carried[node as usize].is_nan());
-        }
-        assert_eq!(changes.first_triangle as usize, self.triangles.len());
-        self.triangles.resize(self.surface.triangles().len(), [u32::MAX; 3]);
-        for &triangle in &changes.triangles {
-            self.triangles[triangle as usize] = self.surface.corner_points(triangle);
-        }
-    }
-
-    /// Sum of the stiffness of a node's springs by its mass, of the worst node.
-    pub fn worst_ratio(&self) -> f64 {
-        let mut sums = vec![0.0; self.masses.len()];
-        for (nodes, spring) in &self.springs {
-            for &node in nodes {
-                sums[node as usize] += spring.stiffness;
-            }
-        }
-        sums.iter()
-            .zip(&self.masses)
-            .map(|(sum, mass)| sum / mass)
-            .fold(0.0, f64::max)
+        let (surface, count) = (&self.surface, self.surface.triangles().len());
+        self.follower.apply(changes, surface.node_count(), count, |triangle| {
+            surface.corner_points(triangle)
+        });
     }
 
     /// Checks all that has to hold whatever was cut; returns the number of pieces.
     pub fn check(&self) -> usize {
         self.check_drawn();
         self.check_material();
-        self.check_springs();
+        self.check_masses();
+        self.check_springs(self.surface.cells().iter().map(|cell| cell.nodes), &EDGES);
         let (drawn, simulated) = (self.drawn_pieces(), self.simulated_pieces());
         assert_eq!(
             drawn, simulated,
@@ -377,10 +235,10 @@ impl Body {
                 assert!((vertex.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             }
         }
-        let mut areas = vec![0.0; self.first_areas.len()];
+        let mut areas = vec![0.0; self.first_sizes.len()];
         for (number, cell) in self.surface.cells().iter().enumerate() {
             let source = self.cell_sources[number] as usize;
-            let part = cell.area / self.first_areas[source];
+            let part = cell.area / self.first_sizes[source];
             assert!(
                 (part - covered[number]).abs() < 1e-12,
                 "cell {number}: {part} and {}",
@@ -388,10 +246,9 @@ impl Body {
             );
             areas[source] += cell.area;
         }
-        for (area, first) in areas.iter().zip(&self.first_areas) {
+        for (area, first) in areas.iter().zip(&self.first_sizes) {
             assert!((area / first - 1.0).abs() < 1e-12);
         }
-        let mut masses = vec![0.0; self.first_masses.len()];
         for (point, vertex) in self.surface.vertices().iter().map(|vertex| (vertex.point, vertex)) {
             match self.bound.get(&point) {
                 None => assert_eq!((vertex.nodes[0], vertex.weights[0]), (point, 1.0)),
@@ -401,39 +258,6 @@ impl Body {
                     assert_eq!(weights[3], 0.0);
                 }
             }
-        }
-        for (node, (mass, &source)) in (0..).zip(self.masses.iter().zip(&self.sources)) {
-            if self.bound.contains_key(&node) {
-                continue;
-            }
-            assert!(*mass > 0.0);
-            masses[source as usize] += mass;
-        }
-        for (mass, first) in masses.iter().zip(&self.first_masses) {
-            assert!((mass / first - 1.0).abs() < 1e-12);
-        }
-    }
-
-    /// Springs lie along the cells' edges, and keep their stiffness in all.
-    fn check_springs(&self) {
-        let mut edges = BTreeSet::new();
-        for cell in self.surface.cells() {
-            for k in 0..3 {
-                edges.insert(ordered([cell.nodes[k], cell.nodes[(k + 1) % 3]]));
-            }
-        }
-        assert!(
-            edges.iter().eq(self.springs.keys()),
-            "springs lie along the edges of cells"
-        );
-        let mut sums = BTreeMap::new();
-        for (nodes, spring) in &self.springs {
-            assert_eq!(ordered(nodes.map(|node| self.sources[node as usize])), spring.source);
-            *sums.entry(spring.source).or_insert(0.0) += spring.stiffness;
-        }
-        assert_eq!(sums.len(), self.first_springs.len());
-        for (source, sum) in sums {
-            assert!((sum / self.first_springs[&source] - 1.0).abs() < 1e-12, "{source:?}");
         }
     }
 
@@ -446,19 +270,6 @@ impl Body {
         union.count()
     }
 
-    /// How many nodes are simulated.
-    pub fn simulated_count(&self) -> u32 {
-        self.surface.node_count() - self.bound.len() as u32
-    }
-
-    fn simulated_pieces(&self) -> usize {
-        let mut union = Union::new(self.surface.node_count() as usize);
-        for nodes in self.springs.keys() {
-            union.unite(nodes[0], nodes[1]);
-        }
-        union.count() - self.bound.len()
-    }
-
     /// The areas of the pieces that are drawn, in the rest shape, in ascending order.
     pub fn piece_areas(&self) -> Vec<f64> {
         let mut union = Union::new(self.surface.vertices().len());
@@ -469,7 +280,7 @@ impl Body {
         let mut areas = BTreeMap::new();
         for (number, triangle) in self.surface.triangles().iter().enumerate() {
             let source = self.cell_sources[triangle.cell as usize] as usize;
-            let area = self.first_areas[source] * self.surface.part_of_cell(number as u32);
+            let area = self.first_sizes[source] * self.surface.part_of_cell(number as u32);
             *areas.entry(union.root(triangle.corners[0])).or_insert(0.0) += area;
         }
         let mut areas: Vec<f64> = areas.into_values().collect();
@@ -528,31 +339,6 @@ fn farthest(of: &[[DVec3; 2]], from: &[[DVec3; 2]]) -> f64 {
         }
     }
     largest
-}
-
-struct Union(Vec<u32>);
-
-impl Union {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn root(&mut self, mut at: u32) -> u32 {
-        while self.0[at as usize] != at {
-            self.0[at as usize] = self.0[self.0[at as usize] as usize];
-            at = self.0[at as usize];
-        }
-        at
-    }
-
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a as usize] = b;
-    }
-
-    fn count(&mut self) -> usize {
-        (0..self.0.len() as u32).filter(|&at| self.root(at) == at).count()
-    }
 }
 
 /// The sheet at rest.

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{BodyDefinition, BodyId, Solver, Storage, Values, World, WorldDefinition};
 
-use super::sheet::Random;
+use crate::support::random::Random;
 
 const SIDE: usize = 7;
 

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use super::sheet::{Random, grid, unstructured};
+use super::sheet::{grid, unstructured};
+use crate::support::random::Random;
 use glam::{DVec3, Vec2, Vec3, vec2};
 use sinew::cutting::Sweep;
 use sinew::{

@@ -12,26 +12,10 @@ use sinew::{
     Solver, Storage, SurfacePoint, SutureDefinition, Tearing, Values, World, WorldDefinition,
 };
 
-struct Random(u64);
+use crate::support::random::Random;
 
 impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() * count as f64) as usize
-    }
-
-    fn of<T: Copy>(&mut self, all: &[T]) -> T {
-        all[self.below(all.len())]
-    }
-
-    fn point(&mut self, size: f32) -> Vec3 {
+    fn within(&mut self, size: f32) -> Vec3 {
         let mut one = || (self.next() as f32 * 2.0 - 1.0) * size;
         vec3(one(), one(), one())
     }
@@ -170,9 +154,9 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
     if random.next() < 0.7 {
         for place in &mut mesh.positions {
             *place += if kind.is_solid {
-                random.point(0.001)
+                random.within(0.001)
             } else {
-                random.point(0.0015) * vec3(1.0, 0.0, 1.0)
+                random.within(0.0015) * vec3(1.0, 0.0, 1.0)
             };
         }
     }
@@ -215,11 +199,11 @@ fn made(kind: Kind, random: &mut Random) -> (World, BodyId, Vec<Vec3>) {
             ..Default::default()
         })
         .unwrap();
-    let (push, turn) = (random.point(0.3), random.point(6.0));
+    let (push, turn) = (random.within(0.3), random.within(6.0));
     let velocities: Vec<Vec3> = mesh
         .positions
         .iter()
-        .map(|&place| push + turn.cross(place) + random.point(0.1))
+        .map(|&place| push + turn.cross(place) + random.within(0.1))
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body, mesh.positions)
@@ -238,8 +222,8 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
         .normalize_or_zero();
     match random.below(10) {
         0 | 1 => {
-            let (at, edge, way) = (node(random), random.point(0.08), random.point(0.08));
-            let turned = random.point(0.03);
+            let (at, edge, way) = (node(random), random.within(0.08), random.within(0.08));
+            let turned = random.within(0.03);
             let (start, end) = (at - 0.5 * way, at + 0.5 * way);
             let sweep = Sweep {
                 start: [start - edge, start + edge],
@@ -276,7 +260,7 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
         }
         5 => {
             let at = node(random);
-            let edge = random.point(0.05);
+            let edge = random.within(0.05);
             let sweep = Sweep {
                 start: [at - edge, at + edge],
                 end: [at - edge, at + edge],
@@ -284,7 +268,7 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
             ("of no length", sweep)
         }
         6 => {
-            let (at, way) = (node(random), random.point(0.06));
+            let (at, way) = (node(random), random.within(0.06));
             let sweep = Sweep {
                 start: [at - way; 2],
                 end: [at + way; 2],
@@ -293,7 +277,7 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
         }
         7 => {
             // The edge turns about a node.
-            let (at, one, other) = (node(random), random.point(0.06), random.point(0.06));
+            let (at, one, other) = (node(random), random.within(0.06), random.within(0.06));
             let sweep = Sweep {
                 start: [at, at + one],
                 end: [at, at + other],
@@ -311,7 +295,7 @@ fn sweep(body: &Body, random: &mut Random) -> (&'static str, Sweep) {
         }
         _ => {
             let (from, to) = (node(random), node(random));
-            let edge = 0.1 * Quat::from_scaled_axis(random.point(1.0)).mul_vec3(normal);
+            let edge = 0.1 * Quat::from_scaled_axis(random.within(1.0)).mul_vec3(normal);
             let sweep = Sweep {
                 start: [from - edge, from + edge],
                 end: [to - edge, to + edge],
@@ -485,9 +469,9 @@ impl Wild {
                 self.what += " blade;";
                 let places = it.positions();
                 let middle = places.iter().sum::<Vec3>() / places.len() as f32;
-                let axis = self.random.point(0.06);
+                let axis = self.random.within(0.06);
                 let mut definition = BladeDefinition::new([-axis, axis + Vec3::X * 1e-3]);
-                definition.pose.position = middle + self.random.point(0.08);
+                definition.pose.position = middle + self.random.within(0.08);
                 definition.stiffness = self.random.of(&[10.0, 1000.0]);
                 self.blades.push(self.world.create_blade(&definition).unwrap());
                 self.parted = None;
@@ -496,8 +480,8 @@ impl Wild {
                 if let Some(&blade) = self.blades.last() {
                     let places = it.positions();
                     let middle = places.iter().sum::<Vec3>() / places.len() as f32;
-                    let to = middle + self.random.point(0.05);
-                    let turn = Quat::from_scaled_axis(self.random.point(1.0));
+                    let to = middle + self.random.within(0.05);
+                    let turn = Quat::from_scaled_axis(self.random.within(1.0));
                     self.what += " blade moves;";
                     for part in 1..=4 {
                         let place = middle.lerp(to, part as f32 / 4.0);

@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3, vec2};
 use sinew::cutting::Sweep;
 use sinew::{BodyDefinition, Solver, Storage, Values, World, WorldDefinition};
 
-use super::sheet::{Random, unstructured};
+use super::sheet::unstructured;
+use crate::support::random::Random;
 
 /// A sheet of `n` x `n` cells that hangs by its upper side.
 fn hanging(n: usize, threads: u32, storage: Storage, solver: Solver) -> (World, sinew::BodyId) {

@@ -1,6 +1,7 @@
 //! The material parts where the blade went, and nowhere else.
 
-use super::block::{Body, Random, bent, block, flat, shaken, snap, volume};
+use super::block::{Body, bent, block, flat, shaken, snap, volume};
+use crate::support::random::Random;
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::{Limits, Sweep};
 

@@ -2,34 +2,14 @@
 #![allow(dead_code)]
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
 
 use glam::{DVec3, Vec3, vec3};
 use sinew::Error;
 use sinew::cutting::{Changes, CutSolid, Limits, Sweep};
 
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.next() as f32
-    }
-
-    pub fn point(&mut self, low: f32, high: f32) -> Vec3 {
-        vec3(
-            self.between(low, high),
-            self.between(low, high),
-            self.between(low, high),
-        )
-    }
-}
+use crate::support::change_lists::{Follower, Union};
+use crate::support::random::Random;
 
 pub type Mesh = (Vec<Vec3>, Vec<[u32; 4]>);
 
@@ -103,34 +83,19 @@ pub fn upright(rest: &[Vec3], [a, b, c, d]: [u32; 4]) -> [u32; 4] {
     }
 }
 
-pub struct Spring {
-    pub stiffness: f64,
-    pub source: [u32; 2],
-}
+const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// What a simulation and a renderer know: they see the solid only when it is made, and then change lists.
 pub struct Body {
     pub solid: CutSolid,
-    pub rest: Vec<Vec3>,
-    pub positions: Vec<Vec3>,
-    pub masses: Vec<f64>,
-    pub first_masses: Vec<f64>,
-    pub sources: Vec<u32>,
-    pub springs: BTreeMap<[u32; 2], Spring>,
-    pub first_springs: BTreeMap<[u32; 2], f64>,
-    pub triangles: Vec<[u32; 3]>,
-    /// Something that nodes and points carry: where they are in the rest shape.
-    pub carried: Vec<DVec3>,
-    pub bound: BTreeMap<u32, ([u32; 4], [f64; 4])>,
-    pub cell_sources: Vec<u32>,
-    pub first_volumes: Vec<f64>,
-    pub deformation: fn(Vec3) -> Vec3,
+    pub follower: Follower,
 }
 
-const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+impl Deref for Body {
+    type Target = Follower;
 
-fn ordered(nodes: [u32; 2]) -> [u32; 2] {
-    [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])]
+    fn deref(&self) -> &Follower {
+        &self.follower
+    }
 }
 
 pub fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
@@ -138,47 +103,12 @@ pub fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
 }
 
 impl Body {
-    /// Stiffness of springs by volume and length, masses by volume, both made uneven.
     pub fn new((rest, cells): Mesh, deformation: fn(Vec3) -> Vec3) -> Self {
         let solid = CutSolid::new(&rest, &cells, &[]).unwrap();
-        let mut random = Random(11);
-        let mut masses = vec![0.0; rest.len()];
-        let mut springs = BTreeMap::new();
-        for cell in solid.cells() {
-            for node in cell.nodes {
-                masses[node as usize] += cell.volume / 4.0;
-            }
-            for (a, b) in EDGES {
-                let edge = ordered([cell.nodes[a], cell.nodes[b]]);
-                let length = rest[edge[0] as usize].distance(rest[edge[1] as usize]) as f64;
-                *springs.entry(edge).or_insert(0.0) += cell.volume / (length * length);
-            }
-        }
-        for mass in &mut masses {
-            *mass *= 0.9 + 0.2 * random.next();
-        }
-        for stiffness in springs.values_mut() {
-            *stiffness *= 0.9 + 0.2 * random.next();
-        }
-        Self {
-            positions: rest.iter().map(|&place| deformation(place)).collect(),
-            first_masses: masses.clone(),
-            masses,
-            sources: (0..rest.len() as u32).collect(),
-            first_springs: springs.clone(),
-            springs: springs
-                .into_iter()
-                .map(|(source, stiffness)| (source, Spring { stiffness, source }))
-                .collect(),
-            triangles: solid.triangles().iter().map(|triangle| triangle.corners).collect(),
-            carried: rest.iter().map(|place| place.as_dvec3()).collect(),
-            bound: BTreeMap::new(),
-            cell_sources: (0..cells.len() as u32).collect(),
-            first_volumes: solid.cells().iter().map(|cell| cell.volume).collect(),
-            rest,
-            solid,
-            deformation,
-        }
+        let cells: Vec<_> = solid.cells().iter().map(|cell| (cell.nodes, cell.volume)).collect();
+        let triangles = solid.triangles().iter().map(|triangle| triangle.corners).collect();
+        let follower = Follower::new(rest, &cells, &EDGES, triangles, deformation);
+        Self { solid, follower }
     }
 
     /// The blade's edge goes straight from one place to another, all in the rest shape.
@@ -215,112 +145,19 @@ impl Body {
         }
     }
 
-    /// Takes over a change list, as a solver and a renderer do.
     pub fn apply(&mut self, changes: &Changes) {
-        let masses = self.masses.clone();
-        for piece in &changes.nodes {
-            let source = piece.source as usize;
-            assert!(piece.part > 0.0);
-            if piece.node != piece.source {
-                assert_eq!(piece.node as usize, self.masses.len(), "new nodes are numbered on");
-                self.masses.push(0.0);
-                self.positions.push(self.positions[source]);
-                self.rest.push(self.rest[source]);
-                self.sources.push(self.sources[source]);
-            }
-            self.masses[piece.node as usize] = masses[source] * piece.part;
-        }
-        let before: Vec<(f64, [u32; 2])> = changes
-            .springs
-            .iter()
-            .map(|piece| {
-                let spring = &self.springs[&piece.source];
-                (spring.stiffness, spring.source)
-            })
-            .collect();
-        for source in &changes.removed_springs {
-            assert!(self.springs.remove(source).is_some());
-        }
-        for (piece, (whole, source)) in changes.springs.iter().zip(before) {
-            assert!(piece.part > 0.0);
-            let spring = Spring {
-                stiffness: whole * piece.part,
-                source,
-            };
-            self.springs.insert(ordered(piece.nodes), spring);
-        }
-        for piece in &changes.cells {
-            let source = self.cell_sources[piece.source as usize];
-            if piece.cell as usize == self.cell_sources.len() {
-                self.cell_sources.push(source);
-            }
-            assert_eq!(self.cell_sources[piece.cell as usize], source);
-        }
-        for bound in &changes.bound {
-            let parts = || bound.nodes.iter().zip(bound.weights);
-            let place: DVec3 = parts()
-                .map(|(&node, weight)| weight * self.positions[node as usize].as_dvec3())
-                .sum();
-            if bound.point as usize == self.masses.len() {
-                self.masses.push(0.0);
-                self.positions.push(place.as_vec3());
-                self.rest.push(Vec3::NAN);
-                self.sources.push(u32::MAX);
-            }
-            assert_eq!(self.masses[bound.point as usize], 0.0);
-            self.bound.insert(bound.point, (bound.nodes, bound.weights));
-        }
-        assert_eq!(self.masses.len(), self.solid.node_count() as usize);
-        let known = self.carried.len();
-        self.carried.resize(self.masses.len(), DVec3::NAN);
-        for source in &changes.sources {
-            assert!(source.point as usize >= known && self.carried[source.point as usize].is_nan());
-            assert!(source.sources.iter().all(|&from| from < source.point));
-            let place = (0..3)
-                .map(|k| source.weights[k] * self.carried[source.sources[k] as usize])
-                .sum();
-            self.carried[source.point as usize] = place;
-        }
-        for &node in &changes.undrawn {
-            assert!(node as usize >= known && self.carried[node as usize].is_nan());
-            self.carried[node as usize] = self.rest[node as usize].as_dvec3();
-        }
-        assert!(
-            self.carried.iter().all(|place| !place.is_nan()),
-            "all that is new is told of"
-        );
-        assert_eq!(changes.first_triangle as usize, self.triangles.len());
-        self.triangles.resize(self.solid.triangles().len(), [u32::MAX; 3]);
-        for &triangle in &changes.triangles {
-            self.triangles[triangle as usize] = self.solid.corner_points(triangle);
-        }
-    }
-
-    /// How many nodes there are beside points that are bound to others.
-    pub fn nodes_that_move(&self) -> usize {
-        self.masses.len() - self.bound.len()
-    }
-
-    /// Sum of the stiffness of a node's springs by its mass, of the worst node.
-    pub fn worst_ratio(&self) -> f64 {
-        let mut sums = vec![0.0; self.masses.len()];
-        for (nodes, spring) in &self.springs {
-            for &node in nodes {
-                sums[node as usize] += spring.stiffness;
-            }
-        }
-        sums.iter()
-            .zip(&self.masses)
-            .filter(|&(_, &mass)| mass > 0.0)
-            .map(|(sum, mass)| sum / mass)
-            .fold(0.0, f64::max)
+        let (solid, count) = (&self.solid, self.solid.triangles().len());
+        self.follower.apply(changes, solid.node_count(), count, |triangle| {
+            solid.corner_points(triangle)
+        });
     }
 
     /// Checks all that has to hold whatever was cut; returns the number of pieces.
     pub fn check(&self) -> usize {
         self.check_drawn();
         self.check_material();
-        self.check_springs();
+        self.check_masses();
+        self.check_springs(self.solid.cells().iter().map(|cell| cell.nodes), &EDGES);
         let (pieces, simulated) = (self.piece_volumes().len(), self.simulated_pieces());
         assert_eq!(pieces, simulated, "pieces of material, and that nodes hang together in");
         assert_eq!(pieces, self.solid.piece_count().unwrap() as usize);
@@ -373,7 +210,7 @@ impl Body {
             }
             assert_eq!(count, about.len(), "the triangles about vertex {vertex} are one fan");
         }
-        let material: f64 = self.first_volumes.iter().sum();
+        let material: f64 = self.first_sizes.iter().sum();
         assert!(
             (enclosed / material - 1.0).abs() < 1e-10,
             "{enclosed} is drawn about {material} of material"
@@ -400,7 +237,7 @@ impl Body {
         for (number, tetrahedron) in self.solid.tetrahedra().iter().enumerate() {
             let places = tetrahedron.corners.map(|corner| self.solid.rest_place(corner));
             let volume = volume(places);
-            let first = self.first_volumes[self.cell_sources[tetrahedron.cell as usize] as usize];
+            let first = self.first_sizes[self.cell_sources[tetrahedron.cell as usize] as usize];
             assert!(tetrahedron.volume > 0.0);
             assert!(
                 (volume - tetrahedron.volume).abs() < 1e-12 * first.max(places[0].length_squared()),
@@ -426,64 +263,20 @@ impl Body {
                 assert!(vertex.nodes.iter().all(|node| nodes.contains(node)));
             }
         }
-        let mut volumes = vec![0.0; self.first_volumes.len()];
+        let mut volumes = vec![0.0; self.first_sizes.len()];
         for (number, cell) in self.solid.cells().iter().enumerate() {
             let source = self.cell_sources[number] as usize;
             assert!(
-                (cell.volume - filled[number]).abs() < 1e-12 * self.first_volumes[source],
+                (cell.volume - filled[number]).abs() < 1e-12 * self.first_sizes[source],
                 "cell {number}: {} and {}",
                 cell.volume,
                 filled[number]
             );
             volumes[source] += cell.volume;
         }
-        for (volume, first) in volumes.iter().zip(&self.first_volumes) {
+        for (volume, first) in volumes.iter().zip(&self.first_sizes) {
             assert!((volume / first - 1.0).abs() < 1e-12);
         }
-        let mut masses = vec![0.0; self.first_masses.len()];
-        for (mass, &source) in self.masses.iter().zip(&self.sources) {
-            if source != u32::MAX {
-                assert!(*mass > 0.0);
-                masses[source as usize] += mass;
-            }
-        }
-        for (mass, first) in masses.iter().zip(&self.first_masses) {
-            assert!((mass / first - 1.0).abs() < 1e-12);
-        }
-    }
-
-    /// Springs lie along the cells' edges, and keep their stiffness in all.
-    pub fn check_springs(&self) {
-        let mut edges = BTreeSet::new();
-        for cell in self.solid.cells() {
-            for (a, b) in EDGES {
-                edges.insert(ordered([cell.nodes[a], cell.nodes[b]]));
-            }
-        }
-        assert!(
-            edges.iter().eq(self.springs.keys()),
-            "springs lie along the edges of cells"
-        );
-        let mut sums = BTreeMap::new();
-        for (nodes, spring) in &self.springs {
-            assert_eq!(ordered(nodes.map(|node| self.sources[node as usize])), spring.source);
-            *sums.entry(spring.source).or_insert(0.0) += spring.stiffness;
-        }
-        assert_eq!(sums.len(), self.first_springs.len());
-        for (source, sum) in sums {
-            assert!((sum / self.first_springs[&source] - 1.0).abs() < 1e-12, "{source:?}");
-        }
-    }
-
-    fn simulated_pieces(&self) -> usize {
-        let mut union = Union::new(self.solid.node_count() as usize);
-        for nodes in self.springs.keys() {
-            union.unite(nodes[0], nodes[1]);
-        }
-        for (&point, (nodes, _)) in &self.bound {
-            union.unite(point, nodes[0]);
-        }
-        union.count()
     }
 
     /// Which piece each tetrahedron is in, found by shared faces alone.
@@ -512,31 +305,6 @@ impl Body {
         let mut volumes: Vec<f64> = volumes.into_values().collect();
         volumes.sort_by(f64::total_cmp);
         volumes
-    }
-}
-
-struct Union(Vec<u32>);
-
-impl Union {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn root(&mut self, mut at: u32) -> u32 {
-        while self.0[at as usize] != at {
-            self.0[at as usize] = self.0[self.0[at as usize] as usize];
-            at = self.0[at as usize];
-        }
-        at
-    }
-
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a as usize] = b;
-    }
-
-    fn count(&mut self) -> usize {
-        (0..self.0.len() as u32).filter(|&at| self.root(at) == at).count()
     }
 }
 

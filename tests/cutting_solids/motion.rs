@@ -10,7 +10,8 @@ use sinew::{
     World, WorldDefinition,
 };
 
-use super::block::{Mesh, Random, shaken, upright};
+use super::block::{Mesh, shaken, upright};
+use crate::support::random::Random;
 
 /// What a body is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,8 @@
 //! Many cuts at random: nothing breaks, cuts that close part what they should, and what is simulated stays well shaped.
 
-use super::block::{Body, Random, bent, block, far, flat, shaken};
+use super::block::{Body, bent, block, far, flat, shaken};
+use crate::support::change_lists::Follower;
+use crate::support::random::Random;
 use glam::{Vec3, vec3};
 use sinew::cutting::{Limits, Sweep};
 
@@ -84,7 +86,8 @@ fn a_thousand_cuts_in_a_row() {
                 random.point(-0.5, 0.5),
             );
             // The wounds gape, and nodes go where they like.
-            for (place, &rest) in body.positions.iter_mut().zip(&body.rest) {
+            let Follower { positions, rest, .. } = &mut body.follower;
+            for (place, &rest) in positions.iter_mut().zip(&*rest) {
                 *place = bent(rest) + random.point(-0.1, 0.1);
             }
             let sweep = Sweep {

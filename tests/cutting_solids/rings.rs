@@ -10,8 +10,9 @@ use sinew::{
     World, WorldDefinition,
 };
 
-use super::block::{Random, shaken, upright};
+use super::block::{shaken, upright};
 use super::motion::{CUTS, Matter, SOLVERS, edge, enclosed, in_flight, kept, mesh};
+use crate::support::random::Random;
 
 #[derive(Clone, Copy)]
 struct Tissue {

@@ -7,8 +7,8 @@ use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Material, Model, Values};
 
-use super::block::Random;
 use super::motion::kept;
+use crate::support::random::Random;
 use crate::support::tissue::world;
 
 #[test]

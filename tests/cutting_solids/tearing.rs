@@ -3,7 +3,8 @@
 
 use std::collections::HashMap;
 
-use super::block::{Mesh, Random, shaken, upright};
+use super::block::{Mesh, shaken, upright};
+use crate::support::random::Random;
 use glam::{DVec3, Vec3, vec3};
 use sinew::{
     Body, BodyDefinition, BodyId, Material, Model, Solver, Storage, TearReport, Tearing, Values, World, WorldDefinition,

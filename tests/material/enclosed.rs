@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 
 use crate::support::bodies::{FREE, Random, largest_difference};
 use crate::support::scene::{SOLVERS, STORAGES, Scene};
+use crate::support::solid::ball;
 use glam::{DMat3, DVec3, Vec3};
+use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Error, Material, Model, Solver, Storage, Values, World, WorldDefinition};
 
 const RADIUS: f64 = 0.05;
@@ -28,49 +30,11 @@ struct Surface {
 }
 
 impl Surface {
-    /// An icosahedron whose triangles are cut in four so often.
     fn sphere(radius: f64, levels: u32) -> Self {
-        let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
-        let mut places = Vec::new();
-        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
-            places.extend([DVec3::new(0.0, a, b), DVec3::new(a, b, 0.0), DVec3::new(b, 0.0, a)]);
-        }
-        let mut triangles = Vec::new();
-        for a in 0..12_usize {
-            for b in a + 1..12 {
-                for c in b + 1..12 {
-                    let is_side = |a: usize, b: usize| places[a].distance(places[b]) < 2.1;
-                    if is_side(a, b) && is_side(b, c) && is_side(c, a) {
-                        let is_outward = places[a].dot(places[b].cross(places[c])) > 0.0;
-                        triangles.push(if is_outward { [a, b, c] } else { [a, c, b] });
-                    }
-                }
-            }
-        }
-        for _ in 0..levels {
-            let mut middles = std::collections::BTreeMap::new();
-            let mut finer = Vec::new();
-            for [a, b, c] in triangles {
-                let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
-                    *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                        places.push(places[a].normalize() + places[b].normalize());
-                        places.len() - 1
-                    })
-                });
-                finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
-            }
-            triangles = finer;
-        }
-        Self {
-            positions: places
-                .iter()
-                .map(|place| (place.normalize() * radius).as_vec3())
-                .collect(),
-            triangles: triangles
-                .iter()
-                .map(|corners| corners.map(|corner| corner as u32))
-                .collect(),
-        }
+        let Mesh {
+            positions, triangles, ..
+        } = ball(radius as f32, levels);
+        Self { positions, triangles }
     }
 
     /// Both, the other moved.

@@ -4,10 +4,12 @@
 #![allow(dead_code, reason = "every test takes a part of it")]
 
 pub mod bodies;
+pub mod change_lists;
 pub mod euler;
 pub mod hanging;
 pub mod motion;
 pub mod organ;
+pub mod random;
 pub mod reference;
 pub mod scene;
 pub mod solid;

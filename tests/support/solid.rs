@@ -96,10 +96,10 @@ pub fn ball(radius: f32, quartered: u32) -> Mesh {
         [-golden, 0.0, -1.0],
         [-golden, 0.0, 1.0],
     ];
-    let mut positions: Vec<Vec3> = corners
+    let positions: Vec<Vec3> = corners
         .map(|corner| Vec3::from_array(corner).normalize() * radius)
         .to_vec();
-    let mut triangles: Vec<[u32; 3]> = vec![
+    let triangles = vec![
         [0, 11, 5],
         [0, 5, 1],
         [0, 1, 7],
@@ -121,7 +121,37 @@ pub fn ball(radius: f32, quartered: u32) -> Mesh {
         [8, 6, 7],
         [9, 8, 1],
     ];
-    for _ in 0..quartered {
+    let (positions, triangles) = quarter((positions, triangles), radius, quartered);
+    Mesh {
+        positions,
+        triangles,
+        ..Default::default()
+    }
+}
+
+/// A ball of radius 1: an octahedron whose triangles were quartered so often.
+pub fn octahedral_ball(quartered: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let corners = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
+    let triangles = vec![
+        [0, 1, 2],
+        [1, 3, 2],
+        [3, 4, 2],
+        [4, 0, 2],
+        [1, 0, 5],
+        [3, 1, 5],
+        [4, 3, 5],
+        [0, 4, 5],
+    ];
+    quarter((corners, triangles), 1.0, quartered)
+}
+
+/// Divides each triangle in four, with new corners on a ball of this radius, so many times.
+fn quarter(
+    (mut positions, mut triangles): (Vec<Vec3>, Vec<[u32; 3]>),
+    radius: f32,
+    times: u32,
+) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    for _ in 0..times {
         let mut middles = std::collections::HashMap::new();
         let mut middle = |a: u32, b: u32| {
             *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
@@ -136,9 +166,5 @@ pub fn ball(radius: f32, quartered: u32) -> Mesh {
         });
         triangles = quarters.collect();
     }
-    Mesh {
-        positions,
-        triangles,
-        ..Default::default()
-    }
+    (positions, triangles)
 }

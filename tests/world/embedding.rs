@@ -9,68 +9,7 @@ use sinew::{
     Values, World, WorldDefinition,
 };
 
-/// A ball of some triangles, as an icosahedron divided so many times, about the origin.
-fn ball(radius: f32, times: u32) -> Mesh {
-    let t = (1.0 + 5.0_f32.sqrt()) / 2.0;
-    let mut positions: Vec<Vec3> = [
-        (-1.0, t, 0.0),
-        (1.0, t, 0.0),
-        (-1.0, -t, 0.0),
-        (1.0, -t, 0.0),
-        (0.0, -1.0, t),
-        (0.0, 1.0, t),
-        (0.0, -1.0, -t),
-        (0.0, 1.0, -t),
-        (t, 0.0, -1.0),
-        (t, 0.0, 1.0),
-        (-t, 0.0, -1.0),
-        (-t, 0.0, 1.0),
-    ]
-    .map(|(x, y, z)| vec3(x, y, z).normalize())
-    .to_vec();
-    let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5],
-        [0, 5, 1],
-        [0, 1, 7],
-        [0, 7, 10],
-        [0, 10, 11],
-        [1, 5, 9],
-        [5, 11, 4],
-        [11, 10, 2],
-        [10, 7, 6],
-        [7, 1, 8],
-        [3, 9, 4],
-        [3, 4, 2],
-        [3, 2, 6],
-        [3, 6, 8],
-        [3, 8, 9],
-        [4, 9, 5],
-        [2, 4, 11],
-        [6, 2, 10],
-        [8, 6, 7],
-        [9, 8, 1],
-    ];
-    for _ in 0..times {
-        let mut middles = std::collections::HashMap::new();
-        let mut finer = Vec::new();
-        for [a, b, c] in triangles {
-            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]| {
-                *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                    positions.push((positions[a as usize] + positions[b as usize]).normalize());
-                    positions.len() as u32 - 1
-                })
-            });
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    positions.iter_mut().for_each(|position| *position *= radius);
-    Mesh {
-        positions,
-        triangles,
-        ..Mesh::default()
-    }
-}
+use crate::support::solid::ball;
 
 fn world() -> World {
     World::new(WorldDefinition {
