@@ -10,4 +10,4 @@ pub(crate) mod symbolic_perturbation;
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
 pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};
-pub(crate) use ranges::{above_zero, not_negative};
+pub(crate) use ranges::{above_zero, finite, not_negative};

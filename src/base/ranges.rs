@@ -14,6 +14,11 @@ pub(crate) fn not_negative<N: Display + Copy + Into<f64>>(name: &str, value: N) 
     in_range(name, value, |value| value >= 0.0, "at least 0 and finite")
 }
 
+/// Refuses what is not finite.
+pub(crate) fn finite(name: &str, value: f32) -> Result<()> {
+    in_range(name, value, |_| true, "finite")
+}
+
 fn in_range<N: Display + Copy + Into<f64>>(name: &str, value: N, holds: fn(f64) -> bool, range: &str) -> Result<()> {
     if holds(value.into()) && value.into().is_finite() {
         return Ok(());

@@ -3,8 +3,8 @@
 use glam::{BVec3, Vec3};
 
 use super::Body;
-use crate::base::{Error, Result, memory, not_negative};
-use crate::def::{Spring, distance, expect_count, finite, finite_vector, finite_vectors};
+use crate::base::{Error, Result, finite, memory, not_negative};
+use crate::def::{Spring, distance, expect_count, finite_vector, finite_vectors};
 use crate::geometry::Bounds;
 use crate::soa::Masses;
 use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};

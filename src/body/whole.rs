@@ -3,8 +3,8 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::Body;
-use crate::base::{Error, Result, memory};
-use crate::def::{CollisionFilter, expect_count, finite, finite_vector};
+use crate::base::{Error, Result, finite, memory};
+use crate::def::{CollisionFilter, expect_count, finite_vector};
 use crate::geometry::{Bounds, vertex_normals};
 use crate::solver::close;
 

@@ -4,9 +4,9 @@ use glam::{Quat, Vec3};
 
 use super::definition::sinew_body_def;
 use super::mesh::sinew_mesh_view;
-use crate::base::{Result, memory};
+use crate::base::{Result, finite, memory};
 use crate::contact::Pose;
-use crate::def::{BodyDefinition, finite};
+use crate::def::BodyDefinition;
 
 impl sinew_body_def {
     /// Takes nodes and elements from a mesh.

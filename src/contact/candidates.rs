@@ -271,14 +271,8 @@ impl Candidates {
             let edges = edges.map(|edge| longest_edge(&corners_of(edge, (positions, bindings))[..edge.nodes().len()]));
             // Where one corner is near, the others are known too.
             let within = reach + 2.0 * edges.fold(0.0, f32::max);
-            let mut surface = std::mem::take(&mut self.surface);
-            measure_nodes(&mut surface, (positions, bindings), meshes(), within);
-            self.surface = surface;
+            measure_nodes(&mut self.surface, (positions, bindings), meshes(), within);
         }
-        let meshes = || {
-            let zones = self.zones.iter().zip(tools.clone());
-            zones.filter_map(|(zone, tool)| Some((zone, tool.mesh()?)))
-        };
         self.planes.clear();
         for index in 0..count as u32 {
             let Some(feature) = features.get(index) else {

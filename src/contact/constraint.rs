@@ -92,22 +92,10 @@ saved!(Constraint {
 });
 
 impl Constraint {
-    /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility;
-    /// `None` where none of them can move along the normal.
+    /// A contact that has given nothing yet, of a feature that these nodes move, which are held along these axes but have a mobility, with a
+    /// tool that becomes so much faster for an impulse, along the normal and along any direction at most, 1/kg. `None`: neither can move
+    /// along the normal.
     pub fn new(
-        met: (Feature, [f32; 3]),
-        supports: &Supports,
-        starts: [Vec3; MOST],
-        normal: Vec3,
-        mobility: &Mobility,
-        held: [BVec3; MOST],
-    ) -> Option<Self> {
-        Self::between(met, supports, starts, normal, (mobility, held), [0.0; 2])
-    }
-
-    /// The same for a tool that becomes so much faster for an impulse, along the normal and along any direction at most, 1/kg: nodes
-    /// that cannot move stop it.
-    pub fn between(
         (feature, weights): (Feature, [f32; 3]),
         supports: &Supports,
         starts: [Vec3; MOST],
@@ -206,7 +194,8 @@ impl Constraint {
         (supports, mobility, held): (&Supports, &Mobility, [BVec3; MOST]),
     ) -> Self {
         let (weights, normal) = (meets.weights.map(|weight| weight as f32), meets.normal.as_vec3());
-        let found = Self::new((self.feature, weights), supports, self.starts, normal, mobility, held);
+        let met = (self.feature, weights);
+        let found = Self::new(met, supports, self.starts, normal, (mobility, held), [0.0; 2]);
         let mut after = Self {
             surface_velocity: self.surface_velocity,
             arm: self.arm,

@@ -242,7 +242,7 @@ impl Meeting<'_> {
         let held = self.held_axes(&supports);
         let (weights, normal) = (geometry.weights, geometry.normal);
         let nodes = (&self.mobility, held);
-        let mut constraint = Constraint::between((feature, weights), &supports, starts, normal, nodes, recoil)?;
+        let mut constraint = Constraint::new((feature, weights), &supports, starts, normal, nodes, recoil)?;
         constraint.surface_velocity = geometry.surface_velocity;
         constraint.arm = geometry.arm;
         constraint.friction = friction;

@@ -8,7 +8,7 @@ use super::Sleep;
 use super::SpringLaw;
 use super::Tearing;
 use super::{Material, Model, Viscosity, Yielding};
-use crate::base::{Error, Result, memory, not_negative};
+use crate::base::{Error, Result, finite, memory, not_negative};
 
 /// One value for all, or one for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -490,13 +490,6 @@ pub(crate) fn finite_vector(name: &str, vector: Vec3) -> Result<()> {
         return Ok(());
     }
     Err(Error::invalid(format!("{name} is {vector}: must be finite")))
-}
-
-pub(crate) fn finite(name: &str, value: f32) -> Result<()> {
-    if value.is_finite() {
-        return Ok(());
-    }
-    Err(Error::invalid(format!("{name} is {value}: must be finite")))
 }
 
 pub(crate) fn finite_vectors(name: &str, vectors: &[Vec3]) -> Result<()> {

@@ -16,7 +16,7 @@ mod yielding;
 pub use anchor::{Anchor, SurfacePoint};
 pub use body::{BodyDefinition, Solver, Storage, Values};
 pub(crate) use body::{
-    MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite, finite_vector,
+    MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite_vector,
     finite_vectors, node_indices,
 };
 pub use choice::{ChoiceReason, LimitKind, SolverChoice, SubstepLimit};

@@ -135,12 +135,7 @@ fn axis(name: &str, size: f64, cells: u32) -> Result<Vec<f32>> {
             "cells along {name} is 0: there must be at least 1"
         )));
     }
-    if !((size as f32).is_finite() && size > 0.0) {
-        return Err(Error::invalid(format!(
-            "size along {name} is {} m: it must be finite and above 0",
-            size as f32
-        )));
-    }
+    above_zero(&format!("size along {name}"), size as f32)?;
     let coincide = || {
         Error::invalid(format!(
             "cells along {name} is {cells} over {} m: nodes would coincide",

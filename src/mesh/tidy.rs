@@ -222,14 +222,10 @@ impl RawMesh {
 }
 
 /// The triangle in the same direction from its smallest node on.
-fn smallest_first([a, b, c]: [u32; 3]) -> [u32; 3] {
-    if a <= b && a <= c {
-        [a, b, c]
-    } else if b <= c {
-        [b, c, a]
-    } else {
-        [c, a, b]
-    }
+fn smallest_first(mut nodes: [u32; 3]) -> [u32; 3] {
+    let smallest = (0..3).min_by_key(|&k| nodes[k]).unwrap_or(0);
+    nodes.rotate_left(smallest);
+    nodes
 }
 
 /// Gives the elements other node numbers and drops those that repeat a node; returns how many.

@@ -198,14 +198,10 @@ fn put_in_order(triangles: &mut [SolidTriangle], tetrahedra: &mut [Tetrahedron],
 }
 
 /// The corners from the lowest on.
-fn from_lowest([a, b, c]: [u32; 3]) -> [u32; 3] {
-    if a <= b && a <= c {
-        [a, b, c]
-    } else if b <= c {
-        [b, c, a]
-    } else {
-        [c, a, b]
-    }
+fn from_lowest(mut corners: [u32; 3]) -> [u32; 3] {
+    let lowest = (0..3).min_by_key(|&k| corners[k]).unwrap_or(0);
+    corners.rotate_left(lowest);
+    corners
 }
 
 /// The volume of a tetrahedron, below 0 if it is turned over.
