@@ -103,7 +103,7 @@ pub mod whole;
 pub mod several;
 
 #[allow(rustdoc::broken_intra_doc_links)]
-pub mod looks;
+pub mod getters;
 
 #[allow(rustdoc::broken_intra_doc_links)]
 pub mod profile;

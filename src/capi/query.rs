@@ -4,7 +4,9 @@ use super::body::sinew_body_id;
 use super::guard::{sinew_world, with_world};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::query::SurfaceHit;
+use super::tool::sinew_tool_id;
+use crate::def::CollisionFilter;
+use crate::query::{RayHit, SurfaceHit};
 
 /// Point on the surface of a body.
 #[repr(C)]
@@ -102,6 +104,112 @@ pub unsafe extern "C" fn sinew_world_find_nearest(
             let out = memory::report("out", out)?;
             let point = memory::vector("point", point)?;
             out.fill(world.nearest_point(point, max_distance)?.into());
+            Ok(())
+        })
+    }
+}
+
+/// First body or tool that a ray hits.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct sinew_ray_hit {
+    /// Set to sizeof(sinew_ray_hit) before the call.
+    pub struct_size: usize,
+    /// Body that is hit; all zero if none.
+    pub body: sinew_body_id,
+    /// Tool that is hit; all zero if none.
+    pub tool: sinew_tool_id,
+    /// Index of the triangle in the body's surface; 0 for a tool.
+    pub triangle: u32,
+    /// Weights of the triangle's corners, with sum 1; 0 for a tool.
+    pub weights: [f32; 3],
+    /// [m] Position of the hit.
+    pub position: [f32; 3],
+    /// Outward unit normal at the hit.
+    pub normal: [f32; 3],
+    /// [m] Distance from the origin.
+    pub distance: f32,
+    /// Reserved; set to 0 by the library.
+    pub reserved: u32,
+}
+
+// SAFETY: repr(C), begins with struct_size, numbers alone.
+unsafe impl Versioned for sinew_ray_hit {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "sinew_ray_hit";
+}
+
+impl From<Option<RayHit>> for sinew_ray_hit {
+    fn from(hit: Option<RayHit>) -> Self {
+        let nothing = Self {
+            struct_size: size_of::<Self>(),
+            body: sinew_body_id {
+                index1: 0,
+                generation: 0,
+            },
+            tool: sinew_tool_id {
+                index1: 0,
+                generation: 0,
+            },
+            triangle: 0,
+            weights: [0.0; 3],
+            position: [0.0; 3],
+            normal: [0.0; 3],
+            distance: 0.0,
+            reserved: 0,
+        };
+        match hit {
+            None => nothing,
+            Some(RayHit::Body(hit)) => Self {
+                body: hit.body.into(),
+                triangle: hit.triangle,
+                weights: hit.weights,
+                position: hit.position.to_array(),
+                normal: hit.normal.to_array(),
+                distance: hit.distance,
+                ..nothing
+            },
+            Some(RayHit::Tool {
+                tool,
+                position,
+                normal,
+                distance,
+            }) => Self {
+                tool: tool.into(),
+                position: position.to_array(),
+                normal: normal.to_array(),
+                distance,
+                ..nothing
+            },
+        }
+    }
+}
+
+/// Finds the first body or tool that a ray with a collision filter hits.
+///
+/// The ray meets bodies and tools as if it had this category and mask. Otherwise like sinew_world_cast_ray; without a hit
+/// both ids are all zero.
+///
+/// # Safety
+/// Pointers are NULL or as the comment above says; nobody changes what they point to meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_world_cast_ray_filtered(
+    world: *const sinew_world,
+    origin: *const f32,
+    direction: *const f32,
+    max_distance: f32,
+    category: u32,
+    mask: u32,
+    out: *mut sinew_ray_hit,
+) -> sinew_status {
+    // SAFETY: the same contract.
+    unsafe {
+        with_world(world, |world| {
+            let out = memory::report("out", out)?;
+            let origin = memory::vector("origin", origin)?;
+            let direction = memory::vector("direction", direction)?;
+            let filter = CollisionFilter { category, mask };
+            out.fill(world.cast_ray_at(origin, direction, max_distance, filter)?.into());
             Ok(())
         })
     }
