@@ -1,5 +1,6 @@
 //! Tools that are rigid bodies: weight, momentum and energy, light on heavy tissue and heavy on light.
 
+use crate::support::hanging::nodes_at;
 use crate::support::scene::SOLVERS;
 use crate::support::tissue::*;
 use glam::{DVec3, Quat, Vec3};
@@ -45,9 +46,7 @@ fn block(world: &mut World, solver: Solver, on_floor: bool) -> BodyId {
     }
     let block = tissue.put_for(solver, world, &mesh);
     if !on_floor {
-        let lowest = (0..).zip(&mesh.positions).filter(|(_, at)| at.y < -0.019);
-        let lowest: Vec<u32> = lowest.map(|(node, _)| node).collect();
-        pin_all(world, block, &lowest);
+        pin_all(world, block, &nodes_at(&mesh, |at| at.y < -0.019));
     }
     block
 }

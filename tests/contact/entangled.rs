@@ -1,5 +1,6 @@
 //! Sheets that were made through each other.
 
+use crate::support::hanging::nodes_at;
 use crate::support::tissue::*;
 use glam::Vec3;
 use sinew::mesh::Mesh;
@@ -34,8 +35,7 @@ fn ribbons(world: &mut World, thickness: f32, solver: Solver) -> [BodyId; 2] {
         };
         world.create_body(&definition).expect("a body")
     });
-    let ends = (0..).zip(&lying.positions).filter(|(_, p)| p.x.abs() > 0.099);
-    pin_all(world, ids[0], &ends.map(|(node, _)| node).collect::<Vec<u32>>());
+    pin_all(world, ids[0], &nodes_at(&lying, |p| p.x.abs() > 0.099));
     ids
 }
 

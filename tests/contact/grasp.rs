@@ -1,5 +1,6 @@
 //! Nodes that a tool holds: where they are, what holds them, and when they slip.
 
+use crate::support::hanging::nodes_at;
 use crate::support::tissue::*;
 use glam::{DQuat, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -70,11 +71,7 @@ const APART: Vec3 = Vec3::new(0.01, 4.0, -0.015);
 /// The nodes of the upper side within 3 cm of its middle.
 fn upper(mesh: &Mesh, away: Vec3) -> Vec<u32> {
     let is_held = |position: Vec3| position.y > 0.49 * SIZE.y && position.x.abs() < 0.02 && position.z.abs() < 0.03;
-    (0..)
-        .zip(&mesh.positions)
-        .filter(|(_, position)| is_held(**position - away))
-        .map(|(node, _)| node)
-        .collect()
+    nodes_at(mesh, |position| is_held(position - away))
 }
 
 impl Held {
@@ -497,11 +494,7 @@ fn stretched(solver: Solver, width: u32) -> (World, BodyId, [ToolId; 2], Vec<Att
         };
         let along = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
         let jaw = tool(&mut world, shape, 0.3, Vec3::X * side * 0.1, along);
-        let nodes: Vec<u32> = (0..)
-            .zip(&mesh.positions)
-            .filter(|(_, position)| position.x * side > 0.0999)
-            .map(|(node, _)| node)
-            .collect();
+        let nodes = nodes_at(&mesh, |position| position.x * side > 0.0999);
         assert_eq!(nodes.len() as u32, width + 1);
         ids.extend(world.attach_nodes(cloth, &nodes, jaw, 0.0).expect("attachments"));
         jaw

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{BodyContact, BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, Values, World};
 
+use crate::support::hanging::nodes_at;
 use crate::support::tissue::{body, kinetic, momentum, moved, pin_all, pin_forces, total_energy, world};
 
 const FRAME: f32 = 1.0 / 60.0;
@@ -53,18 +54,13 @@ fn block(world: &mut World, solver: Solver, height: f32, mirrored: bool, damping
     (id, mesh)
 }
 
-fn far_nodes(mesh: &Mesh, is_far: impl Fn(f32) -> bool) -> Vec<u32> {
-    let nodes = (0..).zip(&mesh.positions).filter(|(_, place)| is_far(place.y));
-    nodes.map(|(node, _)| node).collect()
-}
-
 /// Two blocks between pinned plates that come 4 mm closer than the blocks are high, and apart again: what the lower plate feels then, N.
 fn pressed(solver: Solver, dt: f32) -> [f64; 2] {
     let mut world = world(Vec3::ZERO);
     let (lower, below) = block(&mut world, solver, -0.5 * SIZE[1], false, 30.0);
     let (upper, above) = block(&mut world, solver, 0.5 * SIZE[1] + 2e-4, true, 30.0);
-    let ground = far_nodes(&below, |y| y < -0.999 * SIZE[1]);
-    let plate = far_nodes(&above, |y| y > SIZE[1] + 1.9e-4);
+    let ground = nodes_at(&below, |place| place.y < -0.999 * SIZE[1]);
+    let plate = nodes_at(&above, |place| place.y > SIZE[1] + 1.9e-4);
     pin_all(&mut world, lower, &ground);
     pin_all(&mut world, upper, &plate);
     let lead = |world: &mut World, seconds: f32, from: f32, to: f32| {

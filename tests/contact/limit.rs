@@ -1,5 +1,6 @@
 //! A tool of limited force presses with no more, while it comes and long after, and with no less where it does not get to its pose.
 
+use crate::support::hanging::nodes_at;
 use glam::Vec3;
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
@@ -31,11 +32,7 @@ fn press(solver: Solver, speed: f32, dt: f32, drag: f32) -> (f32, f32, f32) {
             ..Default::default()
         })
         .expect("a body");
-    let below: Vec<u32> = (0..)
-        .zip(&mesh.positions)
-        .filter(|(_, position)| position.y < -0.0199)
-        .map(|(node, _)| node)
-        .collect();
+    let below = nodes_at(&mesh, |position| position.y < -0.0199);
     crate::support::tissue::pin_all(&mut world, block, &below);
     let start = Vec3::new(0.001, 0.0201 + RADIUS, 0.002);
     let tool = world

@@ -1,5 +1,6 @@
 //! Tissue against tissue, and against itself.
 
+use crate::support::hanging::nodes_at;
 use crate::support::tissue::*;
 use glam::{DMat3, DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -208,11 +209,7 @@ fn a_block_rests_on_another_of(count: usize) {
             let below = block(0.06, 3, Vec3::ZERO);
             let above = block(0.04, 3, Vec3::new(0.004, 0.0515, 0.003));
             let low = put(&mut world, &below, CALM, solver, contact);
-            let floor: Vec<u32> = (0..)
-                .zip(&below.positions)
-                .filter(|(_, p)| p.y < -0.029)
-                .map(|(node, _)| node)
-                .collect();
+            let floor = nodes_at(&below, |p| p.y < -0.029);
             pin_all(&mut world, low, &floor);
             let high = put(&mut world, &above, CALM, solver, contact);
             for _ in 0..(1.2 / dt) as u32 {

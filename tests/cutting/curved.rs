@@ -9,7 +9,10 @@ use sinew::cutting::{Limits, Sweep};
 fn cut(body: &mut Body, start: [Vec3; 2], end: [Vec3; 2]) -> usize {
     let sweep = Sweep { start, end };
     let near = body.surface.near(&sweep, &body.positions).unwrap();
-    let changes = body.surface.cut(&sweep, &body.positions, &near, Limits::NONE).unwrap();
+    let changes = body
+        .surface
+        .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+        .unwrap();
     body.apply(&changes);
     changes.rim.len()
 }

@@ -5,6 +5,7 @@ use sinew::cutting::Sweep;
 use sinew::{Body, BodyDefinition, BodyId, Solver, Storage, Values, World, WorldDefinition};
 
 use super::sheet::unstructured;
+use crate::support::kept::kept;
 use crate::support::random::Random;
 
 const STORAGES: [Storage; 4] = [
@@ -72,32 +73,6 @@ pub fn in_flight_with(
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body)
-}
-
-/// Mass, momentum, angular momentum about the origin, energy, in `f64`.
-pub struct Kept {
-    pub mass: f64,
-    pub momentum: DVec3,
-    pub spin: DVec3,
-    pub energy: f64,
-}
-
-pub fn kept(world: &World, body: BodyId) -> Kept {
-    let it = world.body(body).unwrap();
-    let mut kept = Kept {
-        mass: 0.0,
-        momentum: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        energy: it.energy(Vec3::ZERO).kinetic + it.energy(Vec3::ZERO).elastic,
-    };
-    for (node, (place, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
-        let mass = f64::from(it.node_mass(node).unwrap());
-        let (place, velocity) = (place.as_dvec3(), velocity.as_dvec3());
-        kept.mass += mass;
-        kept.momentum += mass * velocity;
-        kept.spin += mass * place.cross(velocity);
-    }
-    kept
 }
 
 /// A blade that stands upright, from one point of the rest shape to another, where the sheet is now.

@@ -39,7 +39,10 @@ fn organs() -> Vec<(&'static str, Surface)> {
 fn cut(body: &mut Body, start: [Vec3; 2], end: [Vec3; 2]) {
     let sweep = Sweep { start, end };
     let near = body.surface.near(&sweep, &body.positions).unwrap();
-    let changes = body.surface.cut(&sweep, &body.positions, &near, Limits::NONE).unwrap();
+    let changes = body
+        .surface
+        .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+        .unwrap();
     body.apply(&changes);
 }
 

@@ -83,7 +83,10 @@ fn a_cut_that_is_taken_back_leaves_no_trace() {
     let before = seen(&body.surface);
     let sweep = body.sweep(vec2(2.0, 6.6), vec2(5.1, -1.0));
     let near = body.surface.near(&sweep, &body.positions).unwrap();
-    let first = body.surface.cut(&sweep, &body.positions, &near, Limits::NONE).unwrap();
+    let first = body
+        .surface
+        .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+        .unwrap();
     assert_ne!(seen(&body.surface), before);
     body.surface.undo();
     assert_eq!(seen(&body.surface), before);
@@ -93,7 +96,7 @@ fn a_cut_that_is_taken_back_leaves_no_trace() {
     turned.reverse();
     let again = body
         .surface
-        .cut(&sweep, &body.positions, &turned, Limits::NONE)
+        .cut(&sweep, &body.follower.positions, &turned, Limits::NONE)
         .unwrap();
     assert_eq!(first, again, "whatever the order of the candidates");
     body.apply(&again);
@@ -177,7 +180,7 @@ fn a_blade_that_does_not_meet_the_surface_changes_nothing() {
     ] {
         let changes = body
             .surface
-            .cut(&Sweep { start, end }, &body.positions, &all, Limits::NONE)
+            .cut(&Sweep { start, end }, &body.follower.positions, &all, Limits::NONE)
             .unwrap();
         assert!(
             changes.rim.is_empty() && changes.nodes.is_empty(),

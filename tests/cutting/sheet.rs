@@ -109,7 +109,7 @@ impl Body {
         let sweep = self.sweep(from, to);
         let near = self.surface.near(&sweep, &self.positions)?;
         let before = self.surface.piece_count()?;
-        let changes = self.surface.cut(&sweep, &self.positions, &near, limits)?;
+        let changes = self.surface.cut(&sweep, &self.follower.positions, &near, limits)?;
         let parted = self.surface.parted(&changes.rim, usize::MAX)?;
         assert_eq!(
             parted,

@@ -12,6 +12,7 @@ use sinew::{
     Solver, Storage, SurfacePoint, SutureDefinition, Tearing, Values, World, WorldDefinition,
 };
 
+use crate::support::kept::kept;
 use crate::support::random::Random;
 
 impl Random {
@@ -19,37 +20,6 @@ impl Random {
         let mut one = || (self.next() as f32 * 2.0 - 1.0) * size;
         vec3(one(), one(), one())
     }
-}
-
-/// Mass, momentum, angular momentum about the middle, and energy, in `f64`.
-struct Kept {
-    mass: f64,
-    momentum: DVec3,
-    spin: DVec3,
-    energy: f64,
-    /// What momentum and angular momentum are measured by: sums of sizes.
-    sizes: [f64; 2],
-}
-
-fn kept(body: &Body) -> Kept {
-    let energy = body.energy(Vec3::ZERO);
-    let mut kept = Kept {
-        mass: 0.0,
-        momentum: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        energy: energy.kinetic + energy.elastic,
-        sizes: [0.0; 2],
-    };
-    for (node, (place, velocity)) in (0..).zip(body.positions().iter().zip(body.velocities())) {
-        let mass = f64::from(body.node_mass(node).unwrap());
-        let (place, velocity) = (place.as_dvec3(), velocity.as_dvec3());
-        kept.mass += mass;
-        kept.momentum += mass * velocity;
-        kept.spin += mass * place.cross(velocity);
-        kept.sizes[0] += mass * velocity.length();
-        kept.sizes[1] += mass * place.length() * velocity.length();
-    }
-    kept
 }
 
 /// A renderer's own mesh, which sees the body once and then change lists alone.
@@ -328,7 +298,7 @@ struct Wild {
 impl Wild {
     fn cut(&mut self, sweep: &Sweep) {
         let it = self.world.body(self.body).unwrap();
-        let (before, hash) = (kept(it), self.world.state_hash());
+        let (before, hash) = (kept(&self.world, self.body), self.world.state_hash());
         let sutures: Vec<f32> = self
             .sutures
             .iter()
@@ -349,7 +319,7 @@ impl Wild {
             }
         }
         let it = self.world.body(self.body).unwrap();
-        let after = kept(it);
+        let after = kept(&self.world, self.body);
         assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
         let off = [
             before.momentum.distance(after.momentum),
@@ -505,10 +475,10 @@ impl Wild {
                 self.world = world;
             }
             _ => {
-                let (quiet, before) = (self.blades.is_empty(), kept(it));
+                let (quiet, before) = (self.blades.is_empty(), kept(&self.world, self.body));
                 self.what += " steps;";
                 self.steps(5);
-                let after = kept(self.world.body(self.body).unwrap());
+                let after = kept(&self.world, self.body);
                 if quiet {
                     let off = before.momentum.distance(after.momentum);
                     assert!(

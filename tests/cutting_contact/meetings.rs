@@ -4,6 +4,8 @@ use glam::{DVec3, Vec3, Vec3Swizzles, vec3};
 use sinew::{BodyContact, BodyDefinition, Detection, Solver, Tearing, Values};
 
 use super::scene::*;
+use crate::support::hanging::nodes_at;
+use crate::support::tissue::pin_all;
 
 /// A sheet that is held at one end above another, in two bodies or in one, is cut off there, falls and lies on the lower one.
 #[test]
@@ -58,7 +60,7 @@ fn a_sheet_that_is_cut_off_is_carried_by_what_it_falls_on() {
             )
         };
         for (&id, nodes) in bodies.iter().zip(&rims) {
-            pin(&mut world, id, nodes);
+            pin_all(&mut world, id, nodes);
         }
         let at = vec3(-0.013, 0.005, 0.0);
         let cut = sweep(at - 0.1 * Vec3::Z, at + 0.1 * Vec3::Z, 0.003 * Vec3::Y);
@@ -275,7 +277,7 @@ fn a_sheet_that_tears_stays_in_its_plane() {
         })
         .unwrap();
     let ends = [-1.0, 1.0].map(|end: f32| nodes_at(&mesh, |place| place.x * end > 0.0299));
-    ends.iter().for_each(|nodes| pin(&mut world, body, nodes));
+    ends.iter().for_each(|nodes| pin_all(&mut world, body, nodes));
     for step in 1..=60 {
         for (nodes, end) in ends.iter().zip([-1.0, 1.0]) {
             for &node in nodes {

@@ -1,5 +1,6 @@
 //! Bodies that are cut and meet tissue, and measures of where they are in `f64` that know nothing of the library's contact.
 
+use crate::support::kept::Kept;
 use crate::support::tissue::point_to_triangle;
 use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
@@ -157,45 +158,12 @@ pub fn overlapping(body: &Body, depth: f64) -> usize {
         .count()
 }
 
-/// Mass, momentum, angular momentum about the origin and energy, in `f64`.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Kept {
-    pub mass: f64,
-    pub momentum: DVec3,
-    pub spin: DVec3,
-    pub energy: f64,
-}
-
 pub fn kept(world: &World, bodies: &[BodyId]) -> Kept {
     let mut kept = Kept::default();
     for &id in bodies {
-        let body = world.body(id).unwrap();
-        let energy = body.energy(world.gravity());
-        kept.energy += energy.kinetic + energy.elastic + energy.gravitational;
-        for (node, (place, velocity)) in (0..).zip(body.positions().iter().zip(body.velocities())) {
-            let mass = f64::from(body.node_mass(node).unwrap());
-            let (place, velocity) = (place.as_dvec3(), velocity.as_dvec3());
-            kept.mass += mass;
-            kept.momentum += mass * velocity;
-            kept.spin += mass * place.cross(velocity);
-        }
+        kept.add(world.body(id).unwrap(), world.gravity());
     }
     kept
-}
-
-/// Which nodes, of those that the body was made with, lie where this says.
-pub fn nodes_at(mesh: &Mesh, is_there: impl Fn(Vec3) -> bool) -> Vec<u32> {
-    let nodes = (0..).zip(&mesh.positions);
-    nodes
-        .filter(|&(_, &place)| is_there(place))
-        .map(|(node, _)| node)
-        .collect()
-}
-
-pub fn pin(world: &mut World, body: BodyId, nodes: &[u32]) {
-    for &node in nodes {
-        world.body_mut(body).unwrap().pin(node).unwrap();
-    }
 }
 
 /// The sum of what holds these pins, N.

@@ -4,6 +4,8 @@ use glam::{Vec3, vec3};
 use sinew::{BodyContact, Solver};
 
 use super::scene::*;
+use crate::support::hanging::nodes_at;
+use crate::support::tissue::pin_all;
 
 /// Depths below this are none, m: a hundredth of a cell.
 const DEPTH: f64 = 1e-4;
@@ -24,7 +26,7 @@ fn press(matter: Matter, cut: Option<[Vec3; 2]>) -> (usize, f64) {
     let mesh = block();
     let body = matter.put(&mut world, &mesh);
     let ends = ENDS.map(|end| nodes_at(&mesh, |place| place.x * end > 0.0199));
-    ends.iter().for_each(|nodes| pin(&mut world, body, nodes));
+    ends.iter().for_each(|nodes| pin_all(&mut world, body, nodes));
     if let Some([from, to]) = cut {
         let report = world.cut(body, &sweep(from, to, 0.1 * Vec3::Z)).unwrap();
         assert!(report.area > 4e-4, "{report:?}");
@@ -105,7 +107,7 @@ fn what_is_stretched_parts_freely() {
                     .collect();
                 world.body_mut(body).unwrap().set_positions(&stretched).unwrap();
                 let far = mesh.positions.iter().map(|place| place.x).fold(0.0, f32::max);
-                pin(&mut world, body, &nodes_at(&mesh, |place| place.x.abs() > 0.99 * far));
+                pin_all(&mut world, body, &nodes_at(&mesh, |place| place.x.abs() > 0.99 * far));
                 let across = if is_sheet { Vec3::Z } else { Vec3::Y };
                 let middle = 0.003 * Vec3::X;
                 let cut = sweep(middle + 0.001 * across, middle + 0.1 * across, 0.1 * along);
@@ -195,7 +197,7 @@ fn what_is_cut_off_lies_on_the_rest_of(count: usize) {
         let mesh = block();
         let body = matter.put(&mut world, &mesh);
         let foot = nodes_at(&mesh, |place| place.y < -0.0149);
-        pin(&mut world, body, &foot);
+        pin_all(&mut world, body, &foot);
         let cut = sweep(vec3(-0.1, 0.0062, 0.0), vec3(0.1, 0.0062, 0.0), 0.1 * Vec3::Z);
         assert_eq!(world.cut(body, &cut).unwrap().pieces_parted, 1);
         for step in 0..150 {

@@ -267,7 +267,7 @@ fn a_blade_that_does_not_meet_the_material_changes_nothing() {
     ] {
         let changes = body
             .solid
-            .cut(&Sweep { start, end }, &body.positions, &all, Limits::NONE)
+            .cut(&Sweep { start, end }, &body.follower.positions, &all, Limits::NONE)
             .unwrap();
         assert!(
             changes.faces.is_empty() && changes.nodes.is_empty() && changes.sources.is_empty(),

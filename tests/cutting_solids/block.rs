@@ -127,7 +127,7 @@ impl Body {
         let sweep = self.sweep(start, end);
         let near = self.solid.near(&sweep, &self.positions)?;
         let before = self.solid.piece_count()?;
-        let changes = self.solid.cut(&sweep, &self.positions, &near, limits)?;
+        let changes = self.solid.cut(&sweep, &self.follower.positions, &near, limits)?;
         let parted = self.solid.parted(&changes.faces, usize::MAX)?;
         assert_eq!(
             parted,

@@ -11,6 +11,7 @@ use sinew::{
 };
 
 use super::block::{Mesh, shaken, upright};
+use crate::support::kept::kept;
 use crate::support::random::Random;
 
 /// What a body is made of.
@@ -150,33 +151,6 @@ pub fn in_flight(matter: Matter, solver: Solver, storage: Storage) -> (World, Bo
         .collect();
     world.body_mut(body).unwrap().set_velocities(&velocities).unwrap();
     (world, body)
-}
-
-/// Mass, momentum, angular momentum about the origin, energy, in `f64`.
-pub struct Kept {
-    pub mass: f64,
-    pub momentum: DVec3,
-    pub spin: DVec3,
-    pub energy: f64,
-}
-
-pub fn kept(world: &World, body: BodyId) -> Kept {
-    let it = world.body(body).unwrap();
-    let energy = it.energy(Vec3::ZERO);
-    let mut kept = Kept {
-        mass: 0.0,
-        momentum: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        energy: energy.kinetic + energy.elastic,
-    };
-    for (node, (place, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
-        let mass = f64::from(it.node_mass(node).unwrap());
-        let (place, velocity) = (place.as_dvec3(), velocity.as_dvec3());
-        kept.mass += mass;
-        kept.momentum += mass * velocity;
-        kept.spin += mass * place.cross(velocity);
-    }
-    kept
 }
 
 /// A blade's edge along z through a point of the rest shape, in m, where the block is now.

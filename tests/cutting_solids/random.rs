@@ -95,7 +95,10 @@ fn a_thousand_cuts_in_a_row() {
                 end: [start + way, start + way + edge + turn],
             };
             let near = body.solid.near(&sweep, &body.positions).unwrap();
-            let changes = body.solid.cut(&sweep, &body.positions, &near, Limits::NONE).unwrap();
+            let changes = body
+                .solid
+                .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+                .unwrap();
             body.apply(&changes);
             if cut % 100 == 99 {
                 body.check();

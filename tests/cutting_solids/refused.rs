@@ -77,7 +77,10 @@ fn a_cut_that_is_taken_back_leaves_no_trace() {
     let before = seen(&body.solid);
     let sweep = body.sweep(THIRD[0], THIRD[1]);
     let near = body.solid.near(&sweep, &body.positions).unwrap();
-    let first = body.solid.cut(&sweep, &body.positions, &near, Limits::NONE).unwrap();
+    let first = body
+        .solid
+        .cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+        .unwrap();
     let after = seen(&body.solid);
     assert_ne!(after, before);
     body.solid.undo();
@@ -87,7 +90,10 @@ fn a_cut_that_is_taken_back_leaves_no_trace() {
     // Whatever the order of the candidates, and whatever others there are.
     let mut all: Vec<u32> = (0..body.solid.cells().len() as u32).rev().collect();
     all.extend(&near);
-    let again = body.solid.cut(&sweep, &body.positions, &all, Limits::NONE).unwrap();
+    let again = body
+        .solid
+        .cut(&sweep, &body.follower.positions, &all, Limits::NONE)
+        .unwrap();
     assert_eq!(first, again);
     assert_eq!(seen(&body.solid), after);
     body.apply(&again);
@@ -103,7 +109,9 @@ fn a_stroke_goes_on_from_a_step_that_was_taken_back() {
         let [from, to] = [at, at + 1].map(|at| place(0.1 * at as f32 - 1.0));
         let astray = body.sweep(from, [to[0] + vec3(0.5, 1.0, 0.0), to[1] + vec3(0.5, 1.0, 0.0)]);
         let near = body.solid.near(&astray, &body.positions).unwrap();
-        body.solid.cut(&astray, &body.positions, &near, Limits::NONE).unwrap();
+        body.solid
+            .cut(&astray, &body.follower.positions, &near, Limits::NONE)
+            .unwrap();
         body.solid.undo();
         body.cut(from, to);
         other.cut(from, to);

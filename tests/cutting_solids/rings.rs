@@ -11,7 +11,8 @@ use sinew::{
 };
 
 use super::block::{shaken, upright};
-use super::motion::{CUTS, Matter, SOLVERS, edge, enclosed, in_flight, kept, mesh};
+use super::motion::{CUTS, Matter, SOLVERS, edge, enclosed, in_flight, mesh};
+use crate::support::kept::kept;
 use crate::support::random::Random;
 
 #[derive(Clone, Copy)]

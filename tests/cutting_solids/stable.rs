@@ -7,7 +7,7 @@ use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
 use sinew::{BodyDefinition, Material, Model, Values};
 
-use super::motion::kept;
+use crate::support::kept::kept;
 use crate::support::random::Random;
 use crate::support::tissue::world;
 

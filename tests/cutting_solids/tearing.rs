@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use super::block::{Mesh, shaken, upright};
+use crate::support::kept::kept;
 use crate::support::random::Random;
 use glam::{DVec3, Vec3, vec3};
 use sinew::{
@@ -183,31 +184,6 @@ impl Made {
 
 fn report(world: &World, body: BodyId) -> TearReport {
     world.body(body).unwrap().tear_report()
-}
-
-struct Kept {
-    mass: f64,
-    momentum: DVec3,
-    spin: DVec3,
-    energy: f64,
-}
-
-fn kept(world: &World, body: BodyId) -> Kept {
-    let it = world.body(body).unwrap();
-    let energy = it.energy(Vec3::ZERO);
-    let mut kept = Kept {
-        mass: 0.0,
-        momentum: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        energy: energy.kinetic + energy.elastic,
-    };
-    for (node, (place, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
-        let mass = f64::from(it.node_mass(node).unwrap());
-        kept.mass += mass;
-        kept.momentum += mass * velocity.as_dvec3();
-        kept.spin += mass * place.as_dvec3().cross(velocity.as_dvec3());
-    }
-    kept
 }
 
 #[test]

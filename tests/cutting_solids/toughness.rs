@@ -6,7 +6,7 @@ use sinew::{
 };
 
 use super::block::{shaken, upright};
-use super::motion::kept;
+use crate::support::kept::kept;
 
 /// J/m².
 const TOUGHNESS: f32 = 2.0;

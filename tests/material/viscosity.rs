@@ -2,6 +2,7 @@
 //! solver and storage, stable whatever the times and the step.
 
 use crate::support::bodies::{FREE, Random};
+use crate::support::hanging::nodes_at;
 use crate::support::scene::{SOLVERS, STORAGES, Scene};
 use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
@@ -138,11 +139,7 @@ fn tetrahedra_relax_along_the_curve_whatever_their_poisson_ratio() {
                 ..BodyDefinition::default()
             };
             let mut scene = Scene::new(FREE, &definition);
-            let side: Vec<u32> = (0..)
-                .zip(&mesh.positions)
-                .filter(|(_, p)| p.x > 0.019)
-                .map(|(node, _)| node)
-                .collect();
+            let side = nodes_at(&mesh, |p| p.x > 0.019);
             let lead = |scene: &mut Scene, stretch: Vec3, shear: f32| {
                 for (node, &p) in (0..).zip(&mesh.positions) {
                     let place = p * stretch + Vec3::Y * (shear * p.x);

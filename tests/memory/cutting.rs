@@ -28,7 +28,9 @@ fn a_cut_without_memory_changes_nothing() {
         body.surface.vertices()
     );
     for times in 0.. {
-        let answer = with(times, || body.surface.cut(&sweep, &body.positions, &near, Limits::NONE));
+        let answer = with(times, || {
+            body.surface.cut(&sweep, &body.follower.positions, &near, Limits::NONE)
+        });
         match answer {
             Ok(changes) => {
                 assert!(times > 100, "it needs memory {times} times");

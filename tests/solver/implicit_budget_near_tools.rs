@@ -2,13 +2,11 @@
 //! a few budgets, and the tool feels what VERLET has it feel.
 
 use glam::Vec3;
-use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition};
 
+use crate::support::held_block::{CELL, ELEMENTS, TOP, held_block_with};
 use crate::support::solid::ball;
 
-const CELL: f32 = 0.005;
-const CELLS: [u32; 3] = [14, 5, 14];
 const RADIUS: f32 = 0.02;
 const FRAME: f32 = 1.0 / 60.0;
 const DEPTH: f32 = 0.003;
@@ -26,38 +24,18 @@ struct Felt {
 
 /// What a tool feels that is pressed into a block, dragged aside, and stays there.
 fn drag(solver: Solver, model: Model, shape: Shape, friction: f32) -> Vec<Felt> {
-    let size = CELLS.map(|count| count as f32 * CELL);
-    let mesh = Mesh::block(size, CELLS).expect("a block");
-    let mut world = World::new(WorldDefinition {
-        gravity: Vec3::ZERO,
-        max_substeps: 1000,
-        ..Default::default()
-    })
-    .expect("a world");
-    let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
-    let body = world
-        .create_body(&BodyDefinition {
-            positions: &mesh.positions,
-            tetrahedra: &mesh.tetrahedra,
-            node_dampings: Values::Uniform(200.0 * node_mass),
-            material: Some(Material {
-                model,
-                young_modulus: 10e3,
-                poisson_ratio: if model == Model::Springs { 0.25 } else { 0.3 },
-                density: 1000.0,
-                ..Default::default()
-            }),
-            solver,
-            iterations: if solver == Solver::Implicit { BUDGET } else { 0 },
-            ..Default::default()
-        })
-        .expect("a body");
-    let top = 0.5 * size[1];
-    let below = (0..).zip(&mesh.positions).filter(|(_, place)| place.y < -0.99 * top);
-    let below: Vec<u32> = below.map(|(node, _)| node).collect();
-    crate::support::tissue::pin_all(&mut world, body, &below);
+    let (mut world, body, _) = held_block_with(|definition, _| BodyDefinition {
+        material: Some(Material {
+            model,
+            poisson_ratio: if model == Model::Springs { 0.25 } else { 0.3 },
+            ..ELEMENTS
+        }),
+        solver,
+        iterations: if solver == Solver::Implicit { BUDGET } else { 0 },
+        ..definition
+    });
     // Beside the mesh's symmetry.
-    let at = |aside: f32, depth: f32| Vec3::new(0.3 * CELL + aside, top + RADIUS - depth, 0.1 * CELL);
+    let at = |aside: f32, depth: f32| Vec3::new(0.3 * CELL + aside, TOP + RADIUS - depth, 0.1 * CELL);
     let tool = world
         .create_tool(&ToolDefinition {
             friction,

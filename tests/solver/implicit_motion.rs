@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use crate::support::bodies::{FREE, Parts, Random, Scene, largest_difference};
+use crate::support::hanging::nodes_at;
 use crate::support::motion::{
     Mode, Pendulum, STRETCH, Waves, fixed_chain, omega, period_of, rounding, stretch, two_masses,
 };
@@ -485,9 +486,7 @@ fn a_bar_rings_by_however_little() {
                     ..Default::default()
                 };
                 let id = world.create_body(&definition).expect("a body");
-                let nodes = (0..).zip(&mesh.positions);
-                let held: Vec<u32> = nodes.filter(|(_, p)| p.x < -0.0499).map(|(node, _)| node).collect();
-                crate::support::tissue::pin_all(&mut world, id, &held);
+                crate::support::tissue::pin_all(&mut world, id, &nodes_at(&mesh, |p| p.x < -0.0499));
                 let mut scene = Scene { world, id };
                 let velocities: Vec<Vec3> = mesh.positions.iter().map(|p| shape(p) * (0.1 * size * rate)).collect();
                 scene.body_mut().set_velocities(&velocities).expect("velocities");

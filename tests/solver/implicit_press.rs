@@ -1,13 +1,11 @@
 //! IMPLICIT pressed at the speed of a hand, 0.1 m/s, in frames of 1/60 s: it finds the forces that VERLET does, and its equations are
 //! solved within their budget, however many contacts come and go.
 
+use crate::support::held_block::{CELL, TOP, held_block};
 use crate::support::solid::ball;
 use glam::Vec3;
-use sinew::mesh::Mesh;
-use sinew::{BodyDefinition, Material, Model, Pose, Shape, Solver, ToolDefinition, Values, World, WorldDefinition};
+use sinew::{Pose, Shape, Solver, ToolDefinition};
 
-const CELL: f32 = 0.005;
-const CELLS: [u32; 3] = [14, 5, 14];
 const RADIUS: f32 = 0.04;
 const FRAME: f32 = 1.0 / 60.0;
 const SPEED: f32 = 0.1;
@@ -23,51 +21,9 @@ struct Felt {
 
 /// What a ball feels that is pressed into a block and stays there.
 fn press(solver: Solver, elements: bool, shape: Shape) -> Vec<Felt> {
-    let size = CELLS.map(|count| count as f32 * CELL);
-    let mesh = Mesh::block(size, CELLS).expect("a block");
-    let mut world = World::new(WorldDefinition {
-        gravity: Vec3::ZERO,
-        max_substeps: 1000,
-        ..Default::default()
-    })
-    .expect("a world");
-    let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
-    let definition = BodyDefinition {
-        positions: &mesh.positions,
-        node_dampings: Values::Uniform(200.0 * node_mass),
-        triangles: &mesh.triangles,
-        tetrahedra: &mesh.tetrahedra,
-        solver,
-        ..Default::default()
-    };
-    let definition = if elements {
-        BodyDefinition {
-            material: Some(Material {
-                model: Model::Tetrahedra,
-                young_modulus: 10e3,
-                poisson_ratio: 0.3,
-                density: 1000.0,
-                ..Default::default()
-            }),
-            ..definition
-        }
-    } else {
-        BodyDefinition {
-            masses: Values::Uniform(node_mass),
-            stiffnesses: Values::Uniform(50.0),
-            ..definition
-        }
-    };
-    let body = world.create_body(&definition).expect("a body");
-    let top = 0.5 * size[1];
-    let below: Vec<u32> = (0..)
-        .zip(&mesh.positions)
-        .filter(|(_, position)| position.y < -0.99 * top)
-        .map(|(node, _)| node)
-        .collect();
-    crate::support::tissue::pin_all(&mut world, body, &below);
+    let (mut world, body, _) = held_block(elements, solver);
     // Aside of the mesh's symmetry, and a little above.
-    let at = |depth: f32| Vec3::new(0.3 * CELL, top + RADIUS - depth, 0.1 * CELL);
+    let at = |depth: f32| Vec3::new(0.3 * CELL, TOP + RADIUS - depth, 0.1 * CELL);
     let tool = world
         .create_tool(&ToolDefinition {
             pose: Pose {

@@ -2,14 +2,10 @@
 //! takes a few products for it.
 
 use glam::{DVec3, Vec3};
-use sinew::mesh::Mesh;
-use sinew::{
-    BodyDefinition, BodyId, Material, Model, Pose, Shape, Solver, ToolDefinition, ToolId, Values, World,
-    WorldDefinition,
-};
+use sinew::{BodyId, Pose, Shape, Solver, ToolDefinition, ToolId, World};
 
-const CELL: f32 = 0.005;
-const CELLS: [u32; 3] = [14, 5, 14];
+use crate::support::held_block::{CELL, TOP, held_block};
+
 const FRAME: f32 = 1.0 / 60.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,46 +25,7 @@ struct Scene {
 
 impl Scene {
     fn new(tissue: Tissue, solver: Solver, radius: f32) -> Self {
-        let size = CELLS.map(|count| count as f32 * CELL);
-        let mesh = Mesh::block(size, CELLS).expect("a block");
-        let mut world = World::new(WorldDefinition {
-            gravity: Vec3::ZERO,
-            max_substeps: 1000,
-            ..WorldDefinition::default()
-        })
-        .expect("a world");
-        let node_mass = 1000.0 * size.iter().product::<f32>() / mesh.positions.len() as f32;
-        let definition = BodyDefinition {
-            positions: &mesh.positions,
-            node_dampings: Values::Uniform(200.0 * node_mass),
-            tetrahedra: &mesh.tetrahedra,
-            solver,
-            ..BodyDefinition::default()
-        };
-        let definition = match tissue {
-            Tissue::Springs => BodyDefinition {
-                masses: Values::Uniform(node_mass),
-                stiffnesses: Values::Uniform(50.0),
-                ..definition
-            },
-            Tissue::Tetrahedra => BodyDefinition {
-                material: Some(Material {
-                    model: Model::Tetrahedra,
-                    young_modulus: 10e3,
-                    poisson_ratio: 0.3,
-                    density: 1000.0,
-                    ..Material::default()
-                }),
-                ..definition
-            },
-        };
-        let body = world.create_body(&definition).expect("a body");
-        let bottom = mesh.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
-        for (node, position) in (0..).zip(&mesh.positions) {
-            if position.y == bottom {
-                world.body_mut(body).expect("the body").pin(node).expect("a node");
-            }
-        }
+        let (mut world, body, mesh) = held_block(tissue == Tissue::Tetrahedra, solver);
         let tool = world.create_tool(&ToolDefinition {
             pose: Pose {
                 position: Self::at(radius, 0.0),
@@ -87,8 +44,7 @@ impl Scene {
 
     /// Where the sphere is at a depth, aside of the mesh's symmetry.
     fn at(radius: f32, depth: f32) -> Vec3 {
-        let top = 0.5 * CELL * CELLS[1] as f32;
-        Vec3::new(0.3 * CELL, top + radius - depth, 0.1 * CELL)
+        Vec3::new(0.3 * CELL, TOP + radius - depth, 0.1 * CELL)
     }
 
     /// One frame to this depth: the force upon the sphere.

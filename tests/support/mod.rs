@@ -7,6 +7,8 @@ pub mod bodies;
 pub mod change_lists;
 pub mod euler;
 pub mod hanging;
+pub mod held_block;
+pub mod kept;
 pub mod motion;
 pub mod organ;
 pub mod random;
