@@ -268,13 +268,7 @@ impl Body {
         if let Some(sleeper) = &mut self.sleeper {
             sleeper.join([a, b].map(|node| self.order.own(node)));
         }
-        self.forces_current = false;
-        self.wake();
-        self.carry.forget();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
-        self.forget_rates();
+        self.forget_stiffness();
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         let nodes = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
         self.scale_for_springs(&nodes);
@@ -309,13 +303,7 @@ impl Body {
         let enclosed = self.enclosed.as_mut();
         removed += enclosed.map_or(0, |enclosed| enclosed.remove_edge(own_a, own_b));
         if removed > 0 {
-            self.forces_current = false;
-            self.wake();
-            self.forget_rates();
-            self.carry.forget();
-            if let Some(implicit) = &mut self.implicit {
-                implicit.forget_matrix();
-            }
+            self.forget_stiffness();
             // Rings of fewer tetrahedra have other pressures, of which nothing was deformed.
             self.measure_anew();
         }
@@ -373,13 +361,7 @@ impl Body {
         if let Some(tears) = &mut self.tears {
             tears.remove([own_a, own_b]);
         }
-        self.forces_current = false;
-        self.wake();
-        self.forget_rates();
-        self.carry.forget();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
+        self.forget_stiffness();
         let other = Link {
             neighbour: own_a,
             ..link
@@ -430,6 +412,17 @@ impl Body {
         self.carry.forget();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_energy();
+        }
+    }
+
+    /// Its springs, elements or terms are not what they were.
+    pub(super) fn forget_stiffness(&mut self) {
+        self.forces_current = false;
+        self.wake();
+        self.carry.forget();
+        self.forget_rates();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
         }
     }
 

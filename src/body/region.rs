@@ -41,13 +41,7 @@ impl Body {
         let terms = self.terms.as_mut();
         scaled += terms.map_or(0, |terms| terms.scale(&region, scale));
         if scaled > 0 {
-            self.forces_current = false;
-            self.carry.forget();
-            self.wake();
-            self.forget_rates();
-            if let Some(implicit) = &mut self.implicit {
-                implicit.forget_matrix();
-            }
+            self.forget_stiffness();
             self.measure_anew();
         }
         Ok(())

@@ -93,13 +93,7 @@ impl Body {
             tears.change(changes);
         }
         self.measure_anew();
-        self.forces_current = false;
-        self.carry.forget();
-        self.wake();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
-        self.forget_rates();
+        self.forget_stiffness();
         self.make_up_for_changes(changes);
         self.scale_for_springs(&nodes);
         let limit = self.watched.limit();

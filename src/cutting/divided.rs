@@ -67,6 +67,7 @@ pub(crate) trait Divided<const N: usize> {
     fn set_cell(&mut self, cell: u32, to: Cell<N>) -> Result<()>;
     /// Adds a cell with what is not named here from another.
     fn add_cell(&mut self, like: u32, cell: Cell<N>) -> Result<u32>;
+    fn simplex_count(&self) -> u32;
     fn simplex(&self, simplex: u32) -> Simplex<N>;
     /// How much of the material of its cell a simplex has, to compare with others in the cell.
     fn part_of(&self, simplex: u32) -> f64;
@@ -133,6 +134,10 @@ macro_rules! divided {
             fn add_cell(&mut self, like: u32, cell: Cell<$corners>) -> Result<u32> {
                 let Cell { nodes, material: $material, first, next } = cell;
                 self.cells.push($cell { nodes, $material, first, next, ..self.cells[like] })
+            }
+
+            fn simplex_count(&self) -> u32 {
+                self.$simplices.count()
             }
 
             fn simplex(&self, simplex: u32) -> Simplex<$corners> {

@@ -35,7 +35,7 @@ mod union;
 
 pub use changes::{BoundPoint, Changes, CutFace, PieceOfCell, PieceOfNode, PieceOfSpring, RimEdge, Source};
 pub use cut::{Limits, Sweep};
-pub(crate) use divided::Divided;
+pub(crate) use divided::{Divided, weighed};
 pub(crate) use material::{CutEnd, CutMaterial};
 pub(crate) use met::Met;
 pub(crate) use solid::SolidStroke;

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::bind::{Binding, Solid, weighted};
 use crate::base::{Error, Result, memory};
-use crate::cutting::{CutMaterial, CutSolid, CutSurface};
+use crate::cutting::{CutMaterial, Divided, weighed};
 use crate::geometry::nearest::nearest_on_triangle;
 
 /// What following cuts asks for: kept for bodies that may be cut.
@@ -52,31 +52,21 @@ impl Follower {
     pub fn follow(&self, material: &CutMaterial, binding: &mut Binding, triangles: &mut Vec<[u32; 3]>) -> Result<bool> {
         match (self, material, binding) {
             (Self::Surface(homes), CutMaterial::Surface(surface), Binding::Triangles(bound)) => {
-                homes.check(surface.node_count())?;
-                let pieces = pieces_of_surface(surface, homes)?;
                 let weights = |vertex: usize| {
                     let [b, c] = bound[vertex].weights.map(f64::from);
                     [1.0 - b - c, b, c]
                 };
-                let rest = |node| surface.rest(node);
-                let now = |vertex: usize| known(bound[vertex].nodes, surface.node_count());
-                let nodes = homes.choose(&pieces, rest, now, weights)?;
-                *triangles = homes.whole(&nodes)?;
+                let nodes = homes.follow(surface, |vertex| bound[vertex].nodes, weights, triangles)?;
                 for (vertex, nodes) in bound.iter_mut().zip(nodes) {
                     vertex.nodes = nodes;
                 }
             }
             (Self::Solid(homes), CutMaterial::Solid(solid), Binding::Tetrahedra(bound)) => {
-                homes.check(solid.node_count())?;
-                let pieces = pieces_of_solid(solid, homes)?;
                 let weights = |vertex: usize| {
                     let [b, c, d] = bound[vertex].weights.map(f64::from);
                     [1.0 - b - c - d, b, c, d]
                 };
-                let rest = |node| solid.rest(node);
-                let now = |vertex: usize| known(bound[vertex].nodes, solid.node_count());
-                let nodes = homes.choose(&pieces, rest, now, weights)?;
-                *triangles = homes.whole(&nodes)?;
+                let nodes = homes.follow(solid, |vertex| bound[vertex].nodes, weights, triangles)?;
                 for (vertex, nodes) in bound.iter_mut().zip(nodes) {
                     vertex.nodes = nodes;
                 }
@@ -119,29 +109,33 @@ impl<const N: usize> Homes<N> {
             .try_for_each(|&nodes| known(nodes, node_count).map(drop))
     }
 
-    /// The nodes of the cell that each vertex goes with from now on, by those of now and the weights that it has of them.
-    fn choose(
+    /// The nodes of the cell that each vertex goes with from now on, by those of now and the weights that it has of them; keeps the triangles
+    /// whose corners hang together then.
+    fn follow(
         &self,
-        pieces: &[Piece<N>],
-        rest: impl Fn(u32) -> Vec3,
-        now: impl Fn(usize) -> Result<[u32; N]>,
+        body: &impl Divided<N>,
+        now: impl Fn(usize) -> [u32; N],
         weights: impl Fn(usize) -> [f64; N],
+        triangles: &mut Vec<[u32; 3]>,
     ) -> Result<Vec<[u32; N]>>
     where
         Piece<N>: Fit,
     {
+        let node_count = body.nodes().count();
+        self.check(node_count)?;
+        let pieces = pieces(body, self)?;
         let mut chosen = memory::reserved(self.of_vertices.len())?;
         for (vertex, &home) in self.of_vertices.iter().enumerate() {
             let first = pieces.partition_point(|piece| piece.home < home);
             let of_home = pieces[first..].iter().take_while(|piece| piece.home == home);
             let mut cells = of_home.clone().map(|piece| piece.nodes);
             // All of its material was taken away: it stays with what it was bound to.
-            let some = cells.next().map_or_else(|| now(vertex), Ok)?;
+            let some = cells.next().map_or_else(|| known(now(vertex), node_count), Ok)?;
             if cells.all(|nodes| nodes == some) {
                 chosen.push(some);
                 continue;
             }
-            let corners = self.cells[home as usize].map(|node| rest(node).as_dvec3());
+            let corners = self.cells[home as usize].map(|node| body.nodes()[node].rest.as_dvec3());
             let weights = weights(vertex);
             let place = (0..N).map(|corner| corners[corner] * weights[corner]).sum();
             let fits = |a: &&Piece<N>, b: &&Piece<N>| {
@@ -150,6 +144,7 @@ impl<const N: usize> Homes<N> {
             };
             chosen.push(of_home.min_by(fits).map_or(some, |piece| piece.nodes));
         }
+        *triangles = self.whole(&chosen)?;
         Ok(chosen)
     }
 
@@ -231,31 +226,16 @@ fn firsts<const N: usize>(cells: &[[u32; N]], rest: impl Fn(u32) -> Vec3) -> Res
     Ok(firsts)
 }
 
-/// All of a surface's material, by the cells that it was in.
-fn pieces_of_surface(surface: &CutSurface, homes: &Homes<3>) -> Result<Vec<Piece<3>>> {
-    let rest = |node| surface.rest(node);
+/// All of a body's material, by the cells that it was in.
+fn pieces<const N: usize>(body: &impl Divided<N>, homes: &Homes<N>) -> Result<Vec<Piece<N>>> {
+    let rest = |node| body.nodes()[node].rest;
     let firsts = firsts(&homes.cells, rest)?;
-    let mut pieces = memory::reserved(surface.triangles().len())?;
-    for triangle in surface.triangles() {
-        let nodes = surface.cells()[triangle.cell as usize].nodes;
+    let count = body.simplex_count();
+    let mut pieces = memory::reserved(count as usize)?;
+    for simplex in (0..count).map(|simplex| body.simplex(simplex)) {
+        let nodes = body.cell(simplex.cell).nodes;
         if let Some(&home) = firsts.get(&key(nodes, rest)) {
-            let corners = triangle.corners.map(|vertex| surface.rest_place(vertex));
-            pieces.push(Piece { home, nodes, corners });
-        }
-    }
-    pieces.sort_unstable_by_key(|piece| (piece.home, piece.nodes));
-    Ok(pieces)
-}
-
-/// The same of a solid's.
-fn pieces_of_solid(solid: &CutSolid, homes: &Homes<4>) -> Result<Vec<Piece<4>>> {
-    let rest = |node| solid.rest(node);
-    let firsts = firsts(&homes.cells, rest)?;
-    let mut pieces = memory::reserved(solid.tetrahedra().len())?;
-    for tetrahedron in solid.tetrahedra() {
-        let nodes = solid.cells()[tetrahedron.cell as usize].nodes;
-        if let Some(&home) = firsts.get(&key(nodes, rest)) {
-            let corners = tetrahedron.corners.map(|vertex| solid.rest_place(vertex));
+            let corners = simplex.corners.map(|vertex| weighed(body.bonds(vertex), rest));
             pieces.push(Piece { home, nodes, corners });
         }
     }

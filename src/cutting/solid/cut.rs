@@ -47,18 +47,7 @@ impl CutSolid {
             self.cells[cell].nodes
         })?;
         self.begin();
-        let cut = Cut {
-            limits,
-            changes: Changes {
-                first_triangle: self.triangles.count(),
-                ..Changes::default()
-            },
-            marked: Vec::new(),
-            beside: Vec::new(),
-            is_tear: false,
-            solid: self,
-        };
-        let changes = cut.make(sweep, positions, candidates);
+        let changes = Cut::new(self, limits, false).make(sweep, positions, candidates);
         if changes.is_err() {
             self.undo();
         }
@@ -91,7 +80,21 @@ impl CutSolid {
     }
 }
 
-impl Cut<'_> {
+impl<'a> Cut<'a> {
+    pub(crate) fn new(solid: &'a mut CutSolid, limits: Limits, is_tear: bool) -> Self {
+        Self {
+            limits,
+            changes: Changes {
+                first_triangle: solid.triangles.count(),
+                ..Changes::default()
+            },
+            marked: Vec::new(),
+            beside: Vec::new(),
+            is_tear,
+            solid,
+        }
+    }
+
     fn make(mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32]) -> Result<Changes> {
         let mut candidates = memory::copied(candidates)?;
         memory::sort_once(&mut candidates);

@@ -96,18 +96,7 @@ impl CutSolid {
         // The stroke of a blade goes on after it.
         let of_blade = std::mem::replace(&mut self.stroke, Stroke::of_tear(strokes));
         self.strokes = strokes;
-        let cut = Cut {
-            limits,
-            changes: Changes {
-                first_triangle: self.triangles.count(),
-                ..Changes::default()
-            },
-            marked: Vec::new(),
-            beside: Vec::new(),
-            is_tear: true,
-            solid: self,
-        };
-        let changes = cut.tear(&faces);
+        let changes = Cut::new(self, limits, true).tear(&faces);
         self.stroke = of_blade;
         match changes {
             Ok(changes) if !changes.faces.is_empty() => Ok(Some(changes)),
