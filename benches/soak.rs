@@ -4,10 +4,11 @@
 //! the memory of a world that was emptied is larger in the second half than in the first by more than a hundredth. `-- --planted` keeps a body of each tenth, and must fail.
 #![allow(clippy::print_stderr)]
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[path = "bill/held.rs"]
+mod held;
+
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
 use sinew::cutting::Sweep;
@@ -24,30 +25,6 @@ const TENTHS: u32 = 10;
 /// How many bodies there are at once, and tools.
 const BODIES: usize = 4;
 const TOOLS: usize = 3;
-
-/// The system's allocator, counting what is held.
-struct Held;
-
-static HELD: AtomicUsize = AtomicUsize::new(0);
-
-#[global_allocator]
-static ALLOCATOR: Held = Held;
-
-// SAFETY: every call goes to the system's allocator unchanged.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Held {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        HELD.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: the same contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the same contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
 
 /// Marsaglia's xorshift, 2003.
 struct Dice(u64);
@@ -267,7 +244,7 @@ fn main() -> ExitCode {
     let is_planted = std::env::args().any(|argument| argument == "--planted");
     let asked = std::env::args().find_map(|argument| argument.parse().ok());
     let frames: u32 = asked.unwrap_or(FRAMES);
-    let before = HELD.load(Ordering::Relaxed);
+    let before = held::held();
     let mut play = Play::new();
     let mut held = Vec::new();
     for tenth in 0..TENTHS {
@@ -285,7 +262,7 @@ fn main() -> ExitCode {
             play.bodies.pop();
         }
         play.empty();
-        held.push(HELD.load(Ordering::Relaxed) - before);
+        held.push(held::held() - before);
     }
     // What a world keeps room for grows by steps to the most that was ever asked for at once, which takes longer and longer to be more.
     let (early, late) = held.split_at(TENTHS as usize / 2);

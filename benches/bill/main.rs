@@ -10,14 +10,14 @@ mod alone;
 #[path = "../storage/clock.rs"]
 #[allow(dead_code)] // the storage bench uses the rest
 mod clock;
+mod held;
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::Vec3;
+use held::held;
 use sinew::mesh::{Mesh, MeshFormat, load};
 use sinew::{
     BodyContact, BodyDefinition, BodyId, BodyReader, ElementLaw, Embedding, EmbeddingDefinition, Material, Model,
@@ -42,30 +42,6 @@ const MAKES: usize = 3;
 const READER: &str = "read on another thread";
 const PROFILED: &str = "stages of the step timed";
 const DRAWN: &str = "drawn: its surface, bound, with normals";
-
-/// The system's allocator, counting what is held.
-struct Held;
-
-static HELD: AtomicUsize = AtomicUsize::new(0);
-
-#[global_allocator]
-static ALLOCATOR: Held = Held;
-
-// SAFETY: every call goes to the system's allocator unchanged.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Held {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        HELD.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: the same contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the same contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
 
 /// A stomach where there is one, else a filled organ of as many nodes.
 fn organ() -> Mesh {
@@ -124,7 +100,7 @@ impl<'a> Contender<'a> {
             ..WorldDefinition::default()
         })
         .expect("a world");
-        let before = HELD.load(Ordering::Relaxed);
+        let before = held();
         let mut made = f64::INFINITY;
         let mut body = BodyId::default();
         for time in 0..MAKES {
@@ -145,7 +121,7 @@ impl<'a> Contender<'a> {
             _ => Beside::Nothing,
         };
         world.set_profiling(name == PROFILED).expect("room");
-        let bytes = HELD.load(Ordering::Relaxed) - before;
+        let bytes = held() - before;
         // Every node trembles a little, so that something is worked out.
         let trembling =
             (0..definition.positions.len()).map(|node| 1e-3 * Vec3::new((node as f32).sin(), 0.5, (node as f32).cos()));
@@ -465,7 +441,7 @@ fn main() -> ExitCode {
     let is_asked =
         |place: usize, name: &str| place < 2 || asked.as_ref().is_none_or(|asked| name.contains(asked.as_str()));
     let mut report = String::from("# The bill\n\n");
-    report.push_str(&alone::report(|| HELD.load(Ordering::Relaxed)));
+    report.push_str(&alone::report(held));
     let drawn = EmbeddingDefinition {
         vertices: &mesh.positions,
         triangles: &surface,

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::header::function_names;
 use crate::support::{Library, installed, root, skip, succeed};
 
 const COMPILERS: [&str; 2] = ["g++", "clang++"];
@@ -38,15 +39,6 @@ fn read(path: &str) -> String {
 fn names(text: &str) -> BTreeSet<&str> {
     text.split(|letter: char| !(letter.is_ascii_alphanumeric() || letter == '_'))
         .filter(|word| word.starts_with("sinew_"))
-        .collect()
-}
-
-/// The functions of the C header.
-fn functions(header: &str) -> BTreeSet<&str> {
-    header
-        .lines()
-        .filter(|line| !line.starts_with([' ', '/', '#']) && !line.starts_with("typedef"))
-        .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
         .collect()
 }
 
@@ -133,7 +125,7 @@ fn nothing_is_lost_or_ended_twice() {
 #[test]
 fn it_is_not_behind_the_c_header() {
     let (c, cpp) = (read("include/sinew/sinew_all.h"), read("include/sinew.hpp"));
-    let (functions, used) = (functions(&c), names(&cpp));
+    let (functions, used): (BTreeSet<&str>, _) = (function_names(&c).collect(), names(&cpp));
     assert!(functions.len() > 100, "the functions are found");
     let left = BTreeSet::from(LEFT_TO_C);
     for function in &functions {

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 
 mod bindings;
 mod layout;
 
+use crate::support::{failure, root, skip};
 use layout::{Header, WIDTH};
 
 /// Headers that most programs need, and the most lines that they may have together.
@@ -23,10 +23,6 @@ const CORE: [&str; 5] = [
 const CORE_LINES: usize = 900;
 const ALL_LINES: usize = 2570;
 const IN_ONE: &str = "sinew/sinew_all.h";
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
 
 /// The declarations of cbindgen. Only `src/capi` is read, so no constant of another module is declared.
 fn declared() -> &'static str {
@@ -164,6 +160,14 @@ fn every_constant_carries_the_prefix() {
     }
 }
 
+/// The name of the function that each declaration begins with in its line.
+pub fn function_names(header: &str) -> impl Iterator<Item = &str> {
+    header
+        .lines()
+        .filter(|line| !line.starts_with([' ', '/', '#']) && !line.starts_with("typedef"))
+        .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
+}
+
 /// The lines of the comment, and the declaration, of every function in a header.
 fn functions(header: &str) -> Vec<(Vec<&str>, &str)> {
     let mut functions = Vec::new();
@@ -284,29 +288,8 @@ fn the_documents_list_every_function_beside_its_counterpart_in_rust() {
             format!("sinew_{name}")
         })
         .collect();
-    let in_modules: Vec<&str> = declared().lines().filter(|line| line.ends_with(");")).collect();
-    let in_modules: Vec<String> = in_modules
-        .into_iter()
-        .filter(|line| !line.starts_with("typedef"))
-        .filter_map(|line| Some(line.split_once('(')?.0.rsplit([' ', '*']).next()?.to_owned()))
-        .collect();
+    let in_modules: Vec<&str> = function_names(declared()).collect();
     assert_eq!(listed, in_modules, "in the order of the modules");
-}
-
-/// A program that is installed, run in a folder of its own; what it says where it fails.
-fn failure(program: &str, arguments: &[&str]) -> Option<String> {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(env!("CARGO_TARGET_TMPDIR"))
-        .output()
-        .expect("a program that is installed runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    (!output.status.success()).then_some(said)
-}
-
-/// Says past the harness's capture, so that it is seen, what was not tested.
-fn skip(what: &str) {
-    let _ = std::io::stderr().write_all(format!("SKIPPED: {what}\n").as_bytes());
 }
 
 #[test]
@@ -328,10 +311,7 @@ fn the_bindings_are_those_of_the_header() {
             path.display()
         );
     }
-    let functions = functions(committed());
-    for (_, declaration) in &functions {
-        let name = declaration.split('(').next().unwrap_or_default();
-        let name = name.rsplit([' ', '*']).next().unwrap_or_default();
+    for name in function_names(committed()) {
         for (path, text) in &bindings {
             assert!(text.contains(&format!("{name}(")), "{name} is not in {path}");
         }
@@ -350,8 +330,7 @@ fn python_reads_its_declarations() {
         return skip("the declarations for Python: cffi is not installed");
     }
     let path = root().join("bindings/python/sinew_cffi.h");
-    let said = failure("python3", &["-c", program, &path.to_string_lossy()]);
-    assert_eq!(said, None);
+    assert_eq!(failure(Command::new("python3").args(["-c", program]).arg(path)), None);
 }
 
 #[test]
@@ -360,9 +339,9 @@ fn csharp_compiles_its_binding() {
         return skip("the binding for C#: mcs is not installed");
     }
     let path = root().join("bindings/csharp/Sinew.cs");
-    let said = failure(
-        "mcs",
-        &["-unsafe", "-target:library", "-out:Sinew.dll", &path.to_string_lossy()],
-    );
-    assert_eq!(said, None);
+    let mut compiler = Command::new("mcs");
+    compiler
+        .args(["-unsafe", "-target:library", "-out:Sinew.dll"])
+        .arg(path);
+    assert_eq!(failure(compiler.current_dir(env!("CARGO_TARGET_TMPDIR"))), None);
 }

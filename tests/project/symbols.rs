@@ -4,18 +4,8 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
+use super::header::function_names;
 use crate::support::{Library, installed, root, skip, succeed};
-
-/// The functions that the headers declare: every `sinew_...(` that begins a line.
-fn declared() -> BTreeSet<String> {
-    let header = std::fs::read_to_string(root().join("include/sinew/sinew_all.h")).expect("sinew_all.h");
-    header
-        .lines()
-        .filter(|line| !line.starts_with(['#', '/', ' ']) && !line.starts_with("typedef"))
-        .filter_map(|line| line.split_once('(')?.0.rsplit([' ', '*']).next())
-        .map(str::to_owned)
-        .collect()
-}
 
 fn exported() -> BTreeSet<String> {
     let output = succeed(
@@ -35,7 +25,9 @@ fn the_exported_symbols_are_the_headers_functions() {
     if !installed("nm") {
         return skip("the exported symbols: nm is not installed");
     }
-    let (declared, exported) = (declared(), exported());
+    let header = std::fs::read_to_string(root().join("include/sinew/sinew_all.h")).expect("sinew_all.h");
+    let declared: BTreeSet<String> = function_names(&header).map(str::to_owned).collect();
+    let exported = exported();
     assert!(
         declared.contains("sinew_world_step"),
         "the header was read: {declared:?}"
