@@ -229,14 +229,7 @@ fn organs_in_motion_keep_mass_momentum_and_volume_of(count: usize) {
                 let before = kept(&world, body);
                 pieces += world.cut(body, &sweep).unwrap().pieces_parted;
                 let after = kept(&world, body);
-                assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
-                let size = before.momentum.length();
-                assert!(
-                    before.momentum.distance(after.momentum) < 1e-6 * size,
-                    "{what}: momentum"
-                );
-                let off = before.spin.distance(after.spin);
-                assert!(off < 1e-6 * before.spin.length().max(0.1 * size), "{what}: spin {off}");
+                after.check_motion(&before, &what);
                 assert!(
                     (after.energy / before.energy - 1.0).abs() < 1e-6,
                     "{what}: {} {}",

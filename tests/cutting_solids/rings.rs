@@ -391,12 +391,7 @@ fn any_cuts_in_motion_keep_mass_momentum_and_energy() {
                     Err(error) => assert!(matches!(error, Error::Capacity(_)), "{what}: {error}"),
                 }
                 let after = kept(&world, body);
-                assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
-                let size = before.momentum.length();
-                let off = before.momentum.distance(after.momentum);
-                assert!(off < 1e-6 * size, "{what}: momentum {off} of {size}");
-                let off = before.spin.distance(after.spin);
-                assert!(off < 1e-6 * before.spin.length().max(0.1 * size), "{what}: spin {off}");
+                after.check_motion(&before, &what);
                 let gained = after.energy / before.energy - 1.0;
                 assert!(gained.abs() < 1e-6, "{what}: {gained} of the energy after {cuts} cuts");
             }

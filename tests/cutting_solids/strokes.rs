@@ -81,13 +81,7 @@ fn cuts_that_meet_in_motion_keep_mass_momentum_and_volume() {
                         let report = world.cut(body, &sweep).unwrap();
                         pieces += report.pieces_parted;
                         let after = kept(&world, body);
-                        assert!((after.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
-                        let size = before.momentum.length();
-                        let off = before.momentum.distance(after.momentum);
-                        assert!(off < 1e-6 * size, "{what}: momentum {off} of {size}");
-                        let off = before.spin.distance(after.spin);
-                        let most = before.spin.length().max(0.1 * size);
-                        assert!(off < 1e-6 * most, "{what}: angular momentum {off} of {most}");
+                        after.check_motion(&before, &what);
                         let gained = (after.energy - before.energy).abs();
                         assert!(gained < 1e-6 * before.energy, "{what}: energy {gained}");
                         let it = world.body(body).unwrap();

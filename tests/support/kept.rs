@@ -28,6 +28,17 @@ impl Kept {
             self.sizes[1] += mass * place.length() * velocity.length();
         }
     }
+
+    /// Mass, momentum and angular momentum are those of `before`.
+    pub fn check_motion(&self, before: &Self, what: &str) {
+        assert!((self.mass / before.mass - 1.0).abs() < 1e-6, "{what}: mass");
+        let size = before.momentum.length();
+        let off = before.momentum.distance(self.momentum);
+        assert!(off < 1e-6 * size, "{what}: momentum {off} of {size}");
+        let most = before.spin.length().max(0.1 * size);
+        let off = before.spin.distance(self.spin);
+        assert!(off < 1e-6 * most, "{what}: angular momentum {off} of {most}");
+    }
 }
 
 /// Without gravity.
