@@ -1,6 +1,7 @@
 //! Nodes that a tool holds: where they are, what holds them, and when they slip.
 
 use crate::support::hanging::nodes_at;
+use crate::support::scene::{SOLVERS, STORAGES};
 use crate::support::tissue::*;
 use glam::{DQuat, DVec3, Quat, Vec3};
 use sinew::mesh::Mesh;
@@ -11,13 +12,6 @@ use sinew::{
 
 const GRAVITY: Vec3 = Vec3::new(1.0, -9.81, 0.5);
 const HANG: f64 = 9.81;
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
 const SIZE: Vec3 = Vec3::new(0.08, 0.04, 0.08);
 /// Where the tool is at first.
 const GRIP: Vec3 = Vec3::new(0.01, 0.035, -0.015);

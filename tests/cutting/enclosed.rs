@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{BodyDefinition, Values, World, WorldDefinition};
 
-use super::motion::SOLVERS;
 use crate::support::kept::kept;
+use crate::support::scene::SOLVERS;
 use crate::support::solid::octahedral_ball;
 
 #[test]

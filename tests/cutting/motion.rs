@@ -7,15 +7,7 @@ use sinew::{Body, BodyDefinition, BodyId, Solver, Storage, Values, World, WorldD
 use super::sheet::unstructured;
 use crate::support::kept::kept;
 use crate::support::random::Random;
-
-const STORAGES: [Storage; 4] = [
-    Storage::Packed,
-    Storage::Efficient,
-    Storage::FastLink,
-    Storage::DynamicBulk,
-];
-
-pub const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
+use crate::support::scene::{SOLVERS, STORAGES};
 
 /// An unstructured sheet of `n` x `n` cells of 1 cm, 1 kg/m², springs of 50 N/m, in flight without gravity, spinning and swinging.
 fn in_flight(n: usize, solver: Solver, storage: Storage, damping: f32) -> (World, BodyId) {

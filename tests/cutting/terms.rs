@@ -4,9 +4,10 @@ use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{Body, BodyDefinition, Solver, SpringLaw, Storage, Values, Viscosity, World, WorldDefinition, Yielding};
 
-use super::motion::{SOLVERS, across, in_flight_with};
+use super::motion::{across, in_flight_with};
 use super::sheet::grid;
 use crate::support::kept::kept;
+use crate::support::scene::SOLVERS;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Beside {

@@ -5,8 +5,8 @@ use sinew::cutting::Sweep;
 use sinew::{BodyDefinition, Material, Model, Values, World, WorldDefinition};
 
 use super::block::{shaken, upright};
-use super::motion::SOLVERS;
 use crate::support::kept::kept;
+use crate::support::scene::SOLVERS;
 
 #[test]
 fn a_hollow_block_keeps_its_pressure_until_it_is_reached() {

@@ -13,6 +13,7 @@ use sinew::{
 use super::block::{Mesh, shaken, upright};
 use crate::support::kept::kept;
 use crate::support::random::Random;
+use crate::support::scene::SOLVERS;
 
 /// What a body is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,8 +42,6 @@ const MATTER: [Matter; 9] = [
     Matter::NeoHookean,
     Matter::MooneyRivlinRings,
 ];
-
-pub const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 /// Sides of 6, 5 and 4 cm.
 pub fn mesh() -> Mesh {

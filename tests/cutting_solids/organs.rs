@@ -10,9 +10,10 @@ use sinew::mesh::{Mesh as Loaded, MeshFormat};
 use sinew::{BodyDefinition, Material, Model, Solver, Storage, Values, World, WorldDefinition};
 
 use super::block::{Body, Mesh, flat, snap};
-use super::motion::{SOLVERS, enclosed};
+use super::motion::enclosed;
 use crate::support::kept::kept;
 use crate::support::random::Random;
+use crate::support::scene::SOLVERS;
 
 /// Real meshes, said aloud where they are missing, and one that always is there; each 10 long about the origin.
 fn organs() -> Vec<(String, Mesh)> {

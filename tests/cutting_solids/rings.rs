@@ -11,9 +11,10 @@ use sinew::{
 };
 
 use super::block::{shaken, upright};
-use super::motion::{CUTS, Matter, SOLVERS, edge, enclosed, in_flight, mesh};
+use super::motion::{CUTS, Matter, edge, enclosed, in_flight, mesh};
 use crate::support::kept::kept;
 use crate::support::random::Random;
+use crate::support::scene::SOLVERS;
 
 #[derive(Clone, Copy)]
 struct Tissue {

@@ -4,8 +4,9 @@ use glam::{DVec3, Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{BladeDefinition, Body, BodyId, Error, Solver, Storage, World};
 
-use super::motion::{Matter, SOLVERS, edge, enclosed, in_flight};
+use super::motion::{Matter, edge, enclosed, in_flight};
 use crate::support::kept::kept;
+use crate::support::scene::SOLVERS;
 
 const THROUGH: [f32; 2] = [-0.02, 0.06];
 

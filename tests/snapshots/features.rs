@@ -1,5 +1,6 @@
 //! Each thing that a body may have, in motion, pressed and cut: saved in the middle of it, it goes on to the bit.
 
+use crate::support::scene::SOLVERS;
 use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::mesh::Mesh;
@@ -123,8 +124,6 @@ const OF_SHEETS: [(&str, Change); 9] = [
         };
     }),
 ];
-
-const SOLVERS: [Solver; 3] = [Solver::Verlet, Solver::Implicit, Solver::Newton];
 
 impl Scene {
     /// `None`: what does not go together.
