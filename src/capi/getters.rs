@@ -8,7 +8,7 @@ use super::body::{sinew_body_id, with_body};
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
-use super::tool::sinew_tool_id;
+use super::tool::{put_pose, sinew_tool_id};
 use crate::world::World;
 
 /// 1 where there is a world that has something, else 0.
@@ -311,12 +311,7 @@ pub unsafe extern "C" fn sinew_blade_get_pose(
             let pose = world.blade_pose(blade.id())?;
             let position = memory::optional_output_array("position", position.cast(), 1)?;
             let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
-            if let Some(place) = position {
-                place[0] = pose.position.to_array();
-            }
-            if let Some(place) = orientation {
-                place[0] = pose.orientation.to_array();
-            }
+            put_pose(pose, position, orientation);
             Ok(())
         })
     }

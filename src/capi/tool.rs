@@ -350,12 +350,7 @@ pub unsafe extern "C" fn sinew_tool_get_pose(
             let pose = world.pose(tool.id())?;
             let position = memory::optional_output_array("position", position.cast(), 1)?;
             let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
-            if let Some(place) = position {
-                place[0] = pose.position.to_array();
-            }
-            if let Some(place) = orientation {
-                place[0] = pose.orientation.to_array();
-            }
+            put_pose(pose, position, orientation);
             Ok(())
         })
     }
@@ -381,14 +376,19 @@ pub unsafe extern "C" fn sinew_tool_get_target(
             let pose = world.tool_target(tool.id())?;
             let position = memory::optional_output_array("position", position.cast(), 1)?;
             let orientation = memory::optional_output_array("orientation", orientation.cast(), 1)?;
-            if let Some(place) = position {
-                place[0] = pose.position.to_array();
-            }
-            if let Some(place) = orientation {
-                place[0] = pose.orientation.to_array();
-            }
+            put_pose(pose, position, orientation);
             Ok(())
         })
+    }
+}
+
+/// Writes a pose where it is wanted.
+pub(super) fn put_pose(pose: Pose, position: Option<&mut [[f32; 3]]>, orientation: Option<&mut [[f32; 4]]>) {
+    if let Some(place) = position {
+        place[0] = pose.position.to_array();
+    }
+    if let Some(place) = orientation {
+        place[0] = pose.orientation.to_array();
     }
 }
 
