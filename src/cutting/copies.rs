@@ -2,11 +2,11 @@
 
 use super::changes::{PieceOfCell, PieceOfNode, PieceOfSpring};
 use super::divided::{Divided, NONE, Node};
-use super::pieces::Parting;
+use super::pieces::Copier;
 use super::union::Union;
 use crate::base::{Result, memory};
 
-impl<const N: usize, D: Divided<N>> Parting<'_, N, D> {
+impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
     /// Copies each of the nodes for each set of cells about it that hangs together by their material, but for that in which the material has
     /// a vertex at the node, of several that with the most material.
     pub(super) fn part_nodes(&mut self, nodes: &[u32]) -> Result<()> {

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::changes::Changes;
-use super::pieces::Parting;
+use super::pieces::Copier;
 use super::surface::CutSurface;
 use crate::base::{Error, Result, memory};
 
@@ -182,7 +182,7 @@ impl Cut<'_> {
         self.carve(second, true, positions, &candidates)?;
         self.keep_crumbs()?;
         let cells = self.open()?;
-        Parting {
+        Copier {
             body: &mut *self.surface,
             limits: self.limits,
             changes: &mut self.changes,

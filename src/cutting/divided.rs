@@ -103,9 +103,52 @@ pub(crate) trait Divided<const N: usize> {
     }
 }
 
-/// Implements [`Divided`] for a body that can be cut, with what is particular to it.
+/// What surfaces and solids tell of themselves alike, and [`Divided`] with what is particular to each.
 macro_rules! divided {
     ($body:ident, $corners:literal, $cell:ident { $material:ident }, $simplices:ident, { $($own:tt)* }) => {
+        impl $body {
+            /// How many nodes there are: those of the body, and copies and bound points, which are numbered on.
+            pub fn node_count(&self) -> u32 {
+                self.nodes.count()
+            }
+
+            /// Where a node is in the rest shape.
+            pub fn rest(&self, node: u32) -> Vec3 {
+                self.nodes[node].rest
+            }
+
+            /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
+            pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
+                let (nodes, weights) = self.bonds(vertex);
+                if weights[0] == 1.0 {
+                    return positions[nodes[0] as usize];
+                }
+                weighed((nodes, weights), |node| positions[node as usize]).as_vec3()
+            }
+
+            /// Where a vertex is in the rest shape.
+            pub fn rest_place(&self, vertex: u32) -> DVec3 {
+                weighed(self.bonds(vertex), |node| self.nodes[node].rest)
+            }
+
+            /// The weights of a vertex, by the corners of a cell that it lies in.
+            pub fn weights_in(&self, vertex: u32, cell: u32) -> [f64; $corners] {
+                let (nodes, weights) = self.bonds(vertex);
+                let weight = |node| (0..$corners).filter(|&k| nodes[k] == node).map(|k| weights[k]).sum();
+                self.cells[cell].nodes.map(weight)
+            }
+
+            /// The corners of a triangle, by their numbers among nodes.
+            pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
+                self.triangles[triangle].corners.map(|corner| self.vertices[corner].point)
+            }
+
+            /// Whether two nodes are corners of one cell.
+            pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
+                self.cells_at(a).any(|cell| self.cells[cell].nodes.contains(&b))
+            }
+        }
+
         impl Divided<$corners> for $body {
             $($own)*
 

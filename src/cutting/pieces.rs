@@ -6,14 +6,14 @@ use super::divided::{Cell, Divided, NONE};
 use super::union::Union;
 use crate::base::{Result, memory};
 
-/// What parts cells and nodes once a cut has parted simplices.
-pub(crate) struct Parting<'a, const N: usize, D: Divided<N>> {
+/// Copies cells and nodes whose material a cut has parted.
+pub(crate) struct Copier<'a, const N: usize, D: Divided<N>> {
     pub body: &'a mut D,
     pub limits: Limits,
     pub changes: &'a mut Changes,
 }
 
-impl<const N: usize, D: Divided<N>> Parting<'_, N, D> {
+impl<const N: usize, D: Divided<N>> Copier<'_, N, D> {
     /// Copies each of the cells for each piece of its material but the largest, and then their nodes.
     pub(crate) fn part(&mut self, cells: &[u32]) -> Result<()> {
         let mut nodes = Vec::new();

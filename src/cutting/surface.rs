@@ -185,16 +185,6 @@ impl CutSurface {
         self.vertices.reserve(4 * nodes)
     }
 
-    /// How many nodes there are: those of the body, and copies and bound points, which are numbered on.
-    pub fn node_count(&self) -> u32 {
-        self.nodes.count()
-    }
-
-    /// Where a node is in the rest shape.
-    pub fn rest(&self, node: u32) -> Vec3 {
-        self.nodes[node].rest
-    }
-
     /// The cells; those made by cuts follow the first ones.
     pub fn cells(&self) -> &[SurfaceCell] {
         self.cells.values()
@@ -210,47 +200,16 @@ impl CutSurface {
         self.vertices.values()
     }
 
-    /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
-    pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
-        let (nodes, weights) = self.bonds(vertex);
-        if weights[0] == 1.0 {
-            return positions[nodes[0] as usize];
-        }
-        weighed((nodes, weights), |node| positions[node as usize]).as_vec3()
-    }
-
-    /// Where a vertex is in the rest shape.
-    pub fn rest_place(&self, vertex: u32) -> DVec3 {
-        weighed(self.bonds(vertex), |node| self.nodes[node].rest)
-    }
-
     /// Where a point of a cell, by weights of its corners, is in the rest shape.
     pub(crate) fn rest_place_in(&self, cell: u32, weights: [f64; 3]) -> DVec3 {
         let nodes = self.cells[cell].nodes;
         (0..3).map(|k| weights[k] * self.nodes[nodes[k]].rest.as_dvec3()).sum()
     }
 
-    /// The weights of a vertex, by the corners of a cell that it lies in.
-    pub fn weights_in(&self, vertex: u32, cell: u32) -> [f64; 3] {
-        let vertex = &self.vertices[vertex];
-        self.cells[cell].nodes.map(|node| {
-            (0..3)
-                .filter(|&k| vertex.nodes[k] == node)
-                .map(|k| vertex.weights[k])
-                .sum()
-        })
-    }
-
     /// How much of its cell, if that were whole, a triangle covers.
     pub fn part_of_cell(&self, triangle: u32) -> f64 {
         let SurfaceTriangle { corners, cell, .. } = self.triangles[triangle];
         turn(corners.map(|corner| self.weights_in(corner, cell)))
-    }
-
-    /// The corners of a triangle, by their numbers among nodes.
-    pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
-        let corners = self.triangles[triangle].corners;
-        corners.map(|corner| self.vertices[corner].point)
     }
 
     /// How many pieces what is drawn has fallen into, found by going through all.
@@ -261,11 +220,6 @@ impl CutSurface {
     /// A third of the material of the cells at a node, m².
     pub fn area_at(&self, node: u32) -> f64 {
         self.cells_at(node).map(|cell| self.cells[cell].area / 3.0).sum()
-    }
-
-    /// Whether two nodes are corners of one cell.
-    pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
-        self.cells_at(a).any(|cell| self.cells[cell].nodes.contains(&b))
     }
 
     /// The area of a triangle in the rest shape.

@@ -184,16 +184,6 @@ impl CutSolid {
         self.vertices.reserve(4 * nodes)
     }
 
-    /// How many nodes there are: those of the body, and copies and bound points, which are numbered on.
-    pub fn node_count(&self) -> u32 {
-        self.nodes.count()
-    }
-
-    /// Where a node is in the rest shape.
-    pub fn rest(&self, node: u32) -> Vec3 {
-        self.nodes[node].rest
-    }
-
     /// The cells; those made by cuts follow the first ones.
     pub fn cells(&self) -> &[SolidCell] {
         self.cells.values()
@@ -214,50 +204,14 @@ impl CutSolid {
         self.vertices.values()
     }
 
-    /// Where a vertex is if nodes are at `positions`, rounded to `f32`, so that differences of places are exact in `f64`.
-    pub fn place(&self, vertex: u32, positions: &[Vec3]) -> Vec3 {
-        let (nodes, weights) = self.bonds(vertex);
-        if weights[0] == 1.0 {
-            return positions[nodes[0] as usize];
-        }
-        weighed((nodes, weights), |node| positions[node as usize]).as_vec3()
-    }
-
-    /// Where a vertex is in the rest shape.
-    pub fn rest_place(&self, vertex: u32) -> DVec3 {
-        weighed(self.bonds(vertex), |node| self.nodes[node].rest)
-    }
-
-    /// The weights of a vertex, by the corners of a cell that it lies in.
-    pub fn weights_in(&self, vertex: u32, cell: u32) -> [f64; 4] {
-        let vertex = &self.vertices[vertex];
-        self.cells[cell].nodes.map(|node| {
-            (0..4)
-                .filter(|&k| vertex.nodes[k] == node)
-                .map(|k| vertex.weights[k])
-                .sum()
-        })
-    }
-
     /// A quarter of the material of the cells at a node, m³.
     pub fn volume_at(&self, node: u32) -> f64 {
         self.cells_at(node).map(|cell| self.cells[cell].volume / 4.0).sum()
     }
 
-    /// Whether two nodes are corners of one cell.
-    pub fn has_edge(&self, [a, b]: [u32; 2]) -> bool {
-        self.cells_at(a).any(|cell| self.cells[cell].nodes.contains(&b))
-    }
-
     /// How many pieces the material has fallen into, found by going through all.
     pub fn piece_count(&self) -> Result<u32> {
         piece_count(self.tetrahedra().iter().map(|tetrahedron| tetrahedron.neighbours))
-    }
-
-    /// The corners of a triangle, by their numbers among nodes.
-    pub fn corner_points(&self, triangle: u32) -> [u32; 3] {
-        let corners = self.triangles[triangle].corners;
-        corners.map(|corner| self.vertices[corner].point)
     }
 
     /// The tetrahedra that fill a cell, in ascending order.

@@ -7,7 +7,7 @@ use super::crossing::Swept;
 use crate::base::{Result, memory};
 use crate::cutting::changes::Changes;
 use crate::cutting::cut::{Limits, Sweep};
-use crate::cutting::pieces::Parting;
+use crate::cutting::pieces::Copier;
 
 /// A cut that is being made.
 pub(crate) struct Cut<'a> {
@@ -113,7 +113,7 @@ impl<'a> Cut<'a> {
     /// Opens faces that are ready, and what follows from that.
     pub(crate) fn finish(mut self, faces: &[(u32, usize)]) -> Result<Changes> {
         let cells = self.open(faces)?;
-        Parting {
+        Copier {
             body: &mut *self.solid,
             limits: self.limits,
             changes: &mut self.changes,
