@@ -1,12 +1,15 @@
 //! Blades: what they cut, and what that costs whoever moves them.
 #![allow(clippy::unwrap_used)]
 
-use glam::{DVec3, Vec3, vec3};
+use glam::{Vec3, vec3};
 use sinew::cutting::Sweep;
 use sinew::{
     BladeDefinition, BladeId, BodyDefinition, BodyId, CollisionFilter, Error, Pose, Solver, Values, World,
     WorldDefinition,
 };
+
+use crate::support::kept::kept;
+use crate::support::stroke::{Stroke, blade_at};
 
 /// J/m.
 const TOUGHNESS: f32 = 0.02;
@@ -93,74 +96,7 @@ impl Sheet {
 
 /// An upright edge of 4 cm about its own origin.
 fn upright(world: &mut World, stiffness: f32, at: Vec3) -> BladeId {
-    let edge = [vec3(0.0, 0.0, -0.02), vec3(0.0, 0.0, 0.02)];
-    let pose = Pose {
-        position: at,
-        ..Pose::IDENTITY
-    };
-    world
-        .create_blade(&BladeDefinition {
-            stiffness,
-            pose,
-            ..BladeDefinition::new(edge)
-        })
-        .unwrap()
-}
-
-/// What a stroke came to.
-#[derive(Default)]
-struct Stroke {
-    /// The work of the hand by force and displacement of its edge, and as it was reported, J.
-    work: f64,
-    told: f64,
-    /// m.
-    length: f64,
-    /// The force on the blade after each step, N, and how far it was ahead, m.
-    forces: Vec<Vec3>,
-    lags: Vec<f64>,
-    refused: usize,
-}
-
-impl Stroke {
-    /// Moves a blade evenly from a place to another.
-    fn draw(&mut self, world: &mut World, blade: BladeId, [from, to]: [Vec3; 2], steps: usize, dt: f32) {
-        let mut before = from;
-        for step in 1..=steps {
-            let place = from.lerp(to, step as f32 / steps as f32);
-            world.set_blade_pose(blade, place, None).unwrap();
-            world.step(dt).unwrap();
-            let report = world.blade_report(blade).unwrap();
-            self.work -= report.force.as_dvec3().dot((place - before).as_dvec3());
-            self.told += report.work;
-            self.length += report.length;
-            self.forces.push(report.force);
-            self.lags.push(report.lag);
-            self.refused += usize::from(report.refused.is_some());
-            before = place;
-        }
-    }
-
-    fn largest_jump(&self) -> f32 {
-        let jumps = self.forces.windows(2).map(|pair| pair[0].distance(pair[1]));
-        jumps.fold(0.0, f32::max)
-    }
-}
-
-/// The momentum of a body and its angular momentum about the origin.
-fn momentum(world: &World, body: BodyId) -> [DVec3; 2] {
-    let it = world.body(body).unwrap();
-    let mut sums = [DVec3::ZERO; 2];
-    for (node, (place, velocity)) in (0..).zip(it.positions().iter().zip(it.velocities())) {
-        let momentum = f64::from(it.node_mass(node).unwrap()) * velocity.as_dvec3();
-        sums[0] += momentum;
-        sums[1] += place.as_dvec3().cross(momentum);
-    }
-    sums
-}
-
-fn energy(world: &World, body: BodyId) -> f64 {
-    let energy = world.body(body).unwrap().energy(Vec3::ZERO);
-    energy.kinetic + energy.elastic
+    blade_at(world, stiffness, at, [vec3(0.0, 0.0, -0.02), vec3(0.0, 0.0, 0.02)])
 }
 
 /// Whether each corner of the border of a body's surface has one way in and one way out.
@@ -257,36 +193,32 @@ fn a_free_sheet_gets_the_momentum_and_no_more_than_the_work() {
         let (mut world, body) = sheet.world();
         let way = [vec3(-0.01, 0.03, 0.0), vec3(0.09, 0.04, 0.01)];
         let blade = upright(&mut world, 100.0, way[0]);
-        let (mut stroke, mut impulse, mut spin) = (Stroke::default(), DVec3::ZERO, DVec3::ZERO);
+        let mut stroke = Stroke::default();
         let (steps, dt) = (400, 0.5e-3);
         let mut worst = f64::NEG_INFINITY;
         for step in 0..steps {
             let [from, to] = [step, step + 1].map(|step| way[0].lerp(way[1], step as f32 / steps as f32));
             stroke.draw(&mut world, blade, [from, to], 1, dt);
-            let report = world.blade_report(blade).unwrap();
-            let (force, torque) = (report.force.as_dvec3(), report.torque.as_dvec3());
-            impulse -= force * f64::from(dt);
-            spin -= (torque + (0.5 * (from + to)).as_dvec3().cross(force)) * f64::from(dt);
             // What is cut is a little behind what is paid for, so that energy may be owed, never made.
             let spent = f64::from(sheet.toughness) * stroke.length;
             let owed = f64::from(sheet.toughness) * 0.25 * f64::from(SIZE) / sheet.cells as f64;
-            worst = worst.max(spent + energy(&world, body) - stroke.work - owed);
+            worst = worst.max(spent + kept(&world, body).energy - stroke.work - owed);
         }
-        let [linear, angular] = momentum(&world, body);
+        let kept = kept(&world, body);
+        let (linear, angular, impulse, spin) = (kept.momentum, kept.spin, stroke.impulse, stroke.spin);
         let spent = f64::from(sheet.toughness) * stroke.length;
         let shape = format!(
             "{solver:?}: work {:.3e} J = {spent:.3e} cut + {:.3e} kept + {:.1e}; worst {worst:.1e}; momentum {linear:?}, impulse {impulse:?}; {angular:?} {spin:?}",
             stroke.work,
-            energy(&world, body),
-            stroke.work - spent - energy(&world, body),
+            kept.energy,
+            stroke.work - spent - kept.energy,
         );
         assert!(linear.distance(impulse) <= 1e-4 * impulse.length(), "{shape}");
         assert!(angular.distance(spin) <= 1e-2 * spin.length(), "{shape}");
         assert!(worst <= 0.02 * stroke.work, "{shape}");
         assert!(stroke.length > 0.05, "{shape}");
-        let kept = energy(&world, body);
         assert!(
-            stroke.work >= 0.95 * spent + kept && stroke.work <= 1.2 * (spent + kept),
+            stroke.work >= 0.95 * spent + kept.energy && stroke.work <= 1.2 * (spent + kept.energy),
             "{shape}"
         );
     }
@@ -479,13 +411,17 @@ fn whatever_is_asked_of_it_stays_finite_of(is_tried: fn(f32) -> bool) {
                 ..1e-6 => stretched,
                 _ => 0.1,
             };
-            assert!(energy(&world, body) < most, "{shape}: {} J", energy(&world, body));
+            assert!(
+                kept(&world, body).energy < most,
+                "{shape}: {} J",
+                kept(&world, body).energy
+            );
         }
         // Whatever it was given, it comes back, and gains nothing more.
-        let mut before = energy(&world, body).max(0.1);
+        let mut before = kept(&world, body).energy.max(0.1);
         for step in 40..80 {
             world.step(dt).unwrap();
-            let after = energy(&world, body);
+            let after = kept(&world, body).energy;
             assert!(
                 after <= 1.0001 * before,
                 "{mass} kg/m2, {solver:?}: {before} J and {after} J at {step}"

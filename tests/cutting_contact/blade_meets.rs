@@ -3,8 +3,10 @@
 
 use std::f32::consts::PI;
 
+use crate::support::kept::kept;
+use crate::support::stroke::blade_at;
 use glam::{DVec3, Quat, Vec3, vec3};
-use sinew::{BladeDefinition, BladeId, BodyDefinition, BodyId, Pose, Solver, Values, World, WorldDefinition};
+use sinew::{BodyDefinition, BodyId, Solver, Values, World, WorldDefinition};
 
 /// m: a square sheet in the plane z = 0, from the origin, in so many cells a side, of 1 kg/m².
 const SIZE: f32 = 0.1;
@@ -57,31 +59,7 @@ fn sheet(toughness: f32, velocity: Vec3, solver: Solver, is_held: bool) -> (Worl
     (world, body)
 }
 
-fn blade(world: &mut World, edge: [Vec3; 2], at: Vec3) -> BladeId {
-    world
-        .create_blade(&BladeDefinition {
-            stiffness: 500.0,
-            pose: Pose {
-                position: at,
-                ..Pose::IDENTITY
-            },
-            ..BladeDefinition::new(edge)
-        })
-        .unwrap()
-}
-
 const UPRIGHT: [Vec3; 2] = [vec3(0.0, 0.0, -0.02), vec3(0.0, 0.0, 0.02)];
-
-fn momentum(world: &World, body: BodyId) -> DVec3 {
-    let it = world.body(body).unwrap();
-    let of_node = |(node, velocity): (u32, &Vec3)| f64::from(it.node_mass(node).unwrap()) * velocity.as_dvec3();
-    (0..).zip(it.velocities()).map(of_node).sum()
-}
-
-fn energy(world: &World, body: BodyId) -> f64 {
-    let energy = world.body(body).unwrap().energy(Vec3::ZERO);
-    energy.kinetic + energy.elastic
-}
 
 #[test]
 fn tissue_that_moves_onto_a_resting_blade_is_cut() {
@@ -93,9 +71,9 @@ fn tissue_that_moves_onto_a_resting_blade_is_cut() {
         (0.005, Solver::Implicit, 0.5e-3),
     ] {
         let (mut world, body) = sheet(toughness, vec3(-1.0, 0.1, 0.0), solver, false);
-        let knife = blade(&mut world, UPRIGHT, vec3(-0.012, 0.048, 0.0));
+        let knife = blade_at(&mut world, 500.0, vec3(-0.012, 0.048, 0.0), UPRIGHT);
         let (mut length, mut impulse, mut work) = (0.0, DVec3::ZERO, 0.0);
-        let before = (momentum(&world, body), energy(&world, body));
+        let before = kept(&world, body);
         for _ in 0..(0.17 / dt) as usize {
             world.step(dt).unwrap();
             let report = world.blade_report(knife).unwrap();
@@ -104,24 +82,25 @@ fn tissue_that_moves_onto_a_resting_blade_is_cut() {
             impulse -= report.force.as_dvec3() * f64::from(dt);
             work += report.work;
         }
-        let lost = before.1 - energy(&world, body);
-        let gained = momentum(&world, body) - before.0;
+        let after = kept(&world, body);
+        let lost = before.energy - after.energy;
+        let gained = after.momentum - before.momentum;
         let spent = f64::from(toughness) * length;
         let what = format!(
             "{toughness} J/m, {solver:?}, {dt} s: {length} m cut; {lost:.2e} J lost, {spent:.2e} spent, {work:.1e} work; {gained:?}, {impulse:?}"
         );
         assert_eq!(world.body(body).unwrap().pieces().unwrap().count, 2, "{what}");
         assert!((length / 0.1005 - 1.0).abs() < 0.04, "{what}");
-        assert!(gained.distance(impulse) <= 1e-5 * before.0.length(), "{what}");
+        assert!(gained.distance(impulse) <= 1e-5 * before.momentum.length(), "{what}");
         assert!(work.abs() < 1e-9, "{what}");
-        assert!(lost >= 0.95 * spent - 1e-6 * before.1, "{what}");
+        assert!(lost >= 0.95 * spent - 1e-6 * before.energy, "{what}");
     }
 }
 
 #[test]
 fn a_sheet_that_rests_on_a_blade_is_not_cut() {
     let (mut world, body) = sheet(0.0, Vec3::ZERO, Solver::Verlet, false);
-    let knife = blade(&mut world, UPRIGHT, vec3(-0.001, 0.048, 0.0));
+    let knife = blade_at(&mut world, 500.0, vec3(-0.001, 0.048, 0.0), UPRIGHT);
     for _ in 0..20 {
         world.step(1e-3).unwrap();
     }
@@ -146,7 +125,7 @@ fn a_blade_that_turns_far_in_a_step_cuts_an_arc() {
         let count = world.body(body).unwrap().surface().len();
         let (centre, radius) = (vec3(0.051, 0.049, 0.0), 0.03);
         let edge = UPRIGHT.map(|end| end + radius * Vec3::X);
-        let knife = blade(&mut world, edge, centre);
+        let knife = blade_at(&mut world, 500.0, centre, edge);
         let mut length = 0.0;
         for step in 1..=2 {
             let turn = Quat::from_rotation_z(step as f32 * 0.7 * PI);
@@ -197,7 +176,7 @@ fn blades_that_meet_in_one_instant_leave_no_bridge() {
                     let turn = Quat::from_rotation_z(0.5 * PI);
                     [ways[0], ways[1].map(|end| middle + turn * (end - middle))]
                 };
-                let knives = ways.map(|[start, _]| blade(&mut world, UPRIGHT, start));
+                let knives = ways.map(|[start, _]| blade_at(&mut world, 500.0, start, UPRIGHT));
                 for step in 1..=steps {
                     for (&knife, [start, end]) in knives.iter().zip(&ways) {
                         let place = start.lerp(*end, step as f32 / steps as f32);

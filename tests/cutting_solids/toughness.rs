@@ -1,12 +1,11 @@
 //! Blades in solids that resist them: what a stroke costs, and what it gives.
 
-use glam::{DVec3, Vec3, vec3};
-use sinew::{
-    BladeDefinition, BladeId, BodyDefinition, BodyId, Material, Model, Pose, Solver, Values, World, WorldDefinition,
-};
+use glam::{Vec3, vec3};
+use sinew::{BodyDefinition, BodyId, Material, Model, Solver, Values, World, WorldDefinition};
 
 use super::block::{shaken, upright};
 use crate::support::kept::kept;
+use crate::support::stroke::{Stroke, blade_at};
 
 /// J/m².
 const TOUGHNESS: f32 = 2.0;
@@ -110,61 +109,7 @@ impl Block {
 }
 
 /// An edge of 8 cm along z about its own origin, at the level of the block's middle.
-fn blade_at(world: &mut World, stiffness: f32, at: Vec3, edge: [Vec3; 2]) -> BladeId {
-    let pose = Pose {
-        position: at,
-        ..Pose::IDENTITY
-    };
-    world
-        .create_blade(&BladeDefinition {
-            stiffness,
-            pose,
-            ..BladeDefinition::new(edge)
-        })
-        .unwrap()
-}
-
 const THROUGH: [Vec3; 2] = [vec3(0.0, 0.0, -0.04), vec3(0.0, 0.0, 0.04)];
-
-/// What a stroke came to.
-#[derive(Default)]
-struct Stroke {
-    /// The work of the hand by force and displacement, and as it was reported, J.
-    work: f64,
-    told: f64,
-    /// m².
-    area: f64,
-    forces: Vec<Vec3>,
-    refused: usize,
-    impulse: DVec3,
-    spin: DVec3,
-}
-
-impl Stroke {
-    fn draw(&mut self, world: &mut World, blade: BladeId, [from, to]: [Vec3; 2], steps: usize, dt: f32) {
-        let mut before = from;
-        for step in 1..=steps {
-            let place = from.lerp(to, step as f32 / steps as f32);
-            world.set_blade_pose(blade, place, None).unwrap();
-            world.step(dt).unwrap();
-            let report = world.blade_report(blade).unwrap();
-            let (force, torque) = (report.force.as_dvec3(), report.torque.as_dvec3());
-            self.work -= force.dot((place - before).as_dvec3());
-            self.told += report.work;
-            self.area += report.area;
-            self.forces.push(report.force);
-            self.refused += usize::from(report.refused.is_some());
-            self.impulse -= force * f64::from(dt);
-            self.spin -= (torque + (0.5 * (before + place)).as_dvec3().cross(force)) * f64::from(dt);
-            before = place;
-        }
-    }
-
-    fn largest_jump(&self) -> f32 {
-        let jumps = self.forces.windows(2).map(|pair| pair[0].distance(pair[1]));
-        jumps.fold(0.0, f32::max)
-    }
-}
 
 #[test]
 fn the_work_of_a_stroke_is_toughness_times_area() {

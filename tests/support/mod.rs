@@ -16,6 +16,7 @@ pub mod reference;
 pub mod scene;
 pub mod solid;
 pub mod statics;
+pub mod stroke;
 pub mod tissue;
 
 use std::io::Write;
