@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use proc_macro2::{Span, TokenStream, TokenTree};
+
 /// A module, and the modules that it may import; lower ones first, so that no loop can be written.
 type Row<'a> = (&'a str, &'a [&'a str]);
 
@@ -95,89 +97,37 @@ struct Token<'a> {
     line: usize,
 }
 
-/// The length of the string literal, with its quotes, that `text` begins with.
-fn string_length(text: &str) -> usize {
-    let mut escaped = false;
-    for (place, letter) in text.char_indices().skip(1) {
-        match letter {
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            '"' => return place + 1,
-            _ => {}
-        }
-    }
-    text.len()
-}
-
-/// The length of the raw string literal that `text` begins with, if there is one, from its first `#` or quote on.
-fn raw_string_length(text: &str) -> Option<usize> {
-    let hashes = text.len() - text.trim_start_matches('#').len();
-    let inner = text[hashes..].strip_prefix('"')?;
-    let end = format!("\"{}", &text[..hashes]);
-    Some(hashes + 1 + inner.find(&end).expect("raw strings end") + end.len())
-}
-
-/// The length of the block comment that `text` begins with.
-fn comment_length(text: &str) -> usize {
-    let mut depth = 0;
-    for (place, _) in text.char_indices() {
-        if text[place..].starts_with("/*") {
-            depth += 1;
-        } else if text[..place].ends_with("*/") && place > 3 {
-            depth -= 1;
-            if depth == 0 {
-                return place;
-            }
-        }
-    }
-    text.len()
-}
-
 /// The tokens of Rust text, without comments, strings and characters.
 fn tokens(text: &str) -> Vec<Token<'_>> {
     let mut tokens = Vec::new();
-    let (mut place, mut line) = (0, 1);
-    while let Some(first) = text[place..].chars().next() {
-        let rest = &text[place..];
-        let word = rest.len()
-            - rest
-                .trim_start_matches(|letter: char| letter.is_alphanumeric() || letter == '_')
-                .len();
-        let (length, is_token) = if rest.starts_with("//") {
-            (rest.find('\n').unwrap_or(rest.len()), false)
-        } else if rest.starts_with("/*") {
-            (comment_length(rest), false)
-        } else if first == '"' {
-            (string_length(rest), false)
-        } else if first == '\'' {
-            // A lifetime has no second quote behind its first letter.
-            let character = &rest[1..];
-            let letter = character.chars().next().map_or(0, char::len_utf8);
-            let closed = match character.strip_prefix('\\') {
-                Some(escape) => escape[1..].find('\'').map(|end| end + 4),
-                None => character[letter..].starts_with('\'').then_some(letter + 2),
-            };
-            (closed.unwrap_or(1), false)
-        } else if let Some(raw) = matches!(&rest[..word], "r" | "br" | "cr")
-            .then(|| raw_string_length(&rest[word..]))
-            .flatten()
-        {
-            (word + raw, false)
-        } else if word > 0 {
-            (word, true)
-        } else if rest.starts_with("::") {
-            (2, true)
-        } else {
-            (first.len_utf8(), !first.is_whitespace())
-        };
-        if is_token {
-            let text = &rest[..length];
-            tokens.push(Token { text, line });
-        }
-        line += rest[..length].matches('\n').count();
-        place += length;
-    }
+    add_tokens(text.parse().expect("Rust text"), text, &mut tokens);
     tokens
+}
+
+fn add_tokens<'a>(stream: TokenStream, text: &'a str, tokens: &mut Vec<Token<'a>>) {
+    let token = |span: Span| Token {
+        text: &text[span.byte_range()],
+        line: span.start().line,
+    };
+    let mut trees = stream.into_iter().peekable();
+    while let Some(tree) = trees.next() {
+        match tree {
+            TokenTree::Group(group) => {
+                tokens.push(token(group.span_open()));
+                add_tokens(group.stream(), text, tokens);
+                tokens.push(token(group.span_close()));
+            }
+            TokenTree::Punct(_) if text[tree.span().byte_range().start..].starts_with("::") => {
+                trees.next();
+                tokens.push(Token {
+                    text: "::",
+                    ..token(tree.span())
+                });
+            }
+            TokenTree::Ident(_) | TokenTree::Punct(_) => tokens.push(token(tree.span())),
+            TokenTree::Literal(_) => {}
+        }
+    }
 }
 
 /// Removes the items marked `#[cfg(test)]`; returns the names of the modules among them that are files.
