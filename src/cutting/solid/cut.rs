@@ -39,8 +39,9 @@ impl CutSolid {
     ///
     /// # Errors
     ///
-    /// [`Error::InvalidArgument`] if there is not one position for each node, if one that is needed or the blade is not finite, or if a
-    /// candidate is unknown; [`Error::Capacity`] beyond the limits; [`Error::OutOfMemory`]. Then nothing has changed.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): there is not one position for each node, one that is needed or the blade is
+    /// not finite, or a candidate is unknown. [`Error::Capacity`](crate::Error::Capacity) beyond the limits.
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory). Then nothing has changed.
     pub fn cut(&mut self, sweep: &Sweep, positions: &[Vec3], candidates: &[u32], limits: Limits) -> Result<Changes> {
         let items = ("cells", self.cells.count());
         sweep.check(positions, self.node_count(), candidates, items, |cell| {
