@@ -605,6 +605,7 @@ impl World {
         }
         if let Some(tissue) = &self.tissue {
             tissue.bonds.hash(&mut hasher);
+            tissue.pushes.hash(&mut hasher);
         }
         for (place, blade) in self.blades.iter() {
             hasher.write_u64(place as u64);

@@ -38,6 +38,7 @@ pub(crate) struct Together<'a> {
 impl Together<'_> {
     /// Takes the step of all islands without making it current.
     pub fn attempt(&mut self, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+        self.tissue.pushes.begin();
         for island in 0..self.tissue.islands.count() {
             if self.tissue.is_asleep(island, bodies) {
                 for &place in self.tissue.islands.members(island) {
@@ -93,6 +94,7 @@ impl Together<'_> {
             }
         }
         self.tissue.bonds.unload(bodies);
+        let mut is_whole = is_taken;
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
             let (Some(walk), Some(body)) = (self.walks[place].take(), bodies.at(place)) else {
@@ -110,6 +112,10 @@ impl Together<'_> {
                     error: 0.0,
                 }
             });
+            is_whole &= matches!(outcomes[place], Some(Outcome::Done { .. }));
+        }
+        if is_whole {
+            self.tissue.end_island();
         }
     }
 

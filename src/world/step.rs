@@ -310,6 +310,7 @@ impl World {
         } = self;
         if let Some(tissue) = tissue {
             tissue.bonds.commit(outcomes, dt);
+            tissue.pushes.commit();
             let took = |place: usize| matches!(outcomes.get(place), Some(Some(Outcome::Done { .. })));
             rest_islands(tissue, bodies, took);
         }

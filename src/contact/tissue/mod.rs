@@ -32,7 +32,8 @@ use self::link::Side;
 use self::pairs::Pairs;
 use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
-use self::warm_start::{Pushes, give_again};
+pub(crate) use self::warm_start::Pushes;
+use self::warm_start::give_again;
 use glam::{DVec3, Vec3};
 
 use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
@@ -51,6 +52,11 @@ const EFFORT: Effort = Effort {
     sweeps: 32,
     converged: 1e-3,
 };
+
+/// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
+/// Between bodies that are attached it is that alone: about a suture surfaces come closer than they may, and several contacts would contradict
+/// each other.
+const EDGES: usize = 4;
 
 /// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
 const LEAST_THICKNESS: f32 = 1e-3;
@@ -107,8 +113,8 @@ pub(crate) struct Tissue {
     links: Vec<Link>,
     /// The contacts of earlier searches in the order of their sides.
     known: Vec<u32>,
-    /// What contacts gave in the last substep.
-    pushes: Pushes,
+    /// What contacts gave before.
+    pub pushes: Pushes,
     /// What bodies are near each other with.
     pairs: Pairs,
     /// Bodies that fell asleep together.
@@ -206,6 +212,7 @@ impl Tissue {
     /// A body meets no tissue any more; what is attached of it stays so.
     pub fn shed(&mut self, place: usize) {
         self.entangled.leave(place);
+        self.pushes.leave(place);
         if let Some(skin) = self.skins.get_mut(place) {
             *skin = None;
         }
@@ -413,7 +420,10 @@ impl Tissue {
     pub fn meet(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
         let watch = Stopwatch::start(moment.profile);
         if moment.begins {
-            self.pushes.forget();
+            let members = self.islands.members(island);
+            // Attached points are drawn together where contacts part them: what these gave would grow from step to step.
+            let are_attached = members.iter().any(|&place| self.bonds.concern(place as usize));
+            self.pushes.begin_island(members, !are_attached);
             self.pairs.forget();
         } else {
             self.pushes.keep(&self.links);
@@ -481,6 +491,12 @@ impl Tissue {
                 }
             }
         }
+    }
+
+    /// The bodies of an island have ended their step, of which this was the last moment.
+    pub fn end_island(&mut self) {
+        self.pushes.keep(&self.links);
+        self.pushes.end_island();
     }
 
     /// Has VERLET bodies that press implicit ones be seen as fast as they are now, before their last half kick: nothing stops that.
@@ -578,6 +594,7 @@ impl Tissue {
                 skins,
                 bonds,
                 islands,
+                pushes,
                 ..
             } = self;
             let members = islands.members(island);
@@ -588,7 +605,7 @@ impl Tissue {
                 });
             }
             has_begun = true;
-            let recalled = give_again(&mut links[known..], skins);
+            let recalled = give_again(&mut links[known..], pushes.most(), skins);
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
             }
@@ -622,7 +639,7 @@ impl Tissue {
         let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
         let mut all = of_one.chain(self.islands.pairs(island));
         all.all(|pair| {
-            let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
+            let search = Self::search((&self.skins, &self.entangled, &self.bonds), pair, bodies, moment);
             search.is_none_or(|search| search.has_foreseen())
         })
     }
@@ -644,7 +661,7 @@ impl Tissue {
 
     /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
     fn search<'a>(
-        (skins, entangled): (&'a [Option<Skin>], &Entangled),
+        (skins, entangled, bonds): (&'a [Option<Skin>], &Entangled, &Bonds),
         [a, b]: [usize; 2],
         bodies: &Slots<Body>,
         moment: &Moment,
@@ -669,13 +686,14 @@ impl Tissue {
             ahead: own.ahead().min(others.ahead()),
             motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
             in_images: a != b && meet_in_images(own, others),
+            most_edges: if bonds.attach([a, b]) { 1 } else { EDGES },
             measures: Measure::Nothing,
         })
     }
 
     /// The same of a pair that is not found in images.
     fn search_by_distance<'a>(
-        skins: (&'a [Option<Skin>], &Entangled),
+        skins: (&'a [Option<Skin>], &Entangled, &Bonds),
         pair: [usize; 2],
         bodies: &Slots<Body>,
         moment: &Moment,
@@ -689,12 +707,13 @@ impl Tissue {
             skins,
             entangled,
             pairs,
+            bonds,
             islands,
             ..
         } = self;
         let mut all = islands.pairs(island).enumerate();
         let holds = all.all(|(number, pair)| {
-            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
+            let search = Self::search_by_distance((skins, entangled, bonds), pair, bodies, moment);
             search.is_none_or(|search| pairs.holds(number, &search))
         });
         if holds {
@@ -708,7 +727,7 @@ impl Tissue {
         if pairs.can_be_found() {
             pairs.begin();
             let added = islands.pairs(island).try_for_each(|pair| {
-                let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
+                let search = Self::search_by_distance((skins, entangled, bonds), pair, bodies, moment);
                 pairs.add(search.as_ref())
             });
             if added.is_none() {
@@ -740,7 +759,7 @@ impl Tissue {
         let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
         let of_two = islands.pairs(island).enumerate();
         for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
-            let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
+            let Some(mut search) = Self::search((skins, entangled, bonds), [a, b], bodies, moment) else {
                 continue;
             };
             if again && search.has_foreseen() {

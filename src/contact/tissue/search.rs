@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::EDGES;
 use super::clearances::{Clearances, Part};
 use super::link::Side;
 use super::pairs::{Known, Near};
@@ -58,6 +59,8 @@ pub(super) struct Search<'a> {
     pub motion: f32,
     /// Whether they find each other in images.
     pub in_images: bool,
+    /// How many edges of the second an edge of the first meets at most.
+    pub most_edges: usize,
     pub measures: Measure,
 }
 
@@ -302,7 +305,8 @@ impl Search<'_> {
         let near = Bounds::of(segment.ends.into_iter()).extended(far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
-        let mut closest: Option<Met<[u32; 2]>> = None;
+        let mut all: [Option<Met<[u32; 2]>>; EDGES] = [None; EDGES];
+        let touched = &mut all[..self.most_edges];
         let mut see_edges = |edges: [u32; 3]| {
             let mut least = f32::INFINITY;
             for (other, pierces) in second.skin.edges_of(edges) {
@@ -335,8 +339,13 @@ impl Search<'_> {
                 };
                 // At an end of either it is a node that meets.
                 let order = (is_ahead, start, other);
-                if found.is_across() && closest.is_none_or(|(known, least, edge, _)| order < (known, least, edge)) {
-                    closest = Some((is_ahead, start, other, (found, clearance)));
+                let is_closer = |(known, least, edge, _): Met<[u32; 2]>| order < (known, least, edge);
+                if found.is_across()
+                    && touched.iter().flatten().all(|(_, _, edge, _)| *edge != other)
+                    && let Some(place) = touched.iter().position(|known| known.is_none_or(is_closer))
+                {
+                    touched[place..].rotate_right(1);
+                    touched[place] = Some((is_ahead, start, other, (found, clearance)));
                 }
             }
             least
@@ -373,7 +382,7 @@ impl Search<'_> {
             }
         }
         self.measure(kept, Part::Edge(index), nearest);
-        if let Some((_, _, other, (found, clearance))) = closest {
+        for (_, _, other, (found, clearance)) in all.into_iter().flatten() {
             let sides = [
                 Side {
                     body: first.place,

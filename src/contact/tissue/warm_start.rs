@@ -1,5 +1,5 @@
-//! Contacts begin a substep with the impulses of the one before (warm starting, Catto 2005): what rests on something is pressed as it was, and few
-//! sweeps correct that.
+//! Contacts begin a substep with the impulses of the one before, and a step with those that the last one ended with (warm starting, Catto 2005):
+//! what rests on something is pressed as it was, and few sweeps correct that.
 //!
 //! Impulses that no longer fit could add energy. So a substep takes as much of them as lowers the dual energy most, which is a quadratic of that
 //! share. It takes none where any would raise it, and kinetic energy never grows.
@@ -8,12 +8,19 @@ use glam::Vec3;
 
 use super::link::{Key, Link};
 use super::skin::Skin;
-use crate::base::{Result, memory};
+use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
+
+/// A substep takes so many times as much as the first of a step gave, at most: a step of VERLET begins with half a kick. Later ones take no more than
+/// the one before: where contacts push against each other, impulses would grow without end.
+const AFTER_FIRST: f32 = 2.0;
+
+/// One of so many contacts that there is room for presses at most; what others gave is not recalled.
+const PRESSING: usize = 3;
 
 /// What a contact gave in the last substep, N s.
 #[derive(Clone, Copy, Debug)]
-struct Push {
+pub(super) struct Push {
     key: Key,
     impulse: f32,
     friction: Vec3,
@@ -21,29 +28,61 @@ struct Push {
 
 saved!(Push { key, impulse, friction });
 
-/// The impulses of the last substep of the same step and island, in the order of their sides.
+/// The impulses of earlier substeps, in the order of their sides.
 #[derive(Debug, Default)]
-pub(super) struct Pushes(Vec<Push>);
+pub(crate) struct Pushes {
+    /// Those of the last substep of the island whose turn it is.
+    last: Vec<Push>,
+    /// Those that the last step ended with.
+    settled: Vec<Push>,
+    /// Those that the step in progress ends with, of islands that have taken it.
+    next: Vec<Push>,
+    /// How many substeps of its step that island has taken, and whether it goes on with what the last step gave.
+    substeps: u32,
+    recalls: bool,
+}
 
-saved!(Pushes { 0 });
+saved!(Pushes {
+    last,
+    settled,
+    next,
+    substeps,
+    recalls
+});
 
 impl Pushes {
-    /// Makes room for so many.
-    pub fn reserve(&mut self, count: usize) -> Result<()> {
-        memory::reserve(&mut self.0, count)
+    /// Makes room for those of so many contacts, of which few press at once.
+    pub(super) fn reserve(&mut self, contacts: usize) -> Result<()> {
+        let count = contacts / PRESSING;
+        let mut all = [&mut self.last, &mut self.settled, &mut self.next].into_iter();
+        all.try_for_each(|pushes| memory::reserve(pushes, count))
     }
 
-    /// A step or an island begins.
-    pub fn forget(&mut self) {
-        self.0.clear();
+    /// A step begins, or is begun again.
+    pub fn begin(&mut self) {
+        self.next.clear();
     }
 
-    /// Takes up what contacts have given, as far as there is room.
-    pub fn keep(&mut self, links: &[Link]) {
-        self.0.clear();
-        let room = self.0.capacity();
+    /// The bodies at these places begin a step, with what the last one ended with if that is to be recalled.
+    pub(super) fn begin_island(&mut self, members: &[u32], recalls: bool) {
+        self.last.clear();
+        (self.substeps, self.recalls) = (0, recalls);
+        for &place in members.iter().filter(|_| recalls) {
+            let first = self.settled.partition_point(|push| push.key[0].0 < place as usize);
+            let of_body = self.settled[first..].iter();
+            self.last
+                .extend(of_body.take_while(|push| push.key[0].0 == place as usize));
+        }
+        self.last.sort_unstable_by_key(|push| push.key);
+    }
+
+    /// Takes up what contacts of a substep have given, as far as there is room.
+    pub(super) fn keep(&mut self, links: &[Link]) {
+        self.substeps = self.substeps.saturating_add(1);
+        self.last.clear();
+        let room = self.last.capacity();
         let pressing = links.iter().filter(|link| link.presses()).take(room);
-        self.0.extend(pressing.map(|link| {
+        self.last.extend(pressing.map(|link| {
             let (impulse, friction) = link.impulses();
             Push {
                 key: link.key(),
@@ -51,20 +90,57 @@ impl Pushes {
                 friction,
             }
         }));
-        self.0.sort_unstable_by_key(|push| push.key);
+        self.last.sort_unstable_by_key(|push| push.key);
+    }
+
+    /// The island whose turn it is has ended its step.
+    pub(super) fn end_island(&mut self) {
+        let room = self.next.capacity() - self.next.len();
+        self.next.extend(self.last.iter().take(room));
+    }
+
+    /// The step is taken.
+    pub fn commit(&mut self) {
+        std::mem::swap(&mut self.settled, &mut self.next);
+        self.settled.sort_unstable_by_key(|push| push.key);
+        self.next.clear();
+    }
+
+    /// How many times as much as the last substep this one takes at most.
+    pub(super) fn most(&self) -> f32 {
+        if self.recalls && self.substeps == 1 {
+            AFTER_FIRST
+        } else {
+            1.0
+        }
+    }
+
+    /// A body is gone.
+    pub(super) fn leave(&mut self, place: usize) {
+        self.settled.retain(|push| push.key.iter().all(|side| side.0 != place));
     }
 
     /// Has a new contact recall what it gave.
-    pub fn recall(&self, link: &mut Link) {
+    pub(super) fn recall(&self, link: &mut Link) {
         let key = link.key();
-        if let Ok(place) = self.0.binary_search_by_key(&key, |push| push.key) {
-            link.recall(self.0[place].impulse, self.0[place].friction);
+        if let Ok(place) = self.last.binary_search_by_key(&key, |push| push.key) {
+            link.recall(self.last[place].impulse, self.last[place].friction);
+        }
+    }
+
+    pub fn hash(&self, hasher: &mut StateHasher) {
+        for push in &self.settled {
+            for (body, nodes) in push.key {
+                hasher.write_u64(body as u64);
+                nodes.into_iter().for_each(|node| hasher.write_u64(u64::from(node)));
+            }
+            hasher.write_floats(&[push.impulse, push.friction.x, push.friction.y, push.friction.z]);
         }
     }
 }
 
-/// Gives nodes what new contacts recall, or the best share of it: the fastest that one makes its sides by that, m/s.
-pub(super) fn give_again(links: &mut [Link], skins: &mut [Option<Skin>]) -> f32 {
+/// Gives nodes what new contacts recall, or the best share of it up to `most`: the fastest that one makes its sides by that, m/s.
+pub(super) fn give_again(links: &mut [Link], most: f32, skins: &mut [Option<Skin>]) -> f32 {
     let pressing = |links: &[Link]| links.iter().any(Link::presses);
     if !pressing(links) {
         return 0.0;
@@ -78,7 +154,7 @@ pub(super) fn give_again(links: &mut [Link], skins: &mut [Option<Skin>]) -> f32 
     let [after, _] = works(links, skins);
     let (slope, curvature) = (before - allowed, after - before);
     let share = if curvature > 0.0 {
-        (-slope / curvature).clamp(0.0, 1.0)
+        (-slope / curvature).clamp(0.0, most)
     } else {
         0.0
     };
