@@ -347,7 +347,12 @@ fn run_stably(
                 _ => break,
             }
         }
-        let need = Need::new(body, request, start, guess * stable_substep, guess * beside_springs);
+        let known_substeps = known.substeps;
+        let need = if guess < 1.0 {
+            Need::new(body, request, start, guess * stable_substep, guess * beside_springs)
+        } else {
+            known
+        };
         let is_last = need.substeps >= request.max_substeps || attempt >= ATTEMPTS && guess == 1.0;
         (attempt, was_tried) = (attempt + 1, true);
         let substeps = need.substeps.min(request.max_substeps);
@@ -364,7 +369,7 @@ fn run_stably(
         ) {
             Ok(mut taken) => {
                 // A guess says nothing of what the next steps need.
-                taken.carry.pace = start.pace.after(known.substeps, request.dt);
+                taken.carry.pace = start.pace.after(known_substeps, request.dt);
                 return Ok((substeps, taken));
             }
             Err(found) => {

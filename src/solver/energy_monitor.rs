@@ -27,7 +27,7 @@ use crate::base::StateHasher;
 use crate::body::{Body, Inertia};
 use crate::codec::saved;
 use crate::simd::Loops;
-use crate::soa::{TILE, tile_count, tile_nodes};
+use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
 use crate::solver::write_records;
 use crate::threads::{Items, Team};
 
@@ -539,7 +539,6 @@ fn close(body: &mut Body, carry: &Carry, team: &Team) -> [f64; 2] {
 /// holds keeps its momentum and its angular momentum: it is its deformation that becomes slower.
 /// `at_next`: the nodes are at the next positions.
 pub(super) fn slow_down(body: &mut Body, held: BVec3, energy: f64, at_next: bool) -> f64 {
-    let rigid = RigidMotion::of(body, held, at_next);
     let state = body.state.substep();
     let positions = if at_next {
         &*state.next_positions
@@ -548,6 +547,7 @@ pub(super) fn slow_down(body: &mut Body, held: BVec3, energy: f64, at_next: bool
     };
     let velocities = state.velocities;
     let inverse_masses = &body.inverse_masses;
+    let rigid = RigidMotion::of(positions, velocities, inverse_masses, held);
     let mut own = 0.0;
     for node in (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0) {
         let held = body.pins.partial_axes_of(node as u32);
@@ -574,8 +574,8 @@ pub(super) fn keep_energy(body: &mut Body, account: &mut EnergyAccount) {
     let state = body.state.substep();
     state.velocities.copy_from(state.first_velocities);
     let held = body.held_axes();
-    let rigid = RigidMotion::of(body, held, false);
     let state = body.state.substep();
+    let rigid = RigidMotion::of(state.positions, state.velocities, &body.inverse_masses, held);
     let mut added = 0.0;
     for sliver in body.scaling.iter().flat_map(|scaling| scaling.slivers()) {
         let node = sliver.node as usize;
@@ -597,15 +597,7 @@ struct RigidMotion {
 }
 
 impl RigidMotion {
-    fn of(body: &mut Body, held: BVec3, at_next: bool) -> Self {
-        let inverse_masses = &body.inverse_masses;
-        let state = body.state.substep();
-        let positions = if at_next {
-            &*state.next_positions
-        } else {
-            state.positions
-        };
-        let velocities = &*state.velocities;
+    fn of(positions: &Vectors, velocities: &Vectors, inverse_masses: &[f32], held: BVec3) -> Self {
         let nodes = || (0..inverse_masses.len()).filter(|&node| inverse_masses[node] > 0.0);
         let mass_of = |node: usize| 1.0 / f64::from(inverse_masses[node]);
         let (mut mass, mut moment, mut momentum) = (0.0, DVec3::ZERO, DVec3::ZERO);

@@ -32,8 +32,7 @@ use self::link::Side;
 use self::pairs::Pairs;
 use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
-pub(crate) use self::warm_start::Pushes;
-use self::warm_start::give_again;
+use self::warm_start::{Pushes, give_again};
 use glam::{DVec3, Vec3};
 
 use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
@@ -639,7 +638,7 @@ impl Tissue {
         let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
         let mut all = of_one.chain(self.islands.pairs(island));
         all.all(|pair| {
-            let search = Self::search((&self.skins, &self.entangled, &self.bonds), pair, bodies, moment);
+            let search = Self::search((&self.skins, &self.entangled), pair, bodies, moment);
             search.is_none_or(|search| search.has_foreseen())
         })
     }
@@ -661,7 +660,7 @@ impl Tissue {
 
     /// The search of one of the near pairs of bodies, or of one body, in a substep, if they meet then.
     fn search<'a>(
-        (skins, entangled, bonds): (&'a [Option<Skin>], &Entangled, &Bonds),
+        (skins, entangled): (&'a [Option<Skin>], &Entangled),
         [a, b]: [usize; 2],
         bodies: &Slots<Body>,
         moment: &Moment,
@@ -686,14 +685,14 @@ impl Tissue {
             ahead: own.ahead().min(others.ahead()),
             motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
             in_images: a != b && meet_in_images(own, others),
-            most_edges: if bonds.attach([a, b]) { 1 } else { EDGES },
+            most_edges: EDGES,
             measures: Measure::Nothing,
         })
     }
 
     /// The same of a pair that is not found in images.
     fn search_by_distance<'a>(
-        skins: (&'a [Option<Skin>], &Entangled, &Bonds),
+        skins: (&'a [Option<Skin>], &Entangled),
         pair: [usize; 2],
         bodies: &Slots<Body>,
         moment: &Moment,
@@ -707,13 +706,12 @@ impl Tissue {
             skins,
             entangled,
             pairs,
-            bonds,
             islands,
             ..
         } = self;
         let mut all = islands.pairs(island).enumerate();
         let holds = all.all(|(number, pair)| {
-            let search = Self::search_by_distance((skins, entangled, bonds), pair, bodies, moment);
+            let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
             search.is_none_or(|search| pairs.holds(number, &search))
         });
         if holds {
@@ -727,7 +725,7 @@ impl Tissue {
         if pairs.can_be_found() {
             pairs.begin();
             let added = islands.pairs(island).try_for_each(|pair| {
-                let search = Self::search_by_distance((skins, entangled, bonds), pair, bodies, moment);
+                let search = Self::search_by_distance((skins, entangled), pair, bodies, moment);
                 pairs.add(search.as_ref())
             });
             if added.is_none() {
@@ -759,11 +757,14 @@ impl Tissue {
         let of_one = islands.members(island).iter().map(|&place| (None, [place as usize; 2]));
         let of_two = islands.pairs(island).enumerate();
         for (number, [a, b]) in of_one.chain(of_two.map(|(number, pair)| (Some(number), pair))) {
-            let Some(mut search) = Self::search((skins, entangled, bonds), [a, b], bodies, moment) else {
+            let Some(mut search) = Self::search((skins, entangled), [a, b], bodies, moment) else {
                 continue;
             };
             if again && search.has_foreseen() {
                 continue;
+            }
+            if bonds.attach([a, b]) {
+                search.most_edges = 1;
             }
             let [a, b] = search.parties.map(|party| party.place);
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {

@@ -228,12 +228,7 @@ impl Search<'_> {
                 && let Some((found, is_ahead)) =
                     self.approach(of_faces.skin, ([node; 2], &segment), (&nodes, &corners), start)
             {
-                let order = (is_ahead, distance, triangle);
-                let is_closer = |(is_ahead, least, known, _): Met<usize>| order < (is_ahead, least, known);
-                if let Some(place) = touched.iter().position(|known| known.is_none_or(is_closer)) {
-                    touched[place..].rotate_right(1);
-                    touched[place] = Some((is_ahead, distance, triangle, found));
-                }
+                keep_closest(&mut touched, (is_ahead, distance, triangle, found));
             }
             distance
         });
@@ -338,14 +333,9 @@ impl Search<'_> {
                     continue;
                 };
                 // At an end of either it is a node that meets.
-                let order = (is_ahead, start, other);
-                let is_closer = |(known, least, edge, _): Met<[u32; 2]>| order < (known, least, edge);
-                if found.is_across()
-                    && touched.iter().flatten().all(|(_, _, edge, _)| *edge != other)
-                    && let Some(place) = touched.iter().position(|known| known.is_none_or(is_closer))
-                {
-                    touched[place..].rotate_right(1);
-                    touched[place] = Some((is_ahead, start, other, (found, clearance)));
+                let is_known = touched.iter().flatten().any(|(_, _, edge, _)| *edge == other);
+                if found.is_across() && !is_known {
+                    keep_closest(touched, (is_ahead, start, other, (found, clearance)));
                 }
             }
             least
@@ -490,6 +480,16 @@ fn nearest_of(all: &mut [Near], (moved, reach): (f32, f32), mut see: impl FnMut(
         least = least.min(near.apart - moved);
     }
     least
+}
+
+/// Has what is met be among the closest, if it is one of them: what comes near after what meets.
+fn keep_closest<Feature: Copy + PartialOrd>(closest: &mut [Option<Met<Feature>>], met: Met<Feature>) {
+    let order = |(is_ahead, distance, feature, _): Met<Feature>| (is_ahead, distance, feature);
+    let is_closer = |known: Met<Feature>| order(met) < order(known);
+    if let Some(place) = closest.iter().position(|known| known.is_none_or(is_closer)) {
+        closest[place..].rotate_right(1);
+        closest[place] = Some(met);
+    }
 }
 
 /// How far above a face what is compared with it begins, m; below 0 on its inner side.

@@ -20,7 +20,7 @@ const PRESSING: usize = 3;
 
 /// What a contact gave in the last substep, N s.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Push {
+struct Push {
     key: Key,
     impulse: f32,
     friction: Vec3,
