@@ -18,6 +18,7 @@ mod haptics;
 mod ids;
 pub mod material;
 pub mod mesh;
+mod nodes;
 mod order;
 mod picture;
 mod query;

@@ -4,10 +4,11 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Quat, Vec3};
 
-use super::{Body, Bound, NewNode};
+use super::Body;
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
 use crate::def::{BodyDefinition, Solver, Storage, Values};
 use crate::ids::{BodyId, ToolId};
+use crate::nodes::{Bound, NewNode};
 use crate::springs::Rewiring;
 use crate::world::{World, WorldDefinition};
 

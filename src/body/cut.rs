@@ -1,12 +1,13 @@
 //! A cut: what the blade parted falls apart in everything that a body is moved with.
 
+use super::Body;
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::Cuttable;
-use super::{Body, Bound, NewNode};
 use crate::base::{Error, Result, memory};
 use crate::contact::{Skin, SkinChange, SurfaceChange, SurfaceToBe};
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
+use crate::nodes::{Bound, NewNode};
 use crate::soa::NodeOrder;
 use crate::solver::close_beside;
 use crate::springs::{Change, Rewiring};

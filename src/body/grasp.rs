@@ -8,11 +8,12 @@ use std::fmt::Display;
 
 use glam::{DVec3, Vec3};
 
-use super::{Body, Pin, Pins};
+use super::Body;
 use crate::base::{Error, Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::contact::{Frame, ToolPath};
 use crate::ids::SlotId;
+use crate::nodes::{Pin, Pins};
 use crate::soa::Vectors;
 use crate::solver::close;
 

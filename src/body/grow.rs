@@ -1,20 +1,12 @@
 //! Nodes that come after a body was made, as cuts make them: room for them is made at the door, so that adding one moves nothing.
 
-use super::{Body, Bound};
+use super::Body;
 use crate::base::{Error, Result, memory};
+use crate::nodes::NewNode;
 use crate::soa::{TILE, Vectors, tile_count};
 use crate::solver::{Sums, Survey};
 
 use crate::geometry::Bounds;
-
-/// What a new node is.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum NewNode {
-    /// It moves as this one does, and is damped as it is; it has no mass yet, and is held by nothing.
-    Copy(u32),
-    /// A point that is bound to others.
-    Bound(Bound),
-}
 
 impl Body {
     /// Makes room for so many nodes more than there are.

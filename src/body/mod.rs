@@ -1,7 +1,6 @@
 //! A body: nodes with mass, joined by springs.
 
 mod bearing;
-mod bindings;
 mod blade;
 #[cfg(test)]
 mod bound_tests;
@@ -13,7 +12,6 @@ mod cut_masses;
 mod cut_shares;
 mod cut_springs;
 mod cuttable;
-mod damping;
 mod edit;
 mod energy;
 mod grasp;
@@ -25,7 +23,6 @@ mod order;
 mod origin;
 mod past;
 mod pieces;
-mod pins;
 mod published;
 mod query_tree;
 mod region;
@@ -35,7 +32,6 @@ mod several;
 mod shown;
 mod sleep;
 mod sound;
-mod state;
 mod stretch;
 mod stroke;
 mod surface;
@@ -55,15 +51,12 @@ use crate::def::{
 use crate::geometry::Bounds;
 use crate::simd::ChosenKernel;
 use crate::soa::{Masses, NodeOrder, Rates, Records, Vectors, tile_count, tile_nodes};
-pub(crate) use bindings::{Bindings, Bound};
 pub(crate) use blade::HoldAt;
 pub use change_log::{NewNodeSource, NewRimEdge, TopologyChanges};
 pub(crate) use coarse::CoarseStep;
 pub use cut::CutReport;
 use cuttable::Cuttable;
-pub(crate) use damping::{Inertia, InverseMasses, Mobility, NodeDamping};
 pub(crate) use grasp::{Grasps, Grip, Lapse};
-pub(crate) use grow::NewNode;
 pub(crate) use tear::Torn;
 pub use tune::SpringState;
 
@@ -74,6 +67,7 @@ use crate::elements::{Elements, Law};
 use crate::enclosed::Enclosed;
 use crate::ids::BodyId;
 use crate::material::Made;
+use crate::nodes::{Bindings, NodeDamping, Pins, State};
 use crate::readers::Shown;
 use crate::solver::{
     Carry, EnergyAccount, GravityKicks, Heavier, Implicit, MassScaling, Pace, Stability, Sums, Survey, Watched, close,
@@ -86,11 +80,9 @@ pub(crate) use material_point::MaterialPoint;
 use order::{order_for_springs, order_for_tetrahedra};
 use origin::shift_towards;
 pub use pieces::Pieces;
-pub(crate) use pins::{Pin, Pins};
 use published::Published;
 use query_tree::QueryTree;
 pub(crate) use sleep::Sleeper;
-use state::State;
 pub(crate) use stroke::Stroke;
 use tears::Tears;
 

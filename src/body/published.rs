@@ -5,10 +5,11 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use glam::{DVec3, Vec3};
 
-use super::{Bindings, Body};
+use super::Body;
 use crate::base::{Result, memory};
 use crate::codec::{Reader, Saved, Writer, saved};
 use crate::geometry::Bounds;
+use crate::nodes::Bindings;
 use crate::simd::{Loops, prefetch};
 use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
 use crate::solver::show_closed;

@@ -1,8 +1,9 @@
 //! Settings of a body that change between steps: what keeps off its surface, how much it rubs, damping and sleep.
 
-use super::{Body, NodeDamping};
+use super::Body;
 use crate::base::{Result, memory, not_negative};
 use crate::def::{BodyContact, BodySettings, Sleep};
+use crate::nodes::NodeDamping;
 use crate::soa::tile_count;
 use crate::solver::close;
 

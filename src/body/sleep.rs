@@ -89,6 +89,11 @@ impl Sleeper {
         self.asleep[tile]
     }
 
+    /// Whether each tile sleeps.
+    pub fn asleep(&self) -> &[bool] {
+        &self.asleep
+    }
+
     fn all(&self) -> bool {
         self.asleep_count == self.tiles.len()
     }

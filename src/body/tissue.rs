@@ -3,11 +3,11 @@
 use glam::Vec3;
 
 use super::Body;
-use super::bindings::parts;
 use crate::base::Result;
 use crate::contact::Moment;
 use crate::cutting::CutMaterial;
 use crate::def::CollisionFilter;
+use crate::nodes::parts;
 use crate::solver::close;
 
 impl Body {

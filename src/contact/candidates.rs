@@ -8,10 +8,10 @@ use super::path::{Placement, Solid, ToolPath};
 use super::room::{Room, sides_of};
 use super::sweep::Corners;
 use crate::base::{Result, memory};
-use crate::body::Bindings;
 use crate::codec::{saved, saved_enum};
 use crate::def::CollisionFilter;
 use crate::geometry::Bounds;
+use crate::nodes::Bindings;
 use crate::soa::Vectors;
 
 /// A list that is good for so many substeps more is kept.

@@ -8,8 +8,8 @@ use super::gauge::{Gauge, Meets};
 use super::impulses::{LEVERAGE, pushed_out};
 use super::press::Press;
 use super::supports::{MOST, Supports};
-use crate::body::Mobility;
 use crate::codec::saved;
+use crate::nodes::Mobility;
 use crate::soa::Vectors;
 
 /// A contact over one slice of a substep.

@@ -22,10 +22,10 @@ use super::rigid::RigidMotion;
 use super::supports::{MOST, Supports};
 use super::sweep::Corners;
 use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
-use crate::body::{Bindings, Mobility, Pins};
 use crate::codec::saved;
 use crate::def::{BodyContact, CollisionFilter};
 use crate::geometry::Bounds;
+use crate::nodes::{Bindings, Mobility, Pins};
 use crate::simd::ChosenKernel;
 use crate::soa::Vectors;
 
@@ -1093,7 +1093,7 @@ impl Meeting<'_> {
     /// Whether the slice is the whole of a substep in which every node moves by its mass alone: none is held along some axes, asleep, or bound to others.
     fn is_even(&self, slice: &Slice) -> bool {
         let is_whole = slice.first && slice.duration == self.substep && self.drifts && !self.mobility.half;
-        is_whole && !self.pins.have_partial() && self.mobility.sleeper.is_none() && self.bindings.is_none()
+        is_whole && !self.pins.have_partial() && self.mobility.asleep.is_none() && self.bindings.is_none()
     }
 
     /// The axes along which nodes of a feature are held that are free along others.

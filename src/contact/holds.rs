@@ -16,8 +16,8 @@ use super::gauge::{Gauge, Meets};
 use super::grip::{Grip, Grips, add};
 use super::supports::{MOST, Supports, Ties};
 use crate::base::{Result, StateHasher};
-use crate::body::Bindings;
 use crate::codec::saved;
+use crate::nodes::Bindings;
 
 /// How much stiffer a contact is than its nodes: the more, the faster its multiplier is found, and the worse what lies between.
 const STIFFER: f32 = 3.0;

@@ -9,8 +9,8 @@ use super::candidates::NearestPlane;
 use super::impulses::pushed_out;
 use super::path::Placement;
 use super::sweep::{Segment, TOUCHING};
-use crate::body::NodeDamping;
 use crate::geometry::Bounds;
+use crate::nodes::NodeDamping;
 use crate::simd::Loops;
 
 /// Nodes side by side.

@@ -2,7 +2,7 @@
 //! acts on its nodes.
 
 use super::features::Feature;
-use crate::body::Bindings;
+use crate::nodes::Bindings;
 
 /// So many nodes move a feature at most: the corners of a drawn triangle are bound to nodes of one cell.
 pub(super) const MOST: usize = 4;

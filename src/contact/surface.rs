@@ -2,7 +2,7 @@
 
 use super::contacts::Contacts;
 use crate::base::Result;
-use crate::body::Bindings;
+use crate::nodes::Bindings;
 use crate::soa::Vectors;
 
 /// How a surface changes.

@@ -9,12 +9,14 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use super::gravity::GravityKicks;
+use super::kick::Inertia;
 use super::kick::{Kick, Survey, TileKick, look};
 use crate::base::{Result, memory};
-use crate::body::{Body, Inertia, NodeDamping, Pin};
+use crate::body::Body;
 use crate::codec::saved;
 use crate::elements::Shares;
 use crate::enclosed;
+use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
 use crate::springs::{Motion, Springs, pull};

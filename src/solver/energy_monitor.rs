@@ -22,9 +22,10 @@ use glam::{BVec3, DMat3, DVec3, Vec3};
 
 use super::attempt::{Carry, StepRequest};
 use super::closing::Closed;
+use super::kick::Inertia;
 use super::substep::{Before, Part};
 use crate::base::StateHasher;
-use crate::body::{Body, Inertia};
+use crate::body::Body;
 use crate::codec::saved;
 use crate::simd::Loops;
 use crate::soa::{TILE, Vectors, tile_count, tile_nodes};

@@ -7,12 +7,40 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::mass_scaling::{MassScaling, Sliver};
 use super::subnormal::{on_grid, still_or};
-use crate::body::{Inertia, InverseMasses, NodeDamping};
 use crate::codec::saved;
 use crate::geometry::Bounds;
+use crate::nodes::NodeDamping;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors};
+
+/// The inverse masses of nodes that are free to move, 1/kg.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum InverseMasses<'a> {
+    /// The same for all; for a pinned node too, which something else holds.
+    Uniform(f32),
+    /// 0 where a node is pinned.
+    Each(&'a [f32]),
+}
+
+/// How nodes resist a force.
+#[derive(Clone, Copy)]
+pub(super) struct Inertia<'a> {
+    pub inverse_masses: InverseMasses<'a>,
+    /// The nodes that gravity pulls less than in proportion, in their order.
+    pub heavier: &'a [Sliver],
+}
+
+impl<'a> Inertia<'a> {
+    /// With the inverse mass `uniform` where there is such a one, else with `each`.
+    pub fn of(uniform: Option<f32>, each: &'a [f32], scaling: Option<&'a MassScaling>) -> Self {
+        Self {
+            inverse_masses: uniform.map_or(InverseMasses::Each(each), InverseMasses::Uniform),
+            heavier: scaling.map_or(&[], MassScaling::heavier),
+        }
+    }
+}
 
 /// One kick of a body.
 #[derive(Clone, Copy)]

@@ -11,9 +11,9 @@
 
 use super::attempt::RESERVE as RESERVE_AT_REST;
 use crate::base::{Result, memory};
-use crate::body::NodeDamping;
 use crate::codec::saved;
 use crate::def::Carried;
+use crate::nodes::NodeDamping;
 use crate::springs::Springs;
 
 /// What is left of the substeps where mass is added, at most: for less the motion is not changed.

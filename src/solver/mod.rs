@@ -25,7 +25,7 @@ pub(crate) use gravity::GravityKicks;
 pub(crate) use implicit::Implicit;
 pub(crate) use kick::Survey;
 pub(crate) use lockstep::{Together, Walk};
-pub(crate) use mass_scaling::{Heavier, MassScaling, Sliver};
+pub(crate) use mass_scaling::{Heavier, MassScaling};
 pub(crate) use newton::rest_state;
 pub use newton::{RestStateDefinition, RestStateReport};
 pub(crate) use pace::Pace;

@@ -8,9 +8,11 @@
 use std::array::from_fn;
 
 use super::attempt::StepRequest;
+use super::kick::Inertia;
 use super::kick::Survey;
 use super::substep::{Part, Pass, Written};
-use crate::body::{Body, Inertia, NodeDamping, Pin};
+use crate::body::Body;
+use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, Vectors, View, tile_count, tile_nodes};
 use crate::springs::Springs;

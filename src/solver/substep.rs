@@ -6,10 +6,12 @@ use glam::Vec3;
 
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
+use super::kick::Inertia;
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::{Body, Inertia, NodeDamping, Pin};
+use crate::body::Body;
 use crate::elements::{Elements, Shares};
 use crate::enclosed::{self, Enclosed};
+use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
 use crate::soa::{Records, TileForces, Vectors, View, WriteRecords, tile_count, tile_nodes};
 use crate::springs::{Motion, Springs};

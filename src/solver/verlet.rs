@@ -15,9 +15,10 @@ use super::pipeline::{self, DEEPEST, Plan};
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
 use crate::base::{Stage, Stopwatch};
-use crate::body::{Body, Lapse, Mobility};
+use crate::body::{Body, Lapse, Sleeper};
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
+use crate::nodes::Mobility;
 use crate::threads::Team;
 
 /// The substep asked for is longer than what is stable, or the motion made it so on the way.
@@ -368,7 +369,7 @@ fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: B
             damping: body.damping.as_ref(),
             substep: part.substep,
             half: part.half,
-            sleeper: body.sleeper.as_deref(),
+            asleep: body.sleeper.as_deref().map(Sleeper::asleep),
         },
         positions: state.positions,
         velocities: state.velocities,

@@ -5,10 +5,11 @@ use glam::Vec3;
 use super::skin::{NONE, Skin};
 use super::wound::Wound;
 use crate::base::{Result, memory};
-use crate::body::{Body, Bound, NewNode};
+use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::SurfaceChange;
 use crate::geometry::forest::Later;
+use crate::nodes::{Bound, NewNode};
 use crate::soa::Vectors;
 
 /// An edge that is none.

@@ -8,12 +8,13 @@ use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::base::{Result, memory};
-use crate::body::{Bindings, Body};
+use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment};
 use crate::def::{BodyContact, Detection};
 use crate::geometry::{Bounds, Forest};
 use crate::mesh;
+use crate::nodes::Bindings;
 use crate::soa::Vectors;
 
 /// Where the nodes of a body may go in a step, and the tree of its triangles as the step begins.

@@ -8,10 +8,10 @@ use glam::{BVec3, DMat3, DVec3, Mat3, Vec3};
 
 use super::gradient::add_lanes;
 use crate::base::{Result, StateHasher, memory};
-use crate::body::Pins;
 use crate::codec::saved;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
+use crate::nodes::Pins;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TILE, Vectors};
 use crate::solver::held::without_held;

@@ -9,9 +9,10 @@ use glam::Vec3;
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::base::{Stage, Stopwatch};
-use crate::body::{Body, Mobility};
+use crate::body::Body;
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
+use crate::nodes::Mobility;
 use crate::soa::{Vectors, tile_count, tile_nodes};
 use crate::solver::attempt::StepRequest;
 use crate::solver::kick::look;
@@ -187,7 +188,7 @@ impl Substep<'_> {
                 damping: None,
                 substep: self.step as f32,
                 half: false,
-                sleeper: None,
+                asleep: None,
             },
             positions: state.positions,
             velocities,

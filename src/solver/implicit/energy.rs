@@ -3,11 +3,12 @@
 use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, History, Implicit};
-use crate::body::{Body, Pins};
+use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
+use crate::nodes::Pins;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
 use crate::solver::energy_monitor::slow_down;

@@ -7,9 +7,10 @@ use glam::Vec3;
 
 use super::Implicit;
 use super::coarse::Coarse;
-use crate::body::{Body, Pins};
+use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::Contacts;
+use crate::nodes::Pins;
 use crate::simd::Loops;
 use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
 use crate::springs::{Course, Tangent};

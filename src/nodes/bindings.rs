@@ -46,6 +46,15 @@ impl Bound {
     }
 }
 
+/// What a new node is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum NewNode {
+    /// It moves as this one does, and is damped as it is; it has no mass yet, and is held by nothing.
+    Copy(u32),
+    /// A point that is bound to others.
+    Bound(Bound),
+}
+
 /// The bound points of a body, in the order of their numbers.
 #[derive(Debug, Default)]
 pub(crate) struct Bindings {
@@ -60,7 +69,7 @@ saved!(Bindings { points, places, hidden });
 
 /// The nodes that a number stands for, with their weights: itself where it is not bound, as where nothing is.
 #[inline]
-pub(super) fn parts(bindings: Option<&Bindings>, node: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
+pub(crate) fn parts(bindings: Option<&Bindings>, node: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
     let bound = bindings.and_then(|bindings| bindings.get(node)).copied();
     bound.unwrap_or_else(|| Bound::itself(node)).into_parts()
 }

@@ -3,11 +3,9 @@
 //! Over a time t with a constant force, `v(t) = v e^-s + f t/m (1 - e^-s)/s` with s = gamma t / m. The paper's factor
 //! per step becomes the same decay and the same terminal velocity at every step.
 
-use super::Sleeper;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::soa::TILE;
-use crate::solver::{MassScaling, Sliver};
 
 /// What half a substep does to each node's velocity; kept only by bodies that have node damping.
 #[derive(Debug)]
@@ -86,33 +84,6 @@ impl NodeDamping {
     }
 }
 
-/// The inverse masses of nodes that are free to move, 1/kg.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum InverseMasses<'a> {
-    /// The same for all; for a pinned node too, which something else holds.
-    Uniform(f32),
-    /// 0 where a node is pinned.
-    Each(&'a [f32]),
-}
-
-/// How nodes resist a force.
-#[derive(Clone, Copy)]
-pub(crate) struct Inertia<'a> {
-    pub inverse_masses: InverseMasses<'a>,
-    /// The nodes that gravity pulls less than in proportion, in their order.
-    pub heavier: &'a [Sliver],
-}
-
-impl<'a> Inertia<'a> {
-    /// With the inverse mass `uniform` where there is such a one, else with `each`.
-    pub fn of(uniform: Option<f32>, each: &'a [f32], scaling: Option<&'a MassScaling>) -> Self {
-        Self {
-            inverse_masses: uniform.map_or(InverseMasses::Each(each), InverseMasses::Uniform),
-            heavier: scaling.map_or(&[], MassScaling::heavier),
-        }
-    }
-}
-
 /// How nodes answer an impulse within a kick.
 #[derive(Clone, Copy)]
 pub(crate) struct Mobility<'a> {
@@ -122,8 +93,8 @@ pub(crate) struct Mobility<'a> {
     pub substep: f32,
     /// Whether the kick is half of one.
     pub half: bool,
-    /// What sleeps does not move.
-    pub sleeper: Option<&'a Sleeper>,
+    /// By tile: what sleeps does not move.
+    pub asleep: Option<&'a [bool]>,
 }
 
 impl Mobility<'_> {
@@ -131,7 +102,7 @@ impl Mobility<'_> {
     /// whole kick, so that damping takes of it what it takes of any force.
     #[inline]
     pub fn of(&self, node: usize) -> f32 {
-        if self.sleeper.is_some_and(|sleeper| sleeper.is_asleep(node / TILE)) {
+        if self.asleep.is_some_and(|asleep| asleep[node / TILE]) {
             return 0.0;
         }
         let inverse_mass = self.inverse_masses[node];
