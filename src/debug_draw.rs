@@ -126,13 +126,13 @@ impl World {
 }
 
 fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
-    let Some(sleeper) = body.sleeper.as_deref() else {
+    let Some(sleeper) = body.system.sleeper.as_deref() else {
         return;
     };
     let positions = body.positions();
     let count = body.node_count();
     let sleeps = |node: u32| {
-        let tile = body.own(node) as usize / TILE;
+        let tile = body.system.own(node) as usize / TILE;
         tile < tile_count(count) && sleeper.is_asleep(tile)
     };
     for triangle in body.surface() {
@@ -145,8 +145,9 @@ fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
 fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
     let positions = body.positions();
     for (node, &place) in positions.iter().enumerate() {
-        body.springs.visit(body.own(node as u32) as usize, &mut |link| {
-            let other = body.callers(link.neighbour as usize);
+        let system = &body.system;
+        system.springs.visit(system.own(node as u32) as usize, &mut |link| {
+            let other = system.callers(link.neighbour as usize);
             if other > node && link.rest_length > 0.0 {
                 let strain = place.distance(positions[other]) / link.rest_length - 1.0;
                 canvas.line([place, positions[other]], color_of(strain / full));
@@ -167,8 +168,8 @@ fn color_of(part: f32) -> Rgba {
 }
 
 fn draw_pins(body: &Body, canvas: &mut dyn DebugCanvas) {
-    for pin in body.pins.iter() {
-        let place = body.positions()[body.callers(pin.node as usize)];
+    for pin in body.system.pins.iter() {
+        let place = body.positions()[body.system.callers(pin.node as usize)];
         canvas.point(place, if pin.is_partial() { SLIDING } else { PINNED });
     }
 }

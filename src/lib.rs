@@ -33,6 +33,7 @@ mod springs;
 pub mod strain;
 mod terms;
 mod threads;
+mod tissue;
 mod world;
 
 pub use base::{Error, Result};

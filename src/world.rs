@@ -25,14 +25,15 @@ use glam::{Quat, Vec3};
 
 use crate::base::{Error, Profile, Result, StateHasher, memory, not_negative};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
-use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Skin, Tissue, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::def::{Anchor, BodyDefinition, CollisionFilter, finite_vector};
 use crate::ids::{AttachmentId, BodyId, SlotId, Slots, ToolId};
 use crate::readers::Clock;
 use crate::simd::{ChosenKernel, Kernel};
-use crate::solver::{Outcome, RestStateDefinition, RestStateReport, Walk, rest_state};
+use crate::solver::{Outcome, RestStateDefinition, RestStateReport};
 use crate::threads::{RunTasks, Threads};
+use crate::tissue::{Skin, Tissue, Walk};
 use attachments::{Attachment, Which};
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
@@ -180,7 +181,7 @@ impl World {
     pub fn set_gravity(&mut self, gravity: Vec3) -> Result<()> {
         finite_vector("gravity", gravity)?;
         self.definition.gravity = gravity;
-        self.bodies.iter_mut().for_each(|(_, body)| body.wake());
+        self.bodies.iter_mut().for_each(|(_, body)| body.system.wake());
         Ok(())
     }
 
@@ -201,7 +202,7 @@ impl World {
             },
         };
         let mut body = Body::new(definition, needs)?;
-        if let Some(contacts) = &mut body.contacts {
+        if let Some(contacts) = &mut body.system.contacts {
             contacts.reserve_dynamic(needs.tools, self.dynamic_count())?;
         }
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
@@ -220,12 +221,12 @@ impl World {
     fn join_tissue(&mut self, id: SlotId) -> Result<()> {
         let place = self.bodies.place(id)?;
         let body = self.bodies.get_mut(id)?;
-        if !body.meets_tissue() {
+        if !body.system.meets_tissue() {
             return Ok(());
         }
-        body.reserve_pressed()?;
+        body.system.reserve_pressed()?;
         make_walks(&mut self.walks, place)?;
-        memory::get_or_box(&mut self.tissue)?.join(place, body)
+        memory::get_or_box(&mut self.tissue)?.join(place, &body.system)
     }
 
     /// Removes a body, and with it what is attached of it.
@@ -376,8 +377,8 @@ impl World {
         self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
         let body = self.bodies.get_mut(body.0)?;
-        let gravity = gravity * body.gravity_scale;
-        rest_state(body, gravity, definition)
+        let gravity = gravity * body.system.gravity_scale;
+        body.rest_state(gravity, definition)
     }
 
     /// All bodies.
@@ -410,7 +411,7 @@ impl World {
         let id = ToolId(id?);
         let index = self.tool_index(id)?;
         for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.contacts {
+            if let Some(contacts) = &mut body.system.contacts {
                 contacts.add_tool(index);
             }
         }
@@ -427,7 +428,8 @@ impl World {
     /// Wakes what a tool meets and is near to.
     fn wake_near(&mut self, tool: ToolId) -> Result<()> {
         let path = ToolPath::new(self.tools.place(tool.0)?, self.tools.get(tool.0)?);
-        self.bodies.iter_mut().for_each(|(_, body)| body.wake_near(&path));
+        let bodies = self.bodies.iter_mut();
+        bodies.for_each(|(_, body)| body.system.wake_near(&path));
         Ok(())
     }
 
@@ -447,7 +449,7 @@ impl World {
             self.drop_contacts();
         }
         for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.contacts {
+            if let Some(contacts) = &mut body.system.contacts {
                 contacts.forget_tool(slot, index);
             }
         }
@@ -466,7 +468,7 @@ impl World {
     /// A world without tools keeps nothing for them.
     fn drop_contacts(&mut self) {
         for (_, body) in self.bodies.iter_mut() {
-            body.contacts = None;
+            body.system.contacts = None;
         }
     }
 
@@ -516,7 +518,7 @@ impl World {
         self.tools.get_mut(tool.0)?.filter = filter;
         self.wake_near(tool)?;
         for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.contacts {
+            if let Some(contacts) = &mut body.system.contacts {
                 contacts.look_again();
             }
         }
@@ -573,7 +575,7 @@ impl World {
         self.bodies.iter_ids().flat_map(move |(body, content)| {
             self.tools.iter_ids().filter_map(move |(tool, _)| {
                 let slot = tool.index1 as usize - 1;
-                let [now, before] = content.contacts.as_ref()?.touched(slot);
+                let [now, before] = content.system.contacts.as_ref()?.touched(slot);
                 (now != before).then_some(ContactChange {
                     tool: ToolId(tool),
                     body: BodyId(body),

@@ -20,7 +20,7 @@ pub(crate) enum HoldAt {
 impl Body {
     /// What it takes to cut it, J/m, of solids J/m²; `None`: it cannot be cut.
     pub(crate) fn toughness(&self) -> Option<f32> {
-        self.cuttable.as_ref().map(|cuttable| cuttable.toughness)
+        self.system.may_be_cut.map(|cut| cut.toughness)
     }
 
     /// What of its material a blade would pass through, in the places of the nodes as they are. `near` becomes what it may meet.
@@ -59,8 +59,8 @@ impl Body {
 
     /// Whether the box about it meets that about a sweep.
     fn is_near(&self, sweep: &Sweep) -> bool {
-        let (own, origin) = (self.local_bounds(), self.origin.as_vec3());
-        let slack = 1e-3 * self.extent() + 4.0 * f32::EPSILON * origin.abs().max_element();
+        let (own, origin) = (self.system.local_bounds(), self.system.origin.as_vec3());
+        let slack = 1e-3 * self.system.extent() + 4.0 * f32::EPSILON * origin.abs().max_element();
         let own = Bounds {
             min: own.min + origin,
             max: own.max + origin,

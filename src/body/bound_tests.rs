@@ -101,7 +101,10 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
     body.reserve_surface(bound.len(), change.changed.len(), change.added.len())
         .expect("room");
     let new: Vec<NewNode> = bound.iter().map(|&bound| NewNode::Bound(bound)).collect();
-    body.springs.resize(body.node_count() + new.len()).expect("memory");
+    body.system
+        .springs
+        .resize(body.node_count() + new.len())
+        .expect("memory");
     body.rewire(&Rewiring::default(), 0).expect("memory");
     body.add_nodes(&new).expect("room");
     body.change_surface(change);
@@ -109,7 +112,7 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
 
 /// A point between two nodes, given in the caller's numbers.
 fn between(body: &Body, node: u32, ends: [u32; 2]) -> Bound {
-    let [a, b] = ends.map(|end| body.order.own(end));
+    let [a, b] = ends.map(|end| body.system.order.own(end));
     Bound {
         node,
         nodes: [a, b, a, a],
@@ -157,7 +160,7 @@ fn draw(world: &mut World, id: BodyId, drawn: Drawn) {
         Drawn::Twice => {
             let count = body.node_count() as u32;
             let twin = |node: u32| {
-                let own = body.order.own(node);
+                let own = body.system.order.own(node);
                 Bound {
                     node: count + own,
                     nodes: [own; 4],
@@ -168,7 +171,7 @@ fn draw(world: &mut World, id: BodyId, drawn: Drawn) {
             bound.sort_by_key(|bound| bound.node);
             let changed: Vec<(u32, [u32; 3])> = (0..)
                 .zip(body.surface())
-                .map(|(index, corners)| (index, corners.map(|corner| count + body.order.own(corner))))
+                .map(|(index, corners)| (index, corners.map(|corner| count + body.system.order.own(corner))))
                 .collect();
             let hidden: Vec<u32> = (0..count).collect();
             let to = SurfaceChange {
@@ -192,7 +195,9 @@ fn deepest(body: &Body, centre: Vec3, radius: f32) -> f32 {
 fn momentum(body: &Body) -> DVec3 {
     let velocities = (0..).zip(body.velocities());
     velocities
-        .map(|(node, velocity)| velocity.as_dvec3() * f64::from(body.masses[body.order.own(node) as usize]))
+        .map(|(node, velocity)| {
+            velocity.as_dvec3() * f64::from(body.system.masses[body.system.order.own(node) as usize])
+        })
         .sum()
 }
 
@@ -261,7 +266,7 @@ fn free_nodes(world: &mut World, positions: &[Vec3], masses: &[f32], parts: [[f3
     let id = world.create_body(&definition).expect("a body");
     let body = world.body_mut(id).expect("a body");
     let count = positions.len() as u32;
-    let nodes = [0, 1, 2, 3].map(|node| body.order.own(node.min(count - 1)));
+    let nodes = [0, 1, 2, 3].map(|node| body.system.order.own(node.min(count - 1)));
     let bound: Vec<Bound> = (count..)
         .zip(parts)
         .map(|(node, weights)| Bound { node, nodes, weights })
@@ -487,9 +492,9 @@ fn a_surface_that_changes_under_a_tool_is_met_as_it_is_then() {
                     // Whole squares, so that what is beside them may have gaps, but no two see the same edge divided twice.
                     divide(body, drawn..drawn + 10);
                     drawn += 10;
-                    assert!(!body.contacts.as_ref().is_some_and(|contacts| contacts.are_far()));
+                    assert!(!body.system.contacts.as_ref().is_some_and(|contacts| contacts.are_far()));
                     if anew {
-                        body.contacts.as_mut().expect("contacts").forget();
+                        body.system.contacts.as_mut().expect("contacts").forget();
                     }
                 }
             }
@@ -510,19 +515,15 @@ fn forces_at_a_bound_point_are_those_of_its_nodes() {
         let body = world.body_mut(id).expect("a body");
         let force = Vec3::new(0.25, 0.5, -0.125);
         let middle = body.surface()[0][1];
-        let bound = *body
-            .bindings
-            .as_ref()
-            .expect("bindings")
-            .get(middle)
-            .expect("a bound point");
+        let bindings = body.system.bindings.as_ref().expect("bindings");
+        let bound = *bindings.get(middle).expect("a bound point");
         for _ in 0..5 {
             let body = world.body_mut(id).expect("a body");
             if is_bound {
                 body.apply_force(middle, force).expect("a force");
             } else {
                 for own in [bound.nodes[0], bound.nodes[1]] {
-                    let node = body.order.caller(own);
+                    let node = body.system.order.caller(own);
                     body.apply_force(node, force * 0.5).expect("a force");
                 }
             }
@@ -593,7 +594,7 @@ fn a_tool_that_holds_a_bound_point_holds_its_nodes() {
             .to_string();
         assert!(refused.contains("bound to a node that is"), "{refused}");
         world.release(attachment).expect("an attachment");
-        assert!(!world.body(id).expect("a body").is_grasped());
+        assert!(!world.body(id).expect("a body").system.is_grasped());
         world.attach_node(id, middle, other, 0.0).expect("an attachment");
     }
 }

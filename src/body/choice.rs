@@ -49,8 +49,8 @@ impl Body {
     /// How many substeps it would take with VERLET in a step, with its nodes where they are.
     fn substeps_for(&mut self, needs: &Needs) -> u32 {
         let request = StepRequest::alone(needs.steps.length, needs.steps.max_substeps);
-        let substeps = substeps_alone(self, &request, &Team::alone());
-        self.put_back();
+        let substeps = substeps_alone(&mut self.system, &request, &Team::alone());
+        self.system.put_back();
         substeps
     }
 }

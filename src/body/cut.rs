@@ -4,7 +4,7 @@ use super::Body;
 use super::change_log::{TopologyChanges, unchanged};
 use super::cuttable::Cuttable;
 use crate::base::{Error, Result, memory};
-use crate::contact::{Skin, SkinChange, SurfaceChange, SurfaceToBe};
+use crate::contact::SurfaceChange;
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
 use crate::nodes::{Bound, NewNode};
@@ -12,6 +12,7 @@ use crate::soa::NodeOrder;
 use crate::solver::close_beside;
 use crate::springs::{Change, Rewiring};
 use crate::terms::Parting;
+use crate::tissue::{Skin, SkinChange, SurfaceToBe};
 
 /// What a cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -89,7 +90,7 @@ impl Body {
         let mut near = Vec::new();
         self.items_near(cuttable, &sweep, &mut near)?;
         let limits = Limits {
-            nodes: self.node_room as u32,
+            nodes: self.system.node_room as u32,
             ..Limits::NONE
         };
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
@@ -114,7 +115,7 @@ impl Body {
         before: [u32; 2],
     ) -> Result<CutReport> {
         let applied = self.try_apply(cuttable, skin, way, changes, before);
-        if let Some(terms) = self.terms.as_mut().filter(|_| applied.is_err()) {
+        if let Some(terms) = self.system.terms.as_mut().filter(|_| applied.is_err()) {
             terms.forget_parts();
         }
         applied
@@ -140,11 +141,11 @@ impl Body {
             return Ok(CutReport::default());
         }
         let mut closed = None;
-        let is_held = |source: u32| self.inverse_masses[self.order.own(source) as usize] == 0.0;
-        if self.carry.masses_for > 0.0 || changes.nodes.iter().any(|piece| is_held(piece.source)) {
+        let is_held = |source: u32| self.system.inverse_masses[self.system.order.own(source) as usize] == 0.0;
+        if self.system.carry.masses_for > 0.0 || changes.nodes.iter().any(|piece| is_held(piece.source)) {
             // What closes the last step is made with the masses that it was taken with, and gives nothing to copies of what was held.
-            if let Some(beside) = close_beside(self) {
-                let forces = beside.forces(self)?;
+            if let Some(beside) = close_beside(&mut self.system) {
+                let forces = beside.forces(&self.system)?;
                 closed = Some((beside, forces));
             }
         }
@@ -159,7 +160,7 @@ impl Body {
             rewiring
                 .removed
                 .iter()
-                .map(|spring| spring.nodes.map(|node| self.order.caller(node))),
+                .map(|spring| spring.nodes.map(|node| self.system.order.caller(node))),
         );
         cuttable.log.reserve(changes, gone.len())?;
         let (known_triangles, new) = split_at(&changes.triangles, first_triangle);
@@ -181,8 +182,8 @@ impl Body {
             Some(skin) => self.prepare_skin(skin, material, changes, (&change, &nodes))?,
             None => None,
         };
-        self.pins.reserve(nodes.len(), known + nodes.len())?;
-        if let Some(scaling) = &mut self.scaling {
+        self.system.pins.reserve(nodes.len(), known + nodes.len())?;
+        if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(touched.len())?;
         }
         let mut changing = memory::reserved(touched.len())?;
@@ -190,49 +191,49 @@ impl Body {
         let candidates = memory::reserved(touched.len())?;
         let of_pieces = pieces.iter().flat_map(|piece| piece.nodes);
         let mut at_pieces = memory::reserved(4 * pieces.len() + touched.len())?;
-        if self.elements.is_some() {
+        if self.system.elements.is_some() {
             at_pieces.extend(of_pieces.chain(changing.iter().copied()));
             memory::sort_once(&mut at_pieces);
         }
-        if let Some(elements) = &mut self.elements {
-            let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
+        if let Some(elements) = &mut self.system.elements {
+            let implicit = self.system.implicit.as_mut();
+            let sums = implicit.and_then(|implicit| implicit.changes_mut());
             elements.reserve_pieces(&pieces, known + nodes.len(), sums)?;
             elements.reserve_rings(changes.nodes.len())?;
         }
         if let Some(tears) = &mut self.tears {
             tears.reserve(changes.springs.len().max(rewiring.added.len()))?;
         }
-        if let Some(terms) = &mut self.terms {
-            let parting = parting(&self.order, material, changes, &rewiring)?;
+        if let Some(terms) = &mut self.system.terms {
+            let parting = parting(&self.system.order, material, changes, &rewiring)?;
             terms.prepare_parts(&parting, known + nodes.len())?;
         }
-        self.springs.resize(known + nodes.len())?;
+        self.system.springs.resize(known + nodes.len())?;
         let rewired = self.rewire(&rewiring, 6 * pieces.len());
         if rewired.is_err() {
-            self.springs.resize(known)?;
+            self.system.springs.resize(known)?;
             return rewired.map(|()| CutReport::default());
         }
         // From here on nothing fails.
         if let Some((beside, forces)) = closed {
-            self.pins
-                .iter_mut()
-                .zip(forces)
-                .for_each(|(pin, force)| pin.force = force);
-            beside.commit(self);
+            let pins = self.system.pins.iter_mut().zip(forces);
+            pins.for_each(|(pin, force)| pin.force = force);
+            beside.commit(&mut self.system);
         }
         // Damping is to be that of masses as they are.
-        self.scale_masses(0.0);
+        self.system.scale_masses(0.0);
         self.add_nodes(&nodes)?;
-        if let Some(elements) = &mut self.elements {
-            let sums = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut());
+        if let Some(elements) = &mut self.system.elements {
+            let implicit = self.system.implicit.as_mut();
+            let sums = implicit.and_then(|implicit| implicit.changes_mut());
             elements.rewire(&pieces, known + nodes.len(), sums);
         }
-        if let Some(terms) = &mut self.terms {
+        if let Some(terms) = &mut self.system.terms {
             terms.take_parts(known + nodes.len());
         }
         if let Some(tears) = &mut self.tears {
             tears.grow(known + nodes.len());
-            tears.follow(changes, &rewiring, &self.order);
+            tears.follow(changes, &rewiring, &self.system.order);
         }
         self.rebind(changes);
         self.part_rings(&cuttable.material, changes);
@@ -262,33 +263,34 @@ impl Body {
 
     /// Parts the rings of nodes that fell apart.
     fn part_rings(&mut self, material: &CutMaterial, changes: &Changes) {
-        let Some(elements) = &mut self.elements else {
+        let Some(elements) = &mut self.system.elements else {
             return;
         };
-        let order = &self.order;
+        let order = &self.system.order;
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let copies = pieces.iter().map(|piece| order.own(piece.node));
             let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
-            elements.part_ring(order.own(pieces[0].source), copies, cells_at, self.state.positions());
+            let source = order.own(pieces[0].source);
+            elements.part_ring(source, copies, cells_at, self.system.state.positions());
         }
     }
 
     /// Opens the cavities of which triangles, given as they are now, had other corners.
     fn open_cavities(&mut self, changed: &[(u32, [u32; 3])]) {
-        let Some(enclosed) = &mut self.enclosed else {
+        let Some(enclosed) = &mut self.system.enclosed else {
             return;
         };
         let mut opened = false;
         for &(triangle, mut corners) in changed {
-            let mut before = self.surface[triangle as usize];
+            let mut before = self.system.surface[triangle as usize];
             before.sort_unstable();
             corners.sort_unstable();
             if before != corners {
-                opened |= enclosed.open_at(before.map(|node| self.order.own(node)));
+                opened |= enclosed.open_at(before.map(|node| self.system.order.own(node)));
             }
         }
         enclosed.forget_rates();
-        if let Some(implicit) = self.implicit.as_mut().filter(|_| opened) {
+        if let Some(implicit) = self.system.implicit.as_mut().filter(|_| opened) {
             // What a step of second order takes from the last, pressure gave.
             implicit.forget_history();
         }
@@ -308,14 +310,14 @@ impl Body {
 
     /// What becomes of tetrahedra that are elements.
     fn pieces_of_elements(&self, material: &CutMaterial, changes: &Changes) -> Result<Vec<PieceOfElement>> {
-        if self.elements.is_none() {
+        if self.system.elements.is_none() {
             return Ok(Vec::new());
         }
         let mut pieces = memory::reserved(changes.cells.len())?;
         pieces.extend(changes.cells.iter().map(|piece| PieceOfElement {
             cell: piece.cell,
             source: piece.source,
-            nodes: material.nodes_of(piece.cell).map(|node| self.order.own(node)),
+            nodes: material.nodes_of(piece.cell).map(|node| self.system.order.own(node)),
             part: piece.part as f32,
         }));
         Ok(pieces)
@@ -340,7 +342,7 @@ impl Body {
             bound: &bound,
             is_open: material.surface().is_some() && !changes.rim.is_empty(),
         };
-        skin.prepare(self, &to_be)
+        skin.prepare(&self.system, &to_be)
     }
 
     /// The new nodes in the order of their numbers.
@@ -349,7 +351,7 @@ impl Body {
         let mut nodes = memory::reserved(changes.nodes.len() + changes.bound.len())?;
         for piece in &changes.nodes {
             if piece.node >= known {
-                nodes.push((piece.node, NewNode::Copy(self.order.own(piece.source))));
+                nodes.push((piece.node, NewNode::Copy(self.system.order.own(piece.source))));
             }
         }
         for bound in &changes.bound {
@@ -367,14 +369,15 @@ impl Body {
     fn rebind(&mut self, changes: &Changes) {
         for of in &changes.bound {
             let bound = self.bound(of);
-            if let Some(known) = self.bindings.as_mut().and_then(|bindings| bindings.get_mut(of.point)) {
+            let bindings = self.system.bindings.as_mut();
+            if let Some(known) = bindings.and_then(|bindings| bindings.get_mut(of.point)) {
                 *known = bound;
             }
         }
     }
 
     fn bound(&self, bound: &BoundPoint) -> Bound {
-        let own = |node: u32| self.order.own(node);
+        let own = |node: u32| self.system.order.own(node);
         Bound {
             node: bound.point,
             nodes: bound.nodes.map(own),

@@ -31,8 +31,8 @@ impl Body {
             memory::push(
                 &mut touched,
                 Touched {
-                    node: self.order.own(piece.node),
-                    source: self.order.own(piece.source),
+                    node: self.system.order.own(piece.node),
+                    source: self.system.order.own(piece.source),
                     part: piece.part as f32,
                     before: Vec3::ZERO,
                 },
@@ -68,10 +68,10 @@ impl Body {
     /// What springs do to a node where it is, but for their damping, N; nothing where nobody asks.
     fn spring_force(&self, node: u32) -> Vec3 {
         let mut force = Vec3::ZERO;
-        if self.carry.closing.is_some() {
-            let positions = self.state.positions();
+        if self.system.carry.closing.is_some() {
+            let positions = self.system.state.positions();
             let here = positions.get(node as usize);
-            self.springs.visit(node as usize, &mut |link| {
+            self.system.springs.visit(node as usize, &mut |link| {
                 force += pull(
                     node as usize,
                     &link,
@@ -86,17 +86,17 @@ impl Body {
     /// Gives nodes that fell apart their parts of the mass, and holds copies of held nodes that are drawn.
     pub(super) fn share_masses(&mut self, cuttable: &Cuttable, changes: &Changes) -> Result<()> {
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
-            let source = self.order.own(pieces[0].source);
-            let whole = f64::from(self.masses[source as usize]);
+            let source = self.system.order.own(pieces[0].source);
+            let whole = f64::from(self.system.masses[source as usize]);
             // Of what a tool holds no copies are held.
-            let axes = if self.is_held_by_tool(source) {
+            let axes = if self.system.is_held_by_tool(source) {
                 BVec3::FALSE
             } else {
-                self.pins.axes_of(source)
+                self.system.pins.axes_of(source)
             };
-            let is_held = self.inverse_masses[source as usize] == 0.0;
+            let is_held = self.system.inverse_masses[source as usize] == 0.0;
             for piece in pieces {
-                let node = self.order.own(piece.node);
+                let node = self.system.order.own(piece.node);
                 let is_drawn = changes.undrawn.binary_search(&piece.node).is_err();
                 let is_copy = piece.node != piece.source;
                 let mass = if whole > 0.0 {
@@ -108,13 +108,13 @@ impl Body {
                 } as f32;
                 let mass = if mass > 0.0 { mass.max(SMALLEST_MASS) } else { mass };
                 if is_copy && is_drawn && axes.any() {
-                    let target = self.pins.get(source).and_then(|pin| pin.target);
-                    self.pins.hold(node, axes)?;
-                    if let Some(pin) = self.pins.get_mut(node) {
+                    let target = self.system.pins.get(source).and_then(|pin| pin.target);
+                    self.system.pins.hold(node, axes)?;
+                    if let Some(pin) = self.system.pins.get_mut(node) {
                         pin.target = target;
                     }
                 } else if mass == 0.0 {
-                    self.pins.hold(node, BVec3::TRUE)?;
+                    self.system.pins.hold(node, BVec3::TRUE)?;
                 }
                 let stays_held = mass == 0.0
                     || if is_copy {
@@ -122,8 +122,8 @@ impl Body {
                     } else {
                         is_held
                     };
-                self.masses[node as usize] = mass;
-                self.inverse_masses[node as usize] = if stays_held { 0.0 } else { 1.0 / mass };
+                self.system.masses[node as usize] = mass;
+                self.system.inverse_masses[node as usize] = if stays_held { 0.0 } else { 1.0 / mass };
             }
         }
         Ok(())
@@ -131,60 +131,62 @@ impl Body {
 
     /// The same for elements, at all nodes of pieces and all others of which masses or springs have changed.
     pub(super) fn follow_elements(&mut self, material: &CutMaterial, changes: &Changes, nodes: &[u32]) {
-        let Some(elements) = &mut self.elements else {
+        let Some(elements) = &mut self.system.elements else {
             return;
         };
-        let order = &self.order;
+        let order = &self.system.order;
         let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
+            masses: &self.system.masses,
+            inverse_masses: &self.system.inverse_masses,
             are_heavier: false,
         };
         let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
-        elements.find_rates_at(nodes, cells_at, &*self.springs, &masses);
-        if self.carry.closing.is_none() {
+        elements.find_rates_at(nodes, cells_at, &*self.system.springs, &masses);
+        if self.system.carry.closing.is_none() {
             return;
         }
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let force_on = |body: &Self, node: u32| {
                 let cells = material.tetrahedra_at(node);
-                let elements = body.elements.as_ref();
+                let elements = body.system.elements.as_ref();
                 elements.map_or(DVec3::ZERO, |elements| {
-                    elements.force_at(body.order.own(node), cells, body.state.positions())
+                    elements.force_at(body.system.order.own(node), cells, body.system.state.positions())
                 })
             };
             let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
             for piece in pieces {
                 let more = whole * piece.part - force_on(self, piece.node);
-                make_up_for(self, self.order.own(piece.node), more.as_vec3());
+                let own = self.system.order.own(piece.node);
+                make_up_for(&mut self.system, own, more.as_vec3());
             }
         }
     }
 
     /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
     pub(super) fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
-        self.forces_current = false;
-        self.carry.forget();
-        self.wake();
-        self.published.forget_velocities();
-        self.scale_for_springs(nodes);
+        self.system.forces_current = false;
+        self.system.carry.forget();
+        self.system.wake();
+        self.forget_velocities();
+        self.system.scale_for_springs(nodes);
         for touched in touched {
             let force = self.spring_force(touched.node);
-            make_up_for(self, touched.node, touched.before * touched.part - force);
+            make_up_for(&mut self.system, touched.node, touched.before * touched.part - force);
         }
-        self.follow_nodes();
+        self.system.follow_nodes();
         let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
+            masses: &self.system.masses,
+            inverse_masses: &self.system.inverse_masses,
             are_heavier: false,
         };
-        let watched = (&mut self.watched, candidates);
-        let positions = self.state.positions();
-        self.carry.stability = self
-            .carry
-            .stability
-            .cut(nodes, &*self.springs, masses, positions, watched);
-        if let Some(implicit) = &mut self.implicit {
+        let watched = (&mut self.system.watched, candidates);
+        let positions = self.system.state.positions();
+        self.system.carry.stability =
+            self.system
+                .carry
+                .stability
+                .cut(nodes, &*self.system.springs, masses, positions, watched);
+        if let Some(implicit) = &mut self.system.implicit {
             implicit.forget_matrix();
         }
     }

@@ -11,7 +11,7 @@ use crate::cutting::{Changes, CutMaterial, PieceOfCell, PieceOfNode, PieceOfSpri
 impl Body {
     /// Shifts mass between the copies of each node, where they would have higher frequencies than there were.
     pub(super) fn share_by_stiffness(&self, material: &CutMaterial, changes: &mut Changes) -> Result<()> {
-        if self.implicit.is_some() {
+        if self.system.implicit.is_some() {
             return Ok(());
         }
         let Changes {
@@ -19,8 +19,8 @@ impl Body {
         } = changes;
         let mut needs = Vec::new();
         for pieces in nodes.chunk_by_mut(|a, b| a.source == b.source) {
-            let source = self.order.own(pieces[0].source);
-            if self.inverse_masses[source as usize] == 0.0 {
+            let source = self.system.order.own(pieces[0].source);
+            if self.system.inverse_masses[source as usize] == 0.0 {
                 continue;
             }
             needs.clear();
@@ -28,7 +28,7 @@ impl Body {
             needs.resize(pieces.len(), 0.0);
             let of_elements = self.carried_of_elements(material, pieces, cells, &mut needs);
             let of_springs = self.carried_of_springs(pieces, springs, &mut needs);
-            let mass = f64::from(self.masses[source as usize]);
+            let mass = f64::from(self.system.masses[source as usize]);
             let whole: f64 = needs.iter().sum();
             let most = of_elements.max(of_springs).max(whole / mass);
             needs.iter_mut().for_each(|need| *need /= most * mass);
@@ -46,17 +46,17 @@ impl Body {
         carried: &mut [f64],
     ) -> f64 {
         let mut highest = 0.0_f64;
-        let Some(elements) = &self.elements else {
+        let Some(elements) = &self.system.elements else {
             return highest;
         };
-        let source = self.order.own(pieces[0].source);
+        let source = self.system.order.own(pieces[0].source);
         for (piece, carried) in pieces.iter().zip(carried) {
             for cell in material.tetrahedra_at(piece.node) {
                 let (of, part) = match cells.binary_search_by_key(&cell, |piece| piece.cell) {
                     Ok(at) => (cells[at].source, cells[at].part),
                     Err(_) => (cell, 1.0),
                 };
-                let (of_cell, beside) = elements.carried_by(of, source, &self.inverse_masses);
+                let (of_cell, beside) = elements.carried_by(of, source, &self.system.inverse_masses);
                 *carried += part * of_cell;
                 highest = highest.max(beside);
             }
@@ -66,10 +66,10 @@ impl Body {
 
     /// The same of springs: those that did not fall apart stay with the source.
     fn carried_of_springs(&self, pieces: &[PieceOfNode], springs: &[PieceOfSpring], carried: &mut [f64]) -> f64 {
-        let source = self.order.own(pieces[0].source);
+        let source = self.system.order.own(pieces[0].source);
         let mut highest = 0.0_f64;
-        self.springs.visit(source as usize, &mut |link| {
-            let [a, b] = [pieces[0].source, self.order.caller(link.neighbour)];
+        self.system.springs.visit(source as usize, &mut |link| {
+            let [a, b] = [pieces[0].source, self.system.order.caller(link.neighbour)];
             let ends = [a.min(b), a.max(b)];
             let first = springs.partition_point(|piece| piece.source < ends);
             let parts = springs[first..].iter().take_while(|piece| piece.source == ends);
@@ -91,9 +91,10 @@ impl Body {
     /// A bound on the square of a node's frequency that its springs give it, 1/s²; 0 where it is held.
     fn spring_rate(&self, node: u32) -> f64 {
         let mut stiffness = 0.0;
-        self.springs
+        self.system
+            .springs
             .visit(node as usize, &mut |link| stiffness += 2.0 * f64::from(link.stiffness));
-        stiffness * f64::from(self.inverse_masses[node as usize])
+        stiffness * f64::from(self.system.inverse_masses[node as usize])
     }
 }
 

@@ -11,16 +11,16 @@ impl Body {
     /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
     /// nothing where it fails.
     pub(super) fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
-        let beside = (self.terms.as_deref(), self.enclosed.as_deref());
-        let roomier = match &self.implicit {
+        let beside = (self.system.terms.as_deref(), self.system.enclosed.as_deref());
+        let roomier = match &self.system.implicit {
             Some(implicit) => {
                 let more = rewiring.added.len() + pairs;
-                implicit.roomier(&*self.springs, more, self.elements.as_deref(), beside)?
+                implicit.roomier(&*self.system.springs, more, self.system.elements.as_deref(), beside)?
             }
             None => None,
         };
-        self.springs.rewire(rewiring)?;
-        if let (Some(implicit), Some(roomier)) = (&mut self.implicit, roomier) {
+        self.system.springs.rewire(rewiring)?;
+        if let (Some(implicit), Some(roomier)) = (&mut self.system.implicit, roomier) {
             implicit.adopt(roomier);
         }
         Ok(())
@@ -29,7 +29,7 @@ impl Body {
     /// What becomes of springs along edges of cells.
     pub(super) fn rewiring(&self, changes: &Changes) -> Result<Rewiring> {
         let mut rewiring = Rewiring::default();
-        let own = |nodes: [u32; 2]| nodes.map(|node| self.order.own(node));
+        let own = |nodes: [u32; 2]| nodes.map(|node| self.system.order.own(node));
         for pieces in changes.springs.chunk_by(|a, b| a.source == b.source) {
             let source = own(pieces[0].source);
             let Some(link) = self.link(source) else {
@@ -59,14 +59,14 @@ impl Body {
     ) -> Result<()> {
         let mut nodes = memory::reserved(4 * near.len())?;
         for &item in near {
-            nodes.extend(material.nodes_of(item).map(|node| self.order.own(node)));
+            nodes.extend(material.nodes_of(item).map(|node| self.system.order.own(node)));
         }
         // New ones have no springs yet.
         let known = self.node_count() as u32;
         nodes.retain(|&node| node < known);
         let parted = changes.nodes.iter().filter(|piece| piece.node == piece.source);
         let mut parts = memory::reserved(changes.nodes.len())?;
-        parts.extend(parted.map(|piece| (self.order.own(piece.node), piece.part)));
+        parts.extend(parted.map(|piece| (self.system.order.own(piece.node), piece.part)));
         parts.sort_unstable_by_key(|&(node, _)| node);
         nodes.try_reserve(parts.len())?;
         nodes.extend(parts.iter().map(|&(node, _)| node));
@@ -89,7 +89,7 @@ impl Body {
         let mut found = Vec::new();
         for &node in &nodes {
             let mut room = Ok(());
-            self.springs.visit(node as usize, &mut |link| {
+            self.system.springs.visit(node as usize, &mut |link| {
                 let ends = ordered([node, link.neighbour]);
                 // Of two nodes that are both looked at the lower sees to it.
                 let is_seen = ends[0] != node && nodes.binary_search(&ends[0]).is_ok();
@@ -101,7 +101,7 @@ impl Body {
         }
         for (node, link) in found {
             let ends = [node, link.neighbour];
-            let callers = ends.map(|node| self.order.caller(node));
+            let callers = ends.map(|node| self.system.order.caller(node));
             if material.has_edge(callers) {
                 continue;
             }

@@ -25,8 +25,6 @@ pub(super) struct Cuttable {
     pub density: f64,
     /// Whether every spring lies along an edge of a cell.
     pub springs_are_edges: bool,
-    /// What it takes to cut it, J/m, of solids J/m².
-    pub toughness: f32,
 }
 
 saved!(Cuttable {
@@ -35,8 +33,7 @@ saved!(Cuttable {
     log,
     stroke,
     density,
-    springs_are_edges,
-    toughness
+    springs_are_edges
 });
 
 impl Cuttable {
@@ -107,7 +104,6 @@ impl Cuttable {
             log: ChangeLog::default(),
             stroke: Stroke::default(),
             springs_are_edges: springs.iter().all(is_edge),
-            toughness: definition.toughness,
         })?))
     }
 }
@@ -219,11 +215,11 @@ impl Search {
     /// Adds the items that a blade may have met.
     fn near(&self, body: &Body, material: &CutMaterial, swept: &Bounds, near: &mut Vec<u32>) -> Result<()> {
         let positions = body.positions();
-        let origin = body.origin.as_vec3();
+        let origin = body.system.origin.as_vec3();
         // What was rounded is in the box all the same.
         let slack = 4.0 * f32::EPSILON * (origin.abs().max_element() + body.reach());
         for home in &self.homes {
-            let tiles = home.tiles.iter().map(|&tile| body.boxes[tile as usize]);
+            let tiles = home.tiles.iter().map(|&tile| body.system.boxes[tile as usize]);
             let tiles = tiles.fold(Bounds::EMPTY, |all, tile| all.and(&tile)).extended(slack);
             let tiles = Bounds {
                 min: tiles.min + origin,
@@ -315,7 +311,7 @@ impl Body {
 
     /// How far it reaches from where its coordinates begin, m.
     fn reach(&self) -> f32 {
-        let bounds = self.local_bounds();
+        let bounds = self.system.local_bounds();
         bounds.magnitudes().max_element()
     }
 }

@@ -6,7 +6,6 @@ use super::Body;
 use crate::base::{Error, Result, finite, memory, not_negative};
 use crate::def::{Spring, distance, expect_count, finite_vector, finite_vectors};
 use crate::geometry::Bounds;
-use crate::soa::Masses;
 use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
@@ -34,34 +33,34 @@ impl Body {
                 return Err(Error::invalid(format!("forces[{index}] is {force}: must be finite")));
             }
         }
-        if self.applied.is_none() {
-            self.applied = Some(self.zeros()?);
+        if self.system.applied.is_none() {
+            self.system.applied = Some(self.system.zeros()?);
         }
-        let Some(applied) = &mut self.applied else {
+        let Some(applied) = &mut self.system.applied else {
             return Ok(());
         };
         let mut push = |node: u32, force: Vec3| {
-            if self.inverse_masses[node as usize] == 0.0 {
+            if self.system.inverse_masses[node as usize] == 0.0 {
                 return;
             }
-            let held = self.pins.partial_axes_of(node);
+            let held = self.system.pins.partial_axes_of(node);
             let force = Vec3::select(held, Vec3::ZERO, force);
             // Sums of finite forces stay finite.
             let sum = (applied.get(node as usize) + force).clamp(Vec3::MIN, Vec3::MAX);
             applied.set(node as usize, sum);
-            self.forces_applied = true;
+            self.system.forces_applied = true;
         };
         for (&node, &force) in nodes.iter().zip(forces) {
-            let own = self.order.own(node);
-            match self.bindings.as_ref().and_then(|bindings| bindings.get(own)) {
+            let own = self.system.order.own(node);
+            match self.system.bindings.as_ref().and_then(|bindings| bindings.get(own)) {
                 Some(bound) => bound.parts().for_each(|(node, weight)| push(node, force * weight)),
                 None => push(own, force),
             }
         }
-        if self.sleeps() {
+        if self.system.sleeps() {
             for &node in nodes {
-                let own = self.order.own(node);
-                self.movers(own).for_each(|(node, _)| self.wake_at(node));
+                let own = self.system.order.own(node);
+                self.system.movers(own).for_each(|(node, _)| self.system.wake_at(node));
             }
         }
         Ok(())
@@ -75,7 +74,7 @@ impl Body {
     pub fn set_positions(&mut self, positions: &[Vec3]) -> Result<()> {
         expect_count("positions", positions.len(), self.node_count())?;
         finite_vectors("positions", positions)?;
-        close(self);
+        close(&mut self.system);
         self.place(positions);
         Ok(())
     }
@@ -88,13 +87,16 @@ impl Body {
     pub fn set_velocities(&mut self, velocities: &[Vec3]) -> Result<()> {
         expect_count("velocities", velocities.len(), self.node_count())?;
         finite_vectors("velocities", velocities)?;
-        close(self);
-        self.wake();
+        close(&mut self.system);
+        self.system.wake();
         for (node, &velocity) in (0..).zip(velocities) {
-            let own = self.order.own(node);
-            if self.inverse_masses[own as usize] > 0.0 {
-                let kept = self.state.velocities().get(own as usize);
-                self.set_velocity(node, Vec3::select(self.pins.partial_axes_of(own), kept, velocity));
+            let own = self.system.order.own(node);
+            if self.system.inverse_masses[own as usize] > 0.0 {
+                let kept = self.system.state.velocities().get(own as usize);
+                self.set_velocity(
+                    node,
+                    Vec3::select(self.system.pins.partial_axes_of(own), kept, velocity),
+                );
             }
         }
         self.follow_velocities();
@@ -103,9 +105,9 @@ impl Body {
 
     /// Has what is known of velocities be that of those that were set.
     pub(super) fn follow_velocities(&mut self) {
-        self.follow_nodes();
-        self.carry.gravity = GravityKicks::new(Bounds::of(self.state.velocities().iter()));
-        if let Some(implicit) = &mut self.implicit {
+        self.system.follow_nodes();
+        self.system.carry.gravity = GravityKicks::new(Bounds::of(self.system.state.velocities().iter()));
+        if let Some(implicit) = &mut self.system.implicit {
             implicit.forget_history();
         }
     }
@@ -140,9 +142,9 @@ impl Body {
         }
         self.check_node(&"node", node)?;
         self.check_not_bound(&"node", node)?;
-        self.check_not_held(&"node", node)?;
-        let own = self.order.own(node);
-        let before = self.pins.axes_of(own);
+        self.system.check_not_held(&"node", node)?;
+        let own = self.system.order.own(node);
+        let before = self.system.pins.axes_of(own);
         if axes == before {
             return Ok(());
         }
@@ -151,20 +153,20 @@ impl Body {
         } else {
             1.0 / self.mass_of_unpinned(node)?
         };
-        self.wake_at(own);
+        self.system.wake_at(own);
         if before.any() {
-            close(self);
+            close(&mut self.system);
         }
-        self.pins.hold(own, axes)?;
-        self.inverse_masses[own as usize] = inverse_mass;
-        let velocity = self.state.velocities().get(own as usize);
+        self.system.pins.hold(own, axes)?;
+        self.system.inverse_masses[own as usize] = inverse_mass;
+        let velocity = self.system.state.velocities().get(own as usize);
         self.set_velocity(node, Vec3::select(axes & !before, Vec3::ZERO, velocity));
-        if let Some(applied) = &mut self.applied {
+        if let Some(applied) = &mut self.system.applied {
             let force = applied.get(own as usize);
             applied.set(own as usize, Vec3::select(axes, Vec3::ZERO, force));
         }
-        self.scale_masses(self.carry.masses_for);
-        self.forget_matrix();
+        self.system.scale_masses(self.system.carry.masses_for);
+        self.system.forget_matrix();
         Ok(())
     }
 
@@ -175,16 +177,16 @@ impl Body {
     pub fn unpin(&mut self, node: u32) -> Result<()> {
         self.check_node(&"node", node)?;
         self.check_not_bound(&"node", node)?;
-        self.check_not_held(&"node", node)?;
-        let own = self.order.own(node);
+        self.system.check_not_held(&"node", node)?;
+        let own = self.system.order.own(node);
         let mass = self.mass_of_unpinned(node)?;
-        if self.pins.get(own).is_some() {
-            self.wake_at(own);
-            close(self);
-            self.pins.remove(own);
-            self.inverse_masses[own as usize] = 1.0 / mass;
-            self.scale_masses(self.carry.masses_for);
-            self.forget_matrix();
+        if self.system.pins.get(own).is_some() {
+            self.system.wake_at(own);
+            close(&mut self.system);
+            self.system.pins.remove(own);
+            self.system.inverse_masses[own as usize] = 1.0 / mass;
+            self.system.scale_masses(self.system.carry.masses_for);
+            self.system.forget_matrix();
         }
         Ok(())
     }
@@ -197,13 +199,13 @@ impl Body {
     pub fn move_pin(&mut self, node: u32, position: Vec3) -> Result<()> {
         self.check_node(&"node", node)?;
         self.check_not_bound(&"node", node)?;
-        self.check_not_held(&"node", node)?;
+        self.system.check_not_held(&"node", node)?;
         finite_vector("position", position)?;
-        match self.pins.get_mut(self.order.own(node)) {
+        match self.system.pins.get_mut(self.system.order.own(node)) {
             Some(pin) => pin.target = Some(position),
             None => return Err(not_pinned(node)),
         }
-        self.wake_at(self.order.own(node));
+        self.system.wake_at(self.system.order.own(node));
         Ok(())
     }
 
@@ -215,11 +217,18 @@ impl Body {
     /// ([`World::attachment_force`](crate::World::attachment_force)).
     pub fn pin_force(&self, node: u32) -> Result<Vec3> {
         self.check_node(&"node", node)?;
-        self.check_not_held(&"node", node)?;
-        let pin = self.pins.get(self.order.own(node)).ok_or_else(|| not_pinned(node))?;
-        let closing = self.carry.closing.as_ref();
-        let positions = self.state.positions();
-        Ok(mean_force(pin, closing, &*self.springs, positions, &self.masses))
+        self.system.check_not_held(&"node", node)?;
+        let pin = self.system.pins.get(self.system.order.own(node));
+        let pin = pin.ok_or_else(|| not_pinned(node))?;
+        let closing = self.system.carry.closing.as_ref();
+        let positions = self.system.state.positions();
+        Ok(mean_force(
+            pin,
+            closing,
+            &*self.system.springs,
+            positions,
+            &self.system.masses,
+        ))
     }
 
     /// Joins two nodes by a linear spring without damping: `stiffness` in N/m, `rest_length` in metres, `None`: the current
@@ -237,12 +246,12 @@ impl Body {
         let rest_length = match rest_length {
             Some(length) => length,
             None => {
-                let [a, b] = nodes.map(|node| self.state.positions().get(node as usize));
+                let [a, b] = nodes.map(|node| self.system.state.positions().get(node as usize));
                 distance(a, b)
             }
         };
         not_negative("rest_length", rest_length)?;
-        if let Some(scaling) = &mut self.scaling {
+        if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(nodes.len())?;
         }
         let spring = Spring {
@@ -251,28 +260,28 @@ impl Body {
             rest_length,
             damping: 0.0,
         };
-        if let Some(implicit) = &mut self.implicit {
-            implicit.make_room(self.springs.spring_count() + 1)?;
+        if let Some(implicit) = &mut self.system.implicit {
+            implicit.make_room(self.system.springs.spring_count() + 1)?;
         }
         if let Some(cuttable) = &mut self.cuttable {
-            cuttable.reserve_spring([a, b], &self.order)?;
+            cuttable.reserve_spring([a, b], &self.system.order)?;
         }
         // What is invalid is told in the caller's numbers.
-        self.springs.add(&spring).map_err(|error| match error {
+        self.system.springs.add(&spring).map_err(|error| match error {
             Error::InvalidArgument(_) => already_joined(a, b),
             error => error,
         })?;
         if let Some(cuttable) = &mut self.cuttable {
-            cuttable.add_spring([a, b], &self.order);
+            cuttable.add_spring([a, b], &self.system.order);
         }
-        if let Some(sleeper) = &mut self.sleeper {
-            sleeper.join([a, b].map(|node| self.order.own(node)));
+        if let Some(sleeper) = &mut self.system.sleeper {
+            sleeper.join([a, b].map(|node| self.system.order.own(node)));
         }
-        self.forget_stiffness();
+        self.system.forget_stiffness();
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         let nodes = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
-        self.scale_for_springs(&nodes);
-        self.see_stability_of(&nodes);
+        self.system.scale_for_springs(&nodes);
+        self.system.see_stability_of(&nodes);
         Ok(())
     }
 
@@ -296,21 +305,21 @@ impl Body {
                 cuttable.log.add_removed_spring([a, b]);
             }
         }
-        let elements = self.elements.as_mut();
+        let elements = self.system.elements.as_mut();
         let mut removed = elements.map_or(0, |elements| elements.remove_edge(own_a, own_b));
-        let terms = self.terms.as_mut();
+        let terms = self.system.terms.as_mut();
         removed += terms.map_or(0, |terms| terms.remove_edge(own_a, own_b));
-        let enclosed = self.enclosed.as_mut();
+        let enclosed = self.system.enclosed.as_mut();
         removed += enclosed.map_or(0, |enclosed| enclosed.remove_edge(own_a, own_b));
         if removed > 0 {
-            self.forget_stiffness();
+            self.system.forget_stiffness();
             // Rings of fewer tetrahedra have other pressures, of which nothing was deformed.
-            self.measure_anew();
+            self.system.measure_anew();
         }
         if link.is_none() && removed == 0 {
             return Err(not_joined(a, b));
         }
-        self.is_cut_open = self.is_cut_open || self.has_on_surface(a, b);
+        self.system.is_cut_open = self.system.is_cut_open || self.has_on_surface(a, b);
         Ok(())
     }
 
@@ -321,15 +330,15 @@ impl Body {
     /// [`Error::InvalidArgument`]: the pressure is not finite, or the body was made with neither an `enclosed_stiffness` nor a `pressure`.
     pub fn set_pressure(&mut self, pressure: f32) -> Result<()> {
         finite("pressure", pressure)?;
-        let Some(enclosed) = &mut self.enclosed else {
+        let Some(enclosed) = &mut self.system.enclosed else {
             return Err(Error::invalid(format!(
                 "pressure is {pressure} Pa, and the body was made with neither an enclosed_stiffness nor a pressure"
             )));
         };
         enclosed.set_pressure(pressure);
-        self.forces_current = false;
-        self.wake();
-        self.forget_energy();
+        self.system.forces_current = false;
+        self.system.wake();
+        self.system.forget_energy();
         Ok(())
     }
 
@@ -337,11 +346,11 @@ impl Body {
     fn has_on_surface(&mut self, a: u32, b: u32) -> bool {
         // That nodes are no corners at all, as mostly in a cut through a volume, is kept from the first cut on.
         if self.corners.is_empty()
-            && !self.surface.is_empty()
+            && !self.system.surface.is_empty()
             && let Ok(corners) = memory::filled(0_u64, self.node_count().div_ceil(64))
         {
             self.corners = corners;
-            for &corner in self.surface.as_flattened() {
+            for &corner in self.system.surface.as_flattened() {
                 self.corners[corner as usize / 64] |= 1 << (corner % 64);
             }
         }
@@ -352,121 +361,52 @@ impl Body {
                 .is_none_or(|bits| bits >> (node % 64) & 1 == 1)
         };
         let has = |triangle: &[u32; 3]| triangle.contains(&a) && triangle.contains(&b);
-        is_corner(a) && is_corner(b) && self.surface.iter().any(has)
+        is_corner(a) && is_corner(b) && self.system.surface.iter().any(has)
     }
 
     /// Removes a spring, given as the first of its nodes sees it.
     fn remove_link(&mut self, [own_a, own_b]: [u32; 2], link: Link) -> Result<()> {
-        self.springs.remove(own_a, own_b)?;
+        self.system.springs.remove(own_a, own_b)?;
         if let Some(tears) = &mut self.tears {
             tears.remove([own_a, own_b]);
         }
-        self.forget_stiffness();
+        self.system.forget_stiffness();
         let other = Link {
             neighbour: own_a,
             ..link
         };
         self.make_up_for_spring([link, other], 1.0);
-        if self
-            .scaling
-            .as_ref()
-            .is_some_and(|scaling| scaling.concerns([own_a, own_b]))
-        {
-            self.scale_for_springs(&[own_a, own_b]);
+        let scaling = self.system.scaling.as_ref();
+        if scaling.is_some_and(|scaling| scaling.concerns([own_a, own_b])) {
+            self.system.scale_for_springs(&[own_a, own_b]);
         }
         // What was stable still is; nothing limits what has no springs.
-        if self.springs.spring_count() == 0 {
-            self.carry.stability = Stability::UNKNOWN;
+        if self.system.springs.spring_count() == 0 {
+            self.system.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
-    }
-
-    /// Makes what is known of the longest stable substep true again after springs of these nodes, given in order, have come or
-    /// changed.
-    pub(super) fn see_stability_of(&mut self, nodes: &[u32]) {
-        let stability = self.carry.stability;
-        let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_heavier: false,
-        };
-        let positions = self.state.positions();
-        self.carry.stability = stability.changed(nodes, &*self.springs, masses, positions, &mut self.watched);
-    }
-
-    /// Masses, pins or springs are not what they were.
-    pub(super) fn forget_rates(&mut self) {
-        if let Some(elements) = &mut self.elements {
-            elements.forget_rates();
-        }
-        if let Some(terms) = &mut self.terms {
-            terms.forget_rates();
-        }
-        if let Some(enclosed) = &mut self.enclosed {
-            enclosed.forget_rates();
-        }
-    }
-
-    /// What it is made of has another energy where it is.
-    pub(super) fn forget_energy(&mut self) {
-        self.carry.forget();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_energy();
-        }
-    }
-
-    /// Its springs, elements or terms are not what they were.
-    pub(super) fn forget_stiffness(&mut self) {
-        self.forces_current = false;
-        self.wake();
-        self.carry.forget();
-        self.forget_rates();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
-    }
-
-    /// Other nodes move now.
-    pub(super) fn forget_matrix(&mut self) {
-        self.carry.stability = Stability::UNKNOWN;
-        self.carry.forget();
-        self.forget_rates();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
     }
 
     /// Keeps the velocities at the time of the positions as they are after a spring has come (sign -1) or gone (1), given
     /// as each of its nodes sees it.
     fn make_up_for_spring(&mut self, [a, b]: [Link; 2], sign: f32) {
-        if self.carry.closing.is_none() {
+        if self.system.carry.closing.is_none() {
             return;
         }
-        self.published.forget_velocities();
+        self.forget_velocities();
         for (node, link) in [(b.neighbour, a), (a.neighbour, b)] {
-            let [here, there] = [node, link.neighbour].map(|node| self.state.positions().get(node as usize));
-            make_up_for(self, node, pull(node as usize, &link, there - here, None) * sign);
+            let [here, there] = [node, link.neighbour].map(|node| self.system.state.positions().get(node as usize));
+            make_up_for(
+                &mut self.system,
+                node,
+                pull(node as usize, &link, there - here, None) * sign,
+            );
         }
-    }
-
-    /// Sees that other springs may ask for other masses of these nodes.
-    pub(super) fn scale_for_springs(&mut self, nodes: &[u32]) {
-        if self.carry.masses_for > 0.0 {
-            // What closes the step is made with the masses that it was taken with.
-            close(self);
-        }
-        if let Some(scaling) = &mut self.scaling {
-            let rates = self.damping.as_ref().map(|damping| damping.rates());
-            for &node in nodes {
-                scaling.change(node, &*self.springs, &self.masses, rates);
-            }
-        }
-        self.scale_masses(self.carry.masses_for);
     }
 
     /// The mass of a node that is to move, kg.
     pub(super) fn mass_of_unpinned(&self, node: u32) -> Result<f32> {
-        let mass = self.masses[self.order.own(node) as usize];
+        let mass = self.system.masses[self.system.order.own(node) as usize];
         if mass == 0.0 {
             return Err(Error::invalid(format!(
                 "node {node} has no mass: it is pinned for good"
@@ -476,13 +416,13 @@ impl Body {
     }
 
     pub(super) fn set_velocity(&mut self, node: u32, velocity: Vec3) {
-        let own = self.order.own(node) as usize;
-        self.state.velocities_mut().set(own, velocity);
-        self.published.forget_velocities();
-        self.carry.forget();
-        if self.springs.damped() {
-            self.forces_current = false;
-            self.wake();
+        let own = self.system.order.own(node) as usize;
+        self.system.state.velocities_mut().set(own, velocity);
+        self.forget_velocities();
+        self.system.carry.forget();
+        if self.system.springs.damped() {
+            self.system.forces_current = false;
+            self.system.wake();
         }
     }
 
@@ -498,8 +438,8 @@ impl Body {
 
     /// Whether it is a point that is bound to nodes.
     pub(super) fn is_bound(&self, node: u32) -> bool {
-        let bindings = self.bindings.as_ref();
-        bindings.is_some_and(|bindings| bindings.get(self.order.own(node)).is_some())
+        let bindings = self.system.bindings.as_ref();
+        bindings.is_some_and(|bindings| bindings.get(self.system.order.own(node)).is_some())
     }
 
     /// Refuses a point that is bound to nodes: nothing holds or pulls it but those.
@@ -521,7 +461,7 @@ impl Body {
                 "a and b are both {a}: a spring joins two nodes"
             )));
         }
-        Ok([a, b].map(|node| self.order.own(node)))
+        Ok([a, b].map(|node| self.system.order.own(node)))
     }
 }
 

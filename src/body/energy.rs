@@ -8,18 +8,18 @@ use crate::def::Energy;
 impl Energy {
     pub(crate) fn of(body: &Body, gravity: Vec3) -> Self {
         let mut energy = Self::default();
-        let (positions, velocities) = (body.state.positions(), body.velocities());
-        let gravity = (gravity * body.gravity_scale).as_dvec3();
+        let (positions, velocities) = (body.system.state.positions(), body.velocities());
+        let gravity = (gravity * body.system.gravity_scale).as_dvec3();
         for node in 0..body.node_count() {
-            let mass = f64::from(body.masses[node]);
+            let mass = f64::from(body.system.masses[node]);
             let position = positions.get(node).as_dvec3();
-            if body.inverse_masses[node] > 0.0 {
-                let held = body.pins.partial_axes_of(node as u32);
-                let velocity = Vec3::select(held, Vec3::ZERO, velocities[body.callers(node)]);
+            if body.system.inverse_masses[node] > 0.0 {
+                let held = body.system.pins.partial_axes_of(node as u32);
+                let velocity = Vec3::select(held, Vec3::ZERO, velocities[body.system.callers(node)]);
                 energy.kinetic += 0.5 * mass * velocity.as_dvec3().length_squared();
             }
-            energy.gravitational -= mass * gravity.dot(position + body.origin);
-            body.springs.visit(node, &mut |link| {
+            energy.gravitational -= mass * gravity.dot(position + body.system.origin);
+            body.system.springs.visit(node, &mut |link| {
                 let neighbour = link.neighbour as usize;
                 // Each spring is met at both of its nodes.
                 if neighbour > node {
@@ -29,14 +29,14 @@ impl Energy {
                 }
             });
         }
-        if let Some(elements) = &body.elements {
+        if let Some(elements) = &body.system.elements {
             let mut growths = vec![0.0; elements.ring_count()];
             energy.elastic += elements.exact_energy(|node| positions.get(node).as_dvec3(), &mut growths);
         }
-        if let Some(terms) = &body.terms {
+        if let Some(terms) = &body.system.terms {
             energy.elastic += terms.energy(&|node| positions.get(node).as_dvec3());
         }
-        if let Some(enclosed) = &body.enclosed {
+        if let Some(enclosed) = &body.system.enclosed {
             let [stored, work] = enclosed.energy(&|node| positions.get(node).as_dvec3());
             energy.elastic += stored - work;
         }

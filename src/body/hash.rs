@@ -5,52 +5,53 @@ use crate::base::StateHasher;
 
 impl Body {
     pub(crate) fn hash_state(&self, hasher: &mut StateHasher) {
+        let system = &self.system;
         hasher.write_u64(self.node_count() as u64);
-        for value in self.origin.to_array() {
+        for value in system.origin.to_array() {
             hasher.write_u64(value.to_bits());
         }
-        let mut vectors = vec![self.state.positions(), self.state.velocities()];
-        vectors.extend(self.state.remainders());
+        let mut vectors = vec![system.state.positions(), system.state.velocities()];
+        vectors.extend(system.state.remainders());
         // Without damping the forces follow from the positions.
-        if self.springs.damped() && self.forces_current {
-            vectors.push(self.state.forces());
+        if system.springs.damped() && system.forces_current {
+            vectors.push(system.state.forces());
         }
-        hasher.write_u64(u64::from(self.forces_applied));
-        if self.forces_applied {
-            vectors.extend(&self.applied);
+        hasher.write_u64(u64::from(system.forces_applied));
+        if system.forces_applied {
+            vectors.extend(&system.applied);
         }
         for vectors in vectors {
             for vector in vectors.iter() {
                 hasher.write_floats(&vector.to_array());
             }
         }
-        hasher.write_floats(&[self.gravity_scale]);
-        hasher.write_floats(&self.masses);
-        hasher.write_floats(&self.inverse_masses);
-        if let Some(damping) = &self.damping {
+        hasher.write_floats(&[system.gravity_scale]);
+        hasher.write_floats(&system.masses);
+        hasher.write_floats(&system.inverse_masses);
+        if let Some(damping) = &system.damping {
             hasher.write_floats(damping.rates());
         }
-        hasher.write_u64(self.surface.len() as u64);
-        for &[a, b, c] in &self.surface {
+        hasher.write_u64(system.surface.len() as u64);
+        for &[a, b, c] in &system.surface {
             hasher.write_u64(u64::from(a) << 32 | u64::from(b));
             hasher.write_u64(u64::from(c));
         }
         for node in 0..self.node_count() {
-            self.springs.visit(node, &mut |link| {
+            system.springs.visit(node, &mut |link| {
                 hasher.write_u64(u64::from(link.neighbour));
                 hasher.write_floats(&[link.stiffness, link.rest_length, link.damping]);
             });
         }
-        if let Some(elements) = &self.elements {
+        if let Some(elements) = &system.elements {
             elements.hash(hasher);
         }
-        if let Some(terms) = &self.terms {
+        if let Some(terms) = &system.terms {
             terms.hash(hasher);
         }
-        if let Some(enclosed) = &self.enclosed {
+        if let Some(enclosed) = &system.enclosed {
             enclosed.hash(hasher);
         }
-        for pin in self.pins.iter() {
+        for pin in system.pins.iter() {
             let led = u64::from(pin.target.is_some());
             hasher.write_u64(u64::from(pin.node) << 4 | u64::from(pin.axes.bitmask()) << 1 | led);
             if let Some(target) = pin.target {
@@ -58,44 +59,47 @@ impl Body {
             }
         }
         if let Some(cuttable) = &self.cuttable {
-            hasher.write_floats(&[cuttable.toughness]);
+            hasher.write_floats(self.toughness().as_slice());
             cuttable.stroke.hash(hasher);
             cuttable.material.hash(hasher);
         }
-        if let Some(bindings) = &self.bindings {
+        if let Some(bindings) = &system.bindings {
             bindings.hash(hasher);
         }
         if let Some(tears) = &self.tears {
             tears.bearing.hash(hasher);
         }
-        if let Some(grasps) = &self.grasps {
+        if let Some(grasps) = &system.grasps {
             grasps.hash(hasher);
         }
-        hasher.write_floats(&self.carry.stability.floats());
-        if self.carry.stability.limit().is_some() {
-            self.watched.floats().for_each(|limit| hasher.write_floats(&[limit]));
+        hasher.write_floats(&system.carry.stability.floats());
+        if system.carry.stability.limit().is_some() {
+            self.system
+                .watched
+                .floats()
+                .for_each(|limit| hasher.write_floats(&[limit]));
         }
-        if let Some(closing) = &self.carry.closing {
+        if let Some(closing) = &system.carry.closing {
             hasher.write_floats(&[closing.substep]);
             hasher.write_floats(&closing.gravity.to_array());
         }
-        hasher.write_floats(&[self.carry.masses_for]);
-        self.carry.energy.hash(hasher);
-        self.carry.pace.hash(hasher);
-        for sliver in self.scaling.iter().flat_map(|scaling| scaling.slivers()) {
+        hasher.write_floats(&[system.carry.masses_for]);
+        system.carry.energy.hash(hasher);
+        system.carry.pace.hash(hasher);
+        for sliver in system.scaling.iter().flat_map(|scaling| scaling.slivers()) {
             hasher.write_u64(u64::from(sliver.node));
         }
-        if let Some(implicit) = &self.implicit {
+        if let Some(implicit) = &system.implicit {
             implicit.hash(hasher);
         }
-        if let Some(sleeper) = &self.sleeper {
+        if let Some(sleeper) = &system.sleeper {
             sleeper.hash(hasher);
         }
-        self.contact.hash(hasher);
-        if let Some(contacts) = &self.contacts {
+        system.contact.hash(hasher);
+        if let Some(contacts) = &system.contacts {
             contacts.holds.hash(hasher);
         }
-        for bits in self.carry.gravity.bits() {
+        for bits in system.carry.gravity.bits() {
             hasher.write_u64(bits);
         }
     }

@@ -9,29 +9,29 @@ impl Body {
     /// What allows the shortest substep with the nodes where they are. It looks at everything that makes forces.
     pub(crate) fn substep_limit(&self) -> SubstepLimit {
         let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_heavier: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
+            masses: &self.system.masses,
+            inverse_masses: &self.system.inverse_masses,
+            are_heavier: self.system.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
         };
-        let positions = self.state.positions();
+        let positions = self.system.state.positions();
         let (mut limit, mut shortest) = (self.limit_of(LimitKind::Cavity, &[]), f32::INFINITY);
-        if let Some(enclosed) = &self.enclosed {
+        if let Some(enclosed) = &self.system.enclosed {
             shortest = enclosed.rates().limit();
         }
-        if let Some((nodes, substep)) = Stability::tightest(&*self.springs, masses, positions)
+        if let Some((nodes, substep)) = Stability::tightest(&*self.system.springs, masses, positions)
             && substep <= shortest
         {
             shortest = substep;
             limit = self.limit_of(LimitKind::Spring, &nodes.map(|node| node as u32));
         }
-        if let Some(elements) = &self.elements
+        if let Some(elements) = &self.system.elements
             && let Some((nodes, substep)) = elements.tightest(&masses, positions)
             && substep <= shortest
         {
             shortest = substep;
             limit = self.limit_of(LimitKind::Element, &nodes);
         }
-        if let Some(terms) = &self.terms
+        if let Some(terms) = &self.system.terms
             && terms.rates().limit() < shortest
         {
             let (mut most, mut found) = (-1.0, None);
@@ -48,7 +48,7 @@ impl Body {
 
     /// One of these nodes of its own, at most 4.
     fn limit_of(&self, kind: LimitKind, nodes: &[u32]) -> SubstepLimit {
-        let caller = |place: usize| nodes.get(place).map(|&node| self.order.caller(node));
+        let caller = |place: usize| nodes.get(place).map(|&node| self.system.order.caller(node));
         let last = nodes.len().saturating_sub(1);
         SubstepLimit {
             kind,

@@ -33,12 +33,12 @@ impl Body {
 
     /// Where a point of the surface is, found from the nodes that move it: what is shown may be older.
     fn place_now(&self, triangle: u32, weights: [f64; 3]) -> DVec3 {
-        let corners = self.surface[triangle as usize].into_iter().zip(weights);
+        let corners = self.system.surface[triangle as usize].into_iter().zip(weights);
         let parts = corners.flat_map(|(corner, weight)| {
-            let parts = self.parts_of(corner);
+            let parts = self.system.parts_of(corner);
             parts.map(move |(node, part)| (node, weight * f64::from(part)))
         });
-        let positions = self.state.positions();
+        let positions = self.system.state.positions();
         parts
             .map(|(node, part)| part * positions.get(node as usize).as_dvec3())
             .sum()

@@ -19,28 +19,29 @@ impl Body {
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn pieces(&self) -> Result<Pieces> {
         let count = self.node_count();
+        let order = &self.system.order;
         let mut lowest: Vec<u32> = memory::reserved(count)?;
         lowest.extend(0..count as u32);
         for node in 0..count as u32 {
-            let own = self.order.own(node) as usize;
-            self.springs.visit(own, &mut |link| {
-                unite(&mut lowest, node, self.order.caller(link.neighbour))
-            });
+            let own = order.own(node) as usize;
+            self.system
+                .springs
+                .visit(own, &mut |link| unite(&mut lowest, node, order.caller(link.neighbour)));
         }
-        for &[a, b, c] in &self.surface {
+        for &[a, b, c] in &self.system.surface {
             unite(&mut lowest, a, b);
             unite(&mut lowest, a, c);
         }
-        if let Some(elements) = &self.elements {
+        if let Some(elements) = &self.system.elements {
             elements.visit(&mut |corners, _| {
                 for corner in &corners[1..] {
-                    unite(&mut lowest, self.order.caller(corners[0]), self.order.caller(*corner));
+                    unite(&mut lowest, order.caller(corners[0]), order.caller(*corner));
                 }
             });
         }
-        for bound in self.bindings.iter().flat_map(|bindings| bindings.iter()) {
+        for bound in self.system.bindings.iter().flat_map(|bindings| bindings.iter()) {
             for (node, _) in bound.parts() {
-                unite(&mut lowest, self.order.caller(bound.node), self.order.caller(node));
+                unite(&mut lowest, order.caller(bound.node), order.caller(node));
             }
         }
         let mut count = 0;

@@ -6,12 +6,12 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use glam::{DVec3, Vec3};
 
 use super::Body;
-use crate::base::{Result, memory};
-use crate::codec::{Reader, Saved, Writer, saved};
+use crate::base::{Error, Result, memory};
+use crate::codec::{Reader, Saved, Writer};
 use crate::geometry::Bounds;
-use crate::nodes::Bindings;
+use crate::nodes::{Bindings, NewNode};
 use crate::simd::{Loops, prefetch};
-use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
+use crate::soa::{TILE, tile_count, tile_nodes};
 use crate::solver::show_closed;
 use crate::threads::{Items, Team, Tiles};
 
@@ -25,21 +25,9 @@ pub(super) struct Published {
     velocities: OnceLock<Vec<Vec3>>,
     /// Where velocities are written next, while there are none. Locked by who asks for them alone.
     blank: Mutex<Vec<Vec3>>,
-    /// Of bodies that may press others: of the last step, and of the one that is tried.
-    early: Option<[Early; 2]>,
 }
 
-/// Velocities from before the last half kick of a step.
-#[derive(Debug)]
-struct Early {
-    velocities: Vectors,
-    /// Whether callers see these.
-    is_seen: bool,
-}
-
-saved!(Early { velocities, is_seen });
-
-/// Positions, and early velocities: others are written again when they are asked for.
+/// Positions: velocities are written again when they are asked for.
 impl Saved for Published {
     const SHAPE: u64 = Vec::<Vec3>::SHAPE;
     const LEAST: usize = Vec::<Vec3>::LEAST;
@@ -49,11 +37,9 @@ impl Saved for Published {
             positions,
             velocities: _,
             blank: _,
-            early,
         } = self;
         to.needs(positions.capacity() * size_of::<Vec3>());
         positions.save(to);
-        early.save(to);
     }
 
     fn load(from: &mut Reader) -> Result<Self> {
@@ -64,7 +50,6 @@ impl Saved for Published {
             positions,
             velocities: OnceLock::new(),
             blank: Mutex::new(blank),
-            early: Saved::load(from)?,
         })
     }
 }
@@ -75,22 +60,12 @@ impl Published {
             positions: memory::filled(Vec3::ZERO, node_count)?,
             velocities: OnceLock::new(),
             blank: Mutex::new(memory::filled(Vec3::ZERO, node_count)?),
-            early: None,
         })
-    }
-
-    /// The step that was tried is taken.
-    pub fn commit(&mut self) {
-        self.clear_velocities();
-        if let Some(early) = &mut self.early {
-            early.swap(0, 1);
-        }
     }
 
     /// Whether it is of so many nodes.
     pub fn is_sound(&self, node_count: usize) -> bool {
-        let mut early = self.early.iter().flatten();
-        self.positions.len() == node_count && early.all(|early| early.velocities.len() == node_count)
+        self.positions.len() == node_count
     }
 
     /// Makes room for so many nodes in all.
@@ -98,9 +73,6 @@ impl Published {
         self.forget_velocities();
         let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
         memory::reserve(blank, node_count)?;
-        for early in self.early.iter_mut().flatten() {
-            early.velocities.reserve(node_count)?;
-        }
         memory::reserve(&mut self.positions, node_count)
     }
 
@@ -109,9 +81,6 @@ impl Published {
         self.forget_velocities();
         let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
         blank.resize(node_count, Vec3::ZERO);
-        for early in self.early.iter_mut().flatten() {
-            early.velocities.grow(node_count);
-        }
         self.positions.resize(node_count, Vec3::ZERO);
     }
 
@@ -125,7 +94,7 @@ impl Published {
 
     /// The list of positions, and another as long that holds nothing while velocities were not asked for.
     fn lists_mut(&mut self) -> [&mut [Vec3]; 2] {
-        self.clear_velocities();
+        self.forget_velocities();
         let blank = self.blank.get_mut().unwrap_or_else(PoisonError::into_inner);
         [&mut self.positions, blank]
     }
@@ -140,22 +109,8 @@ impl Published {
         })
     }
 
-    /// The early velocities, where callers see those.
-    fn early_seen(&self) -> Option<&Vectors> {
-        let [early, _] = self.early.as_ref()?;
-        early.is_seen.then_some(&early.velocities)
-    }
-
-    /// To be called when velocities change.
-    pub fn forget_velocities(&mut self) {
-        self.clear_velocities();
-        if let Some([early, _]) = &mut self.early {
-            early.is_seen = false;
-        }
-    }
-
     /// Has velocities be written again when they are asked for.
-    fn clear_velocities(&mut self) {
+    pub fn forget_velocities(&mut self) {
         if let Some(velocities) = self.velocities.take() {
             *self.blank.get_mut().unwrap_or_else(PoisonError::into_inner) = velocities;
         }
@@ -163,6 +118,12 @@ impl Published {
 }
 
 impl Body {
+    /// To be called when velocities change.
+    pub(super) fn forget_velocities(&mut self) {
+        self.published.forget_velocities();
+        self.system.forget_early();
+    }
+
     /// Where each node is, in metres, in the caller's order.
     pub fn positions(&self) -> &[Vec3] {
         self.published.positions()
@@ -176,54 +137,50 @@ impl Body {
     pub fn velocities(&self) -> &[Vec3] {
         self.published.velocities(|to| {
             let mut put = |nodes: Range<usize>, from: [&[f32]; 3]| {
-                if self.order.is_callers() {
+                if self.system.order.is_callers() {
                     let (origin, to) = (DVec3::ZERO, &mut to[nodes]);
-                    self.kernel.run(Publish { from, origin, to });
+                    self.system.kernel.run(Publish { from, origin, to });
                 } else {
                     for (place, node) in nodes.enumerate() {
-                        to[self.order.caller(node as u32) as usize] = Vec3::from(from.map(|axis| axis[place]));
+                        to[self.system.order.caller(node as u32) as usize] = Vec3::from(from.map(|axis| axis[place]));
                     }
                 }
             };
-            let closing = self.carry.closing;
-            if let Some(early) = self.published.early_seen() {
+            let closing = self.system.carry.closing;
+            if let Some(early) = self.system.early_seen() {
                 put(0..self.node_count(), early.axes());
-            } else if !closing.is_some_and(|closing| show_closed(self, &closing, &mut put)) {
-                put(0..self.node_count(), self.state.velocities().axes());
+            } else if !closing.is_some_and(|closing| show_closed(&self.system, &closing, &mut put)) {
+                put(0..self.node_count(), self.system.state.velocities().axes());
             }
-            for bound in self.bindings.iter().flat_map(Bindings::iter) {
-                let velocity = bound.of(|node| to[self.order.caller(node as u32) as usize]);
-                to[self.order.caller(bound.node) as usize] = velocity;
+            for bound in self.system.bindings.iter().flat_map(Bindings::iter) {
+                let velocity = bound.of(|node| to[self.system.order.caller(node as u32) as usize]);
+                to[self.system.order.caller(bound.node) as usize] = velocity;
             }
         })
     }
 
-    /// Makes room for velocities from before the last half kick of a step.
-    pub(super) fn reserve_early(&mut self) -> Result<()> {
-        if self.published.early.is_none() {
-            let early = [self.zeros()?, self.zeros()?];
-            self.published.early = Some(early.map(|velocities| Early {
-                velocities,
-                is_seen: false,
-            }));
-        }
+    /// Makes room for so many nodes more than there are.
+    pub(super) fn reserve_nodes(&mut self, more: usize) -> Result<()> {
+        let count = self.node_count().checked_add(more).ok_or(Error::OutOfMemory)?;
+        self.published.reserve(count)?;
+        self.system.reserve_nodes(more)
+    }
+
+    /// Adds nodes, for which there is room, in their own numbers: they follow those that there are. Changes nothing where it fails.
+    pub(super) fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
+        self.system.add_nodes(nodes)?;
+        self.published.grow(self.node_count());
         Ok(())
     }
 
-    /// Has callers see the velocities that it has now, before the last half kick of the step that is tried, once that is taken.
-    pub(crate) fn show_early(&mut self) {
-        if let Some([_, early]) = &mut self.published.early
-            && !early.is_seen
-        {
-            early.velocities.copy_from(self.state.newest().1);
-            early.is_seen = true;
-        }
-    }
-
-    /// Has callers see the velocities at the end of the step that is to be tried.
-    pub(crate) fn show_late(&mut self) {
-        if let Some([_, early]) = &mut self.published.early {
-            early.is_seen = false;
+    /// Shows callers the nodes from this one on, which are new.
+    pub(super) fn publish_new(&mut self, first: usize) {
+        self.query_tree.outdate();
+        for node in first..self.node_count() {
+            let local = self.system.state.positions().get(node);
+            self.published.positions_mut()[node] = (local.as_dvec3() + self.system.origin).as_vec3();
+            let bounds = &mut self.system.boxes[node / TILE];
+            *bounds = bounds.with(local);
         }
     }
 
@@ -236,14 +193,14 @@ impl Body {
     /// Writes the positions for callers and shows them to readers, and finds the box of each tile.
     pub(super) fn publish(&mut self, team: &Team) {
         self.query_tree.outdate();
-        let (kernel, origin, order) = (self.kernel, self.origin, &self.order);
-        let positions = self.state.positions();
+        let (kernel, origin, order) = (self.system.kernel, self.system.origin, &self.system.order);
+        let positions = self.system.state.positions();
         let count = positions.len();
         let [published, blank] = self.published.lists_mut();
         let is_callers = order.is_callers();
         let first = if is_callers { &mut *published } else { &mut *blank };
-        let written = (Tiles::new(first, TILE), Items::new(&mut self.boxes));
-        let sleeper = self.sleeper.as_deref();
+        let written = (Tiles::new(first, TILE), Items::new(&mut self.system.boxes));
+        let sleeper = self.system.sleeper.as_deref();
         let is_asleep = |tile: usize| sleeper.is_some_and(|sleeper| sleeper.is_asleep(tile));
         team.pass(tile_count(count), written, |tile, (to, bounds): (_, &mut Bounds)| {
             if is_asleep(tile) {

@@ -24,25 +24,25 @@ impl Body {
         let mut own = memory::reserved(nodes.len())?;
         for (index, &node) in nodes.iter().enumerate() {
             self.check_node(&format_args!("nodes[{index}]"), node)?;
-            own.push(self.order.own(node));
+            own.push(self.system.order.own(node));
         }
         let region = Region::of(own);
         let scale = Scale { stiffness, length };
         let changes = self.springs_in(&region, scale)?;
-        if let Some(elements) = &self.elements {
+        if let Some(elements) = &self.system.elements {
             elements.check_scale(&region, scale)?;
         }
-        if let Some(terms) = &self.terms {
+        if let Some(terms) = &self.system.terms {
             terms.check_scale(&region, scale)?;
         }
         self.change_springs(&changes)?;
-        let elements = self.elements.as_mut();
+        let elements = self.system.elements.as_mut();
         let mut scaled = elements.map_or(0, |elements| elements.scale(&region, scale));
-        let terms = self.terms.as_mut();
+        let terms = self.system.terms.as_mut();
         scaled += terms.map_or(0, |terms| terms.scale(&region, scale));
         if scaled > 0 {
-            self.forget_stiffness();
-            self.measure_anew();
+            self.system.forget_stiffness();
+            self.system.measure_anew();
         }
         Ok(())
     }
@@ -52,7 +52,7 @@ impl Body {
         let mut changes = Vec::new();
         let mut result = Ok(());
         for &node in region.nodes() {
-            self.springs.visit(node as usize, &mut |before| {
+            self.system.springs.visit(node as usize, &mut |before| {
                 if before.neighbour < node || !region.has(before.neighbour) || result.is_err() {
                     return;
                 }
@@ -64,7 +64,7 @@ impl Body {
                 if after.stiffness.is_finite() && after.rest_length.is_finite() {
                     result = memory::push(&mut changes, Change { node, before, after });
                 } else {
-                    let [a, b] = [node, before.neighbour].map(|node| self.order.caller(node));
+                    let [a, b] = [node, before.neighbour].map(|node| self.system.order.caller(node));
                     result = Err(Error::invalid(format!(
                         "the spring of nodes {a} and {b} would have a stiffness of {} N/m and a rest length of {} m",
                         after.stiffness, after.rest_length

@@ -4,30 +4,28 @@ use super::Body;
 use crate::base::{Result, memory, not_negative};
 use crate::def::{BodyContact, BodySettings, Sleep};
 use crate::nodes::NodeDamping;
-use crate::soa::tile_count;
+use crate::soa::{tile_count, tile_nodes};
 use crate::solver::close;
 
 impl Body {
     /// What of it can be set, as it was made or set.
     pub fn settings(&self) -> BodySettings {
-        let contact = &self.contact;
+        let sleeper = self.system.sleeper.as_ref();
+        let contact = &self.system.contact;
         BodySettings {
             thickness: contact.thickness,
             friction: contact.friction,
             with_bodies: contact.with_bodies,
             with_itself: contact.with_itself,
-            sleep: self
-                .sleeper
-                .as_ref()
-                .map_or(Sleep::default(), |sleeper| sleeper.sleep()),
+            sleep: sleeper.map_or(Sleep::default(), |sleeper| sleeper.sleep()),
         }
     }
 
     /// Has tools and other tissue keep to another contact, which has been checked.
     pub(crate) fn set_contact(&mut self, contact: BodyContact) {
-        self.contact = contact;
-        self.wake();
-        if let Some(contacts) = &mut self.contacts {
+        self.system.contact = contact;
+        self.system.wake();
+        if let Some(contacts) = &mut self.system.contacts {
             contacts.set_thickness(contact.thickness);
         }
     }
@@ -38,13 +36,13 @@ impl Body {
     /// [`Error::InvalidArgument`](crate::Error::InvalidArgument): there is no such node.
     pub fn node_damping(&self, node: u32) -> Result<f32> {
         self.check_node(&"node", node)?;
-        let own = self.order.own(node) as usize;
-        let Some(damping) = &self.damping else {
+        let own = self.system.order.own(node) as usize;
+        let Some(damping) = &self.system.damping else {
             return Ok(0.0);
         };
         // The rate is that of the mass with what is added to it.
-        let mass = match self.inverse_masses[own] {
-            0.0 => self.masses[own],
+        let mass = match self.system.inverse_masses[own] {
+            0.0 => self.system.masses[own],
             inverse_mass => 1.0 / inverse_mass,
         };
         Ok(damping.rates()[own] * mass)
@@ -58,20 +56,20 @@ impl Body {
         not_negative("node_damping", damping)?;
         let mut rates = memory::reserved(self.node_count())?;
         let rate = |&mass: &f32| if mass > 0.0 { damping / mass } else { 0.0 };
-        rates.extend(self.masses.iter().map(rate));
+        rates.extend(self.system.masses.iter().map(rate));
         let is_damped = damping > 0.0;
-        if let Some(scaling) = &mut self.scaling {
+        if let Some(scaling) = &mut self.system.scaling {
             scaling.set_rates(&rates);
         }
         let mut made = NodeDamping::new(rates)?;
-        made.reserve(self.node_room)?;
+        made.reserve(self.system.node_room)?;
         // The velocities so far are those of the damping so far.
-        close(self);
-        self.damping = is_damped.then_some(made);
-        let step = self.scaling.as_ref().map_or(0.0, |scaling| scaling.step());
-        self.scale_masses(step);
-        self.forget_matrix();
-        self.wake();
+        close(&mut self.system);
+        self.system.damping = is_damped.then_some(made);
+        let step = self.system.scaling.as_ref().map_or(0.0, |scaling| scaling.step());
+        self.system.scale_masses(step);
+        self.system.forget_matrix();
+        self.system.wake();
         Ok(())
     }
 
@@ -82,24 +80,41 @@ impl Body {
     pub(crate) fn set_sleep(&mut self, sleep: Sleep) -> Result<()> {
         sleep.check()?;
         if sleep.speed == 0.0 {
-            self.wake();
-            self.sleeper = None;
-        } else if let Some(sleeper) = &mut self.sleeper {
+            self.system.wake();
+            self.system.sleeper = None;
+        } else if let Some(sleeper) = &mut self.system.sleeper {
             sleeper.set_sleep(sleep);
-            self.wake();
+            self.system.wake();
         } else {
-            let made = self.make_sleeper(sleep).and_then(|()| self.reserve_sleep());
+            let made = self.system.make_sleeper(sleep).and_then(|()| self.reserve_sleep());
             if made.is_err() {
-                self.sleeper = None;
+                self.system.sleeper = None;
             }
             return made;
         }
         Ok(())
     }
 
+    /// What part of its nodes is awake, 0 to 1: stepped. 1 for bodies that never sleep.
+    pub fn awake_share(&self) -> f32 {
+        let Some(sleeper) = &self.system.sleeper else {
+            return 1.0;
+        };
+        let count = self.node_count();
+        let asleep = (0..tile_count(count)).filter(|&tile| sleeper.is_asleep(tile));
+        let asleep: usize = asleep.map(|tile| tile_nodes(tile, count).len()).sum();
+        1.0 - asleep as f32 / count as f32
+    }
+
+    /// Has all of it be stepped again, until it has been at rest for as long as it takes.
+    pub fn wake(&mut self) {
+        self.system.wake();
+    }
+
     /// Makes room for the tiles that cuts may add.
     fn reserve_sleep(&mut self) -> Result<()> {
-        let tiles = tile_count(self.node_count().max(self.node_room));
-        self.sleeper.as_mut().map_or(Ok(()), |sleeper| sleeper.reserve(tiles))
+        let tiles = tile_count(self.node_count().max(self.system.node_room));
+        let sleeper = self.system.sleeper.as_mut();
+        sleeper.map_or(Ok(()), |sleeper| sleeper.reserve(tiles))
     }
 }

@@ -14,7 +14,7 @@ impl Body {
     /// [`Error::OutOfMemory`]. Then no node has changed.
     pub fn pin_nodes(&mut self, nodes: &[u32]) -> Result<()> {
         self.check_free_to_pin(nodes)?;
-        self.pins.reserve(nodes.len(), self.node_count())?;
+        self.system.pins.reserve(nodes.len(), self.node_count())?;
         nodes.iter().try_for_each(|&node| self.pin(node))
     }
 
@@ -49,8 +49,8 @@ impl Body {
     pub fn unpin_box(&mut self, min: Vec3, max: Vec3) -> Result<usize> {
         let mut nodes = self.nodes_in(min, max)?;
         nodes.retain(|&node| {
-            let own = self.order.own(node);
-            self.pins.get(own).is_some() && self.masses[own as usize] > 0.0
+            let own = self.system.order.own(node);
+            self.system.pins.get(own).is_some() && self.system.masses[own as usize] > 0.0
         });
         self.unpin_nodes(&nodes)?;
         Ok(nodes.len())
@@ -64,8 +64,9 @@ impl Body {
     pub fn pin_forces(&self, forces: &mut [Vec3]) -> Result<()> {
         crate::def::expect_count("forces", forces.len(), self.node_count())?;
         forces.fill(Vec3::ZERO);
-        for pin in self.pins.iter().filter(|pin| !self.is_held_by_tool(pin.node)) {
-            let node = self.order.caller(pin.node);
+        let pins = self.system.pins.iter();
+        for pin in pins.filter(|pin| !self.system.is_held_by_tool(pin.node)) {
+            let node = self.system.order.caller(pin.node);
             forces[node as usize] = self.pin_force(node)?;
         }
         Ok(())
@@ -77,7 +78,7 @@ impl Body {
             let name = format_args!("nodes[{index}]");
             self.check_node(&name, node)?;
             self.check_not_bound(&name, node)?;
-            self.check_not_held(&name, node)?;
+            self.system.check_not_held(&name, node)?;
         }
         Ok(())
     }

@@ -7,10 +7,10 @@ use crate::threads::Team;
 
 impl Body {
     pub(crate) fn create_reader(&mut self, clock: Clock) -> Result<BodyReader> {
-        let room = self.node_room.max(self.node_count());
+        let room = self.system.node_room.max(self.node_count());
         let mut shown = match self.shown.take() {
             Some(shown) => shown,
-            None => memory::boxed(Shown::new(room, &self.surface)?)?,
+            None => memory::boxed(Shown::new(room, &self.system.surface)?)?,
         };
         shown.clock = clock;
         let reader = shown.create_reader(room, self.view());
@@ -48,7 +48,7 @@ impl Body {
     fn view(&self) -> View<'_> {
         View {
             positions: self.published.positions(),
-            triangles: &self.surface,
+            triangles: &self.system.surface,
             topology_version: self.topology_version(),
         }
     }

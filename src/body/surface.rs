@@ -7,31 +7,31 @@ use crate::contact::SurfaceChange;
 impl Body {
     /// Makes room for a change of its surface with which so many nodes come, and so many triangles change and are added.
     pub(crate) fn reserve_surface(&mut self, nodes: usize, changed: usize, added: usize) -> Result<()> {
-        self.surface.try_reserve(added)?;
+        self.system.surface.try_reserve(added)?;
         if let Some(shown) = self.shown.as_mut().filter(|_| changed + added > 0) {
-            shown.reserve_triangles(self.surface.capacity())?;
+            shown.reserve_triangles(self.system.surface.capacity())?;
         }
         let node_count = self.node_count() + nodes;
-        self.bindings.get_or_insert_default().reserve(0, node_count)?;
-        if let Some(contacts) = &mut self.contacts {
+        self.system.bindings.get_or_insert_default().reserve(0, node_count)?;
+        if let Some(contacts) = &mut self.system.contacts {
             contacts.reserve_surface(nodes, changed, added)?;
         }
-        self.reserve_holds()
+        self.system.reserve_holds()
     }
 
     /// Changes its surface, for which there is room; all that is named is there, and nodes that have come since the surface last changed
     /// are touched unless they are hidden.
     pub(crate) fn change_surface(&mut self, change: &SurfaceChange) {
         for &(index, corners) in change.changed {
-            self.surface[index as usize] = corners;
+            self.system.surface[index as usize] = corners;
         }
-        self.surface.extend_from_slice(change.added);
+        self.system.surface.extend_from_slice(change.added);
         self.query_tree.outdate();
         if let Some(shown) = &mut self.shown {
             shown.forget_triangles();
         }
-        let bindings = self.bindings.get_or_insert_default();
-        let order = &self.order;
+        let bindings = self.system.bindings.get_or_insert_default();
+        let order = &self.system.order;
         let own = |node: u32| order.own(node);
         change.hidden.iter().for_each(|&node| bindings.hide(own(node)));
         let changed = change.changed.iter().map(|(_, corners)| corners);
@@ -42,8 +42,8 @@ impl Body {
                 *word |= 1 << (corner % 64);
             }
         }
-        if let Some(contacts) = &mut self.contacts {
-            let places = (self.state.positions(), &*bindings);
+        if let Some(contacts) = &mut self.system.contacts {
+            let places = (self.system.state.positions(), &*bindings);
             contacts.change_surface(change, corners.map(|&corner| own(corner)), own, places);
         }
     }

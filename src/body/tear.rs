@@ -5,11 +5,12 @@ use glam::{DMat3, DVec3};
 use super::cuttable::Cuttable;
 use super::{Body, CutReport};
 use crate::base::{Error, Result, memory};
-use crate::contact::Skin;
 use crate::cutting::{CutSurface, Limits, Load};
 use crate::def::{TearReport, Values, Withheld, check_values};
+use crate::solver::System;
 use crate::springs::{Link, pull};
 use crate::threads::Team;
+use crate::tissue::Skin;
 
 /// What became of a spring that was to tear.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +66,7 @@ impl Body {
         let (Some(solid), true) = (solid, is_known) else {
             return found;
         };
-        let nodes = callers.map(|node| self.order.own(node));
+        let nodes = callers.map(|node| self.system.order.own(node));
         if !tears.watches(nodes) {
             return found;
         }
@@ -84,7 +85,10 @@ impl Body {
         let version = self.topology_version();
         if let Some(mut tears) = self.tears.take() {
             let link = |nodes| self.link(nodes);
-            tears.begin(self.state.positions(), version, &self.order, link, (self.kernel, team));
+            let System {
+                state, order, kernel, ..
+            } = &self.system;
+            tears.begin(state.positions(), version, order, link, (*kernel, team));
             self.tears = Some(tears);
         }
     }
@@ -135,8 +139,8 @@ impl Body {
         let Some(surface) = cuttable.material.surface() else {
             return Ok(Vec::new());
         };
-        let callers = spring.map(|node| self.order.caller(node));
-        let is_free = |own: u32| self.inverse_masses[own as usize] > 0.0;
+        let callers = spring.map(|node| self.system.order.caller(node));
+        let is_free = |own: u32| self.system.inverse_masses[own as usize] > 0.0;
         let mut at_nodes = memory::reserved(2)?;
         for (own, node) in spring.into_iter().zip(callers) {
             // What holds a node would hold its copies too.
@@ -152,12 +156,12 @@ impl Body {
         let other = if spring.into_iter().any(is_free) {
             None
         } else {
-            surface.vertex_between(callers, |node| is_free(self.order.own(node)))?
+            surface.vertex_between(callers, |node| is_free(self.system.order.own(node)))?
         };
         for vertex in surface.tip_near(callers)?.into_iter().chain(other) {
             let mut forces = DMat3::ZERO;
             for node in surface.nodes_about(vertex)? {
-                forces += self.separation(self.order.own(node));
+                forces += self.separation(self.system.order.own(node));
             }
             if let Some(load) = surface.load_at(vertex, forces, self.positions())? {
                 found.push((vertex, load));
@@ -185,10 +189,10 @@ impl Body {
             .triangles
             .iter()
             .flat_map(|&triangle| surface.nodes_under(triangle));
-        nodes.extend(under.map(|node| self.order.own(node)));
+        nodes.extend(under.map(|node| self.system.order.own(node)));
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
         let limits = Limits {
-            nodes: self.node_room as u32,
+            nodes: self.system.node_room as u32,
             ..Limits::NONE
         };
         let changes = cuttable
@@ -232,11 +236,11 @@ impl Body {
 
     /// The tensor of the forces that pull a node apart, N (O'Brien, Hodgins 1999, equation 13), of its springs.
     fn separation(&self, node: u32) -> DMat3 {
-        let positions = self.state.positions();
+        let positions = self.system.state.positions();
         let here = positions.get(node as usize);
         let mut sums = [DVec3::ZERO; 2];
         let mut tensors = [DMat3::ZERO; 2];
-        self.springs.visit(node as usize, &mut |link| {
+        self.system.springs.visit(node as usize, &mut |link| {
             let offset = positions.get(link.neighbour as usize) - here;
             let force = pull(node as usize, &link, offset, None).as_dvec3();
             let pushes = usize::from(force.dot(offset.as_dvec3()) < 0.0);

@@ -4,9 +4,9 @@ use super::cuttable::Cuttable;
 use super::tear::Torn;
 use super::{Body, CutReport};
 use crate::base::{Result, memory};
-use crate::contact::Skin;
 use crate::cutting::{CutMaterial, Divided, Limits, Load};
 use crate::def::Withheld;
+use crate::tissue::Skin;
 
 impl Body {
     /// Tears a solid at a spring, or an edge of elements: through that of its nodes which is stretched more, else the other, or else one beside it.
@@ -32,12 +32,12 @@ impl Body {
         let Some(solid) = cuttable.material.solid() else {
             return Ok(Vec::new());
         };
-        let callers = spring.map(|node| self.order.caller(node));
+        let callers = spring.map(|node| self.system.order.caller(node));
         let beside = solid.nodes_beside(callers)?;
         let mut found = memory::reserved(2 + beside.len())?;
         // What holds a node would hold its copies too.
         let load_at = |&node: &u32| {
-            let is_free = self.inverse_masses[self.order.own(node) as usize] > 0.0;
+            let is_free = self.system.inverse_masses[self.system.order.own(node) as usize] > 0.0;
             let load = is_free.then(|| solid.load_at(node, self.positions())).flatten()?;
             Some((node, load))
         };
@@ -52,7 +52,7 @@ impl Body {
 
     fn tear_node(&mut self, cuttable: &mut Cuttable, node: u32, load: &Load, skin: Option<&mut Skin>) -> Result<Torn> {
         let limits = Limits {
-            nodes: self.node_room as u32,
+            nodes: self.system.node_room as u32,
             ..Limits::NONE
         };
         let counts = [cuttable.material.triangle_count(), cuttable.material.item_count()];
@@ -92,7 +92,7 @@ impl Body {
         };
         match applied {
             Ok(CutReport { pieces_parted, .. }) => {
-                let order = &self.order;
+                let order = &self.system.order;
                 if let Some(tears) = &mut self.tears {
                     tears.made(pieces_parted, nodes.into_iter().map(|node| order.own(node)));
                 }

@@ -79,43 +79,43 @@ impl Body {
         nodes.extend(changes.iter().flat_map(Change::ends).map(|(node, _)| node));
         nodes.sort_unstable();
         nodes.dedup();
-        if let Some(scaling) = &mut self.scaling {
+        if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(nodes.len())?;
         }
-        self.springs.set(changes)?;
+        self.system.springs.set(changes)?;
         if changes.is_empty() {
             return Ok(());
         }
-        if let Some(terms) = &mut self.terms {
+        if let Some(terms) = &mut self.system.terms {
             changes.iter().for_each(|change| terms.set_spring(change));
         }
         if let Some(tears) = &mut self.tears {
             tears.change(changes);
         }
-        self.measure_anew();
-        self.forget_stiffness();
+        self.system.measure_anew();
+        self.system.forget_stiffness();
         self.make_up_for_changes(changes);
-        self.scale_for_springs(&nodes);
-        let limit = self.watched.limit();
-        self.see_stability_of(&nodes);
-        if self.watched.limit() > limit {
+        self.system.scale_for_springs(&nodes);
+        let limit = self.system.watched.limit();
+        self.system.see_stability_of(&nodes);
+        if self.system.watched.limit() > limit {
             // Longer substeps may be stable now.
-            self.carry.stability = Stability::UNKNOWN;
+            self.system.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
     }
 
     /// Keeps the velocities at the time of the positions as they are.
     fn make_up_for_changes(&mut self, changes: &[Change]) {
-        if self.carry.closing.is_none() {
+        if self.system.carry.closing.is_none() {
             return;
         }
-        self.published.forget_velocities();
+        self.forget_velocities();
         for &Change { node, before, after } in changes {
-            let [here, there] = [node, after.neighbour].map(|node| self.state.positions().get(node as usize));
+            let [here, there] = [node, after.neighbour].map(|node| self.system.state.positions().get(node as usize));
             let [before, after_it] = [before, after].map(|link| pull(node as usize, &link, there - here, None));
-            make_up_for(self, node, before - after_it);
-            make_up_for(self, after.neighbour, after_it - before);
+            make_up_for(&mut self.system, node, before - after_it);
+            make_up_for(&mut self.system, after.neighbour, after_it - before);
         }
     }
 
@@ -132,7 +132,7 @@ impl Body {
     /// What the first of two nodes sees of their spring, in the body's own numbers.
     pub(super) fn link(&self, [node, neighbour]: [u32; 2]) -> Option<Link> {
         let mut found = None;
-        self.springs.visit(node as usize, &mut |link| {
+        self.system.springs.visit(node as usize, &mut |link| {
             if link.neighbour == neighbour {
                 found = Some(link);
             }

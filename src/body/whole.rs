@@ -22,7 +22,7 @@ impl Body {
     pub fn node_masses(&self, masses: &mut [f32]) -> Result<()> {
         expect_count("masses", masses.len(), self.node_count())?;
         for (node, mass) in (0..).zip(masses) {
-            *mass = self.masses[self.order.own(node) as usize];
+            *mass = self.system.masses[self.system.order.own(node) as usize];
         }
         Ok(())
     }
@@ -36,7 +36,7 @@ impl Body {
         expect_count("normals", normals.len(), self.node_count())?;
         let [low, high] = self.bounds();
         let scale = 1.0 / (high - low).max_element();
-        vertex_normals(self.positions(), &self.surface, scale, normals);
+        vertex_normals(self.positions(), &self.system.surface, scale, normals);
         Ok(())
     }
 
@@ -93,15 +93,15 @@ impl Body {
                 )));
             }
         }
-        close(self);
+        close(&mut self.system);
         for (&node, &impulse) in nodes.iter().zip(impulses) {
-            for (own, weight) in self.movers(self.order.own(node)) {
-                let change = impulse * (weight * self.inverse_masses[own as usize]);
-                let change = Vec3::select(self.pins.partial_axes_of(own), Vec3::ZERO, change);
-                let velocity = self.state.velocities().get(own as usize);
+            for (own, weight) in self.system.movers(self.system.order.own(node)) {
+                let change = impulse * (weight * self.system.inverse_masses[own as usize]);
+                let change = Vec3::select(self.system.pins.partial_axes_of(own), Vec3::ZERO, change);
+                let velocity = self.system.state.velocities().get(own as usize);
                 let velocity = (velocity + change).clamp(Vec3::MIN, Vec3::MAX);
-                self.wake_at(own);
-                self.set_velocity(self.order.caller(own), velocity);
+                self.system.wake_at(own);
+                self.set_velocity(self.system.order.caller(own), velocity);
             }
         }
         self.follow_velocities();
@@ -110,7 +110,7 @@ impl Body {
 
     /// The part of the world's gravity that acts on it: 1 unless it was set.
     pub fn gravity_scale(&self) -> f32 {
-        self.gravity_scale
+        self.system.gravity_scale
     }
 
     /// Lets this part of the world's gravity act on it from the next step on: 0 none, -1 upward.
@@ -119,19 +119,29 @@ impl Body {
     /// [`Error::InvalidArgument`]: it is not finite.
     pub fn set_gravity_scale(&mut self, scale: f32) -> Result<()> {
         finite("gravity_scale", scale)?;
-        self.gravity_scale = scale;
-        self.wake();
+        self.system.gravity_scale = scale;
+        self.system.wake();
         Ok(())
+    }
+
+    /// Has tools and other bodies meet it as this filter says, from the next step on. What lies within it or them then is pushed out.
+    pub fn set_collision_filter(&mut self, filter: CollisionFilter) {
+        self.system.contact.filter = filter;
+        self.system.wake();
+        if let Some(contacts) = &mut self.system.contacts {
+            contacts.set_filter(filter);
+        }
     }
 
     /// What it meets.
     pub fn collision_filter(&self) -> CollisionFilter {
-        self.contact.filter
+        self.system.contact.filter
     }
 
     /// The pressure of its cavities at their volumes at rest, Pa: as it was made or set; 0 without cavities.
     pub fn pressure(&self) -> f32 {
-        self.enclosed.as_ref().map_or(0.0, |enclosed| enclosed.pressure())
+        let enclosed = self.system.enclosed.as_ref();
+        enclosed.map_or(0.0, |enclosed| enclosed.pressure())
     }
 
     /// What the caller keeps with it: 0 unless it was set, and after a snapshot.

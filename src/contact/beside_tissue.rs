@@ -28,7 +28,7 @@ impl Contacts {
     }
 
     /// One sweep over the contacts, on the velocities of the substep: the most that one of them changed, m/s.
-    pub(super) fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
+    pub(crate) fn sweep(&mut self, velocities: &mut Vectors, sweep: Sweep) -> f32 {
         if self.constraints.is_empty() {
             self.nodes.sweep(velocities, sweep)
         } else {

@@ -1,33 +1,33 @@
 //! What contacts with tools and contacts of tissue share: impulses, one contact after another, until they change no more.
 
 /// Sweeps over all contacts, at most: so many that tissue comes to rest.
-pub(super) const SWEEPS: u32 = 128;
+pub(crate) const SWEEPS: u32 = 128;
 
 /// What a sweep changes is nothing, as a part of what the first one did.
 const CONVERGED: f32 = 1e-5;
 
 /// The part of how deep something began inside that it is moved out by in a substep, at most.
-pub(super) const PUSHED_OUT: f32 = 0.2;
+pub(crate) const PUSHED_OUT: f32 = 0.2;
 
 /// s: in substeps so short that this is longer than a fifth of it, what is inside is moved out with a speed of its depth over this time. A part of the
 /// depth in each would be the faster the shorter they are, and viscous tissue would ask for ever shorter ones.
 const PUSH_TIME: f32 = 1e-3;
 
 /// The part of how deep something began inside a tool that it is moved out by in a substep of so many seconds.
-pub(super) fn pushed_out(substep: f32) -> f32 {
+pub(crate) fn pushed_out(substep: f32) -> f32 {
     (substep / PUSH_TIME).min(PUSHED_OUT)
 }
 
 /// How much faster than the contact any of its nodes moves for it, at most. Only a contact close to pinned nodes would
 /// need more, and cannot be had: where nothing gives way, the tool goes in.
-pub(super) const LEVERAGE: f32 = 4.0;
+pub(crate) const LEVERAGE: f32 = 4.0;
 
 /// Between two sweeps over all contacts so many go over those that press: what does not press seldom begins to.
 const BETWEEN: u32 = 3;
 
 /// What a sweep goes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sweep {
+pub(crate) enum Sweep {
     All,
     /// Contacts that have given something.
     Pressing,
@@ -35,7 +35,7 @@ pub(super) enum Sweep {
 
 /// How long sweeps go on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
+pub(crate) struct Effort {
     /// So many at most.
     pub sweeps: u32,
     /// What a sweep changes is nothing, as a part of what the first one did.
@@ -54,7 +54,7 @@ impl Effort {
 
 /// Sweeps until one over all changes velocities by next to nothing beside `first`, m/s, or else beside what the first of them does: the
 /// most that it changed.
-pub(super) fn relax(effort: Effort, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
+pub(crate) fn relax(effort: Effort, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
     let mut first = first;
     let mut left = effort.sweeps;
     while left > 0 {

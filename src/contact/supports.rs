@@ -5,7 +5,7 @@ use super::features::Feature;
 use crate::nodes::Bindings;
 
 /// So many nodes move a feature at most: the corners of a drawn triangle are bound to nodes of one cell.
-pub(super) const MOST: usize = 4;
+pub(crate) const MOST: usize = 4;
 
 /// What each node has in each of three corners.
 pub(super) type Ties = [[f32; MOST]; 3];

@@ -8,17 +8,17 @@ use super::mesh_solid::MeshSolid;
 use crate::geometry::Bounds;
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
-pub(super) const TOUCHING: f32 = 1e-4;
+pub(crate) const TOUCHING: f32 = 1e-4;
 
 /// A way of this part of half a mesh's least extent is not searched: it is too short to pass anything.
-pub(super) const FLAT: f32 = 0.01;
+pub(crate) const FLAT: f32 = 0.01;
 
 /// Advances of one search. A search that takes more grazes the tool, and ends where it is, still clear of it.
 const ADVANCES: u32 = 32;
 
 /// The corners of a node, edge or face over a substep.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Corners {
+pub(crate) struct Corners {
     pub points: [Vec3; 3],
     pub steps: [Vec3; 3],
     pub count: usize,
@@ -26,7 +26,7 @@ pub(super) struct Corners {
 
 /// The segment within a rounded tool over a substep.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
+pub(crate) struct Segment {
     pub ends: [Vec3; 2],
     pub steps: [Vec3; 2],
     pub radius: f32,
@@ -34,7 +34,7 @@ pub(super) struct Segment {
 
 /// The closest points of a feature and a tool's segment.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Separation {
+pub(crate) struct Separation {
     /// From the segment to the feature.
     pub offset: Vec3,
     /// The feature's point, as weights of its corners.

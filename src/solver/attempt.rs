@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::System;
 use super::closing::ClosingKick;
 use super::energy_monitor::EnergyAccount;
 use super::gravity::GravityKicks;
@@ -10,7 +11,6 @@ use super::pace::Pace;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
 use crate::base::Profile;
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::{DynamicTool, ToolPath};
 use crate::threads::Team;
@@ -74,7 +74,7 @@ impl StepRequest<'_> {
     }
 
     /// The same with the gravity that acts on a body.
-    pub fn of(&self, body: &Body) -> Self {
+    pub fn of(&self, body: &System) -> Self {
         Self {
             gravity: self.gravity * body.gravity_scale,
             ..*self
@@ -133,7 +133,7 @@ impl Carry {
 /// Tissue that resists blades takes no more than so many times the substeps that it takes at rest, as far as mass may be added.
 const SQUEEZED: f64 = 1.25;
 
-/// How an attempted step ended. Nothing is current before [`Body::commit`].
+/// How an attempted step ended. Nothing is current before [`System::commit`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outcome {
     /// The step is ready to be committed.
@@ -162,7 +162,7 @@ impl From<TooLong> for Outcome {
 }
 
 /// Takes a step of `body` without making it current.
-pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+pub(crate) fn attempt(body: &mut System, request: &StepRequest, team: &Team) -> Outcome {
     let request = &request.of(body);
     body.rouse(request.tools);
     if body.is_asleep() {
@@ -186,7 +186,7 @@ pub(crate) fn attempt(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
 }
 
 /// What a step of VERLET begins with, and the longest stable substep as far as springs are not concerned, s.
-fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) {
+fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> (Carry, f32) {
     if body.has_more_than_springs() {
         // What else there is asks for substeps by the masses that the step is taken with.
         let ends = body.scaling.as_mut().is_some_and(|scaling| scaling.end_relief());
@@ -228,7 +228,7 @@ fn prepare(body: &mut Body, request: &StepRequest, team: &Team) -> (Carry, f32) 
 }
 
 /// What a body needs for a step.
-pub(super) struct Need {
+pub(crate) struct Need {
     pub start: Carry,
     pub substeps: u32,
     pub masses_for: f32,
@@ -236,7 +236,7 @@ pub(super) struct Need {
 
 impl Need {
     /// That of a step which begins like this, with the longest stable substep and that of all but springs, s.
-    fn new(body: &Body, request: &StepRequest, start: Carry, stable_substep: f32, beside_springs: f32) -> Self {
+    fn new(body: &System, request: &StepRequest, start: Carry, stable_substep: f32, beside_springs: f32) -> Self {
         match fewer_substeps(body, request, stable_substep) {
             Some((substeps, masses_for)) => Self {
                 start: with_less_stability(start, stable_substep),
@@ -253,7 +253,7 @@ impl Need {
 }
 
 /// What a step of VERLET needs that a body takes together with others.
-pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Need {
+pub(crate) fn needed(body: &mut System, request: &StepRequest, team: &Team) -> Need {
     let (start, beside_springs) = prepare(body, request, team);
     if request.substeps > 0 {
         return Need {
@@ -270,7 +270,7 @@ pub(super) fn needed(body: &mut Body, request: &StepRequest, team: &Team) -> Nee
 }
 
 /// How many substeps a step of VERLET takes with the nodes where they are.
-pub(crate) fn substeps_alone(body: &mut Body, request: &StepRequest, team: &Team) -> u32 {
+pub(crate) fn substeps_alone(body: &mut System, request: &StepRequest, team: &Team) -> u32 {
     needed(body, request, team).substeps
 }
 
@@ -280,7 +280,7 @@ fn as_count(substeps: f64) -> u32 {
 }
 
 /// Takes a step that is stable however long it is.
-fn attempt_implicitly(body: &mut Body, request: &StepRequest, team: &Team) -> Outcome {
+fn attempt_implicitly(body: &mut System, request: &StepRequest, team: &Team) -> Outcome {
     let start = body.carry;
     if let Some(implicit) = &mut body.implicit {
         implicit.attempt();
@@ -299,7 +299,7 @@ fn attempt_implicitly(body: &mut Body, request: &StepRequest, team: &Team) -> Ou
 
 /// Takes the step in so many parts, as the body's solver does.
 fn run(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     substeps: u32,
     middle: u32,
@@ -315,7 +315,7 @@ fn run(
 
 /// Takes the step with as many substeps as stability needs: how many, and what came of them.
 fn run_stably(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     start: Carry,
     beside_springs: f32,
@@ -398,7 +398,7 @@ fn refined(substeps: u32, start: &Carry, request: &StepRequest) -> u32 {
 }
 
 /// The longest stable substep as far as is known before the step, s.
-fn first_substep(body: &Body, start: &Carry, beside_springs: f32) -> f32 {
+fn first_substep(body: &System, start: &Carry, beside_springs: f32) -> f32 {
     let is_anywhere = start.stability.is_coarse() || is_better_anywhere(body, &start.stability);
     let of_springs = if is_anywhere {
         anywhere_with_less_reserve(&start.stability)
@@ -410,7 +410,7 @@ fn first_substep(body: &Body, start: &Carry, beside_springs: f32) -> f32 {
 
 /// Whether substeps that are stable wherever the nodes are come cheaper than estimates of all nodes for slightly longer ones.
 /// It is not asked how fast the body moves: what is known of that is a box along the axes, and turns with them.
-fn is_better_anywhere(body: &Body, stability: &Stability) -> bool {
+fn is_better_anywhere(body: &System, stability: &Stability) -> bool {
     let found = stability.limit().unwrap_or(0.0);
     body.watched.limit_of_others() < found && !stability.is_worth_estimating()
 }
@@ -422,13 +422,13 @@ fn anywhere_with_less_reserve(stability: &Stability) -> f32 {
 }
 
 /// How many substeps a step takes of which the longest stable one is this long, s.
-pub(super) fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
+pub(crate) fn substeps_needed(request: &StepRequest, stable_substep: f32) -> f64 {
     (f64::from(request.dt) / f64::from(RESERVE * stable_substep)).ceil()
 }
 
 /// In how few substeps the step can be taken with some mass added, and for what substep, s; `None`: it is not to be, or saves
 /// too little.
-pub(crate) fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
+pub(crate) fn fewer_substeps(body: &System, request: &StepRequest, stable_substep: f32) -> Option<(u32, f32)> {
     // What a tolerance is about would not show what added mass changes.
     if request.substeps > 0 || request.tolerance > 0.0 {
         return None;
@@ -445,8 +445,8 @@ pub(crate) fn fewer_substeps(body: &Body, request: &StepRequest, stable_substep:
 
 /// Makes masses for elements as a step that was tried has deformed them, if that needs more substeps than are taken without: how many it takes then, and
 /// what masses are made for.
-pub(super) fn relieve_squeezed(
-    body: &mut Body,
+pub(crate) fn relieve_squeezed(
+    body: &mut System,
     request: &StepRequest,
     stable_substep: f32,
     team: &Team,
@@ -462,8 +462,8 @@ pub(super) fn relieve_squeezed(
 
 /// In how many substeps a step may be taken before masses are made for elements as they are deformed: in as many as are allowed, but in tissue that
 /// resists blades, which squeeze the cells about their edges, in no more than so many times as at rest.
-fn unrelieved(body: &Body, request: &StepRequest) -> u32 {
-    let resists = body.toughness().is_some_and(|toughness| toughness > 0.0);
+fn unrelieved(body: &System, request: &StepRequest) -> u32 {
+    let resists = body.may_be_cut.is_some_and(|cut| cut.toughness > 0.0);
     match body.scaling.as_ref().filter(|_| resists) {
         Some(scaling) => as_count(SQUEEZED * scaling.unscaled_at_rest(request.dt)).min(request.max_substeps),
         None => request.max_substeps,
@@ -481,7 +481,7 @@ fn middle(substeps: u32) -> u32 {
 /// The difference bounds the error of the finer step whatever the order at which the step converges, from 1 on: contact
 /// is of order 1, and modes that the step does not resolve are of no order at all.
 fn run_to_tolerance(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     substeps: u32,
     start: Carry,
@@ -519,7 +519,7 @@ fn run_to_tolerance(
 }
 
 /// How far the step just taken lies from the one before it, m.
-fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
+fn compare(body: &mut System, request: &StepRequest, carry: &Carry) -> f32 {
     let (positions, velocities) = body.state.newest();
     // 1 over the highest frequency.
     let time = (0.5 * newest_limit(body, carry)).min(request.dt);
@@ -529,12 +529,12 @@ fn compare(body: &mut Body, request: &StepRequest, carry: &Carry) -> f32 {
 }
 
 /// The longest stable substep with the nodes where a step has led them, s; infinity where any is.
-fn newest_limit(body: &Body, carry: &Carry) -> f32 {
+fn newest_limit(body: &System, carry: &Carry) -> f32 {
     let with = |limit: f32| limit.min(body.newest_limit_beside_springs());
     carry.limit().map_or(f32::INFINITY, with)
 }
 
-pub(super) fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Outcome {
+pub(crate) fn finish(body: &System, substeps: u32, taken: Taken, error: f32) -> Outcome {
     if taken.finite && sums_fit(body) {
         Outcome::Done {
             substeps,
@@ -547,7 +547,7 @@ pub(super) fn finish(body: &Body, substeps: u32, taken: Taken, error: f32) -> Ou
 }
 
 /// Whether what is told of pins and tools is finite.
-fn sums_fit(body: &Body) -> bool {
+fn sums_fit(body: &System) -> bool {
     body.pins.iter().all(|pin| fits(pin.force_sum))
         && body.grasps.iter().all(|grasps| grasps.sums_fit(fits))
         && body

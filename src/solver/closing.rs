@@ -8,11 +8,11 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
+use super::System;
 use super::gravity::GravityKicks;
 use super::kick::Inertia;
 use super::kick::{Kick, Survey, TileKick, look};
 use crate::base::{Result, memory};
-use crate::body::Body;
 use crate::codec::saved;
 use crate::elements::Shares;
 use crate::enclosed;
@@ -41,7 +41,7 @@ impl ClosingKick {
 
     /// Whether it can be one kick with the half kick that opens a step of `substep` seconds each: forces from outside
     /// are not for both, and damping takes a different part of either.
-    pub fn joins(&self, body: &Body, substep: f32, gravity: Vec3) -> bool {
+    pub fn joins(&self, body: &System, substep: f32, gravity: Vec3) -> bool {
         let same = Self { substep, gravity } == *self;
         !body.forces_applied && (same || body.damping.is_none())
     }
@@ -63,7 +63,7 @@ impl ClosingKick {
 
 /// Whether a step of `body` may be left open. Damping along springs, comparisons and tools that hold it need velocities at its end, and
 /// forces from outside end with it; those of elements, terms and cavities are not worked out by who only reads.
-pub(super) fn may_stay_open(body: &Body) -> bool {
+pub(super) fn may_stay_open(body: &System) -> bool {
     !body.has_more_than_springs()
         && body.predicted_velocities.is_none()
         && body.coarse.is_none()
@@ -123,7 +123,7 @@ impl Closed<'_> {
 
 /// Writes the closed velocities of the current state to those of the step in progress; `gravity` goes on. Where they would
 /// not be finite all stay as old as they are.
-pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut GravityKicks, team: &Team) {
+pub(super) fn close_aside(body: &mut System, closing: &ClosingKick, gravity: &mut GravityKicks, team: &Team) {
     if let Some(damping) = &mut body.damping {
         damping.prepare(closing.substep);
     }
@@ -163,9 +163,9 @@ pub(super) fn close_aside(body: &mut Body, closing: &ClosingKick, gravity: &mut 
 }
 
 /// Brings the velocities of `body` up to the time of its positions, where they are older.
-pub(crate) fn close(body: &mut Body) {
+pub(crate) fn close(body: &mut System) {
     if let Some(closed) = close_beside(body) {
-        let Body {
+        let System {
             pins,
             springs,
             state,
@@ -187,7 +187,7 @@ pub(crate) struct ClosedBeside {
 }
 
 /// Makes them, where velocities are older.
-pub(crate) fn close_beside(body: &mut Body) -> Option<ClosedBeside> {
+pub(crate) fn close_beside(body: &mut System) -> Option<ClosedBeside> {
     let closing = body.carry.closing?;
     let mut gravity = body.carry.gravity;
     body.state.begin();
@@ -197,7 +197,7 @@ pub(crate) fn close_beside(body: &mut Body) -> Option<ClosedBeside> {
 
 impl ClosedBeside {
     /// What holds each pin, mean over the last step, N; to be asked for while springs and masses are those of the step.
-    pub fn forces(&self, body: &Body) -> Result<Vec<Vec3>> {
+    pub fn forces(&self, body: &System) -> Result<Vec<Vec3>> {
         let mut forces = memory::reserved(body.pins.iter().count())?;
         let of_pin = |pin| {
             mean_force(
@@ -213,7 +213,7 @@ impl ClosedBeside {
     }
 
     /// Has them be those of the body, of which no step was begun since.
-    pub fn commit(self, body: &mut Body) {
+    pub fn commit(self, body: &mut System) {
         body.state.commit();
         for pin in body.pins.iter_mut() {
             pin.closing_share = 0.0;
@@ -228,7 +228,7 @@ type See<'a> = dyn FnMut(Range<usize>, [&[f32]; 3]) + 'a;
 
 /// Shows the velocities of `body` at the time of its positions, tile by tile; whether they are finite. Where they are not,
 /// the rest is not shown.
-pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> bool {
+pub(crate) fn show_closed(body: &System, closing: &ClosingKick, see: &mut See) -> bool {
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let fall = { body.carry.gravity }.next(closing.fall());
     let closed = Closed {
@@ -261,7 +261,7 @@ pub(crate) fn show_closed(body: &Body, closing: &ClosingKick, see: &mut See) -> 
 
 /// Changes the velocity of `node` so that closing it gives what it would give with `force` on top, N: for a spring that has
 /// just been removed, or with its force turned round for one that has just been added.
-pub(crate) fn make_up_for(body: &mut Body, node: u32, mut force: Vec3) {
+pub(crate) fn make_up_for(body: &mut System, node: u32, mut force: Vec3) {
     let Some(closing) = body.carry.closing else {
         return;
     };

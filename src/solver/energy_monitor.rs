@@ -20,16 +20,16 @@
 
 use glam::{BVec3, DMat3, DVec3, Vec3};
 
+use super::System;
 use super::attempt::{Carry, StepRequest};
 use super::closing::Closed;
 use super::kick::Inertia;
+use super::substep::write_records;
 use super::substep::{Before, Part};
 use crate::base::StateHasher;
-use crate::body::Body;
 use crate::codec::saved;
 use crate::simd::Loops;
 use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
-use crate::solver::write_records;
 use crate::threads::{Items, Team};
 
 /// Substeps between two comparisons, at least, and how many more there may be: at even intervals, comparisons might meet a mode in its
@@ -207,7 +207,7 @@ pub(super) struct Account<'a> {
 }
 
 impl<'a> Account<'a> {
-    pub fn new(body: &Body, carry: &Carry, request: &'a StepRequest<'a>, substeps: u32) -> Self {
+    pub fn new(body: &System, carry: &Carry, request: &'a StepRequest<'a>, substeps: u32) -> Self {
         // What is held by a tool, or sleeps in part, is not alone; fixed substeps are taken as they are.
         let watches = request.substeps == 0 && !body.is_grasped() && !body.sleeps();
         Self {
@@ -219,7 +219,7 @@ impl<'a> Account<'a> {
     }
 
     /// Keeps the velocities before the last kick, where forces are kept at the end of a step.
-    pub fn keep_velocities(&self, body: &mut Body, last: &Part) {
+    pub fn keep_velocities(&self, body: &mut System, last: &Part) {
         let state = body.state.substep();
         state.forces.copy_from(match last.before {
             Before::Current | Before::CurrentOpen => state.first_velocities,
@@ -228,7 +228,7 @@ impl<'a> Account<'a> {
     }
 
     /// Takes the step into account. `sums` are those of the open velocities, if it ends with a comparison.
-    pub fn settle(&self, body: &mut Body, carry: &mut Carry, sums: Option<Sums>, team: &Team) {
+    pub fn settle(&self, body: &mut System, carry: &mut Carry, sums: Option<Sums>, team: &Team) {
         let account = &mut carry.energy;
         if !self.watches {
             account.forget();
@@ -247,7 +247,7 @@ impl<'a> Account<'a> {
     }
 
     /// What forces, pins that are led and tools that move put in, J.
-    fn work(&self, body: &Body) -> f64 {
+    fn work(&self, body: &System) -> f64 {
         let mut work = 0.0;
         let (first, (last, _)) = (body.state.positions(), body.state.newest());
         if let Some(applied) = body.applied.as_ref().filter(|_| body.forces_applied) {
@@ -276,7 +276,7 @@ impl<'a> Account<'a> {
     }
 
     /// Takes off the excess energy, and decides how short the next substeps are.
-    fn compare(&self, body: &mut Body, carry: &mut Carry, open: Sums, team: &Team) {
+    fn compare(&self, body: &mut System, carry: &mut Carry, open: Sums, team: &Team) {
         let held = body.held_axes();
         let [closing, elastic] = close(body, carry, team);
         let energy = open.shadow + closing + elastic - open.moment.dot(self.request.gravity.as_dvec3());
@@ -345,7 +345,7 @@ impl Sums {
     ///
     /// With `v` the closed velocities, `v⁺` is `2 v - v⁻`, and the kinetic part of the shadow energy is
     /// `Σ m (v·u + v⁻·v⁻ / 12 - v⁻·u / 2)` with `u = v⁻ - v⁻⁻ / 6`. Here `u` goes to where the next positions will be.
-    pub(super) fn of_open(body: &mut Body, last: &Part, team: &Team) -> Self {
+    pub(super) fn of_open(body: &mut System, last: &Part, team: &Team) -> Self {
         let (kernel, masses, inverse_masses, pins) = (body.kernel, &body.masses, &body.inverse_masses, &body.pins);
         let state = body.state.substep();
         let (positions, before, velocities) = (state.positions, &*state.forces, &*state.velocities);
@@ -479,7 +479,7 @@ impl Loops for Product<'_> {
 
 /// What closed velocities add to the shadow energy, and the energy of all inner forces at the newest positions, less the work of a
 /// constant pressure, J.
-fn close(body: &mut Body, carry: &Carry, team: &Team) -> [f64; 2] {
+fn close(body: &mut System, carry: &Carry, team: &Team) -> [f64; 2] {
     let (kernel, springs) = (body.kernel, &*body.springs);
     let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
     let (inverse_masses, pins) = (&body.inverse_masses, &body.pins);
@@ -539,7 +539,7 @@ fn close(body: &mut Body, carry: &Carry, team: &Team) -> [f64; 2] {
 /// Takes this much kinetic energy off the newest velocities, J, or all there is that nothing conserves: how much it was. A body that nothing
 /// holds keeps its momentum and its angular momentum: it is its deformation that becomes slower.
 /// `at_next`: the nodes are at the next positions.
-pub(super) fn slow_down(body: &mut Body, held: BVec3, energy: f64, at_next: bool) -> f64 {
+pub(super) fn slow_down(body: &mut System, held: BVec3, energy: f64, at_next: bool) -> f64 {
     let state = body.state.substep();
     let positions = if at_next {
         &*state.next_positions
@@ -571,7 +571,7 @@ pub(super) fn slow_down(body: &mut Body, held: BVec3, energy: f64, at_next: bool
 
 /// Sees that motion has no more kinetic energy after masses have changed than before, as a step begins with velocities at the time of its
 /// positions. The motion as a whole of a body that nothing holds stays as it is.
-pub(super) fn keep_energy(body: &mut Body, account: &mut EnergyAccount) {
+pub(super) fn keep_energy(body: &mut System, account: &mut EnergyAccount) {
     let state = body.state.substep();
     state.velocities.copy_from(state.first_velocities);
     let held = body.held_axes();

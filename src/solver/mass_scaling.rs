@@ -7,7 +7,7 @@
 //!
 //! Elements, terms and cavities have such sums too, but at rest alone: masses are made for those, and how short substeps have to be with these
 //! masses is found as it is with any others. Where motion makes elements so stiff that a step would be refused, the sums of their nodes are
-//! made again for how they are deformed (`body/relief.rs`), within the same bound on the mass.
+//! made again for how they are deformed (`relief.rs`), within the same bound on the mass.
 
 use super::attempt::RESERVE as RESERVE_AT_REST;
 use crate::base::{Result, memory};

@@ -2,34 +2,48 @@
 
 mod attempt;
 mod closing;
+mod coarse_step;
+mod early;
 mod energy_monitor;
+mod grasp;
 mod gravity;
+mod grow;
 mod held;
 mod implicit;
 mod kick;
-mod lockstep;
 mod mass_scaling;
 mod newton;
 mod pace;
+mod past;
 mod pipeline;
+mod relief;
+mod sleep;
+mod sound;
 mod stability;
 mod subnormal;
 mod substep;
+mod system;
+mod tissue_impulses;
 mod verlet;
 mod watched;
 
-pub(crate) use attempt::{Carry, Outcome, RESERVE, StepRequest, attempt, fewer_substeps, substeps_alone};
+pub(crate) use attempt::{
+    Carry, Outcome, RESERVE, StepRequest, attempt, finish, needed, relieve_squeezed, substeps_alone, substeps_needed,
+};
 pub(crate) use closing::{close, close_beside, make_up_for, mean_force, show_closed};
+pub(crate) use coarse_step::CoarseStep;
 pub(crate) use energy_monitor::{EnergyAccount, Sums};
+pub(crate) use grasp::Grip;
 pub(crate) use gravity::GravityKicks;
-pub(crate) use implicit::Implicit;
+pub(crate) use implicit::{Implicit, begin_parts, next_part, parts_near};
 pub(crate) use kick::Survey;
-pub(crate) use lockstep::{Together, Walk};
-pub(crate) use mass_scaling::{Heavier, MassScaling};
+pub(crate) use mass_scaling::MassScaling;
 pub(crate) use newton::rest_state;
 pub use newton::{RestStateDefinition, RestStateReport};
 pub(crate) use pace::Pace;
 pub(crate) use stability::Stability;
-pub(crate) use substep::write_records;
-pub(crate) use verlet::begin;
+pub(crate) use substep::Part;
+pub(crate) use system::{MayBeCut, System, Systems};
+pub(crate) use tissue_impulses::Moment;
+pub(crate) use verlet::{Step, Taken, TooLong, begin, check, check_beside_springs, pass};
 pub(crate) use watched::{Candidate, Watched};

@@ -7,11 +7,11 @@
 
 use std::array::from_fn;
 
+use super::System;
 use super::attempt::StepRequest;
 use super::kick::Inertia;
 use super::kick::Survey;
 use super::substep::{Part, Pass, Written};
-use crate::body::Body;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, Vectors, View, tile_count, tile_nodes};
@@ -212,7 +212,7 @@ impl Common<'_> {
 /// Takes these substeps, none of them the first of the step, of a body whose step stays open: what is known of the body
 /// after each.
 pub(super) fn run(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     parts: &[Part],
     plan: Plan,
@@ -239,7 +239,7 @@ pub(super) fn run(
 
 /// Lets `order` say in which order each stretch takes its tiles' substeps; stretches begin at these tiles.
 fn run_stretches(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     parts: &[Part],
     team: &Team,

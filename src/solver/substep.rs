@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::System;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
 use super::kick::Inertia;
 use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::body::Body;
 use crate::elements::{Elements, Shares};
 use crate::enclosed::{self, Enclosed};
 use crate::nodes::{NodeDamping, Pin};
@@ -33,8 +33,8 @@ pub(super) enum Before {
 
 /// One pass over a body: a kick, and the drift that follows it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
-    pub before: Before,
+pub(crate) struct Part {
+    pub(super) before: Before,
     /// Whether it is the last of the step.
     pub last: bool,
     /// Whether the nodes drift after the kick; where they do not, the spring forces are kept.
@@ -72,7 +72,7 @@ impl Part {
     }
 
     /// The kick, without forces from outside.
-    pub fn kick<'a>(&self, gravity: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
+    pub(super) fn kick<'a>(&self, gravity: Vec3, inertia: Inertia<'a>, damping: Option<&'a NodeDamping>) -> Kick<'a> {
         Kick {
             duration: self.duration,
             substep: self.substep,
@@ -121,7 +121,7 @@ const SHORT: f32 = 2.5e-4;
 
 /// Changes the velocities by the forces at the latest positions, moves the nodes by them, and puts the pinned ones where
 /// they are led, along the axes that they are held along.
-pub(super) fn kick_and_drift(body: &mut Body, request: &StepRequest, part: &Part, team: &Team) -> Survey {
+pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Part, team: &Team) -> Survey {
     let node_count = body.node_count();
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     if part.drifts && part.substep < SHORT {

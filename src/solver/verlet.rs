@@ -8,14 +8,16 @@
 
 use glam::DVec3;
 
+use super::System;
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
 use super::energy_monitor::{Account, Sums, keep_energy};
+use super::grasp::Lapse;
 use super::pipeline::{self, DEEPEST, Plan};
+use super::sleep::Sleeper;
 use super::stability::Stability;
 use super::substep::{Before, Part, kick_and_drift};
 use crate::base::{Stage, Stopwatch};
-use crate::body::{Body, Lapse, Sleeper};
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
 use crate::nodes::Mobility;
@@ -23,14 +25,14 @@ use crate::threads::Team;
 
 /// The substep asked for is longer than what is stable, or the motion made it so on the way.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TooLong {
+pub(crate) struct TooLong {
     /// So long may it be, s.
     pub stable_substep: f32,
 }
 
 /// A step that was taken, and is not current yet.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Taken {
+pub(crate) struct Taken {
     /// What it carries on to the next.
     pub carry: Carry,
     /// Whether its positions and velocities are finite.
@@ -39,7 +41,7 @@ pub(super) struct Taken {
 
 /// Takes the step with exactly `substeps` substeps, with masses made for substeps of `masses_for` seconds; 0: as they are. After `middle` of them a world with a tolerance looks at it.
 pub(super) fn run(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     substeps: u32,
     middle: u32,
@@ -66,7 +68,7 @@ pub(super) fn run(
     Ok(step.take(body, start)?.expect("only a pipeline goes too far"))
 }
 
-pub(super) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
+pub(crate) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> {
     match stability.limit() {
         Some(stable_substep) if substep > stable_substep => Err(TooLong { stable_substep }),
         _ => Ok(()),
@@ -74,7 +76,7 @@ pub(super) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> 
 }
 
 /// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
-pub(super) fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooLong> {
+pub(crate) fn check_beside_springs(body: &System, substep: f32) -> Result<(), TooLong> {
     let stable_substep = body.newest_limit_beside_springs();
     if substep <= stable_substep {
         Ok(())
@@ -84,7 +86,7 @@ pub(super) fn check_beside_springs(body: &Body, substep: f32) -> Result<(), TooL
 }
 
 /// A step to be taken.
-pub(super) struct Step<'a> {
+pub(crate) struct Step<'a> {
     request: &'a StepRequest<'a>,
     substeps: u32,
     /// s
@@ -111,7 +113,7 @@ impl<'a> Step<'a> {
     }
 
     /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
-    fn take(&self, body: &mut Body, start: Carry) -> Result<Option<Taken>, TooLong> {
+    fn take(&self, body: &mut System, start: Carry) -> Result<Option<Taken>, TooLong> {
         let Self {
             request,
             substep,
@@ -224,7 +226,7 @@ impl<'a> Step<'a> {
     }
 
     /// The first kick: the half that opens the step, together with the half that closes the last where that was left open.
-    pub fn opening(&self, body: &mut Body, carry: &mut Carry) -> Part {
+    pub fn opening(&self, body: &mut System, carry: &mut Carry) -> Part {
         let Self {
             request, substep, team, ..
         } = *self;
@@ -254,7 +256,7 @@ impl<'a> Step<'a> {
     }
 
     /// Whether no tool comes near within so many substeps, if the motion does not become twice as fast.
-    fn stays_far(&self, body: &Body, depth: usize, velocities: &Bounds) -> bool {
+    fn stays_far(&self, body: &System, depth: usize, velocities: &Bounds) -> bool {
         let duration = depth as f32 * self.substep;
         body.contacts.as_ref().is_none_or(|contacts| {
             let StepRequest { tools, dt, .. } = *self.request;
@@ -263,7 +265,7 @@ impl<'a> Step<'a> {
     }
 
     /// Takes a substep with velocities in this box into account: whether no tool has come near.
-    fn has_stayed_far(&self, body: &mut Body, velocities: &Bounds) -> bool {
+    fn has_stayed_far(&self, body: &mut System, velocities: &Bounds) -> bool {
         body.contacts.as_mut().is_none_or(|contacts| {
             let StepRequest { tools, dt, .. } = *self.request;
             contacts.pass_far(tools, dt, self.substep, fastest(velocities))
@@ -298,7 +300,7 @@ fn diagonal(velocities: &Bounds) -> f32 {
 }
 
 /// Takes one part of the step; whether what it leads to is finite, where it was looked at.
-pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
+pub(crate) fn pass(body: &mut System, request: &StepRequest, part: &Part, carry: &mut Carry, team: &Team) -> bool {
     if part.drifts {
         body.lead_grasps(request.tools, [part.start, part.end]);
     }
@@ -325,7 +327,7 @@ pub(super) fn pass(body: &mut Body, request: &StepRequest, part: &Part, carry: &
 }
 
 /// Starts the step over, from what is current.
-pub(crate) fn begin(body: &mut Body, request: &StepRequest) {
+pub(crate) fn begin(body: &mut System, request: &StepRequest) {
     body.state.begin();
     body.show_late();
     body.recall();
@@ -345,7 +347,7 @@ pub(crate) fn begin(body: &mut Body, request: &StepRequest) {
 }
 
 /// Lets tools stop the nodes that would enter them: the box of all velocities, given that of those before.
-fn meet_tools(body: &mut Body, request: &StepRequest, part: &Part, velocities: Bounds) -> Bounds {
+fn meet_tools(body: &mut System, request: &StepRequest, part: &Part, velocities: Bounds) -> Bounds {
     let Some(contacts) = &mut body.contacts else {
         return velocities;
     };

@@ -4,12 +4,12 @@ use glam::{DVec3, Vec3};
 
 use super::{World, make_walks};
 use crate::base::{Error, Result, memory};
-use crate::body::Grip;
 use crate::codec::{saved, saved_enum};
-use crate::contact::{Bonds, Bound, Thread};
 use crate::def::{Anchor, SurfacePoint};
 use crate::ids::{AttachmentId, BodyId, ToolId};
+use crate::solver::Grip;
 use crate::solver::Outcome;
+use crate::tissue::{Bonds, Bound, Thread, are_one};
 
 /// Whose attachment it is.
 #[derive(Clone, Copy, Debug)]
@@ -131,7 +131,7 @@ impl World {
         for (index, &node) in nodes.iter().enumerate() {
             let name = Lazy(|| name(index));
             body.check_node(&name, node)?;
-            body.check_graspable(&name, node, tool.0.index())?;
+            body.system.check_graspable(&name, node, tool.0.index())?;
         }
         Ok(())
     }
@@ -157,17 +157,19 @@ impl World {
         let holder = Holder::Tool(tool);
         let count = grips.len();
         let answer = held
+            .system
             .reserve_grasps(count)
             .and_then(|()| self.name(Attachment { body, holder }, count, &mut ids))
             .and_then(|()| {
                 let named = ids.iter().map(|id| id.0).zip(grips);
-                self.bodies.get_mut(body.0)?.grasp(tool.0.index(), named, force_limit)
+                let system = &mut self.bodies.get_mut(body.0)?.system;
+                system.grasp(tool.0.index(), named, force_limit)
             });
         if let Err(error) = answer {
             for AttachmentId(id) in ids.into_iter().rev() {
                 self.attachments.take_back(id)?;
             }
-            self.bodies.get_mut(body.0)?.drop_room_for_grasps();
+            self.bodies.get_mut(body.0)?.system.drop_room_for_grasps();
             return Err(error);
         }
         Ok(ids)
@@ -251,13 +253,13 @@ impl World {
         }
         memory::get_or_box(&mut self.tissue)?.reserve_bonds(places, pairs.len())?;
         for id in bodies {
-            self.bodies.get_mut(id.0)?.reserve_bonds()?;
+            self.bodies.get_mut(id.0)?.system.reserve_bonds()?;
         }
         let [body, other] = bodies;
         let holder = Holder::Body(other);
         self.name(Attachment { body, holder }, pairs.len(), &mut ids)?;
         for id in bodies {
-            self.bodies.get_mut(id.0)?.begin_bonds();
+            self.bodies.get_mut(id.0)?.system.begin_bonds();
         }
         if let Some(bonds) = self.bonds_mut() {
             for (&AttachmentId(id), &pair) in ids.iter().zip(pairs) {
@@ -282,7 +284,7 @@ impl World {
         // All corners of a triangle are bound to nodes of one cell.
         let mut nodes = [(0, 0.0); 4];
         for (&corner, weight) in grip.corners.iter().zip(grip.weights) {
-            for (node, part) in body.parts_of(corner) {
+            for (node, part) in body.system.parts_of(corner) {
                 let is_its = |(known, share): &&mut (u32, f32)| *known == node || *share == 0.0;
                 if weight * part != 0.0
                     && let Some(place) = nodes.iter_mut().find(is_its)
@@ -302,7 +304,7 @@ impl World {
     pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<Bound> {
         let body = self.bodies.get(id.0)?;
         let sum: f64 = weights.iter().sum();
-        let own = |node: u32| body.parts_of(node).next().map_or(0, |(own, _)| own);
+        let own = |node: u32| body.system.parts_of(node).next().map_or(0, |(own, _)| own);
         Ok(Bound {
             body: self.bodies.place(id.0)?,
             anchor: None,
@@ -333,7 +335,7 @@ impl World {
         let Attachment { body, holder } = self.attachments.remove(attachment.0)?;
         match (holder, &mut self.tissue) {
             (Holder::Body(_), Some(tissue)) => tissue.bonds.end(&mut self.bodies, attachment.0),
-            _ => self.bodies.get_mut(body.0)?.let_go(attachment.0),
+            _ => self.bodies.get_mut(body.0)?.system.let_go(attachment.0),
         }
         Ok(())
     }
@@ -349,16 +351,16 @@ impl World {
             return Ok(tissue.bonds.force_of(attachment.0));
         }
         let body = self.bodies.get(body.0)?;
-        let grasp = body.grasps.as_ref().and_then(|grasps| grasps.get(attachment.0));
+        let grasp = body.system.grasps.as_ref().and_then(|grasps| grasps.get(attachment.0));
         Ok(grasp.map_or(Vec3::ZERO, |grasp| grasp.force))
     }
 
     /// Shows both ends of what is attached, m: a tool and a node that it holds, or two points of tissue.
     pub(crate) fn show_attached(&self, mut see: impl FnMut([Vec3; 2])) {
         for (_, body) in self.bodies.iter() {
-            for (node, tool) in body.grasps.iter().flat_map(|grasps| grasps.held_nodes()) {
+            for (node, tool) in body.system.grasps.iter().flat_map(|grasps| grasps.held_nodes()) {
                 if let Some(tool) = self.tools.at(tool) {
-                    see([tool.pose.position, body.positions()[body.callers(node)]]);
+                    see([tool.pose.position, body.positions()[body.system.callers(node)]]);
                 }
             }
         }
@@ -408,7 +410,7 @@ impl World {
         } = self;
         attachments.retain(|attachment| attachment.holder != Holder::Tool(tool));
         for (_, body) in bodies.iter_mut() {
-            body.let_go_of(tool.0.index());
+            body.system.let_go_of(tool.0.index());
         }
     }
 
@@ -425,7 +427,7 @@ impl World {
         slipped.clear();
         for (place, body) in bodies.iter_mut() {
             if let Some(Outcome::Done { .. }) = outcomes[place] {
-                body.slip(|id| {
+                body.system.slip(|id| {
                     if attachments.remove(id).is_ok() {
                         slipped.push(AttachmentId(id));
                     }
@@ -453,7 +455,7 @@ pub(super) fn check_limit(force_limit: f32) -> Result<()> {
 
 /// Refuses two points of one body that are one.
 pub(super) fn refuse_one_point(pair: &[Bound; 2], [first, second]: [Which; 2]) -> Result<()> {
-    if !crate::contact::are_one(pair) {
+    if !are_one(pair) {
         return Ok(());
     }
     let [one, many] = match pair[0].anchor {

@@ -6,12 +6,13 @@ use super::resistance::Knot;
 use crate::base::{Error, Result, StateHasher, above_zero, memory};
 use crate::body::{CutReport, Stroke};
 use crate::codec::saved;
-use crate::contact::{Lead, Pose};
+use crate::contact::Pose;
 use crate::cutting::Met;
 use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::rotation::{turn_between, turned};
 use crate::ids::{BodyId, SlotId};
 use crate::mesh::FURTHEST;
+use crate::tissue::Lead;
 
 /// A proxy is held at no more points: a blade through more layers of a body is held at some.
 pub(super) const MOST_HOLDS: usize = 8;

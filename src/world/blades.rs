@@ -10,9 +10,10 @@ use glam::{DVec3, Quat, Vec3};
 use super::World;
 use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
 use crate::base::Result;
-use crate::contact::{Lead, Pose};
+use crate::contact::Pose;
 use crate::def::CollisionFilter;
 use crate::ids::{BladeId, BodyId, SlotId, Slots};
+use crate::tissue::Lead;
 
 impl World {
     /// Adds a blade: an edge that is moved by its pose, as tools are, cuts the bodies made for it ([`BodyDefinition::spare_nodes`]) as

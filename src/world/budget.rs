@@ -103,7 +103,7 @@ impl World {
             }
         };
         self.lag = (owed - length).max(0.0);
-        let solved = || self.bodies.iter().filter_map(|(_, body)| body.implicit.as_ref());
+        let solved = || self.bodies.iter().filter_map(|(_, body)| body.system.implicit.as_ref());
         let products = solved().map(|implicit| implicit.told.iterations).max().unwrap_or(0);
         Ok(BudgetReport {
             step,
@@ -147,7 +147,7 @@ impl World {
     fn allow(&mut self, work: u32) {
         self.work = work;
         for (_, body) in self.bodies.iter_mut() {
-            if let Some(implicit) = &mut body.implicit {
+            if let Some(implicit) = &mut body.system.implicit {
                 implicit.allow(work);
             }
         }
@@ -155,10 +155,10 @@ impl World {
 
     /// The longest explicit substep that is known to be stable, s; infinity where nothing is known.
     fn known_substep(&self) -> f32 {
-        let explicit = self.bodies.iter().filter(|(_, body)| body.implicit.is_none());
+        let explicit = self.bodies.iter().filter(|(_, body)| body.system.implicit.is_none());
         let known = explicit.filter_map(|(_, body)| {
-            let limit = body.carry.limit()?;
-            Some(limit.min(body.newest_limit_beside_springs()))
+            let limit = body.system.carry.limit()?;
+            Some(limit.min(body.system.newest_limit_beside_springs()))
         });
         known.fold(f32::INFINITY, f32::min)
     }

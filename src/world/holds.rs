@@ -7,8 +7,8 @@ use super::blade::{Hold, MOST_HOLDS, Proxy, Stand};
 use super::{World, make_walks};
 use crate::base::{Result, memory};
 use crate::body::{Body, HoldAt};
-use crate::contact::{Lead, Thread};
 use crate::cutting::Met;
+use crate::tissue::{Lead, Thread};
 
 /// Where a proxy is to be held: a point of the tissue, and that of the proxy next to it.
 pub(super) type Held = (HoldAt, DVec3);
@@ -21,7 +21,7 @@ impl World {
         let Some(body) = self.bodies.at_mut(place).filter(|body| body.toughness().is_some()) else {
             return Ok(());
         };
-        body.reserve_bonds()?;
+        body.system.reserve_bonds()?;
         make_walks(&mut self.walks, place)?;
         let tissue = memory::get_or_box(&mut self.tissue)?;
         tissue.bonds.reserve_rebinding(place)?;
@@ -52,7 +52,7 @@ impl World {
             });
         }
         if proxy.holds.is_empty() && bounds[0].is_some() {
-            self.bodies.get_mut(proxy.body.0)?.begin_bonds();
+            self.bodies.get_mut(proxy.body.0)?.system.begin_bonds();
         }
         let Self {
             bodies,

@@ -2,9 +2,9 @@
 
 use super::{World, make_walks};
 use crate::base::{Error, Result, memory};
-use crate::body::CoarseStep;
 use crate::def::{BodyContact, BodySettings};
 use crate::ids::BodyId;
+use crate::solver::CoarseStep;
 
 impl World {
     /// The substeps of a step, 0: as many as stability needs, and how many are allowed then.
@@ -22,16 +22,16 @@ impl World {
         }
         if self.definition.tolerance > 0.0 && substeps == 0 {
             // What a tolerance compares is kept from now on.
-            let bodies = || self.bodies.iter().filter(|(_, body)| body.coarse.is_none());
+            let bodies = || self.bodies.iter().filter(|(_, body)| body.system.coarse.is_none());
             let mut made = memory::reserved(bodies().count())?;
             for (place, body) in bodies() {
                 let mut coarse = CoarseStep::new(body.node_count())?;
-                coarse.reserve(body.node_count() + body.spare_nodes())?;
+                coarse.reserve(body.node_count() + body.system.spare_nodes())?;
                 made.push((place, coarse));
             }
             for (place, coarse) in made {
                 if let Some(body) = self.bodies.at_mut(place) {
-                    body.coarse = Some(coarse);
+                    body.system.coarse = Some(coarse);
                 }
             }
         }
@@ -47,7 +47,7 @@ impl World {
     /// to meet changes, other than to nothing. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn set_body_settings(&mut self, body: BodyId, settings: BodySettings) -> Result<()> {
         let it = self.bodies.get(body.0)?;
-        let before = it.contact;
+        let before = it.system.contact;
         let contact = BodyContact {
             thickness: settings.thickness,
             friction: settings.friction,
@@ -69,7 +69,7 @@ impl World {
             it.set_contact(BodyContact {
                 thickness: contact.thickness,
                 friction: contact.friction,
-                ..it.contact
+                ..it.system.contact
             });
             if let Some(skin) = self.tissue.as_mut().and_then(|tissue| tissue.skin_mut(place)) {
                 skin.forget_nearby();
@@ -82,7 +82,7 @@ impl World {
     fn set_meets(&mut self, body: BodyId, with_bodies: bool, with_itself: bool) -> Result<()> {
         let place = self.bodies.place(body.0)?;
         let it = self.bodies.get_mut(body.0)?;
-        let before = it.contact;
+        let before = it.system.contact;
         if (before.with_bodies, before.with_itself) == (with_bodies, with_itself) {
             return Ok(());
         }
@@ -92,17 +92,17 @@ impl World {
                 "meets_bodies and meets_itself of a body that was cut or torn can only both become 0".into(),
             ));
         }
-        it.contact = BodyContact {
+        it.system.contact = BodyContact {
             with_bodies,
             with_itself,
             ..before
         };
-        it.wake();
-        let joined = if it.meets_tissue() {
+        it.system.wake();
+        let joined = if it.system.meets_tissue() {
             make_walks(&mut self.walks, place)
-                .and_then(|()| it.reserve_pressed())
+                .and_then(|()| it.system.reserve_pressed())
                 .and_then(|()| memory::get_or_box(&mut self.tissue))
-                .and_then(|tissue| tissue.join(place, it))
+                .and_then(|tissue| tissue.join(place, &it.system))
         } else {
             if let Some(tissue) = &mut self.tissue {
                 tissue.shed(place);
@@ -110,7 +110,7 @@ impl World {
             Ok(())
         };
         if joined.is_err() {
-            it.contact = before;
+            it.system.contact = before;
         }
         joined
     }

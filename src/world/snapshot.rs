@@ -4,11 +4,12 @@ use super::{World, WorldDefinition};
 use crate::base::{Error, Result, memory};
 use crate::body::Body;
 use crate::codec::{Saved, Writer, at_end, begin, opened, saved, seal, section, shape_with, write_section};
-use crate::contact::{Tissue, Tool};
+use crate::contact::Tool;
 use crate::ids::Slots;
 use crate::simd::Kernel;
 use crate::soa::TILE;
 use crate::threads::RunTasks;
+use crate::tissue::Tissue;
 
 use super::attachments::Attachment;
 use super::blade::Blade;

@@ -10,8 +10,9 @@ use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
 use crate::def::{ChoiceReason, LimitKind, SubstepLimit};
 use crate::ids::{BodyId, Slots};
-use crate::solver::{Outcome, RESERVE, StepRequest, Together, attempt};
+use crate::solver::{Outcome, RESERVE, StepRequest, attempt};
 use crate::threads::{Items, Team};
+use crate::tissue::Together;
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
@@ -259,7 +260,7 @@ impl World {
         let (id, body, stable_substep, error) = failed.min_by(|one, other| one.2.total_cmp(&other.2))?;
         let of = if error > 0.0 {
             SubstepLimit::of_all(LimitKind::Tolerance)
-        } else if body.implicit.is_some() {
+        } else if body.system.implicit.is_some() {
             SubstepLimit::of_all(LimitKind::Parts)
         } else {
             body.substep_limit()
@@ -274,7 +275,7 @@ impl World {
 
     /// Takes back what bodies have tried.
     fn put_back(&mut self) {
-        self.bodies.iter_mut().for_each(|(_, body)| body.put_back());
+        self.bodies.iter_mut().for_each(|(_, body)| body.system.put_back());
     }
 
     /// Makes the step that was tried the current state.
@@ -353,14 +354,14 @@ fn wrench(
 ) -> [DVec3; 2] {
     let mut wrench = [DVec3::ZERO; 2];
     for (place, body) in bodies.iter() {
-        if let (Some(Outcome::Asleep), Some(contacts)) = (&outcomes[place], &body.contacts) {
+        if let (Some(Outcome::Asleep), Some(contacts)) = (&outcomes[place], &body.system.contacts) {
             let load = contacts.loads()[index];
-            wrench[0] += load.impulse / f64::from(body.last_step());
-            wrench[1] += load.angular_impulse / f64::from(body.last_step());
+            wrench[0] += load.impulse / f64::from(body.system.last_step());
+            wrench[1] += load.angular_impulse / f64::from(body.system.last_step());
         }
-        if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.contacts) {
+        if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.system.contacts) {
             let load = contacts.loads()[index];
-            let [force, torque] = body.pull_of(path.slot, *substeps);
+            let [force, torque] = body.system.pull_of(path.slot, *substeps);
             wrench[0] += load.impulse / f64::from(dt) - force;
             wrench[1] += load.angular_impulse / f64::from(dt) - torque;
         }
@@ -379,7 +380,7 @@ fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::
 
 /// Whether there is work for more than one thread.
 fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
-    let awake = || bodies.iter().filter(|(_, body)| !body.is_asleep());
+    let awake = || bodies.iter().filter(|(_, body)| !body.system.is_asleep());
     let sizes = || awake().map(|(_, body)| body.node_count());
     sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
 }
@@ -408,7 +409,7 @@ fn attempt_bodies(
                     && body.node_count() < SHARED_FROM
                     && goes_alone(place)
                 {
-                    *outcome = Some(attempt(body, request, &Team::alone()));
+                    *outcome = Some(attempt(&mut body.system, request, &Team::alone()));
                 }
             },
         );
@@ -417,9 +418,9 @@ fn attempt_bodies(
         if outcomes[place].is_none() && goes_alone(place) {
             let alone = body.node_count() < SHARED_FROM;
             outcomes[place] = Some(if alone {
-                attempt(body, request, &Team::alone())
+                attempt(&mut body.system, request, &Team::alone())
             } else {
-                attempt(body, request, team)
+                attempt(&mut body.system, request, team)
             });
         }
     }
@@ -439,16 +440,18 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
             Some(Outcome::Done { substeps, carry, error }) => {
                 report.substeps = report.substeps.max(substeps);
                 report.error_estimate = report.error_estimate.max(error);
-                carry.limit().map(|limit| limit.min(body.newest_limit_beside_springs()))
+                carry
+                    .limit()
+                    .map(|limit| limit.min(body.system.newest_limit_beside_springs()))
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);
                 Some(stable_substep)
             }
-            Some(Outcome::Asleep) => body.carry.limit(),
+            Some(Outcome::Asleep) => body.system.carry.limit(),
             Some(Outcome::NotFinite) | None => {
                 report.bodies_restored += 1;
-                body.carry.limit()
+                body.system.carry.limit()
             }
         };
         report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
@@ -469,17 +472,17 @@ fn commit_bodies(
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit((substeps, dt), carry, tools, team);
-                body.fade(dt, team);
+                body.system.fade(dt, team);
                 if goes_alone(place) {
-                    body.doze(dt, (tools, gravity * body.gravity_scale), team);
+                    body.system.doze(dt, (tools, gravity * body.system.gravity_scale), team);
                 } else {
-                    body.doze_together(dt);
+                    body.system.doze_together(dt);
                 }
                 body.find_tears(team);
             }
-            Some(Outcome::Asleep) => body.sleep_on(),
+            Some(Outcome::Asleep) => body.system.sleep_on(),
             _ => {
-                body.stay();
+                body.system.stay();
                 body.find_tears(team);
             }
         }

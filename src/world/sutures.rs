@@ -3,9 +3,9 @@
 use super::World;
 use super::attachments::{Which, check_limit, refuse_one_point};
 use crate::base::{Error, Result};
-use crate::contact::{Thread, distance};
 use crate::def::Anchor;
 use crate::ids::{AttachmentId, BodyId};
+use crate::tissue::{Thread, distance};
 
 /// What a suture is like.
 #[derive(Clone, Copy, Debug, PartialEq)]

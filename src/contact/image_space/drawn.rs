@@ -22,7 +22,7 @@ const RECENT: usize = 16;
 
 /// A surface in memory that was reserved for it, each triangle seen along the axis that sees it the most squarely.
 #[derive(Debug)]
-pub(in crate::contact) struct Drawn {
+pub(crate) struct Drawn {
     /// Metres.
     pixel: f64,
     views: [View; 3],

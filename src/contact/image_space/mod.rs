@@ -23,7 +23,7 @@ mod walk;
 mod tests;
 
 pub use detector::{Form, ImageSpace, ImageSpaceDefinition, Views};
-pub(super) use drawn::Drawn;
+pub(crate) use drawn::Drawn;
 pub use layered_image::LayeredImage;
 pub use overlap::{EdgeInside, Inside, Overlap, PointInside};
 pub use surface::{Placed, Surface};

@@ -9,11 +9,11 @@ use glam::Vec3;
 use super::step::Substep;
 use super::{End, Implicit};
 use crate::base::{Stage, Stopwatch};
-use crate::body::Body;
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
 use crate::nodes::Mobility;
 use crate::soa::{Vectors, tile_count, tile_nodes};
+use crate::solver::System;
 use crate::solver::attempt::StepRequest;
 use crate::solver::kick::look;
 
@@ -25,7 +25,7 @@ const SMALL: u32 = 256;
 
 /// Whether a part longer than that may be tried. What comes near on the way ends up to some micrometres inside, so a budget that is enough
 /// for short parts is used for them.
-pub(super) fn may_be_long(body: &Body, implicit: &Implicit, request: &StepRequest) -> bool {
+pub(super) fn may_be_long(body: &System, implicit: &Implicit, request: &StepRequest) -> bool {
     let is_alone = request.dynamic.is_empty() && request.neighbor_speed.is_none() && body.bindings.is_none();
     implicit.has_small_budget() && !implicit.is_attached && is_alone && body.contacts.is_some()
 }
@@ -37,14 +37,14 @@ const SLACK: f32 = 0.002;
 const LONG_SLACK: f32 = 0.01;
 
 /// Whether a tool was near when the body was last looked at.
-pub(super) fn is_near(body: &Body) -> bool {
+pub(super) fn is_near(body: &System) -> bool {
     body.contacts.as_ref().is_some_and(|contacts| !contacts.are_far())
 }
 
 impl Substep<'_> {
     /// Finds the contacts that belong to the equation. What they do begins and ends within a step, so that it is one of order 1
     /// where there are some. `None`: they are too far from their places for a long one.
-    pub(super) fn foreseeing(&self, body: &mut Body, implicit: &mut Implicit) -> Option<Self> {
+    pub(super) fn foreseeing(&self, body: &mut System, implicit: &mut Implicit) -> Option<Self> {
         if !is_near(body) || self.is_long() && !may_be_long(body, implicit, self.request) {
             if let Some(contacts) = &mut body.contacts {
                 contacts.holds.clear();
@@ -121,7 +121,7 @@ impl Substep<'_> {
 
     /// Whether contacts do what the nodes at them need, as far as is asked for, and in a long step what their multipliers ask for, but for this
     /// part.
-    pub(super) fn is_balanced(&self, body: &Body, implicit: &Implicit, lacking: f64) -> bool {
+    pub(super) fn is_balanced(&self, body: &System, implicit: &Implicit, lacking: f64) -> bool {
         let Some(contacts) = body.contacts.as_deref().filter(|contacts| !contacts.holds.is_empty()) else {
             return true;
         };
@@ -133,7 +133,7 @@ impl Substep<'_> {
 
     /// Makes the preconditioner one of the pressed contacts too: their stiffness is part of the blocks, and the coarse level, which
     /// knows nothing of it, leaves their nodes alone.
-    pub(super) fn stiffen(&self, body: &Body, implicit: &mut Implicit) {
+    pub(super) fn stiffen(&self, body: &System, implicit: &mut Implicit) {
         implicit.soften();
         let Some(contacts) = &body.contacts else {
             return;
@@ -153,7 +153,7 @@ impl Substep<'_> {
     /// with so much inertia per mass, 1/s², N/m.
     fn contact(
         &self,
-        body: &mut Body,
+        body: &mut System,
         velocities: &mut Vectors,
         act: impl FnOnce(&mut Contacts, Meeting, &dyn Fn(usize, f64) -> f32),
     ) {
@@ -207,7 +207,7 @@ impl Substep<'_> {
     }
 
     /// Lets tools stop the nodes that would enter them.
-    pub(super) fn meet(&self, body: &mut Body, implicit: &mut Implicit) -> End {
+    pub(super) fn meet(&self, body: &mut System, implicit: &mut Implicit) -> End {
         let may_stand = may_be_long(body, implicit, self.request);
         let Some(means) = &mut implicit.means else {
             return End::Fine;

@@ -3,7 +3,6 @@
 use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, History, Implicit};
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::elements::Elements;
@@ -11,8 +10,9 @@ use crate::enclosed::Enclosed;
 use crate::nodes::Pins;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
+use crate::solver::System;
 use crate::solver::energy_monitor::slow_down;
-use crate::solver::write_records;
+use crate::solver::substep::write_records;
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
@@ -68,7 +68,7 @@ impl Total {
 
 impl Substep<'_> {
     /// The energy before the step.
-    pub(super) fn energy_before(&self, body: &mut Body, implicit: &mut Implicit) -> Before {
+    pub(super) fn energy_before(&self, body: &mut System, implicit: &mut Implicit) -> Before {
         let history = implicit.last(self.is_first);
         let credit = history.credit;
         let travels = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
@@ -107,7 +107,7 @@ impl Substep<'_> {
     }
 
     /// Compares the energy after the step with what there was and what was put in.
-    pub(super) fn account(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+    pub(super) fn account(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
         let state = body.state.substep();
         let kinetic = kinetic(
             state.velocities,
@@ -140,7 +140,7 @@ impl Substep<'_> {
     }
 
     /// Takes off what was gained: first of the velocities within the body, then of all; where that is not enough, nothing moves but the pins.
-    pub(super) fn slow_down(&self, body: &mut Body, implicit: &mut Implicit, before: Before) {
+    pub(super) fn slow_down(&self, body: &mut System, implicit: &mut Implicit, before: Before) {
         let next = 1 - implicit.settled;
         let known = implicit.histories[next].energy;
         let work = self.work(body, &implicit.histories[next]);
@@ -185,7 +185,7 @@ impl Substep<'_> {
     }
 
     /// Finds out what holds the pins where nothing moves.
-    fn hold(&self, body: &mut Body) {
+    fn hold(&self, body: &mut System) {
         if let Some(velocities) = &mut body.predicted_velocities {
             velocities.clear();
         }
@@ -229,7 +229,7 @@ impl Substep<'_> {
     }
 
     /// What gravity, forces from outside, tools and other tissue did on these ways, J.
-    fn work(&self, body: &Body, history: &History) -> f64 {
+    fn work(&self, body: &System, history: &History) -> f64 {
         let ways = &history.ways;
         let pressed = history.pressing();
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
@@ -300,7 +300,7 @@ fn scale(vectors: &mut Vectors, factor: f32) {
 impl Implicit {
     /// The energy of what is inside a body with nodes where the substep began, or where they are next; they lack the remainders of this place
     /// where there are some, J.
-    fn elastic(&mut self, body: &mut Body, is_next: bool, place: usize, team: &Team) -> Total {
+    fn elastic(&mut self, body: &mut System, is_next: bool, place: usize, team: &Team) -> Total {
         let (kernel, springs) = (body.kernel, &*body.springs);
         let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
         let state = body.state.substep();

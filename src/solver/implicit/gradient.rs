@@ -7,12 +7,12 @@ use glam::Vec3;
 
 use super::Implicit;
 use super::coarse::Coarse;
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::nodes::Pins;
 use crate::simd::Loops;
 use crate::soa::{Records, TileForces, Vectors, WriteRecords, tile_count, tile_nodes};
+use crate::solver::System;
 use crate::springs::{Course, Tangent};
 use crate::threads::{Items, Team, Tiles};
 
@@ -56,7 +56,7 @@ impl Implicit {
     /// The preconditioner has been applied to it, and `square` is the product of both; the spectrum has begun anew.
     pub(super) fn solve(
         &mut self,
-        body: &Body,
+        body: &System,
         positions: &Vectors,
         tangent: Tangent,
         goal: Goal,
@@ -108,7 +108,7 @@ impl Implicit {
     /// The matrix, with what these contacts add to it, times the search direction: the product of both.
     pub(super) fn multiply(
         &mut self,
-        body: &Body,
+        body: &System,
         positions: &Vectors,
         tangent: Tangent,
         contacts: Option<&Contacts>,
@@ -166,7 +166,7 @@ impl Implicit {
 
     /// Goes `length` along the search direction, and applies the preconditioner to what remains of the residual: the product
     /// of both, and the squared norm of inertia of the correction so far.
-    pub(super) fn precondition(&mut self, body: &Body, length: f64, team: &Team) -> Partial {
+    pub(super) fn precondition(&mut self, body: &System, length: f64, team: &Team) -> Partial {
         let node_count = self.inertia.len();
         let size = self.coarse.size();
         let (blocks, inertia, coarse) = (&self.blocks, &self.inertia, &self.coarse);
@@ -212,7 +212,7 @@ impl Implicit {
     }
 
     /// The next search direction, with this part of the last.
-    fn search(&mut self, body: &Body, growth: f64, team: &Team) {
+    fn search(&mut self, body: &System, growth: f64, team: &Team) {
         let node_count = self.inertia.len();
         let (coarse, preconditioned) = (&self.coarse, &self.preconditioned);
         let records = self.search_records.as_mut().map(Records::tiles_mut);

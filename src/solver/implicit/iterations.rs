@@ -6,12 +6,12 @@ use super::Implicit;
 use super::gradient::Goal;
 use super::loops::{Add, Refine, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
-use crate::body::Body;
 use crate::elements::Elements;
 use crate::enclosed::Enclosed;
 use crate::nodes::Pin;
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
+use crate::solver::System;
 use crate::springs::{Motion, Tangent};
 use crate::threads::{Items, Team};
 
@@ -41,7 +41,7 @@ const FINE: f64 = 1e4;
 
 impl Substep<'_> {
     /// What the equation lacks with the nodes where they are: its product with the last correction, J.
-    fn residual(&self, body: &mut Body, implicit: &mut Implicit) -> f64 {
+    fn residual(&self, body: &mut System, implicit: &mut Implicit) -> f64 {
         if let Some(contacts) = &mut body.contacts {
             contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
         }
@@ -124,7 +124,7 @@ impl Substep<'_> {
     }
 
     /// Goes down to where the equation holds, as far as is asked for and the budget reaches; whether all is finite.
-    pub(super) fn minimise(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
+    pub(super) fn minimise(&self, body: &mut System, implicit: &mut Implicit) -> bool {
         let all_inertia = implicit.all_inertia;
         let noise = implicit.noise(body.extent());
         // What each of n equations lacks of its ways goes into the velocity too, and grows as n² by the step's end.
@@ -270,7 +270,7 @@ impl Substep<'_> {
     }
 
     /// Has the residual be that of where the nodes are, not of where their positions are rounded to.
-    fn refine(&self, body: &Body, implicit: &mut Implicit) {
+    fn refine(&self, body: &System, implicit: &mut Implicit) {
         self.find_lacks(body, implicit);
         // What is lacking has no speed.
         let tangent = Tangent {
@@ -294,7 +294,7 @@ impl Substep<'_> {
 
     /// Goes along the correction, as far as the forces do not turn against it, and on where they still pull along it, as they do
     /// where pressed springs buckle: what part of it.
-    fn go(&self, body: &mut Body, implicit: &mut Implicit, work: f64) -> f64 {
+    fn go(&self, body: &mut System, implicit: &mut Implicit, work: f64) -> f64 {
         let mut gone = 1.0;
         add(&mut implicit.pushes, &implicit.corrections, 1.0, body.kernel, self.team);
         for _ in 0..12 {

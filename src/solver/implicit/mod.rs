@@ -20,7 +20,8 @@ mod pressed;
 mod rigid;
 mod step;
 
-pub(super) use step::{begin_parts, next_part, parts_near, run};
+pub(super) use step::run;
+pub(crate) use step::{begin_parts, next_part, parts_near};
 
 use glam::Vec3;
 

@@ -6,8 +6,8 @@ use glam::{BVec3, DMat3, DVec3};
 
 use super::Implicit;
 use super::step::Substep;
-use crate::body::Body;
 use crate::soa::Vectors;
+use crate::solver::System;
 
 /// What forces move the nodes in a step, as a part of the size of the body, beyond which it changes much.
 const MOST_CHANGE: f64 = 0.1;
@@ -85,7 +85,7 @@ impl Substep<'_> {
     ///
     /// With L that about the centre of mass and T the torque from outside, a formula gives `sum x1 x m (v1 - w) = t T`, where it should
     /// give `L1 - L0 - c (L0 - L') = t T`. The first is less by `sum m (s x w + c (1 + c) (x - x') x (v - v'))`.
-    pub(super) fn lost_turn(&self, body: &mut Body, implicit: &Implicit) -> Option<Turn> {
+    pub(super) fn lost_turn(&self, body: &mut System, implicit: &Implicit) -> Option<Turn> {
         let held = body.held_axes();
         if held.all() {
             return None;

@@ -6,11 +6,12 @@ use super::energy::Before;
 use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::base::{Stage, Stopwatch};
-use crate::body::{Body, Lapse};
 use crate::codec::saved;
 use crate::def::SolverReport;
 use crate::soa::{Records, Vectors, WriteRecords, tile_count, tile_nodes};
+use crate::solver::System;
 use crate::solver::attempt::{Carry, StepRequest};
+use crate::solver::grasp::Lapse;
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
 use crate::solver::verlet::{Taken, TooLong, begin};
@@ -65,7 +66,7 @@ const SHARE: u32 = 32;
 /// not solved; then the step is taken again in shorter parts, which are easier to solve, and in the end its motion is slowed
 /// down. How many parts were taken, and what came of them; refused is what is near something and would take more parts than a step may.
 pub(in crate::solver) fn run(
-    body: &mut Body,
+    body: &mut System,
     request: &StepRequest,
     substeps: u32,
     middle: u32,
@@ -155,7 +156,7 @@ impl Implicit {
 }
 
 fn run_in_parts(
-    body: &mut Body,
+    body: &mut System,
     implicit: &mut Implicit,
     request: &StepRequest,
     [substeps, middle]: [u32; 2],
@@ -181,7 +182,7 @@ fn run_in_parts(
 
 /// Takes one of equal parts of a step, up to where it becomes current.
 fn take_part(
-    body: &mut Body,
+    body: &mut System,
     implicit: &mut Implicit,
     request: &StepRequest,
     [index, substeps]: [u32; 2],
@@ -223,14 +224,14 @@ fn take_part(
 }
 
 /// In how many parts a step near a tool or other tissue is to be taken at least.
-pub(in crate::solver) fn parts_near(dt: f32) -> u32 {
+pub(crate) fn parts_near(dt: f32) -> u32 {
     (f64::from(dt) / contact::LONGEST)
         .ceil()
         .clamp(1.0, f64::from(u32::MAX / 4)) as u32
 }
 
 /// Begins a step of so many parts that are taken one by one.
-pub(in crate::solver) fn begin_parts(body: &mut Body, request: &StepRequest, parts: u32) {
+pub(crate) fn begin_parts(body: &mut System, request: &StepRequest, parts: u32) {
     begin(body, request);
     if let Some(implicit) = &mut body.implicit {
         implicit.report = SolverReport::BEFORE;
@@ -242,8 +243,8 @@ pub(in crate::solver) fn begin_parts(body: &mut Body, request: &StepRequest, par
 
 /// Takes one of equal parts of such a step, up to where it becomes current: whether it gained no energy, or as a last resort was slowed
 /// down.
-pub(in crate::solver) fn next_part(
-    body: &mut Body,
+pub(crate) fn next_part(
+    body: &mut System,
     request: &StepRequest,
     part_of: [u32; 2],
     is_last_resort: bool,
@@ -276,7 +277,7 @@ pub(super) struct Substep<'a> {
 impl Substep<'_> {
     /// Takes it, with order 1 where that of order 2 gains energy; as a last resort, or where no product is left to try
     /// anything else, what was gained is taken off again. Then tools stop what would enter them.
-    fn take_safely(self, body: &mut Body, implicit: &mut Implicit, is_last_resort: bool) -> End {
+    fn take_safely(self, body: &mut System, implicit: &mut Implicit, is_last_resort: bool) -> End {
         let watch = Stopwatch::start(self.request.profile);
         let before = self.energy_before(body, implicit);
         let SolverReport { error, converged, .. } = implicit.report;
@@ -320,7 +321,7 @@ impl Substep<'_> {
         }
     }
 
-    fn take(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+    fn take(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
         body.foresee(self.step);
         match self.foreseeing(body, implicit) {
             Some(foreseeing) => foreseeing.take_formula(body, implicit, before),
@@ -328,7 +329,7 @@ impl Substep<'_> {
         }
     }
 
-    fn take_formula(&self, body: &mut Body, implicit: &mut Implicit, before: Before) -> End {
+    fn take_formula(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
         if let Some(mut newton) = implicit.newton.take() {
             self.aim(body, implicit);
             self.solve_exactly(body, implicit, &mut newton);
@@ -366,7 +367,7 @@ impl Substep<'_> {
     }
 
     /// Makes inertia and preconditioner those of this step.
-    fn prepare(&self, body: &Body, implicit: &mut Implicit) {
+    fn prepare(&self, body: &System, implicit: &mut Implicit) {
         /// What viscosity adds goes with the step: within this factor the preconditioner serves.
         const SIMILAR: f32 = 2.0;
         let time = self.formula.time as f32;
@@ -430,7 +431,7 @@ impl Substep<'_> {
 
     /// Puts the velocities where they would be without forces, and begins with no pushes at all: what forces did before is
     /// the better guess where motion is smooth, and where stiff springs turn it is far worse than none.
-    fn aim(&self, body: &mut Body, implicit: &mut Implicit) {
+    fn aim(&self, body: &mut System, implicit: &mut Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
         let first = self.is_first.then_some(state.first_velocities);
@@ -460,7 +461,7 @@ impl Substep<'_> {
     }
 
     /// Puts the nodes where `pushes` has them.
-    pub(super) fn place(&self, body: &mut Body, implicit: &Implicit) {
+    pub(super) fn place(&self, body: &mut System, implicit: &Implicit) {
         let node_count = body.node_count();
         let state = body.state.substep();
         let history = implicit.last(self.is_first);
@@ -511,7 +512,7 @@ impl Substep<'_> {
     }
 
     /// Makes the search direction what the next positions lack of where `pushes` has the nodes.
-    pub(super) fn find_lacks(&self, body: &Body, implicit: &mut Implicit) {
+    pub(super) fn find_lacks(&self, body: &System, implicit: &mut Implicit) {
         let node_count = body.node_count();
         let (positions, velocities) = body.state.newest();
         let next = body.state.next_positions();
@@ -552,7 +553,7 @@ impl Substep<'_> {
     }
 
     /// Finds the pushes to the last digit that counts.
-    fn solve_exactly(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
+    fn solve_exactly(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
         /// What contacts may still lack, as a part of what they do.
         const CONTACTS: f64 = 1e-4;
         for multipliers in 0..=MULTIPLIERS {
@@ -569,7 +570,7 @@ impl Substep<'_> {
     }
 
     /// The same, with the multipliers that contacts have.
-    fn solve_pressed(&self, body: &mut Body, implicit: &mut Implicit, newton: &mut Newton) {
+    fn solve_pressed(&self, body: &mut System, implicit: &mut Implicit, newton: &mut Newton) {
         let (from, to) = (implicit.place(self.is_first), 1 - implicit.settled);
         let aimed = Aimed {
             time: self.formula.time,
@@ -594,7 +595,7 @@ impl Substep<'_> {
     }
 
     /// Makes velocities and history of what was found; whether all is finite.
-    fn finish(&self, body: &mut Body, implicit: &mut Implicit) -> bool {
+    fn finish(&self, body: &mut System, implicit: &mut Implicit) -> bool {
         implicit.taken = self.formula;
         implicit.latest = self.step as f32;
         let node_count = body.node_count();

@@ -4,8 +4,8 @@ use glam::{BVec3, DVec3, Vec3};
 
 use super::descent::{Descent, Found, Goal};
 use crate::base::{Error, Result, memory};
-use crate::body::Body;
 use crate::elements::Elements;
+use crate::solver::System;
 
 /// Linearised equations solved at most.
 const ITERATIONS: u32 = 10_000;
@@ -49,7 +49,11 @@ pub struct RestStateReport {
 }
 
 /// Moves `body` to rest.
-pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateDefinition) -> Result<RestStateReport> {
+pub(crate) fn rest_state(
+    body: &mut System,
+    gravity: Vec3,
+    definition: &RestStateDefinition,
+) -> Result<RestStateReport> {
     // At rest nothing that is viscous holds anything.
     body.release();
     let beside = (body.terms.as_deref(), body.enclosed.as_deref());
@@ -78,7 +82,7 @@ pub(crate) fn rest_state(body: &mut Body, gravity: Vec3, definition: &RestStateD
 /// Finds where `body` is at rest.
 fn find(
     descent: &mut Descent,
-    body: &Body,
+    body: &System,
     gravity: Vec3,
     definition: &RestStateDefinition,
 ) -> Result<RestStateReport> {
@@ -128,7 +132,7 @@ fn find(
     })
 }
 
-fn set_up(descent: &mut Descent, body: &Body, gravity: Vec3) {
+fn set_up(descent: &mut Descent, body: &System, gravity: Vec3) {
     let equation = &mut descent.equation;
     let applied = body.applied.as_ref().filter(|_| body.forces_applied);
     for node in 0..body.node_count() {
@@ -256,7 +260,7 @@ impl Parts {
 
     /// Refuses a part that nothing holds against the forces on it, along any axis. Where they cancel but for rounding, the rest is taken
     /// off them, by mass: it would carry the part away.
-    fn balance(&self, descent: &mut Descent, body: &Body) -> Result<()> {
+    fn balance(&self, descent: &mut Descent, body: &System) -> Result<()> {
         #[derive(Clone, Copy, Default)]
         struct Sums {
             load: DVec3,

@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 
 use super::Newton;
 use super::descent::{Found, Goal};
-use crate::body::Body;
 use crate::soa::Vectors;
+use crate::solver::System;
 
 /// Linearised equations solved in a step at most.
 const ITERATIONS: u32 = 300;
@@ -39,7 +39,7 @@ pub(in crate::solver) struct Aimed<'a> {
 impl Newton {
     /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
     /// there.
-    pub(in crate::solver) fn solve(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) -> Found {
+    pub(in crate::solver) fn solve(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) -> Found {
         let beside = (body.terms.take(), body.enclosed.take());
         self.descent.read(&*body.springs, body.elements.as_deref(), beside);
         self.set_up(body, aimed, pushes);
@@ -70,7 +70,7 @@ impl Newton {
         found
     }
 
-    fn set_up(&mut self, body: &mut Body, aimed: &Aimed, pushes: &Vectors) {
+    fn set_up(&mut self, body: &mut System, aimed: &Aimed, pushes: &Vectors) {
         let equation = &mut self.descent.equation;
         let rate = 1.0 / aimed.time;
         let gravity = aimed.gravity.as_dvec3();
@@ -110,7 +110,7 @@ impl Newton {
         }
     }
 
-    fn take_over(&mut self, body: &mut Body, aimed: &Aimed, pushes: &mut Vectors) {
+    fn take_over(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) {
         let equation = &self.descent.equation;
         let next_positions = body.state.substep().next_positions;
         let remainders = &mut self.remainders[aimed.to];

@@ -1,9 +1,9 @@
 //! Whether a body that was read from bytes hangs together.
 
-use super::Body;
+use super::System;
 use crate::soa::tile_count;
 
-impl Body {
+impl System {
     /// Whether what it has of each node and tile is there for all of them, and what leads to nodes leads to some; all is finite.
     pub(super) fn is_sound(&self) -> bool {
         let count = self.masses.len();
@@ -17,7 +17,7 @@ impl Body {
             && self.implicit.as_ref().is_none_or(|implicit| implicit.is_sound(count))
             && self.state.is_sound(count)
             && self.pins.are_sound(count)
-            && self.published.is_sound(count)
+            && self.early.iter().flatten().all(|early| early.velocities.len() == count)
             && self.surveys.len() == tiles
             && self.tile_sums.len() == tiles
             && self.boxes.len() == tiles

@@ -3,10 +3,10 @@
 use glam::{BVec3, Vec3};
 
 use super::skin::Skin;
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::impulses::LEVERAGE;
 use crate::contact::supports::MOST;
+use crate::solver::System;
 
 /// A node, edge or face of a body, and a point of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl Side {
     }
 
     /// The nodes that move it, with their parts: its own, or what those are bound to.
-    fn movers(&self, body: &Body) -> [(u32, f32); MOST] {
+    fn movers(&self, body: &System) -> [(u32, f32); MOST] {
         let mut movers = [(0, 0.0); MOST];
         let own = self.nodes.into_iter().zip(self.weights);
         let Some(bindings) = &body.bindings else {
@@ -102,7 +102,7 @@ fn weighted(parts: impl Iterator<Item = (u32, f32)>, vector_of: impl Fn(usize) -
 
 impl Link {
     /// A contact that has given nothing yet; `None` where neither side can move.
-    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&Body; 2]) -> Option<Self> {
+    pub fn new(sides: [Side; 2], normal: Vec3, bodies: [&System; 2]) -> Option<Self> {
         let mut answers = [[Vec3::ZERO; MOST]; 2];
         let (mut whole, mut leverage) = (0.0, 0.0_f32);
         let movers = [0, 1].map(|side| used_first(sides[side].movers(bodies[side])));

@@ -5,12 +5,12 @@ use glam::Vec3;
 use super::skin::{NONE, Skin};
 use super::wound::Wound;
 use crate::base::{Result, memory};
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::SurfaceChange;
 use crate::geometry::forest::Later;
 use crate::nodes::{Bound, NewNode};
 use crate::soa::Vectors;
+use crate::solver::System;
 
 /// An edge that is none.
 const HOLE: [u32; 2] = [NONE; 2];
@@ -78,7 +78,7 @@ pub(crate) struct SkinChange {
 
 impl Changing {
     /// For a body's skin with these edges and triangles, each of which is looked at with those that it owns.
-    pub fn new(body: &Body, nodes: &[u32], edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> Result<Self> {
+    pub fn new(body: &System, nodes: &[u32], edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> Result<Self> {
         let spare = body.spare_nodes();
         let mut sides = memory::reserved(triangles.len() + 2 * spare)?;
         let mut of_edge = memory::reserved(edges.len() + 3 * spare)?;
@@ -95,7 +95,7 @@ impl Changing {
         for &node in nodes {
             roles[node as usize] = CORNER | TAKEN;
         }
-        let wound = body.contact.with_itself && body.is_solid();
+        let wound = body.contact.with_itself && body.may_be_cut.is_some_and(|cut| cut.is_solid);
         Ok(Self {
             movers: Vec::new(),
             roles,
@@ -132,7 +132,7 @@ impl Changing {
 
 impl Skin {
     /// What the skin of a body is to become. Changes nothing but the room that there is.
-    pub fn prepare(&mut self, body: &Body, to_be: &SurfaceToBe) -> Result<Option<SkinChange>> {
+    pub fn prepare(&mut self, body: &System, to_be: &SurfaceToBe) -> Result<Option<SkinChange>> {
         let Some(changing) = &self.changing else {
             return Ok(None);
         };
@@ -379,7 +379,7 @@ fn ends_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
 }
 
 /// Where a number is, of those that there are and then these, if nodes are at `places`.
-fn place_of(places: &Vectors, body: &Body, new: &[NewNode], number: u32) -> Vec3 {
+fn place_of(places: &Vectors, body: &System, new: &[NewNode], number: u32) -> Vec3 {
     let Some(new_number) = (number as usize).checked_sub(body.node_count()) else {
         return match &body.bindings {
             Some(bindings) => bindings.vector(places, number as usize),
@@ -398,11 +398,11 @@ mod tests {
     use crate::cutting::Sweep;
     use crate::mesh::{self, Mesh};
     use crate::random::Random;
-    use crate::{BodyContact, BodyDefinition, Values, World, WorldDefinition};
+    use crate::{Body, BodyContact, BodyDefinition, Values, World, WorldDefinition};
 
     /// Whether it is what the skin of the body would be if it were made now, in some order.
     fn check(body: &Body, skin: &Skin) {
-        let surface = body.own_surface().expect("memory");
+        let surface = body.system.own_surface().expect("memory");
         assert_eq!(skin.triangles, surface);
         let mut edges: Vec<[u32; 2]> = skin.edges.iter().copied().filter(|&edge| edge != HOLE).collect();
         edges.sort_unstable();
@@ -425,9 +425,9 @@ mod tests {
         let mut nodes = skin.nodes.clone();
         nodes.sort_unstable();
         assert_eq!(nodes, corners);
-        let positions = body.state.positions();
+        let positions = body.system.state.positions();
         for corner in corners {
-            assert!(body.movers(corner).all(|(node, _)| skin.has(node)));
+            assert!(body.system.movers(corner).all(|(node, _)| skin.has(node)));
             let first = skin.firsts.as_ref().expect("it meets itself").get(corner as usize);
             assert!(first.distance(positions.get(corner as usize)) < 1e-6);
         }
@@ -467,7 +467,7 @@ mod tests {
                 })
                 .expect("a body");
             let body = world.body_mut(id).expect("a body");
-            let mut skin = Skin::new(body).expect("memory");
+            let mut skin = Skin::new(&body.system).expect("memory");
             check(body, &skin);
             let mut random = Random(5);
             let mut within = |most: usize| (random.below(2 * most) as f32 - most as f32) * 1e-4;

@@ -17,12 +17,12 @@ mod thread;
 use glam::{DVec3, Vec3};
 
 use crate::base::{Result, StateHasher, memory};
-use crate::body::Body;
 use crate::codec::saved;
 use crate::def::Anchor;
 use crate::geometry::Bounds;
-use crate::ids::{SlotId, Slots};
+use crate::ids::SlotId;
 use crate::solver::Outcome;
+use crate::solver::{System, Systems};
 
 pub(crate) use self::thread::{Lead, Thread};
 
@@ -194,7 +194,7 @@ impl Bond {
 }
 
 /// Where a point that is bound is now, m.
-fn place(point: &Bound, bodies: &Slots<Body>) -> Option<DVec3> {
+fn place(point: &Bound, bodies: &impl Systems) -> Option<DVec3> {
     let body = bodies.at(point.body)?;
     let positions = body.state.positions();
     let place = |(node, weight): (u32, f32)| positions.get(node as usize).as_dvec3() * f64::from(weight);
@@ -323,13 +323,13 @@ impl Bonds {
     }
 
     /// Where the first point of a bond is now, m.
-    pub fn place_of(&self, bodies: &Slots<Body>, id: SlotId) -> Option<DVec3> {
+    pub fn place_of(&self, bodies: &impl Systems, id: SlotId) -> Option<DVec3> {
         let bond = self.bonds.iter().find(|bond| bond.id == id)?;
         place(&bond.points[0], bodies)
     }
 
     /// Shows both points of each bond between points of tissue, where they are now, m.
-    pub fn show_ends(&self, bodies: &Slots<Body>, mut see: impl FnMut([DVec3; 2])) {
+    pub fn show_ends(&self, bodies: &impl Systems, mut see: impl FnMut([DVec3; 2])) {
         for bond in self
             .bonds
             .iter()
@@ -367,7 +367,7 @@ impl Bonds {
     }
 
     /// Ends some bonds. Needs no memory.
-    fn end_where(&mut self, bodies: &mut Slots<Body>, mut ends: impl FnMut(&Bond) -> bool) {
+    fn end_where(&mut self, bodies: &mut impl Systems, mut ends: impl FnMut(&Bond) -> bool) {
         let count = self.bonds.len();
         self.bonds.retain(|bond| {
             let stays = !ends(bond);
@@ -399,17 +399,17 @@ impl Bonds {
     }
 
     /// Ends a bond.
-    pub fn end(&mut self, bodies: &mut Slots<Body>, id: SlotId) {
+    pub fn end(&mut self, bodies: &mut impl Systems, id: SlotId) {
         self.end_where(bodies, |bond| bond.id == id);
     }
 
     /// Ends the bonds of a body that is gone.
-    pub(super) fn leave(&mut self, bodies: &mut Slots<Body>, body: usize) {
+    pub(super) fn leave(&mut self, bodies: &mut impl Systems, body: usize) {
         self.end_where(bodies, |bond| bond.concerns(body));
     }
 
     /// Ends the bonds whose limit the last step went beyond, and shows them.
-    pub fn slip(&mut self, bodies: &mut Slots<Body>, mut see: impl FnMut(SlotId)) {
+    pub fn slip(&mut self, bodies: &mut impl Systems, mut see: impl FnMut(SlotId)) {
         self.end_where(bodies, |bond| {
             let slips = bond.mean.length() > bond.limit;
             if slips {
@@ -432,7 +432,7 @@ impl Bonds {
     }
 
     /// The thread of a bond, and how far its points are apart now, m.
-    pub fn thread(&self, bodies: &Slots<Body>, id: SlotId) -> Option<(&Thread, f64)> {
+    pub fn thread(&self, bodies: &impl Systems, id: SlotId) -> Option<(&Thread, f64)> {
         let bond = self.bonds.iter().find(|bond| bond.id == id)?;
         Some((bond.thread.as_ref()?, distance(bodies, &bond.points)))
     }
@@ -508,7 +508,7 @@ impl Bonds {
 }
 
 /// How far two points are apart now, m.
-pub(crate) fn distance(bodies: &Slots<Body>, points: &[Bound; 2]) -> f64 {
+pub(crate) fn distance(bodies: &impl Systems, points: &[Bound; 2]) -> f64 {
     let apart: DVec3 = corners_of(points)
         .iter()
         .filter(|corner| corner.weight != 0.0)
@@ -546,8 +546,8 @@ impl End {
 }
 
 /// A body goes on with nothing of the last step but positions and velocities.
-fn forget(bodies: &mut Slots<Body>, place: usize) {
-    if let Some(Body {
+fn forget(bodies: &mut impl Systems, place: usize) {
+    if let Some(System {
         implicit: Some(implicit),
         ..
     }) = bodies.at_mut(place)
@@ -561,6 +561,7 @@ fn forget(bodies: &mut Slots<Body>, place: usize) {
 mod tests {
     use super::*;
     use crate::def::SurfacePoint;
+    use crate::ids::Slots;
 
     fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
         let mut all = [(0, 0.0); OF_POINT];

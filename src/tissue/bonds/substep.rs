@@ -2,11 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::super::Moment;
 use super::super::skin::Skin;
 use super::{Bond, Bonds, CLOSING_SPEED, Corner, End};
-use crate::body::Body;
-use crate::ids::Slots;
+use crate::solver::{Moment, Systems};
 
 /// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
 const CLOSING_TIME: f64 = 0.02;
@@ -30,7 +28,7 @@ const ROUNDING: f32 = 2e-7;
 
 impl Bonds {
     /// Begins to attempt the step of a group, of which these bodies are, which may be taken several times, until [`Self::unload`].
-    pub fn attempt(&mut self, bodies: &mut Slots<Body>, is_of_group: impl Fn(usize) -> bool) {
+    pub fn attempt(&mut self, bodies: &mut impl Systems, is_of_group: impl Fn(usize) -> bool) {
         for end in &mut self.ends {
             end.is_in_turn = is_of_group(end.body);
             if let Some(body) = bodies.at_mut(end.body).filter(|_| end.is_in_turn) {
@@ -75,7 +73,7 @@ impl Bonds {
     }
 
     /// Has the forces that are foreseen act in what follows.
-    pub fn load(&mut self, bodies: &mut Slots<Body>) {
+    pub fn load(&mut self, bodies: &mut impl Systems) {
         self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
         let Self { bonds, ends, .. } = self;
         for bond in bonds.iter().filter(|bond| bond.is_in_turn && !bond.is_implicit) {
@@ -93,7 +91,7 @@ impl Bonds {
     }
 
     /// Takes the forces off again that were foreseen: only what the caller applied is left.
-    pub fn unload(&self, bodies: &mut Slots<Body>) {
+    pub fn unload(&self, bodies: &mut impl Systems) {
         for end in self.ends.iter().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at_mut(end.body) {
                 body.load(end.node as usize, end.pending);
@@ -103,12 +101,7 @@ impl Bonds {
     }
 
     /// Takes a substep as it is to be, after the skins.
-    pub(in crate::contact::tissue) fn follow(
-        &mut self,
-        bodies: &mut Slots<Body>,
-        skins: &[Option<Skin>],
-        moment: &Moment,
-    ) {
+    pub(in crate::tissue) fn follow(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Moment) {
         for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
             let Some(body) = bodies.at_mut(end.body) else { continue };
             let skin = skins.get(end.body).and_then(Option::as_ref);
@@ -141,7 +134,7 @@ impl Bonds {
 
     /// Makes the velocities of the points of each bond equal, or those that its thread asks for, one after the other: the largest difference
     /// that there was, m/s.
-    pub(in crate::contact::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Moment) -> f32 {
+    pub(in crate::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Moment) -> f32 {
         let Self {
             bonds,
             ends,
@@ -180,12 +173,7 @@ impl Bonds {
     }
 
     /// Gives bodies what was found, and foresees the same for the next substep.
-    pub(in crate::contact::tissue) fn give(
-        &mut self,
-        bodies: &mut Slots<Body>,
-        skins: &[Option<Skin>],
-        moment: &Moment,
-    ) {
+    pub(in crate::tissue) fn give(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Moment) {
         let Self {
             bonds,
             ends,
@@ -218,7 +206,7 @@ impl Bonds {
     }
 
     /// Moves what is apart at the end of a substep of `duration` seconds together, without giving it speed.
-    pub(in crate::contact::tissue) fn part(&mut self, bodies: &mut Slots<Body>, duration: f32) {
+    pub(in crate::tissue) fn part(&mut self, bodies: &mut impl Systems, duration: f32) {
         let Self { bonds, ends, .. } = self;
         for end in ends.iter_mut().filter(|end| end.is_in_turn) {
             if let Some(body) = bodies.at(end.body) {

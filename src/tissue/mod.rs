@@ -1,6 +1,6 @@
 //! Tissue against tissue, and with itself.
 //!
-//! Bodies that are near each other take their substeps together (`solver/lockstep.rs`). In each, what would come too close on the straight ways of
+//! Bodies that are near each other take their substeps together (`lockstep.rs`). In each, what would come too close on the straight ways of
 //! the nodes is stopped by impulses, with friction, as against a tool: never a pull, nothing stored, nothing that shortens the substep
 //! (sequential impulses, Catto 2005, on the pairs of Bridson, Fedkiw, Anderson 2002: nodes with faces, edges with edges). Both sides get the same
 //! impulse, with opposite signs, in the same place: no momentum is made.
@@ -14,6 +14,7 @@ mod groups;
 mod images;
 mod islands;
 mod link;
+mod lockstep;
 mod nearby;
 mod pairs;
 mod search;
@@ -29,19 +30,19 @@ use self::groups::Groups;
 use self::islands::{Islands, Reach};
 use self::link::Link;
 use self::link::Side;
+pub(crate) use self::lockstep::{Together, Walk};
 use self::pairs::Pairs;
 use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
 use self::warm_start::{Pushes, give_again};
 use glam::{DVec3, Vec3};
 
-use crate::base::{Count, Profile, Result, Stage, Stopwatch, memory};
-use crate::body::Body;
+use crate::base::{Count, Result, Stage, Stopwatch, memory};
 use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::contact::impulses::{Effort, PUSHED_OUT, Sweep, relax};
 use crate::geometry::Bounds;
-use crate::ids::Slots;
+use crate::solver::{Moment, System, Systems};
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
@@ -78,26 +79,6 @@ const MOST_MOVERS: usize = 12;
 
 /// Contacts that there is room for, for each node, edge and face of the surfaces.
 const ROOM: usize = 1;
-
-/// What of a step is looked at.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Moment<'a> {
-    /// Of the substep or step, s.
-    pub duration: f32,
-    /// Whether positions change: not with the last half kick of a step.
-    pub drifts: bool,
-    /// Whether it begins a step.
-    pub begins: bool,
-    /// Where the stages are timed, if they are.
-    pub profile: Option<&'a Profile>,
-}
-
-impl Moment<'_> {
-    /// Whether a body has a part in it: that which closes a step is VERLET's.
-    fn concerns(&self, body: &Body) -> bool {
-        self.drifts || body.implicit.is_none()
-    }
-}
 
 /// Contacts of tissue with tissue; kept only in worlds with bodies that ask for them.
 #[derive(Debug, Default)]
@@ -137,7 +118,7 @@ saved!(Tissue {
 
 impl Tissue {
     /// Makes room for a body at this place in the world, which meets tissue.
-    pub fn join(&mut self, place: usize, body: &Body) -> Result<()> {
+    pub fn join(&mut self, place: usize, body: &System) -> Result<()> {
         let mut skin = Skin::new(body)?;
         self.add_images(&mut skin)?;
         self.islands.make_place(place)?;
@@ -197,7 +178,7 @@ impl Tissue {
     }
 
     /// A body is gone.
-    pub fn leave(&mut self, bodies: &mut Slots<Body>, place: usize) {
+    pub fn leave(&mut self, bodies: &mut impl Systems, place: usize) {
         self.bonds.leave(bodies, place);
         for other in self.groups.others(place) {
             if let Some(body) = bodies.at_mut(other) {
@@ -227,9 +208,9 @@ impl Tissue {
 
     /// Finds out which bodies take the next step of `dt` seconds together: those that may come near each other, those that are attached,
     /// and by themselves those that meet themselves.
-    pub fn plan(&mut self, bodies: &Slots<Body>, dt: f32) {
+    pub fn plan(&mut self, bodies: &impl Systems, dt: f32) {
         self.islands.part(|place| {
-            let meets_itself = |body: &Body| body.meets_tissue() && body.contact.with_itself;
+            let meets_itself = |body: &System| body.meets_tissue() && body.contact.with_itself;
             bodies.at(place).is_some_and(meets_itself)
         });
         for [first, second] in self.bonds.bodies() {
@@ -255,7 +236,7 @@ impl Tissue {
     }
 
     /// Has bodies go together that came near each other in a step that was tried, and were not known to: whether there are such.
-    pub fn plan_again(&mut self, bodies: &Slots<Body>, dt: f32) -> bool {
+    pub fn plan_again(&mut self, bodies: &impl Systems, dt: f32) -> bool {
         let origin = self.origin(bodies);
         let common = self.common_velocity(bodies) * dt;
         let reaches = meeting(&self.skins, bodies).map(|(place, body)| Reach {
@@ -273,7 +254,7 @@ impl Tissue {
     }
 
     /// The mean of the velocities in the middle of what bodies have, m/s.
-    fn common_velocity(&self, bodies: &Slots<Body>) -> Vec3 {
+    fn common_velocity(&self, bodies: &impl Systems) -> Vec3 {
         let middles = meeting(&self.skins, bodies).map(|(_, body)| {
             let all = velocities(body);
             0.5 * (all.min + all.max)
@@ -283,30 +264,30 @@ impl Tissue {
     }
 
     /// Where the coordinates begin in which bodies are compared.
-    fn origin(&self, bodies: &Slots<Body>) -> DVec3 {
+    fn origin(&self, bodies: &impl Systems) -> DVec3 {
         meeting(&self.skins, bodies)
             .next()
             .map_or(DVec3::ZERO, |(_, body)| body.origin)
     }
 
     /// Whether all bodies of an island sleep: then nothing of it changes.
-    pub fn is_asleep(&self, island: usize, bodies: &Slots<Body>) -> bool {
+    pub fn is_asleep(&self, island: usize, bodies: &impl Systems) -> bool {
         are_asleep(self.islands.members(island), bodies)
     }
 
     /// Whether all bodies of an island have been at rest for long enough, and may sleep: what is attached does not.
-    pub fn is_at_rest(&self, island: usize, bodies: &Slots<Body>) -> bool {
+    pub fn is_at_rest(&self, island: usize, bodies: &impl Systems) -> bool {
         let members = self.islands.members(island);
         let mut bound = self.bonds.bodies().flatten();
         members
             .iter()
-            .all(|&place| bodies.at(place as usize).is_some_and(Body::is_at_rest))
+            .all(|&place| bodies.at(place as usize).is_some_and(System::is_at_rest))
             && !bound.any(|place| members.contains(&(place as u32)))
     }
 
     /// Finds the edges of bodies that go together that pass through tissue when a step begins, or as one that was tried ends: how many
     /// there are.
-    pub fn find_crossings(&mut self, bodies: &Slots<Body>, at_end: bool) -> u32 {
+    pub fn find_crossings(&mut self, bodies: &impl Systems, at_end: bool) -> u32 {
         let mut count = 0_u32;
         let islands = std::mem::take(&mut self.islands);
         for island in 0..islands.count() {
@@ -370,7 +351,7 @@ impl Tissue {
     }
 
     /// Marks the edges of the first of two bodies, or of one, that pass through triangles of the second: how many there are.
-    fn mark_crossings(&mut self, bodies: &Slots<Body>, [a, b]: [usize; 2]) -> u32 {
+    fn mark_crossings(&mut self, bodies: &impl Systems, [a, b]: [usize; 2]) -> u32 {
         // It is written to while both are read.
         let Some(Some(first)) = self.skins.get_mut(a) else {
             return 0;
@@ -393,7 +374,7 @@ impl Tissue {
 
     /// In how many substeps bodies of an island come no further against each other in one, or parts of one that meets itself, than what they are
     /// made of is small.
-    pub fn substeps_wished(&self, island: usize, bodies: &Slots<Body>, dt: f32) -> u32 {
+    pub fn substeps_wished(&self, island: usize, bodies: &impl Systems, dt: f32) -> u32 {
         let short = |place: usize| self.skins.get(place)?.as_ref().map(|skin| skin.short);
         let wished = |[a, b]: [usize; 2]| {
             let speed = relative_speed(bodies.at(a)?, bodies.at(b)?);
@@ -416,7 +397,7 @@ impl Tissue {
     }
 
     /// Stops what meets in a substep of the bodies of an island.
-    pub fn meet(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+    pub fn meet(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) {
         let watch = Stopwatch::start(moment.profile);
         if moment.begins {
             let members = self.islands.members(island);
@@ -449,7 +430,7 @@ impl Tissue {
         }
     }
 
-    fn stop_what_meets(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+    fn stop_what_meets(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) {
         let have_acted = self.solve(island, bodies, moment);
         for &place in self.islands.members(island) {
             let place = place as usize;
@@ -499,7 +480,7 @@ impl Tissue {
     }
 
     /// Has VERLET bodies that press implicit ones be seen as fast as they are now, before their last half kick: nothing stops that.
-    pub fn show_early(&self, bodies: &mut Slots<Body>) {
+    pub fn show_early(&self, bodies: &mut impl Systems) {
         for link in self.links.iter().filter(|link| link.presses()) {
             let places = link.sides.map(|side| side.body);
             let are_implicit = places.map(|place| bodies.at(place).is_some_and(|body| body.implicit.is_some()));
@@ -515,7 +496,7 @@ impl Tissue {
     }
 
     /// The speed of the fastest node of an island, m/s, as far as velocities are kept, after gravity has given as much as this, m/s.
-    pub fn fastest(&self, island: usize, bodies: &Slots<Body>, fall: f32) -> f32 {
+    pub fn fastest(&self, island: usize, bodies: &impl Systems, fall: f32) -> f32 {
         let members = self.islands.members(island).iter();
         let members = members.filter_map(|&place| bodies.at(place as usize));
         let speeds = members.map(|body| {
@@ -526,7 +507,7 @@ impl Tissue {
     }
 
     /// Gives nodes and tools what contacts with tools have done beside those of tissue.
-    fn end_with_tools(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) {
+    fn end_with_tools(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) {
         let members = self.islands.members(island);
         each_pressed(members, &mut self.skins, bodies, moment, |skin, body, contacts| {
             let Skin { velocities, given, .. } = skin;
@@ -539,7 +520,7 @@ impl Tissue {
     }
 
     /// Draws what of each surface is near others that it is found by in images, as the substep begins.
-    fn draw(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Moment) {
         for member in 0..self.islands.members(island).len() {
             let a = self.islands.members(island)[member] as usize;
             // It is written to while others are read.
@@ -570,7 +551,7 @@ impl Tissue {
     }
 
     /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
-    fn solve(&mut self, island: usize, bodies: &mut Slots<Body>, moment: &Moment) -> bool {
+    fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) -> bool {
         let mut first = None;
         let mut has_begun = false;
         for _ in 0..SEARCHES {
@@ -622,7 +603,7 @@ impl Tissue {
     }
 
     /// Has what impulses did to nodes be seen in what is bound to them.
-    fn go_on(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn go_on(&mut self, island: usize, bodies: &impl Systems, moment: &Moment) {
         for &place in self.islands.members(island) {
             let place = place as usize;
             if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place))
@@ -634,7 +615,7 @@ impl Tissue {
     }
 
     /// Whether what may meet where impulses have led nodes was found before they acted.
-    fn has_foreseen(&self, island: usize, bodies: &Slots<Body>, moment: &Moment) -> bool {
+    fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Moment) -> bool {
         let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
         let mut all = of_one.chain(self.islands.pairs(island));
         all.all(|pair| {
@@ -644,7 +625,7 @@ impl Tissue {
     }
 
     /// Moves what began too close apart, without giving it speed.
-    fn part(&self, bodies: &mut Slots<Body>, duration: f32) {
+    fn part(&self, bodies: &mut impl Systems, duration: f32) {
         for link in self.links.iter().filter(|link| link.depth > 0.0) {
             let extents = link
                 .sides
@@ -662,7 +643,7 @@ impl Tissue {
     fn search<'a>(
         (skins, entangled): (&'a [Option<Skin>], &Entangled),
         [a, b]: [usize; 2],
-        bodies: &Slots<Body>,
+        bodies: &impl Systems,
         moment: &Moment,
     ) -> Option<Search<'a>> {
         let party = |place: usize| {
@@ -694,14 +675,14 @@ impl Tissue {
     fn search_by_distance<'a>(
         skins: (&'a [Option<Skin>], &Entangled),
         pair: [usize; 2],
-        bodies: &Slots<Body>,
+        bodies: &impl Systems,
         moment: &Moment,
     ) -> Option<Search<'a>> {
         Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
     }
 
     /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
-    fn know_pairs(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment) {
+    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Moment) {
         let Self {
             skins,
             entangled,
@@ -735,7 +716,7 @@ impl Tissue {
     }
 
     /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
-    fn find(&mut self, island: usize, bodies: &Slots<Body>, moment: &Moment, again: bool) {
+    fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Moment, again: bool) {
         let measures = moment.begins && !again;
         self.know_pairs(island, bodies, moment);
         let Self {
@@ -820,9 +801,9 @@ impl Tissue {
 fn each_pressed(
     members: &[u32],
     skins: &mut [Option<Skin>],
-    bodies: &mut Slots<Body>,
+    bodies: &mut impl Systems,
     moment: &Moment,
-    mut act: impl FnMut(&mut Skin, &mut Body, &mut Contacts),
+    mut act: impl FnMut(&mut Skin, &mut System, &mut Contacts),
 ) {
     for &place in members {
         let place = place as usize;
@@ -838,13 +819,13 @@ fn each_pressed(
 }
 
 /// Whether a bond makes one point of nodes of both sides.
-fn are_joined(bonds: &Bonds, bodies: &Slots<Body>, sides: &[Side; 2]) -> bool {
+fn are_joined(bonds: &Bonds, bodies: &impl Systems, sides: &[Side; 2]) -> bool {
     let [a, b] = sides;
     !bonds.are_none() && join_movers(bonds, bodies, [a.body, b.body], [&a.nodes, &b.nodes])
 }
 
 /// The same of corners of surfaces: what those are bound to counts.
-fn join_movers(bonds: &Bonds, bodies: &Slots<Body>, places: [usize; 2], corners: [&[u32]; 2]) -> bool {
+fn join_movers(bonds: &Bonds, bodies: &impl Systems, places: [usize; 2], corners: [&[u32]; 2]) -> bool {
     let mut movers = [[0; MOST_MOVERS]; 2];
     let mut counts = [0; 2];
     for side in 0..2 {
@@ -861,13 +842,13 @@ fn join_movers(bonds: &Bonds, bodies: &Slots<Body>, places: [usize; 2], corners:
 }
 
 /// Whether the bodies at all these places sleep.
-fn are_asleep(places: &[u32], bodies: &Slots<Body>) -> bool {
+fn are_asleep(places: &[u32], bodies: &impl Systems) -> bool {
     let mut places = places.iter();
-    places.all(|&place| bodies.at(place as usize).is_some_and(Body::is_asleep))
+    places.all(|&place| bodies.at(place as usize).is_some_and(System::is_asleep))
 }
 
 /// How far two bodies, or one with itself, keep apart, m; `None` where they do not meet.
-fn radius(first: &Party, second: &Party, bodies: [&Body; 2]) -> Option<f32> {
+fn radius(first: &Party, second: &Party, bodies: [&System; 2]) -> Option<f32> {
     let [a, b] = bodies.map(|body| &body.contact);
     if first.place == second.place {
         return first.skin.radius_with_itself(a);
@@ -893,22 +874,22 @@ fn near(skin: &Skin, other: &Skin, radius: f32) -> Bounds {
     }
 }
 
-fn meet_each_other(first: &Body, second: &Body) -> bool {
+fn meet_each_other(first: &System, second: &System) -> bool {
     let (a, b) = (&first.contact, &second.contact);
     a.with_bodies && b.with_bodies && a.filter.meets(b.filter)
 }
 
 /// The bodies that meet tissue, with their places in the world.
-fn meeting<'a>(
+fn meeting<'a, B: Systems>(
     skins: &'a [Option<Skin>],
-    bodies: &'a Slots<Body>,
-) -> impl Iterator<Item = (usize, &'a Body)> + use<'a> {
+    bodies: &'a B,
+) -> impl Iterator<Item = (usize, &'a System)> + use<'a, B> {
     let with_skin = skins.iter().enumerate().filter(|(_, skin)| skin.is_some());
     with_skin.filter_map(|(place, _)| Some((place, bodies.at(place)?)))
 }
 
 /// A box about the velocities of a body, m/s, as far as that is kept.
-fn velocities(body: &Body) -> Bounds {
+fn velocities(body: &System) -> Bounds {
     let velocities = body.carry.gravity.velocities;
     if velocities.min.is_finite() && velocities.max.is_finite() {
         velocities
@@ -921,14 +902,14 @@ fn velocities(body: &Body) -> Bounds {
 }
 
 /// No node of a body is faster against one of another, or of the same, m/s, as far as their velocities are kept.
-fn relative_speed(first: &Body, second: &Body) -> f32 {
+fn relative_speed(first: &System, second: &System) -> f32 {
     let [a, b] = [first, second].map(velocities);
     (a.max - b.min).abs().max((b.max - a.min).abs()).length()
 }
 
 /// A box about a body as a step that was tried begins, and as it ends beside the displacement that all bodies have in common, and what keeps off it,
 /// in its own coordinates.
-fn swept(body: &Body, common: Vec3) -> Bounds {
+fn swept(body: &System, common: Vec3) -> Bounds {
     let ends = body.state.newest().0.iter().map(|position| position - common);
     Bounds::of(body.state.positions().iter().chain(ends)).extended(body.contact.thickness + 1e-3 * body.extent())
 }

@@ -9,9 +9,9 @@
 
 use glam::DVec3;
 
-use super::super::Moment;
 use super::CLOSING_SPEED;
 use crate::codec::saved;
+use crate::solver::Moment;
 
 /// Points that move against each other by no more than this part of their distance in a substep keep to their line.
 const RESOLVED: f64 = 0.5;

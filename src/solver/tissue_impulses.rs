@@ -2,62 +2,59 @@
 
 use glam::Vec3;
 
-use super::Body;
-use crate::base::Result;
-use crate::contact::Moment;
-use crate::cutting::CutMaterial;
-use crate::def::CollisionFilter;
+use super::System;
+use super::closing::close;
+use crate::base::{Profile, Result};
 use crate::nodes::parts;
-use crate::solver::close;
 
-impl Body {
+/// What of a step is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment<'a> {
+    /// Of the substep or step, s.
+    pub duration: f32,
+    /// Whether positions change: not with the last half kick of a step.
+    pub drifts: bool,
+    /// Whether it begins a step.
+    pub begins: bool,
+    /// Where the stages are timed, if they are.
+    pub profile: Option<&'a Profile>,
+}
+
+impl Moment<'_> {
+    /// Whether a body has a part in it: that which closes a step is VERLET's.
+    pub fn concerns(&self, body: &System) -> bool {
+        self.drifts || body.implicit.is_none()
+    }
+}
+
+impl System {
     /// Whether it meets other bodies, or itself, and has something to meet with.
-    pub(crate) fn meets_tissue(&self) -> bool {
+    pub fn meets_tissue(&self) -> bool {
         (self.contact.with_bodies || self.contact.with_itself) && !self.surface.is_empty()
     }
 
-    /// Has tools and other bodies meet it as this filter says, from the next step on. What lies within it or them then is pushed out.
-    pub fn set_collision_filter(&mut self, filter: CollisionFilter) {
-        self.contact.filter = filter;
-        self.wake();
-        if let Some(contacts) = &mut self.contacts {
-            contacts.set_filter(filter);
-        }
-    }
-
     /// Its surface in its own numbers.
-    pub(crate) fn own_surface(&self) -> Result<Vec<[u32; 3]>> {
+    pub fn own_surface(&self) -> Result<Vec<[u32; 3]>> {
         self.order.own_triangles(&self.surface)
     }
 
-    /// Whether cuts may change its surface.
-    pub(crate) fn can_be_cut(&self) -> bool {
-        self.cuttable.is_some()
-    }
-
-    /// Whether it is cut as a solid.
-    pub(crate) fn is_solid(&self) -> bool {
-        let cuttable = self.cuttable.as_ref();
-        cuttable.is_some_and(|cuttable| matches!(cuttable.material, CutMaterial::Solid(_)))
-    }
-
     /// Its own number of one of the caller's.
-    pub(crate) fn own(&self, callers: u32) -> u32 {
+    pub fn own(&self, callers: u32) -> u32 {
         self.order.own(callers)
     }
 
     /// How many nodes may come that there is room for.
-    pub(crate) fn spare_nodes(&self) -> usize {
+    pub fn spare_nodes(&self) -> usize {
         self.node_room.saturating_sub(self.node_count())
     }
 
     /// The nodes that move one of its own numbers, with their parts: itself where it is bound to none.
-    pub(crate) fn movers(&self, own: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
+    pub fn movers(&self, own: u32) -> impl Iterator<Item = (u32, f32)> + use<> {
         parts(self.bindings.as_ref(), own)
     }
 
     /// Gives a node this mean velocity, m/s, in a substep: it has received `impulse`, N s, which a pinned node hands on.
-    pub(crate) fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+    pub fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
         let held = self.pins.axes_of(node as u32);
         if let Some(pin) = self.pins.get_mut(node as u32) {
             pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
@@ -80,7 +77,7 @@ impl Body {
     }
 
     /// Makes room for forces on nodes that are attached.
-    pub(crate) fn reserve_bonds(&mut self) -> Result<()> {
+    pub fn reserve_bonds(&mut self) -> Result<()> {
         if self.applied.is_none() {
             self.applied = Some(self.zeros()?);
         }
@@ -88,7 +85,7 @@ impl Body {
     }
 
     /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
-    pub(crate) fn begin_bonds(&mut self) {
+    pub fn begin_bonds(&mut self) {
         close(self);
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_history();
@@ -96,19 +93,19 @@ impl Body {
     }
 
     /// Its own numbers of the nodes that move one of the caller's, with their parts: itself where it is bound to none.
-    pub(crate) fn parts_of(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
+    pub fn parts_of(&self, node: u32) -> impl Iterator<Item = (u32, f32)> {
         parts(self.bindings.as_ref(), self.order.own(node))
     }
 
     /// How much faster a node becomes for an impulse, along each axis, 1/kg.
-    pub(crate) fn answer_of(&self, node: u32) -> Vec3 {
+    pub fn answer_of(&self, node: u32) -> Vec3 {
         let held = self.pins.axes_of(node);
         Vec3::select(held, Vec3::ZERO, Vec3::splat(self.inverse_masses[node as usize]))
     }
 
     /// What damping leaves of the speed that an impulse gives to a node, so that the impulse is what the force behind it
     /// would have given undamped.
-    pub(crate) fn left_by_damping(&self, node: u32, moment: &Moment) -> f32 {
+    pub fn left_by_damping(&self, node: u32, moment: &Moment) -> f32 {
         match (&self.implicit, &self.damping) {
             (Some(_), Some(damping)) => 1.0 / (1.0 + damping.rates()[node as usize] * moment.duration),
             // A kick of VERLET gives (1 - exp(-x)) / x of what its forces would undamped: 1 - x / 2 but for terms of order 2.
@@ -118,7 +115,7 @@ impl Body {
     }
 
     /// How fast a node goes on its way in a substep, m/s.
-    pub(crate) fn mean_velocity(&mut self, node: usize) -> Vec3 {
+    pub fn mean_velocity(&mut self, node: usize) -> Vec3 {
         match &self.implicit {
             None => self.state.substep().velocities.get(node),
             Some(implicit) => implicit.mean(node),
@@ -126,7 +123,7 @@ impl Body {
     }
 
     /// Has this force act on a node, N, instead of what was applied to it.
-    pub(crate) fn load(&mut self, node: usize, force: Vec3) {
+    pub fn load(&mut self, node: usize, force: Vec3) {
         if let Some(applied) = &mut self.applied {
             applied.set(node, force);
             self.forces_applied = true;
@@ -134,7 +131,7 @@ impl Body {
     }
 
     /// Gives a node that is attached this mean velocity, m/s, in a substep: it has received `impulse` in all, N s, which a pinned node hands on.
-    pub(crate) fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+    pub fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
         let held = self.pins.axes_of(node as u32);
         if let Some(pin) = self.pins.get_mut(node as u32) {
             pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
@@ -158,7 +155,7 @@ impl Body {
     }
 
     /// Makes room for what it keeps of contacts with other tissue.
-    pub(crate) fn reserve_pressed(&mut self) -> Result<()> {
+    pub fn reserve_pressed(&mut self) -> Result<()> {
         if self.implicit.is_none() {
             return self.reserve_early();
         }
@@ -170,7 +167,7 @@ impl Body {
     }
 
     /// Takes from an implicit body again what an equation took to press it, before contacts give what they have to.
-    pub(crate) fn release_pressed(&mut self, duration: f32) {
+    pub fn release_pressed(&mut self, duration: f32) {
         let Some(implicit) = &mut self.implicit else {
             return;
         };
@@ -184,7 +181,7 @@ impl Body {
     }
 
     /// Has the next equation of an implicit body know what a contact gave to a node, N s.
-    pub(crate) fn press(&mut self, node: u32, impulse: Vec3) {
+    pub fn press(&mut self, node: u32, impulse: Vec3) {
         let free = self.answer_of(node).cmpgt(Vec3::ZERO);
         if let Some(implicit) = &mut self.implicit {
             let impulse = Vec3::select(free, impulse, Vec3::ZERO);
@@ -194,7 +191,7 @@ impl Body {
     }
 
     /// Moves a node at the end of a substep, without giving it speed.
-    pub(crate) fn part_substep(&mut self, node: usize, way: Vec3) {
+    pub fn part_substep(&mut self, node: usize, way: Vec3) {
         let next_positions = self.state.substep().next_positions;
         let place = next_positions.get(node) + way;
         next_positions.set(node, place);

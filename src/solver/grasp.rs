@@ -8,14 +8,14 @@ use std::fmt::Display;
 
 use glam::{DVec3, Vec3};
 
-use super::Body;
+use super::System;
+use super::closing::close;
 use crate::base::{Error, Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::contact::{Frame, ToolPath};
 use crate::ids::SlotId;
 use crate::nodes::{Pin, Pins};
 use crate::soa::Vectors;
-use crate::solver::close;
 
 /// A part of a body that a tool holds: a node, or the corners of a triangle about a point on it.
 #[derive(Clone, Copy, Debug)]
@@ -264,7 +264,7 @@ impl<'a, const N: usize> Frames<'a, N> {
     }
 }
 
-impl Body {
+impl System {
     /// The nodes that tools hold.
     pub(crate) fn held_nodes(&self) -> impl Iterator<Item = &HeldNode> {
         self.grasps.iter().flat_map(|grasps| &grasps.nodes)
@@ -313,7 +313,7 @@ impl Body {
     }
 
     /// Refuses a node that a tool holds.
-    pub(super) fn check_not_held(&self, name: &dyn Display, node: u32) -> Result<()> {
+    pub(crate) fn check_not_held(&self, name: &dyn Display, node: u32) -> Result<()> {
         let own = self.order.own(node);
         if self.grasps.as_ref().is_some_and(|grasps| grasps.place_of(own).is_ok()) {
             return Err(Error::invalid(format!("{name} is {node}: a tool holds it")));
@@ -322,7 +322,7 @@ impl Body {
     }
 
     /// Whether a tool holds one of its own nodes.
-    pub(super) fn is_held_by_tool(&self, own: u32) -> bool {
+    pub(crate) fn is_held_by_tool(&self, own: u32) -> bool {
         self.grasps.as_ref().is_some_and(|grasps| grasps.place_of(own).is_ok())
     }
 
@@ -533,7 +533,7 @@ impl Body {
     }
 
     /// Nodes were put elsewhere: tools hold them there.
-    pub(super) fn grasp_anew(&mut self) {
+    pub(crate) fn grasp_anew(&mut self) {
         for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
             held.offset = None;
         }
@@ -616,7 +616,7 @@ impl Body {
     }
 
     /// The step in progress, of so many substeps, is the current state.
-    pub(super) fn commit_grasps(&mut self, substeps: u32) {
+    pub(crate) fn commit_grasps(&mut self, substeps: u32) {
         for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
             let mean = |sum: DVec3| (sum / f64::from(substeps)).as_vec3();
             held.force = mean(held.course.force_sum);
@@ -630,7 +630,7 @@ impl Body {
     }
 
     /// What is held is at rest, as its pins tell.
-    pub(super) fn rest_grasps(&mut self) {
+    pub(crate) fn rest_grasps(&mut self) {
         let pins = &self.pins;
         for held in self.grasps.iter_mut().flat_map(|grasps| &mut grasps.nodes) {
             held.force = pins.get(held.node).map_or(Vec3::ZERO, |pin| pin.force);

@@ -10,11 +10,11 @@ use super::link::Side;
 use super::search::{Search, Touch};
 use super::skin::{Clearance, NONE, Skin};
 use crate::base::{Result, memory};
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment, Separation};
 use crate::geometry::Bounds;
 use crate::soa::Vectors;
+use crate::solver::System;
 
 /// Edges meet that both look across the gap by this much at least, as the cosine of an angle.
 const SQUARELY: f32 = 0.5;
@@ -64,7 +64,7 @@ saved!(Wound {
 
 impl Wound {
     /// None yet, of a body with so many triangles.
-    pub fn new(body: &Body, triangles: usize) -> Result<Self> {
+    pub fn new(body: &System, triangles: usize) -> Result<Self> {
         let spare = body.spare_nodes();
         let mut is_bared = memory::reserved(triangles + 2 * spare)?;
         is_bared.resize(triangles, false);

@@ -1,13 +1,13 @@
 //! What a body remembers of how it was deformed: elements and terms that are viscous, or set.
 
-use super::Body;
+use super::System;
+use super::substep::write_records;
 use crate::def::{Course, Viscosity};
 use crate::elements::Elements;
-use crate::solver::write_records;
 use crate::terms::Terms;
 use crate::threads::Team;
 
-impl Body {
+impl System {
     /// Whether it remembers anything.
     pub(crate) fn remembers(&self) -> bool {
         self.elements.as_deref().is_some_and(Elements::remember) || self.terms.as_deref().is_some_and(Terms::remember)
@@ -24,7 +24,7 @@ impl Body {
     }
 
     /// The step in progress is the current state.
-    pub(super) fn keep(&mut self) {
+    pub(crate) fn keep(&mut self) {
         if let Some(elements) = &mut self.elements {
             elements.keep();
         }
@@ -63,7 +63,7 @@ impl Body {
     }
 
     /// What is elastic has changed where nodes are: arms hold what they held.
-    pub(super) fn measure_anew(&mut self) {
+    pub(crate) fn measure_anew(&mut self) {
         if self.remembers() {
             self.lapse(|_| Course::NOTHING, false, &Team::alone());
             self.keep();
@@ -71,7 +71,7 @@ impl Body {
     }
 
     /// Nothing that is viscous holds anything with the nodes where they are.
-    pub(super) fn relax(&mut self) {
+    pub(crate) fn relax(&mut self) {
         self.release();
         self.keep();
     }

@@ -3,13 +3,11 @@
 //! All take as many as the one that needs most: one of VERLET what its stability asks for, one of the other solvers substeps of 1 ms as
 //! near a tool.
 
-use super::attempt::{Carry, Outcome, StepRequest, finish, needed, relieve_squeezed, substeps_needed};
-use super::implicit::{begin_parts, next_part, parts_near};
-use super::substep::Part;
-use super::verlet::{Step, Taken, TooLong, begin, check, check_beside_springs, pass};
-use crate::body::Body;
-use crate::contact::{Moment, Tissue};
-use crate::ids::Slots;
+use super::Tissue;
+use crate::solver::{
+    Carry, Moment, Outcome, Part, Step, StepRequest, System, Systems, Taken, TooLong, begin, begin_parts, check,
+    check_beside_springs, finish, needed, next_part, parts_near, pass, relieve_squeezed, substeps_needed,
+};
 use crate::threads::Team;
 
 /// How often a step is begun again with shorter substeps, because its own motion made them necessary.
@@ -37,7 +35,7 @@ pub(crate) struct Together<'a> {
 
 impl Together<'_> {
     /// Takes the step of all islands without making it current.
-    pub fn attempt(&mut self, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+    pub fn attempt(&mut self, bodies: &mut impl Systems, outcomes: &mut [Option<Outcome>]) {
         self.tissue.pushes.begin();
         for island in 0..self.tissue.islands.count() {
             if self.tissue.is_asleep(island, bodies) {
@@ -50,7 +48,7 @@ impl Together<'_> {
         }
     }
 
-    fn attempt_island(&mut self, island: usize, bodies: &mut Slots<Body>, outcomes: &mut [Option<Outcome>]) {
+    fn attempt_island(&mut self, island: usize, bodies: &mut impl Systems, outcomes: &mut [Option<Outcome>]) {
         let request = self.request;
         let [mut substeps, needed] = self.set_out(island, bodies, outcomes);
         if substeps == 0 {
@@ -120,7 +118,7 @@ impl Together<'_> {
     }
 
     /// Makes a way for each body of an island: in how many substeps, 0: it has none, and how many of them VERLET needs.
-    fn set_out(&mut self, island: usize, bodies: &mut Slots<Body>, outcomes: &[Option<Outcome>]) -> [u32; 2] {
+    fn set_out(&mut self, island: usize, bodies: &mut impl Systems, outcomes: &[Option<Outcome>]) -> [u32; 2] {
         let [mut substeps, mut needed] = [0; 2];
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
@@ -146,7 +144,7 @@ impl Together<'_> {
     }
 
     /// Makes masses for elements as the step that was tried has deformed them, where that spares substeps: how many are needed then.
-    fn relieve(&mut self, island: usize, bodies: &mut Slots<Body>, stable_substep: f32) -> Option<u32> {
+    fn relieve(&mut self, island: usize, bodies: &mut impl Systems, stable_substep: f32) -> Option<u32> {
         let mut relieved = None;
         for &place in self.tissue.islands.members(island) {
             let place = place as usize;
@@ -162,7 +160,7 @@ impl Together<'_> {
     }
 
     /// Takes it in so many substeps, the last time that it is tried or not.
-    fn go(&mut self, island: usize, bodies: &mut Slots<Body>, substeps: u32, is_last: bool) -> Result<(), TooLong> {
+    fn go(&mut self, island: usize, bodies: &mut impl Systems, substeps: u32, is_last: bool) -> Result<(), TooLong> {
         let Self {
             tissue,
             walks,
@@ -266,7 +264,7 @@ impl Together<'_> {
 
 impl Walk {
     /// A body's way through a step that is to begin, and how many substeps it wants by itself.
-    fn of(body: &mut Body, request: &StepRequest, team: &Team) -> (Self, u32) {
+    fn of(body: &mut System, request: &StepRequest, team: &Team) -> (Self, u32) {
         let (mut start, masses_for, substeps) = if body.implicit.is_none() {
             let need = needed(body, request, team);
             (need.start, need.masses_for, need.substeps)
@@ -288,10 +286,10 @@ impl Walk {
 
 /// Does something with each body that is on its way.
 fn each(
-    bodies: &mut Slots<Body>,
+    bodies: &mut impl Systems,
     walks: &mut [Option<Walk>],
     members: &[u32],
-    mut act: impl FnMut(usize, &mut Body, &mut Walk) -> Result<(), TooLong>,
+    mut act: impl FnMut(usize, &mut System, &mut Walk) -> Result<(), TooLong>,
 ) -> Result<(), TooLong> {
     for &place in members {
         let place = place as usize;

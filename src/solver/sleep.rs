@@ -6,7 +6,7 @@
 
 use glam::Vec3;
 
-use super::Body;
+use super::System;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
 use crate::contact::ToolPath;
@@ -155,18 +155,7 @@ impl Sleeper {
     }
 }
 
-impl Body {
-    /// What part of its nodes is awake, 0 to 1: stepped. 1 for bodies that never sleep.
-    pub fn awake_share(&self) -> f32 {
-        let Some(sleeper) = &self.sleeper else {
-            return 1.0;
-        };
-        let count = self.node_count();
-        let asleep = (0..sleeper.tiles.len()).filter(|&tile| sleeper.is_asleep(tile));
-        let asleep: usize = asleep.map(|tile| tile_nodes(tile, count).len()).sum();
-        1.0 - asleep as f32 / count as f32
-    }
-
+impl System {
     /// Has all of it be stepped again, until it has been at rest for as long as it takes.
     pub fn wake(&mut self) {
         let Some(sleeper) = &mut self.sleeper else {
@@ -194,7 +183,7 @@ impl Body {
         }
     }
 
-    /// The same for a step that is tried: where it is not taken, [`Body::sleep_again`] puts back what was.
+    /// The same for a step that is tried: where it is not taken, [`System::sleep_again`] puts back what was.
     pub(crate) fn wake_to_step(&mut self) {
         self.note_sleep();
         self.wake();
@@ -214,7 +203,7 @@ impl Body {
     }
 
     /// The step that was tried is not taken: what it woke is as it was.
-    pub(super) fn sleep_again(&mut self) {
+    pub(crate) fn sleep_again(&mut self) {
         if let Some(sleeper) = &mut self.sleeper
             && !sleeper.before.is_empty()
         {
@@ -230,7 +219,7 @@ impl Body {
     }
 
     /// The step that was tried is taken.
-    pub(super) fn forget_sleep(&mut self) {
+    pub(crate) fn forget_sleep(&mut self) {
         if let Some(sleeper) = &mut self.sleeper {
             sleeper.before.clear();
         }
@@ -271,7 +260,7 @@ impl Body {
     }
 
     /// Makes it one that sleeps.
-    pub(super) fn make_sleeper(&mut self, sleep: Sleep) -> Result<()> {
+    pub(crate) fn make_sleeper(&mut self, sleep: Sleep) -> Result<()> {
         if sleep.speed > 0.0 {
             let tiles = tile_count(self.node_count());
             let mut sleeper = Sleeper {

@@ -4,12 +4,13 @@
 //! deformed, and masses are made for as many substeps as are allowed, with more mass than otherwise if need be. They stay so for a while. Nodes keep
 //! their velocities but for what the added mass would add to the kinetic energy of the deformation, which is taken off all of it.
 
-use super::Body;
+use super::System;
+use super::attempt::{StepRequest, fewer_substeps};
+use super::verlet::begin;
 use crate::soa::Masses;
-use crate::solver::{StepRequest, begin, fewer_substeps};
 use crate::threads::Team;
 
-impl Body {
+impl System {
     /// Makes masses for elements as they are deformed: at the current state, or where a step that `was_tried` has come to. The longest stable
     /// substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for that.
     pub(crate) fn relieve(&mut self, request: &StepRequest, was_tried: bool, team: &Team) -> Option<f32> {
@@ -80,12 +81,12 @@ mod tests {
             let moved = mesh.positions.iter().map(|&place| place + 2e-3 * random.vector());
             let moved: Vec<Vec3> = moved.collect();
             body.set_positions(&moved).expect("positions");
-            let limit = f64::from(body.limit_beside_springs(&Team::alone()));
-            let elements = body.elements.as_deref().expect("elements");
+            let limit = f64::from(body.system.limit_beside_springs(&Team::alone()));
+            let elements = body.system.elements.as_deref().expect("elements");
             let mut stiffest = 0.0_f64;
-            elements.stiffenings(body.state.positions(), &mut |corners, stiffening| {
+            elements.stiffenings(body.system.state.positions(), &mut |corners, stiffening| {
                 for node in corners {
-                    let inverse_mass = body.inverse_masses[node as usize];
+                    let inverse_mass = body.system.inverse_masses[node as usize];
                     let carried = elements.carried_at_rest(node as usize, inverse_mass);
                     stiffest = stiffest.max(2.0 * stiffening * f64::from(carried.stiffness * inverse_mass));
                 }

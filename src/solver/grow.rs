@@ -1,16 +1,16 @@
 //! Nodes that come after a body was made, as cuts make them: room for them is made at the door, so that adding one moves nothing.
 
-use super::Body;
+use super::System;
+use super::energy_monitor::Sums;
+use super::kick::Survey;
 use crate::base::{Error, Result, memory};
-use crate::nodes::NewNode;
-use crate::soa::{TILE, Vectors, tile_count};
-use crate::solver::{Sums, Survey};
-
 use crate::geometry::Bounds;
+use crate::nodes::NewNode;
+use crate::soa::{Vectors, tile_count};
 
-impl Body {
+impl System {
     /// Makes room for so many nodes more than there are.
-    pub(crate) fn reserve_nodes(&mut self, more: usize) -> Result<()> {
+    pub fn reserve_nodes(&mut self, more: usize) -> Result<()> {
         let count = self.node_count().checked_add(more).ok_or(Error::OutOfMemory)?;
         self.order.reserve(count)?;
         self.springs.reserve_nodes(count)?;
@@ -53,21 +53,17 @@ impl Body {
         }
         let triangles = self.surface.len() + 2 * more;
         memory::reserve(&mut self.surface, triangles)?;
-        self.published.reserve(count)?;
+        self.forget_early();
+        for early in self.early.iter_mut().flatten() {
+            early.velocities.reserve(count)?;
+        }
         self.node_room = count;
         let known = self.node_count();
         self.bindings.get_or_insert_default().reserve(more, known)
     }
 
-    /// A zero vector for each node, with room for those that may come.
-    pub(crate) fn zeros(&self) -> Result<Vectors> {
-        let mut vectors = Vectors::zeros(self.node_count())?;
-        vectors.reserve(self.node_room)?;
-        Ok(vectors)
-    }
-
     /// Adds nodes, for which there is room, in their own numbers: they follow those that there are. Changes nothing where it fails.
-    pub(crate) fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
+    pub fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
         let known = self.node_count();
         let count = known + nodes.len();
         self.springs.resize(count)?;
@@ -90,7 +86,10 @@ impl Body {
         if let Some(implicit) = &mut self.implicit {
             implicit.grow(count);
         }
-        self.published.grow(count);
+        self.forget_early();
+        for early in self.early.iter_mut().flatten() {
+            early.velocities.grow(count);
+        }
         self.surveys.resize(tile_count(count), Survey::NOTHING);
         self.tile_sums.resize(tile_count(count), Sums::default());
         self.boxes.resize(tile_count(count), Bounds::EMPTY);
@@ -128,19 +127,15 @@ impl Body {
         }
     }
 
-    /// Shows callers the nodes from this one on, which are new.
-    pub(super) fn publish_new(&mut self, first: usize) {
-        self.query_tree.outdate();
-        for node in first..self.node_count() {
-            let local = self.state.positions().get(node);
-            self.published.positions_mut()[node] = (local.as_dvec3() + self.origin).as_vec3();
-            let bounds = &mut self.boxes[node / TILE];
-            *bounds = bounds.with(local);
-        }
+    /// A zero vector for each node, with room for those that may come.
+    pub fn zeros(&self) -> Result<Vectors> {
+        let mut vectors = Vectors::zeros(self.node_count())?;
+        vectors.reserve(self.node_room)?;
+        Ok(vectors)
     }
 
     /// Puts bound points where their nodes are.
-    pub(super) fn follow_nodes(&mut self) {
+    pub fn follow_nodes(&mut self) {
         if let Some(bindings) = &self.bindings {
             bindings.follow(self.state.positions_mut());
             bindings.follow(self.state.velocities_mut());

@@ -8,7 +8,6 @@ use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::base::{Result, memory};
-use crate::body::Body;
 use crate::codec::saved;
 use crate::contact::sweep::{Corners, Segment};
 use crate::def::{BodyContact, Detection};
@@ -16,6 +15,7 @@ use crate::geometry::{Bounds, Forest};
 use crate::mesh;
 use crate::nodes::Bindings;
 use crate::soa::Vectors;
+use crate::solver::System;
 
 /// Where the nodes of a body may go in a step, and the tree of its triangles as the step begins.
 #[derive(Debug)]
@@ -152,7 +152,7 @@ const PIXELS: f32 = 1024.0;
 
 impl Skin {
     /// That of a body, which has triangles.
-    pub fn new(body: &Body) -> Result<Self> {
+    pub fn new(body: &System) -> Result<Self> {
         let triangles = body.own_surface()?;
         let edges = mesh::edges(&triangles, &[])?;
         let mut owned = memory::filled([NONE; 3], triangles.len())?;
@@ -179,14 +179,14 @@ impl Skin {
         let mut firsts = None;
         if contact.with_itself {
             let firsts = firsts.insert(body.zeros()?);
-            if body.can_be_cut() {
+            if body.may_be_cut.is_some() {
                 // What is inside may come to the surface.
                 (0..body.node_count()).for_each(|node| firsts.set(node, positions.get(node)));
             } else {
                 nodes.iter().for_each(|&node| firsts.set(node as usize, at(node)));
             }
         }
-        let changing = if body.can_be_cut() {
+        let changing = if body.may_be_cut.is_some() {
             Some(memory::boxed(Changing::new(body, &nodes, &edges, &triangles)?)?)
         } else {
             None
@@ -365,7 +365,7 @@ impl Skin {
     }
 
     /// Takes a substep of `duration` seconds, the first one of a step or not, as it is to be.
-    pub fn follow(&mut self, body: &mut Body, duration: f32, begins: bool) {
+    pub fn follow(&mut self, body: &mut System, duration: f32, begins: bool) {
         if begins {
             self.changes.clear();
         }
@@ -396,7 +396,7 @@ impl Skin {
     }
 
     /// Takes nodes to go as impulses have them go by now, and points that are bound to them with those.
-    pub fn go_on(&mut self, body: &Body, duration: f32) {
+    pub fn go_on(&mut self, body: &System, duration: f32) {
         let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
         for bound in bindings
             .into_iter()
@@ -419,7 +419,7 @@ impl Skin {
     }
 
     /// Remembers what contacts have changed in a substep, before the body knows of it.
-    pub fn remember(&mut self, body: &mut Body) {
+    pub fn remember(&mut self, body: &mut System) {
         let movers = self.changing.iter().flat_map(|changing| &changing.movers);
         for &node in self.nodes.iter().chain(movers) {
             let bindings = body.bindings.as_ref().filter(|_| self.changing.is_some());
@@ -479,7 +479,7 @@ impl Skin {
     }
 
     /// Takes the body as it stands when a step that was tried begins, or as it ends.
-    pub fn stand(&mut self, body: &Body, at_end: bool) {
+    pub fn stand(&mut self, body: &System, at_end: bool) {
         let positions = if at_end {
             body.state.newest().0
         } else {

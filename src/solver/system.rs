@@ -1,0 +1,451 @@
+//! What moves of a body: its nodes, what acts on them, and what its solver keeps from step to step.
+
+use glam::{BVec3, DVec3, Vec3};
+
+use super::early::Early;
+use super::grasp::Grasps;
+use super::mass_scaling::Heavier;
+use super::sleep::Sleeper;
+use super::substep::write_records;
+use super::{Carry, CoarseStep, GravityKicks, Implicit, MassScaling, Stability, Sums, Survey, Watched, close};
+use crate::base::{Result, memory};
+use crate::codec::saved;
+use crate::contact::{Contacts, ToolPath};
+use crate::def::{BodyContact, Carried};
+use crate::elements::Elements;
+use crate::enclosed::Enclosed;
+use crate::geometry::Bounds;
+use crate::nodes::{Bindings, NodeDamping, Pins, State};
+use crate::simd::ChosenKernel;
+use crate::soa::{Masses, NodeOrder, Rates, Records, Vectors};
+use crate::springs::Springs;
+use crate::terms::Terms;
+use crate::threads::Team;
+
+/// How a body is cut.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MayBeCut {
+    /// What it takes to cut it, J/m, of solids J/m².
+    pub toughness: f32,
+    /// Whether it is cut as a solid.
+    pub is_solid: bool,
+}
+
+saved!(MayBeCut { toughness, is_solid });
+
+/// A body as solvers and contact see it, in its own numbers and coordinates.
+#[derive(Debug)]
+pub(crate) struct System {
+    /// The numbers of nodes inside are its own, but in `surface`.
+    pub order: NodeOrder,
+    pub springs: Box<dyn Springs>,
+    /// For bodies whose tetrahedra are more than edges.
+    pub elements: Option<Box<Elements>>,
+    /// What a definition asks for beside springs and elements.
+    pub terms: Option<Box<Terms>>,
+    /// For bodies whose surface encloses what keeps its volume or its pressure.
+    pub enclosed: Option<Box<Enclosed>>,
+    pub kernel: ChosenKernel,
+    /// kg, 0 for nodes that are pinned for good.
+    pub masses: Vec<f32>,
+    /// 1/kg, with what mass scaling adds; 0 for nodes that are pinned.
+    pub inverse_masses: Vec<f32>,
+    /// That of every node that is not pinned, where they all have the same.
+    pub uniform_inverse_mass: Option<f32>,
+    pub damping: Option<NodeDamping>,
+    pub watched: Watched,
+    /// For bodies that some added mass lets take longer substeps.
+    pub scaling: Option<Box<MassScaling>>,
+    pub pins: Pins,
+    /// What a substep found in each tile.
+    pub surveys: Vec<Survey>,
+    /// What was added up of each tile when its energy was compared last.
+    pub tile_sums: Vec<Sums>,
+    /// The box about the nodes of each tile when they were last published or put, in its own coordinates as they are now.
+    pub boxes: Vec<Bounds>,
+    /// The triangles that are drawn and touched, in the caller's numbers.
+    pub surface: Vec<[u32; 3]>,
+    pub state: State,
+    /// The positions that forces are made of, for springs that gather them.
+    pub records: Option<Records>,
+    /// Where the coordinates of the state begin.
+    pub origin: DVec3,
+    /// Velocities at the time of the positions, for bodies whose springs have damping.
+    pub predicted_velocities: Option<Vectors>,
+    /// For bodies that are moved implicitly.
+    pub implicit: Option<Box<Implicit>>,
+    /// Forces from outside for the next step, N; kept from the first force on.
+    pub applied: Option<Vectors>,
+    /// Velocities from before the last half kick of a step, of the last one and of the one that is tried; for bodies that may press others.
+    pub early: Option<[Early; 2]>,
+    pub contacts: Option<Box<Contacts>>,
+    pub contact: BodyContact,
+    /// Points of its surface without mass; kept only by bodies that may be cut.
+    pub bindings: Option<Bindings>,
+    /// How many nodes there is room for; 0: for those that there are.
+    pub node_room: usize,
+    /// Whether an edge of its surface was taken away.
+    pub is_cut_open: bool,
+    /// What tools hold of it.
+    pub grasps: Option<Box<Grasps>>,
+    pub carry: Carry,
+    /// Whether the state's forces belong to its positions and velocities.
+    pub forces_current: bool,
+    /// Whether `applied` holds anything.
+    pub forces_applied: bool,
+    /// Kept only in worlds with a tolerance.
+    pub coarse: Option<CoarseStep>,
+    /// For bodies that sleep.
+    pub sleeper: Option<Box<Sleeper>>,
+    pub may_be_cut: Option<MayBeCut>,
+    /// The part of the world's gravity that acts on it.
+    pub gravity_scale: f32,
+}
+
+saved!(System { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale } where Self::is_sound);
+
+impl System {
+    /// How many nodes it has.
+    pub fn node_count(&self) -> usize {
+        self.masses.len()
+    }
+
+    /// The caller's number of one of its own nodes.
+    pub fn callers(&self, own: usize) -> usize {
+        self.order.caller(own as u32) as usize
+    }
+
+    /// The masses as the caller gave them.
+    pub fn masses(&self) -> Masses<'_> {
+        Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+            are_heavier: false,
+        }
+    }
+
+    /// Finds the nodes that set the longest stable substep.
+    pub fn watch(&mut self) {
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+            are_heavier: false,
+        };
+        self.watched.gather(&*self.springs, masses);
+    }
+
+    /// The axes along which anything holds it in its place.
+    pub fn held_axes(&self) -> BVec3 {
+        if self.terms.as_ref().is_some_and(|terms| terms.hold_any()) {
+            return BVec3::TRUE;
+        }
+        self.pins.iter().fold(BVec3::FALSE, |axes, pin| axes | pin.axes)
+    }
+
+    /// Whether forces are made of more than springs.
+    pub fn has_more_than_springs(&self) -> bool {
+        self.elements.is_some() || self.terms.is_some() || self.enclosed.is_some()
+    }
+
+    /// What each node carries of elements, terms and what is enclosed; of no nodes where there are none.
+    pub fn carried_beside_springs(&self) -> Result<Vec<Carried>> {
+        if !self.has_more_than_springs() {
+            return Ok(Vec::new());
+        }
+        let mut carried = memory::filled(Carried::default(), self.node_count())?;
+        let masses = self.masses();
+        if let Some(elements) = &self.elements {
+            elements.add_to(&masses, &mut carried);
+        }
+        if let Some(terms) = &self.terms {
+            terms.add_to(&masses, &mut carried);
+        }
+        if let Some(enclosed) = &self.enclosed {
+            enclosed.add_to(self.state.positions(), &masses, &mut carried)?;
+        }
+        Ok(carried)
+    }
+
+    /// The longest substep that elements, terms and what is enclosed allow with the nodes as they are, s; infinity where there are none.
+    pub fn limit_beside_springs(&mut self, team: &Team) -> f32 {
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+            are_heavier: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
+        };
+        let mut rates = Rates::ZERO;
+        if let Some(elements) = &mut self.elements {
+            let known = elements.find_rates(&*self.springs, &masses) && self.forces_current;
+            if let Some(records) = self.records.as_mut().filter(|_| !known) {
+                write_records(self.kernel, self.state.positions(), records, team);
+                elements.find_forces(self.kernel, records.as_slice(), team);
+                elements.settle();
+            }
+            rates = elements.settled_rates();
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.find_rates(&*self.springs, &masses);
+            if !self.forces_current {
+                terms.settle_at(self.state.positions());
+            }
+            rates = rates.and(terms.settled_rates());
+        }
+        if let Some(enclosed) = &mut self.enclosed {
+            let springs = (self.elements.is_none() && self.terms.is_none()).then_some(&*self.springs);
+            if !(enclosed.find_rates(springs, &masses) && self.forces_current) {
+                enclosed.find_forces(self.state.positions(), team);
+                enclosed.settle();
+            }
+            rates = rates.and(enclosed.settled_rates());
+        }
+        rates.limit()
+    }
+
+    /// The same with the nodes where forces were last worked out.
+    pub fn newest_limit_beside_springs(&self) -> f32 {
+        let of_elements = self.elements.as_ref().map_or(Rates::ZERO, |elements| elements.rates());
+        let of_terms = self.terms.as_ref().map_or(Rates::ZERO, |terms| terms.rates());
+        let of_enclosed = self.enclosed.as_ref().map_or(Rates::ZERO, |enclosed| enclosed.rates());
+        of_elements.and(of_terms).and(of_enclosed).limit()
+    }
+
+    /// The longest stable substep with the nodes at these positions.
+    pub fn estimate(&self, positions: &Vectors) -> Stability {
+        Stability::estimate(&*self.springs, self.masses(), positions, &self.watched)
+    }
+
+    /// Makes the nodes that need it heavy enough for substeps of `step` seconds; 0: masses as they are.
+    pub fn use_masses_for(&mut self, step: f32) {
+        if self.scaling.as_ref().is_some_and(|scaling| scaling.step() != step) {
+            self.scale_masses(step);
+        }
+    }
+
+    /// The same, after springs or pins have changed too.
+    pub fn scale_masses(&mut self, step: f32) {
+        if let Some(scaling) = &mut self.scaling {
+            let differ = step > 0.0 || scaling.step() > 0.0;
+            let heavier = Heavier {
+                masses: &self.masses,
+                inverse_masses: &mut self.inverse_masses,
+                uniform_inverse_mass: &mut self.uniform_inverse_mass,
+                damping: self.damping.as_mut(),
+            };
+            scaling.apply(step, heavier);
+            if differ {
+                self.forget_rates();
+            }
+        }
+    }
+
+    /// Makes room for contacts within equations, where it has such.
+    pub fn reserve_holds(&mut self) -> Result<()> {
+        if let (Some(contacts), Some(implicit)) = (&mut self.contacts, &mut self.implicit) {
+            implicit.reserve_contacts(contacts.reserve_holds(implicit.has_small_budget())?)?;
+            if self.node_room > 0 {
+                implicit.reserve_nodes(self.node_room)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The box about its nodes, in its own coordinates.
+    pub fn local_bounds(&self) -> Bounds {
+        self.boxes.iter().fold(Bounds::EMPTY, Bounds::and)
+    }
+
+    /// How far it reaches along an axis, m.
+    pub fn extent(&self) -> f32 {
+        let bounds = self.boxes.iter().fold(Bounds::EMPTY, Bounds::and);
+        (bounds.max - bounds.min).max_element()
+    }
+
+    /// Nothing is known any more of where the nodes were.
+    pub fn forget_motion(&mut self) {
+        self.wake();
+        self.forces_current = false;
+        self.carry.stability = Stability::UNKNOWN;
+        self.carry.forget();
+        self.state.forget_remainders();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_history();
+            implicit.forget_matrix();
+        }
+        if let Some(contacts) = &mut self.contacts {
+            contacts.forget();
+            contacts.holds.forget();
+        }
+    }
+
+    /// Prepares again what an attempted step that is not committed has changed.
+    pub fn put_back(&mut self) {
+        self.sleep_again();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.put_back();
+        }
+        self.recall();
+        if self.scaling.as_mut().is_some_and(|scaling| scaling.unsettle()) {
+            self.scale_masses(self.carry.masses_for);
+        }
+        self.use_masses_for(self.carry.masses_for);
+        if let (Some(damping), Some(closing)) = (&mut self.damping, &self.carry.closing) {
+            damping.prepare(closing.substep);
+        }
+    }
+
+    /// Leaves the current state as it is, without the step that was attempted.
+    pub fn stay(&mut self) {
+        self.put_back();
+        self.clear_pending();
+        if let Some(contacts) = &mut self.contacts {
+            contacts.stay();
+        }
+    }
+
+    /// Forgets the forces and the ways of pins that were meant for the last step.
+    pub fn clear_pending(&mut self) {
+        for pin in self.pins.iter_mut() {
+            pin.target = None;
+        }
+        if self.forces_applied
+            && let Some(applied) = &mut self.applied
+        {
+            applied.clear();
+        }
+        self.forces_applied = false;
+    }
+
+    /// Makes what is known of the longest stable substep true again after springs of these nodes, given in order, have come or
+    /// changed.
+    pub fn see_stability_of(&mut self, nodes: &[u32]) {
+        let stability = self.carry.stability;
+        let masses = Masses {
+            masses: &self.masses,
+            inverse_masses: &self.inverse_masses,
+            are_heavier: false,
+        };
+        let positions = self.state.positions();
+        self.carry.stability = stability.changed(nodes, &*self.springs, masses, positions, &mut self.watched);
+    }
+
+    /// Masses, pins or springs are not what they were.
+    pub fn forget_rates(&mut self) {
+        if let Some(elements) = &mut self.elements {
+            elements.forget_rates();
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.forget_rates();
+        }
+        if let Some(enclosed) = &mut self.enclosed {
+            enclosed.forget_rates();
+        }
+    }
+
+    /// What it is made of has another energy where it is.
+    pub fn forget_energy(&mut self) {
+        self.carry.forget();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_energy();
+        }
+    }
+
+    /// Its springs, elements or terms are not what they were.
+    pub fn forget_stiffness(&mut self) {
+        self.forces_current = false;
+        self.wake();
+        self.carry.forget();
+        self.forget_rates();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
+        }
+    }
+
+    /// Other nodes move now.
+    pub fn forget_matrix(&mut self) {
+        self.carry.stability = Stability::UNKNOWN;
+        self.carry.forget();
+        self.forget_rates();
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget_matrix();
+        }
+    }
+
+    /// Sees that other springs may ask for other masses of these nodes.
+    pub fn scale_for_springs(&mut self, nodes: &[u32]) {
+        if self.carry.masses_for > 0.0 {
+            // What closes the step is made with the masses that it was taken with.
+            close(self);
+        }
+        if let Some(scaling) = &mut self.scaling {
+            let rates = self.damping.as_ref().map(|damping| damping.rates());
+            for &node in nodes {
+                scaling.change(node, &*self.springs, &self.masses, rates);
+            }
+        }
+        self.scale_masses(self.carry.masses_for);
+    }
+
+    /// Puts the nodes at rest at these places, in its own coordinates and numbers, where this holds its pins.
+    pub fn rest_at(&mut self, place: impl Fn(usize) -> Vec3, held: impl Fn(usize) -> Vec3) {
+        close(self);
+        for node in 0..self.node_count() {
+            if self.inverse_masses[node] > 0.0 {
+                self.state.positions_mut().set(node, place(node));
+            }
+        }
+        self.state.velocities_mut().clear();
+        self.carry.gravity = GravityKicks::new(Bounds {
+            min: Vec3::ZERO,
+            max: Vec3::ZERO,
+        });
+        for pin in self.pins.iter_mut() {
+            pin.force = pin.held(held(pin.node as usize));
+        }
+        self.rest_grasps();
+        self.follow_nodes();
+        self.relax();
+        self.forget_motion();
+    }
+
+    /// Makes the step in progress, of `substeps` substeps and `dt` seconds, the current state.
+    pub fn commit(&mut self, (substeps, dt): (u32, f32), carry: Carry, tools: &[ToolPath]) {
+        self.state.commit();
+        self.carry = carry;
+        self.forces_current = carry.closing.is_none() && self.implicit.is_none();
+        if let Some(elements) = &mut self.elements {
+            elements.settle();
+        }
+        if let Some(terms) = &mut self.terms {
+            terms.settle();
+        }
+        if let Some(enclosed) = &mut self.enclosed {
+            enclosed.settle();
+        }
+        self.keep();
+        if let Some(scaling) = &mut self.scaling {
+            scaling.settle(dt);
+        }
+        if let Some(implicit) = &mut self.implicit {
+            implicit.commit();
+        }
+        if let Some(early) = &mut self.early {
+            early.swap(0, 1);
+        }
+        for pin in self.pins.iter_mut() {
+            pin.force = pin.held((pin.force_sum / f64::from(substeps)).as_vec3());
+            pin.closing_share = carry.closing.map_or(0.0, |_| 0.5 / substeps as f32);
+        }
+        self.commit_grasps(substeps);
+        if let Some(contacts) = &mut self.contacts {
+            contacts.commit(tools);
+        }
+        self.clear_pending();
+        self.follow_nodes();
+    }
+}
+
+/// The systems of bodies, by the places of these in a world.
+pub(crate) trait Systems {
+    fn at(&self, place: usize) -> Option<&System>;
+    fn at_mut(&mut self, place: usize) -> Option<&mut System>;
+}
