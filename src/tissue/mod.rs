@@ -50,12 +50,10 @@ const SEARCHES: u32 = 16;
 /// Contacts of tissue begin with the impulses of the last substep, and the next one corrects what few sweeps leave.
 const EFFORT: Effort = Effort {
     sweeps: 32,
-    converged: 1e-3,
+    converged: 2.5e-4,
 };
 
 /// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
-/// Between bodies that are attached it is that alone: about a suture surfaces come closer than they may, and several contacts would contradict
-/// each other.
 const EDGES: usize = 4;
 
 /// What keeps off a surface without thickness, as a part of its short edges: in `f32` something must.
@@ -585,6 +583,7 @@ impl Tissue {
                 });
             }
             has_begun = true;
+            bonds.loosen(links);
             let recalled = give_again(&mut links[known..], pushes.most(), skins);
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
@@ -666,7 +665,6 @@ impl Tissue {
             ahead: own.ahead().min(others.ahead()),
             motion: own.spread + others.spread + (own.drift - others.drift).length() * moment.duration,
             in_images: a != b && meet_in_images(own, others),
-            most_edges: EDGES,
             measures: Measure::Nothing,
         })
     }
@@ -743,9 +741,6 @@ impl Tissue {
             };
             if again && search.has_foreseen() {
                 continue;
-            }
-            if bonds.attach([a, b]) {
-                search.most_edges = 1;
             }
             let [a, b] = search.parties.map(|party| party.place);
             let (Some(body_a), Some(body_b)) = (bodies.at(a), bodies.at(b)) else {

@@ -59,8 +59,6 @@ pub(super) struct Search<'a> {
     pub motion: f32,
     /// Whether they find each other in images.
     pub in_images: bool,
-    /// How many edges of the second an edge of the first meets at most.
-    pub most_edges: usize,
     pub measures: Measure,
 }
 
@@ -300,8 +298,7 @@ impl Search<'_> {
         let near = Bounds::of(segment.ends.into_iter()).extended(far);
         let mut least = f32::INFINITY;
         let mut nearest = f32::INFINITY;
-        let mut all: [Option<Met<[u32; 2]>>; EDGES] = [None; EDGES];
-        let touched = &mut all[..self.most_edges];
+        let mut touched: [Option<Met<[u32; 2]>>; EDGES] = [None; EDGES];
         let mut see_edges = |edges: [u32; 3]| {
             let mut least = f32::INFINITY;
             for (other, pierces) in second.skin.edges_of(edges) {
@@ -335,7 +332,7 @@ impl Search<'_> {
                 // At an end of either it is a node that meets.
                 let is_known = touched.iter().flatten().any(|(_, _, edge, _)| *edge == other);
                 if found.is_across() && !is_known {
-                    keep_closest(touched, (is_ahead, start, other, (found, clearance)));
+                    keep_closest(&mut touched, (is_ahead, start, other, (found, clearance)));
                 }
             }
             least
@@ -372,7 +369,7 @@ impl Search<'_> {
             }
         }
         self.measure(kept, Part::Edge(index), nearest);
-        for (_, _, other, (found, clearance)) in all.into_iter().flatten() {
+        for (_, _, other, (found, clearance)) in touched.into_iter().flatten() {
             let sides = [
                 Side {
                     body: first.place,

@@ -553,6 +553,51 @@ fn what_it_joins_still_touches() {
 }
 
 #[test]
+fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder() {
+    let contact = BodyContact {
+        thickness: 0.5e-3,
+        with_bodies: true,
+        ..BodyContact::NOTHING
+    };
+    for solvers in [[Solver::Verlet; 2], [Solver::Implicit, Solver::Verlet]] {
+        for stiffness in [1e9, f32::INFINITY] {
+            let [above, below] = solvers.map(|solver| Block {
+                solver,
+                contact,
+                ..CALM
+            });
+            let mut sutured = Sutured::pinned(world(Vec3::ZERO), above, below);
+            let suture = sutured.suture(SutureDefinition {
+                length: Some(0.9e-3),
+                stiffness,
+                ..Default::default()
+            });
+            let case = format!("{solvers:?}, {stiffness} N/m");
+            let mut forces = [0.0; 3];
+            for (second, force) in forces.iter_mut().enumerate() {
+                for step in 0..500 {
+                    let report = sutured.world.step(1e-3).expect("a step");
+                    assert_eq!(report.crossings, 0, "{case}, second {second}, step {step}");
+                }
+                *force = sutured.force(suture).length();
+            }
+            let apart = sutured.across().length();
+            assert!((0.85e-3..1.1e-3).contains(&apart), "{case}: {apart} m apart");
+            let [_, before, after] = forces;
+            assert!(after > 0.0 && after < 1.01 * before, "{case}: {forces:?} N");
+            let kinetic: f64 = [sutured.above, sutured.below]
+                .iter()
+                .map(|&id| body(&sutured.world, id).energy(Vec3::ZERO).kinetic)
+                .sum();
+            assert!(
+                kinetic < 1e-7,
+                "{case}: {kinetic} J, more than at a millimetre a second"
+            );
+        }
+    }
+}
+
+#[test]
 fn threads_change_nothing_and_the_hash_knows_of_it() {
     let hashes = [1, 2].map(|thread_count| {
         let mut hashes = Vec::new();

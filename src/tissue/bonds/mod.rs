@@ -250,12 +250,6 @@ impl Bonds {
         })
     }
 
-    /// Whether any keeps a point of one of these bodies at the other.
-    pub(super) fn attach(&self, bodies: [usize; 2]) -> bool {
-        let [a, b] = bodies;
-        self.concern(a) && self.concern(b) && self.bodies().any(|both| both == [a, b] || both == [b, a])
-    }
-
     /// Makes room for so many bonds more.
     pub fn reserve(&mut self, count: usize) -> Result<()> {
         self.bonds.try_reserve(count)?;

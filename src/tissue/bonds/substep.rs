@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::super::link::Link;
 use super::super::skin::Skin;
 use super::{Bond, Bonds, CLOSING_SPEED, Corner, End};
 use crate::solver::{Moment, Systems};
@@ -127,6 +128,19 @@ impl Bonds {
                 let [velocity, _] = bond.velocity(&self.ends, skins);
                 if let Some(thread) = &mut bond.thread {
                     thread.follow(apart, velocity.as_dvec3(), whole.as_dvec3(), duration, moment);
+                }
+            }
+        }
+    }
+
+    /// Has threads between bodies that keep each other apart by these contacts give way to them.
+    pub(in crate::tissue) fn loosen(&mut self, links: &[Link]) {
+        for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
+            let [a, b] = bond.points.map(|point| point.body);
+            if let Some(thread) = &mut bond.thread {
+                let mut pairs = links.iter().map(|link| link.sides.map(|side| side.body));
+                if pairs.any(|pair| pair == [a, b] || pair == [b, a]) {
+                    thread.loosen();
                 }
             }
         }

@@ -16,6 +16,10 @@ use crate::solver::Moment;
 /// Points that move against each other by no more than this part of their distance in a substep keep to their line.
 const RESOLVED: f64 = 0.5;
 
+/// Where contacts keep its points apart, a thread gives way by this part of what the points give way to it in a substep, at least: then it is about as
+/// stiff as the tissue there. What is to be nearer than contacts let it could not be had, and what pulls and presses would grow without end.
+const LEAST_GIVE: f64 = 0.2;
+
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Thread {
     /// How long it is while nothing pulls, and what it is to become, m.
@@ -31,8 +35,9 @@ pub(crate) struct Thread {
     /// How fast it becomes longer, m/s, and how long it is by now, m.
     pace: f64,
     current: f64,
-    /// How far apart its points may be at the end of the substep, m.
+    /// How far apart its points may be at the end of the substep, m, and how near they come at most where it draws them together gently.
     reach: f64,
+    gentle: f64,
     /// Where the lead is by now, m, and how fast, m/s.
     led: DVec3,
     speed: DVec3,
@@ -46,6 +51,8 @@ pub(crate) struct Thread {
     /// By how much it is longer for an impulse, m/(N s), and by how much its points become faster against each other, 1/kg.
     give: f64,
     answer: DVec3,
+    /// By how much it was longer for a force in the last substep, m/N.
+    gave: f64,
 }
 
 saved!(Thread {
@@ -57,6 +64,7 @@ saved!(Thread {
     pace,
     current,
     reach,
+    gentle,
     led,
     speed,
     apart,
@@ -64,7 +72,8 @@ saved!(Thread {
     drift,
     duration,
     give,
-    answer
+    answer,
+    gave
 });
 
 /// A place that goes straight and evenly from one to another over the next step, m.
@@ -114,6 +123,7 @@ impl Thread {
             pace: 0.0,
             current: length,
             reach: length,
+            gentle: 0.0,
             led: DVec3::ZERO,
             speed: DVec3::ZERO,
             apart: DVec3::ZERO,
@@ -122,6 +132,7 @@ impl Thread {
             duration: 0.0,
             give: 0.0,
             answer: DVec3::ZERO,
+            gave: compliance,
         }
     }
 
@@ -133,8 +144,8 @@ impl Thread {
     /// What it stores where its points are so far apart, J.
     pub fn energy(&self, distance: f64) -> f64 {
         let stretch = (distance - self.length).max(0.0);
-        if self.compliance > 0.0 {
-            0.5 * stretch * stretch / self.compliance
+        if self.gave > 0.0 {
+            0.5 * stretch * stretch / self.gave
         } else {
             0.0
         }
@@ -165,15 +176,27 @@ impl Thread {
         let is_resolved = velocity.length() * self.drift <= RESOLVED * distance && distance > 0.0;
         self.line = is_resolved.then(|| apart / distance);
         self.reach = (self.current + self.pace * self.drift).max(0.0);
-        if self.compliance == 0.0 {
-            // Points that were put further apart than it can be come back gently.
-            self.reach = self.reach.max(distance - CLOSING_SPEED * self.drift);
+        // Points that were put further apart than one that does not stretch can be come back gently.
+        let is_gentle = self.compliance == 0.0;
+        self.gentle = if is_gentle { self.gentlest(distance) } else { 0.0 };
+    }
+
+    fn gentlest(&self, distance: f64) -> f64 {
+        distance - CLOSING_SPEED * self.drift
+    }
+
+    /// Contacts keep its points apart in this substep.
+    pub fn loosen(&mut self) {
+        if self.lead.is_none() {
+            self.give = self.give.max(LEAST_GIVE * self.answer.max_element() * self.drift);
+            self.gentle = self.gentlest(self.apart.length());
         }
     }
 
     /// The substep is over.
     pub fn go_on(&mut self, moment: &Moment) {
         if moment.drifts {
+            self.gave = self.give * self.duration;
             self.current = (self.current + self.pace * self.drift).max(0.0);
             self.led += self.speed * self.drift;
         }
@@ -183,25 +206,37 @@ impl Thread {
     /// `given` so far.
     pub fn impulse(&self, velocity: DVec3, given: DVec3) -> DVec3 {
         let free = self.apart + (velocity - self.speed - self.answer * given) * self.drift;
-        let distance = free.length();
-        if !(distance > self.reach) {
-            return DVec3::ZERO;
-        }
-        let line = self.line.unwrap_or(free / distance);
-        // |free - pull way| = reach + pull give, of which the first solution counts.
-        let way = self.answer * line * self.drift;
-        let square = way.length_squared() - self.give * self.give;
-        let half = free.dot(way) + self.reach * self.give;
-        let excess = (distance - self.reach) * (distance + self.reach);
-        let pull = match half * half - square * excess {
-            root if root >= 0.0 => excess / (half + root.sqrt()),
-            // That far it does not come along this line: as near as it does.
-            _ => half / square,
+        // No harder than it is stretched, and no faster than gently.
+        let stretched = self.pull(free, self.reach, self.give);
+        let pull = if self.gentle > self.reach {
+            stretched.min(self.pull(free, self.gentle, 0.0))
+        } else {
+            stretched
         };
+        let line = self.line.unwrap_or(free / free.length());
         if pull > 0.0 && pull.is_finite() {
             -line * pull.min(self.most * self.duration)
         } else {
             DVec3::ZERO
+        }
+    }
+
+    /// What has its points end as far apart as this, and as it gives way to it, N s; 0 where they end nearer by themselves.
+    fn pull(&self, free: DVec3, reach: f64, give: f64) -> f64 {
+        let distance = free.length();
+        if !(distance > reach) {
+            return 0.0;
+        }
+        let line = self.line.unwrap_or(free / distance);
+        // |free - pull way| = reach + pull give, of which the first solution counts.
+        let way = self.answer * line * self.drift;
+        let square = way.length_squared() - give * give;
+        let half = free.dot(way) + reach * give;
+        let excess = (distance - reach) * (distance + reach);
+        match half * half - square * excess {
+            root if root >= 0.0 => excess / (half + root.sqrt()),
+            // That far it does not come along this line: as near as it does.
+            _ => half / square,
         }
     }
 }
