@@ -15,7 +15,6 @@ mod enclosed;
 mod geometry;
 mod handover;
 mod haptics;
-mod ids;
 pub mod material;
 pub mod mesh;
 mod nodes;
@@ -27,6 +26,7 @@ mod random;
 pub mod raster;
 mod readers;
 mod simd;
+mod slots;
 mod soa;
 mod solver;
 mod springs;
@@ -36,18 +36,17 @@ mod threads;
 mod tissue;
 mod world;
 
-pub use base::{Error, Result};
+pub use base::{AttachmentId, BladeId, BodyId, Error, LimitKind, Result, StepLimit, StepReport, SubstepLimit, ToolId};
 pub use body::{Body, CutReport, NewNodeSource, NewRimEdge, Pieces, SpringState, TopologyChanges};
 pub use contact::{Contact, ContactChange, MassProperties, Pose, Shape, ToolDefinition};
 pub use debug_draw::{DebugCanvas, DebugDrawDefinition, Rgba};
 pub use def::{
     Anchor, BodyContact, BodyDefinition, BodySettings, ChoiceReason, CollisionFilter, Detection, ElementLaw,
-    EnclosedReport, Energy, LimitKind, Material, Model, Sleep, Solver, SolverChoice, SolverReport, SpringLaw, Storage,
-    StorageReport, SubstepLimit, SurfacePoint, TearReport, Tearing, Values, Viscosity, Yielding,
+    EnclosedReport, Energy, Material, Model, Sleep, Solver, SolverChoice, SolverReport, SpringLaw, Storage,
+    StorageReport, SurfacePoint, TearReport, Tearing, Values, Viscosity, Yielding,
 };
 pub use embedding::{Embedding, EmbeddingDefinition};
 pub use haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
-pub use ids::{AttachmentId, BladeId, BodyId, ToolId};
 pub use picture::{BodyValues, PictureDefinition};
 pub use query::{RayHit, SurfaceHit};
 pub use readers::{BodyReader, Frame};
@@ -55,6 +54,6 @@ pub use simd::Kernel;
 pub use solver::{RestStateDefinition, RestStateReport};
 pub use threads::RunTasks;
 pub use world::{
-    BladeDefinition, BladeReport, BudgetReport, ReplayDifference, ReplayReport, StepLimit, StepProfile, StepReport,
-    SutureDefinition, SutureReport, World, WorldDefinition,
+    BladeDefinition, BladeReport, BudgetReport, ReplayDifference, ReplayReport, StepProfile, SutureDefinition,
+    SutureReport, World, WorldDefinition,
 };

@@ -2,11 +2,10 @@
 
 use glam::Vec3;
 
-use crate::base::{Error, Result, memory};
+use crate::base::{BodyId, Error, Result, memory};
 use crate::body::Body;
 use crate::contact::{Contact, Form, Pose, Tool};
 use crate::def::finite_vector;
-use crate::ids::BodyId;
 use crate::mesh::is_closed;
 use crate::raster::{self, Camera, ColourScale, Coloured, Image, Lines, Look, Scene, Surface};
 use crate::world::World;

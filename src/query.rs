@@ -4,13 +4,12 @@ mod tools;
 
 use glam::{DVec3, Vec3};
 
-use crate::base::{Error, Result};
+use crate::base::{BodyId, Error, Result, ToolId};
 use crate::body::Body;
 use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::Bounds;
 use crate::geometry::nearest::nearest_on_triangle;
 use crate::geometry::predicates::pierce;
-use crate::ids::{BodyId, ToolId};
 use crate::world::World;
 
 /// A point of a body's surface.

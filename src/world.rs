@@ -23,14 +23,14 @@ mod tear;
 
 use glam::{Quat, Vec3};
 
-use crate::base::{Error, Profile, Result, StateHasher, memory, not_negative};
+use crate::base::{AttachmentId, BodyId, Error, Profile, Result, SlotId, StateHasher, ToolId, memory, not_negative};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
 use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::def::{Anchor, BodyDefinition, CollisionFilter, finite_vector};
-use crate::ids::{AttachmentId, BodyId, SlotId, Slots, ToolId};
 use crate::readers::Clock;
 use crate::simd::{ChosenKernel, Kernel};
+use crate::slots::Slots;
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport};
 use crate::threads::{RunTasks, Threads};
 use crate::tissue::{Skin, Tissue, Walk};
@@ -42,7 +42,6 @@ use budget::Pace;
 pub use profile::StepProfile;
 use recording::Recorder;
 pub use recording::{ReplayDifference, ReplayReport};
-pub use step::{StepLimit, StepReport};
 pub use sutures::{SutureDefinition, SutureReport};
 
 /// How long the steps of a world are taken to be before the first, s.

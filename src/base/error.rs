@@ -1,6 +1,6 @@
 //! Why a call was refused or failed.
 
-use crate::world::StepReport;
+use super::StepReport;
 
 /// Why a call was refused or failed. A call that answers with an error has changed nothing.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,13 +1,18 @@
-//! What every other module stands on: errors, memory that may run out, a hash of state, exact signs, times of stages.
+//! What every other module stands on: errors, ids, memory that may run out, a hash of state, exact signs, times of stages.
 
 mod error;
 mod hash;
+mod ids;
 pub(crate) mod memory;
 mod profile;
 mod ranges;
+mod step_report;
 pub(crate) mod symbolic_perturbation;
 
 pub use error::{Error, Result};
 pub(crate) use hash::StateHasher;
+pub(crate) use ids::SlotId;
+pub use ids::{AttachmentId, BladeId, BodyId, ToolId};
 pub(crate) use profile::{Count, Profile, Stage, Stopwatch, check_clock};
 pub(crate) use ranges::{above_zero, finite, not_negative};
+pub use step_report::{LimitKind, StepLimit, StepReport, SubstepLimit};

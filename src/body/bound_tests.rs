@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use glam::{DVec3, Quat, Vec3};
 
 use super::Body;
+use crate::base::{BodyId, ToolId};
 use crate::contact::{Pose, Shape, SurfaceChange, ToolDefinition};
 use crate::def::{BodyDefinition, Solver, Storage, Values};
-use crate::ids::{BodyId, ToolId};
 use crate::nodes::{Bound, NewNode};
 use crate::springs::Rewiring;
 use crate::world::{World, WorldDefinition};

@@ -1,7 +1,7 @@
 //! What bounds the explicit substeps of a body: the spring, element or term of the highest frequency.
 
 use super::Body;
-use crate::def::{LimitKind, SubstepLimit};
+use crate::base::{LimitKind, SubstepLimit};
 use crate::soa::Masses;
 use crate::solver::Stability;
 

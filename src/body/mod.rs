@@ -49,16 +49,16 @@ use cuttable::Cuttable;
 pub(crate) use tear::Torn;
 pub use tune::SpringState;
 
-use crate::base::{Error, Result, memory};
+use crate::base::{BodyId, Error, Result, memory};
 use crate::codec::saved;
 use crate::contact::{Contact, Contacts, ToolPath};
 use crate::cutting::CutMaterial;
 use crate::elements::{Elements, Law};
 use crate::enclosed::Enclosed;
-use crate::ids::{BodyId, Slots};
 use crate::material::Made;
 use crate::nodes::{NodeDamping, Pins, State};
 use crate::readers::Shown;
+use crate::slots::Slots;
 use crate::solver::{
     Carry, CoarseStep, EnergyAccount, GravityKicks, Implicit, MassScaling, MayBeCut, Pace, RestStateDefinition,
     RestStateReport, Stability, Sums, Survey, System, Systems, Watched, rest_state,

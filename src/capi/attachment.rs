@@ -5,9 +5,8 @@ use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
 use super::tool::{sinew_tool_id, write_wrench};
-use crate::base::Result;
+use crate::base::{AttachmentId, Result, SlotId};
 use crate::def::{Anchor, SurfacePoint};
-use crate::ids::{AttachmentId, SlotId};
 
 /// Id of an attachment or a suture; all zero means none.
 #[repr(C)]

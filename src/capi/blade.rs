@@ -5,9 +5,9 @@ use glam::{Quat, Vec3};
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::{SINEW_STATUS_OK, sinew_status, status_of};
+use crate::base::{BladeId, SlotId};
 use crate::contact::Pose;
 use crate::def::CollisionFilter;
-use crate::ids::{BladeId, SlotId};
 use crate::world::BladeDefinition;
 
 /// Id of a blade; all zero means none.

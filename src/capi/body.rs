@@ -6,10 +6,9 @@ use super::definition::sinew_body_def;
 use super::guard::{sinew_world, with_world, with_world_mut};
 use super::memory;
 use super::status::sinew_status;
-use crate::base::{Error, Result};
+use crate::base::{BodyId, Error, Result, SlotId};
 use crate::body::Body;
 use crate::def::CollisionFilter;
-use crate::ids::{BodyId, SlotId};
 
 /// Bit of the x axis.
 pub const SINEW_AXIS_X: u32 = 1;

@@ -7,10 +7,9 @@ use super::guard::{guard, sinew_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::{fail, sinew_status};
 use super::tool::sinew_tool_id;
-use crate::base::Error;
+use crate::base::{Error, ToolId};
 use crate::contact::Pose;
 use crate::haptics::{HapticContact, HapticDefinition, HapticHandle, HapticTick};
-use crate::ids::ToolId;
 
 /// Haptic handle: couples a device to a tool, used by the device's thread.
 ///

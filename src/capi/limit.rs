@@ -1,6 +1,6 @@
 //! What limits substeps.
 
-use crate::def::LimitKind;
+use crate::base::LimitKind;
 
 /// The step was not refused.
 pub const SINEW_LIMIT_NONE: u32 = 0;

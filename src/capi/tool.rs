@@ -7,10 +7,9 @@ use glam::{Quat, Vec3};
 use super::guard::{guard, sinew_world, with_world, with_world_mut};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, SlotId, ToolId};
 use crate::contact::{Pose, Shape, ToolDefinition};
 use crate::def::{CollisionFilter, Detection};
-use crate::ids::{SlotId, ToolId};
 
 /// Id of a tool; all zero means none.
 #[repr(C)]

@@ -11,10 +11,10 @@ use super::limit::{SINEW_LIMIT_NONE, limit_of};
 use super::log::{self, SINEW_LOG_WARNING};
 use super::memory::{self, Versioned};
 use super::status::sinew_status;
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, StepReport};
 use crate::simd::Kernel;
 use crate::threads::RunTasks;
-use crate::world::{StepReport, World, WorldDefinition};
+use crate::world::{World, WorldDefinition};
 
 pub use super::guard::sinew_world;
 

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use glam::{BVec3, DMat3, DQuat, DVec3, Quat, Vec3, Vec3A};
 
 use super::bytes::{Reader, Writer};
-use crate::base::{Error, Result, memory};
+use crate::base::{
+    AttachmentId, BodyId, Error, LimitKind, Result, SlotId, StepLimit, StepReport, SubstepLimit, ToolId, memory,
+};
 
 /// What is written and read bit by bit.
 pub(crate) trait Saved: Sized {
@@ -392,3 +394,35 @@ saved_enum!(Error {
     7 => Io(message),
     8 => Internal(message),
 });
+
+saved_enum!(LimitKind { 0 => Spring, 1 => Element, 2 => Term, 3 => Cavity, 4 => Parts, 5 => Tolerance });
+
+saved!(SubstepLimit {
+    kind,
+    nodes,
+    node_count
+});
+
+saved!(StepLimit {
+    body,
+    of,
+    needed,
+    is_chosen
+});
+
+saved!(StepReport {
+    substeps,
+    stable_substep,
+    bodies_restored,
+    error_estimate,
+    crossings,
+    limit
+});
+
+saved!(BodyId { 0 });
+
+saved!(ToolId { 0 });
+
+saved!(AttachmentId { 0 });
+
+saved!(SlotId { index1, generation });

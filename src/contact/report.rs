@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
+use crate::base::{BodyId, ToolId};
 use crate::codec::saved;
-use crate::ids::{BodyId, ToolId};
 
 /// Where a tool pressed a body when the last step ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

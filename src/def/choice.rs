@@ -1,4 +1,4 @@
-//! Which solver a body has, why, and what bounds its explicit substeps.
+//! Which solver a body has, and why.
 
 use super::Solver;
 use crate::codec::{saved, saved_enum};
@@ -48,69 +48,3 @@ impl SolverChoice {
         }
     }
 }
-
-/// What bounds the substeps of a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LimitKind {
-    /// The springs of a node.
-    Spring,
-    /// The tetrahedra of a node.
-    Element,
-    /// The terms of a node: anchor springs, bending, fibers, Maxwell branches and strain limits.
-    Term,
-    /// The pressure in a cavity.
-    Cavity,
-    /// How many parts a step of IMPLICIT or NEWTON may have.
-    Parts,
-    /// The tolerance of the world.
-    Tolerance,
-}
-
-saved_enum!(LimitKind { 0 => Spring, 1 => Element, 2 => Term, 3 => Cavity, 4 => Parts, 5 => Tolerance });
-
-impl LimitKind {
-    /// What it is called in a message.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            LimitKind::Spring => "the springs",
-            LimitKind::Element => "the element",
-            LimitKind::Term => "the term",
-            LimitKind::Cavity => "a cavity",
-            LimitKind::Parts => "contact or attachments",
-            LimitKind::Tolerance => "the tolerance",
-        }
-    }
-}
-
-/// The part of a body that allows the shortest substep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SubstepLimit {
-    /// What it is.
-    pub kind: LimitKind,
-    /// Its nodes in the caller's numbers, that of the highest frequency first; the last is repeated.
-    pub nodes: [u32; 4],
-    /// How many of them differ; 0: it is of no nodes.
-    pub node_count: u32,
-}
-
-impl SubstepLimit {
-    /// One that is of no nodes.
-    pub(crate) fn of_all(kind: LimitKind) -> Self {
-        Self {
-            kind,
-            nodes: [0; 4],
-            node_count: 0,
-        }
-    }
-
-    /// Its nodes, each once.
-    pub fn nodes(&self) -> &[u32] {
-        &self.nodes[..self.node_count as usize]
-    }
-}
-
-saved!(SubstepLimit {
-    kind,
-    nodes,
-    node_count
-});

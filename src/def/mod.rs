@@ -19,7 +19,7 @@ pub(crate) use body::{
     MOST_ITERATIONS, Rounding, SMALLEST_MASS, Spring, check_values, distance, expect_count, finite_vector,
     finite_vectors, node_indices,
 };
-pub use choice::{ChoiceReason, LimitKind, SolverChoice, SubstepLimit};
+pub use choice::{ChoiceReason, SolverChoice};
 pub(crate) use contact::check_reach;
 pub use contact::{BodyContact, CollisionFilter, Detection};
 pub use element_law::ElementLaw;

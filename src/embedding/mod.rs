@@ -6,12 +6,11 @@ mod read;
 
 use glam::Vec3;
 
-use crate::base::{Error, Result, memory};
+use crate::base::{BodyId, Error, Result, memory};
 use crate::body::Body;
 use crate::cutting::CutMaterial;
 use crate::def::{BodyDefinition, Values};
 use crate::geometry::vertex_normals;
-use crate::ids::BodyId;
 use crate::mesh::Mesh;
 use crate::world::World;
 

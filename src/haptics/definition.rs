@@ -1,7 +1,6 @@
 //! What a haptic handle is to be.
 
-use crate::base::{Error, Result, above_zero, not_negative};
-use crate::ids::ToolId;
+use crate::base::{Error, Result, ToolId, above_zero, not_negative};
 
 use super::six::Six;
 

@@ -3,8 +3,8 @@
 use glam::{DQuat, DVec3, Vec3};
 
 use super::six::{self, Matrix, Six};
+use crate::base::BodyId;
 use crate::geometry::rotation;
-use crate::ids::BodyId;
 
 /// Contacts that a model has room for; of more the most pressed.
 pub(crate) const MOST_CONTACTS: usize = 32;

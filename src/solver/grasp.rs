@@ -10,10 +10,9 @@ use glam::{DVec3, Vec3};
 
 use super::System;
 use super::closing::close;
-use crate::base::{Error, Result, StateHasher, memory};
+use crate::base::{Error, Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
 use crate::contact::{Frame, ToolPath};
-use crate::ids::SlotId;
 use crate::nodes::{Pin, Pins};
 use crate::soa::Vectors;
 

@@ -3,10 +3,9 @@
 use glam::{DVec3, Vec3};
 
 use super::{World, make_walks};
-use crate::base::{Error, Result, memory};
+use crate::base::{AttachmentId, BodyId, Error, Result, ToolId, memory};
 use crate::codec::{saved, saved_enum};
 use crate::def::{Anchor, SurfacePoint};
-use crate::ids::{AttachmentId, BodyId, ToolId};
 use crate::solver::Grip;
 use crate::solver::Outcome;
 use crate::tissue::{Bonds, Bound, Thread, are_one};

@@ -3,14 +3,13 @@
 use glam::{DVec3, Vec3};
 
 use super::resistance::Knot;
-use crate::base::{Error, Result, StateHasher, above_zero, memory};
+use crate::base::{BodyId, Error, Result, SlotId, StateHasher, above_zero, memory};
 use crate::body::{CutReport, Stroke};
 use crate::codec::saved;
 use crate::contact::Pose;
 use crate::cutting::Met;
 use crate::def::{CollisionFilter, finite_vector};
 use crate::geometry::rotation::{turn_between, turned};
-use crate::ids::{BodyId, SlotId};
 use crate::mesh::FURTHEST;
 use crate::tissue::Lead;
 

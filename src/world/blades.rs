@@ -9,10 +9,10 @@ use glam::{DVec3, Quat, Vec3};
 
 use super::World;
 use super::blade::{Blade, BladeDefinition, BladeReport, MOST_HOLDS, Stand};
-use crate::base::Result;
+use crate::base::{BladeId, BodyId, Result, SlotId};
 use crate::contact::Pose;
 use crate::def::CollisionFilter;
-use crate::ids::{BladeId, BodyId, SlotId, Slots};
+use crate::slots::Slots;
 use crate::tissue::Lead;
 
 impl World {

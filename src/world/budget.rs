@@ -9,8 +9,8 @@
 
 use std::time::Instant;
 
-use super::{StepReport, World};
-use crate::base::{Error, Result, above_zero, check_clock};
+use super::World;
+use crate::base::{Error, Result, StepReport, above_zero, check_clock};
 
 /// How often a step is tried over a shorter time, because its motion needs shorter substeps than were known.
 const TRIES: u32 = 16;

@@ -3,10 +3,9 @@
 use glam::{DVec3, Quat, Vec3};
 
 use super::World;
-use crate::base::{Error, Result, memory};
+use crate::base::{Error, Result, ToolId, memory};
 use crate::contact::{DynamicTool, MassProperties, Pose, Rigid, Tool};
 use crate::def::finite_vector;
-use crate::ids::ToolId;
 use crate::solver::Outcome;
 
 /// How often a step is begun again because a tool presses more bodies than its mass was divided among.

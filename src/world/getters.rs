@@ -1,10 +1,9 @@
 //! What a caller reads of a world, of its tools and blades, and keeps with them.
 
 use super::World;
-use crate::base::Result;
+use crate::base::{AttachmentId, BladeId, BodyId, Result, ToolId};
 use crate::contact::Pose;
 use crate::def::CollisionFilter;
-use crate::ids::{AttachmentId, BladeId, BodyId, ToolId};
 
 impl World {
     /// The sum of the lengths of the steps that were taken, s.

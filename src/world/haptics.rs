@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3, Vec3};
 
 use super::World;
-use crate::base::{Error, Result};
+use crate::base::{BodyId, Error, Result, ToolId};
 use crate::contact::{Form, Pose};
 use crate::geometry::rotation;
 use crate::handover::triple_buffer::{Reader, Writer, triple_buffer};
@@ -11,7 +11,6 @@ use crate::haptics::{
     Cone, Coupling, HapticContact, HapticDefinition, HapticHandle, MOST_CONTACTS, Model, Secant, Sent, Six, ZERO,
     about, along, difference, inverse, joined, product, scaled, spread, sum,
 };
-use crate::ids::{BodyId, ToolId};
 
 /// What nobody feels, N.
 const UNFELT: f64 = 1e-3;

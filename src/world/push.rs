@@ -7,9 +7,8 @@ use super::approach::Approach;
 use super::blade::{Blade, BladeReport, Proxy, Stand, edge_behind};
 use super::holds::{NOWHERE, fill, points_at};
 use super::resistance::{Advance, Resistance};
-use crate::base::Result;
+use crate::base::{BodyId, Result};
 use crate::cutting::{Met, Sweep};
-use crate::ids::BodyId;
 
 /// An edge that turned back through no more than this part of a cell is out of the tissue.
 const TURNED_BACK: f64 = 0.1;

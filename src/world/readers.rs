@@ -1,8 +1,7 @@
 //! Readers of bodies.
 
 use super::World;
-use crate::base::Result;
-use crate::ids::BodyId;
+use crate::base::{BodyId, Result};
 use crate::readers::BodyReader;
 
 impl World {

@@ -2,7 +2,7 @@
 
 use crate::body::Body;
 use crate::contact::ToolPath;
-use crate::ids::Slots;
+use crate::slots::Slots;
 use crate::solver::Outcome;
 use crate::tissue::Tissue;
 

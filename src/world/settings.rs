@@ -1,9 +1,8 @@
 //! Settings of a world and of its bodies that change between steps.
 
 use super::{World, make_walks};
-use crate::base::{Error, Result, memory};
+use crate::base::{BodyId, Error, Result, memory};
 use crate::def::{BodyContact, BodySettings};
-use crate::ids::BodyId;
 use crate::solver::CoarseStep;
 
 impl World {

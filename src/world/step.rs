@@ -4,12 +4,13 @@ use glam::{DVec3, Vec3};
 
 use super::World;
 use super::rest::{rest_islands, rouse_groups, wake_islands};
-use crate::base::{Count, Error, Result, Stage, Stopwatch, above_zero};
+use crate::base::{
+    BodyId, Count, Error, LimitKind, Result, Stage, StepLimit, StepReport, Stopwatch, SubstepLimit, above_zero,
+};
 use crate::body::Body;
-use crate::codec::saved;
 use crate::contact::{TRIES, ToolPath};
-use crate::def::{ChoiceReason, LimitKind, SubstepLimit};
-use crate::ids::{BodyId, Slots};
+use crate::def::ChoiceReason;
+use crate::slots::Slots;
 use crate::solver::{Outcome, RESERVE, StepRequest, attempt};
 use crate::threads::{Items, Team};
 use crate::tissue::Together;
@@ -19,82 +20,6 @@ const SHARED_FROM: usize = 8192;
 
 /// Small bodies of fewer nodes in all are not worth waking anybody.
 const WORTH_SHARING: usize = 1024;
-
-/// What a step did.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepReport {
-    /// The most substeps that any body took.
-    pub substeps: u32,
-    /// The longest explicit substep that is stable now, over all bodies, s; infinity: no limit.
-    pub stable_substep: f32,
-    /// Bodies that would have become non-finite: put back as they were, the others stepped.
-    pub bodies_restored: u32,
-    /// How far a position of this step may be off, m; 0 where the tolerance is off, infinite where the step is refused before there is
-    /// anything to compare.
-    pub error_estimate: f32,
-    /// Edges of surfaces that pass through other tissue, or through their own body's where it meets itself: what contact could not keep
-    /// apart. Those of another body in one that is closed come out again by themselves.
-    pub crossings: u32,
-    /// What a step that is refused as unstable failed by.
-    pub limit: Option<StepLimit>,
-}
-
-/// The body that needs more substeps than are allowed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepLimit {
-    /// Which.
-    pub body: BodyId,
-    /// What of it allows no longer substep, where its nodes were as the step began.
-    pub of: SubstepLimit,
-    /// How many substeps the step would need, as far as that is known.
-    pub needed: u32,
-    /// Whether [`Solver::Auto`](crate::Solver::Auto) chose the solver of the body: naming it again would not help.
-    pub is_chosen: bool,
-}
-
-saved!(StepLimit {
-    body,
-    of,
-    needed,
-    is_chosen
-});
-
-impl std::fmt::Display for StepLimit {
-    /// Names the body, what limits it, and what helps.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            body,
-            of,
-            needed,
-            is_chosen,
-        } = self;
-        let solver = if *is_chosen { "IMPLICIT" } else { "AUTO or IMPLICIT" };
-        let (index1, generation) = (body.0.index1, body.0.generation);
-        write!(f, "body {index1}:{generation} is limited by {}", of.kind.name())?;
-        match of.nodes() {
-            [] => {}
-            [node] => write!(f, " of node {node}")?,
-            nodes => write!(f, " of nodes {nodes:?}")?,
-        }
-        match of.kind {
-            LimitKind::Parts => write!(f, ": take shorter steps"),
-            LimitKind::Tolerance => write!(f, ": raise tolerance or max_substeps, or take shorter steps"),
-            _ => write!(
-                f,
-                " and needs {needed} substeps: use solver {solver}, raise mass_scaling or max_substeps, or take shorter steps"
-            ),
-        }
-    }
-}
-
-saved!(StepReport {
-    substeps,
-    stable_substep,
-    bodies_restored,
-    error_estimate,
-    crossings,
-    limit
-});
 
 impl World {
     /// Steps everything by `dt` seconds, above 0.

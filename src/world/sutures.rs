@@ -2,9 +2,8 @@
 
 use super::World;
 use super::attachments::{Which, check_limit, refuse_one_point};
-use crate::base::{Error, Result};
+use crate::base::{AttachmentId, BodyId, Error, Result};
 use crate::def::Anchor;
-use crate::ids::{AttachmentId, BodyId};
 use crate::tissue::{Thread, distance};
 
 /// What a suture is like.

@@ -1,10 +1,9 @@
 //! What a step has stretched too far tears when it has ended.
 
 use super::World;
-use crate::base::Result;
+use crate::base::{BodyId, Result};
 use crate::body::{Body, Torn};
 use crate::def::Withheld;
-use crate::ids::BodyId;
 
 impl World {
     /// Tears bodies, one after the other, at the springs that the step has left beyond what they bear. A tear for which there is no room is

@@ -9,15 +9,12 @@ use proc_macro2::{Span, TokenStream, TokenTree};
 /// A module, and the modules that it may import; lower ones first, so that no loop can be written.
 type Row<'a> = (&'a str, &'a [&'a str]);
 
-/// A file, and the modules that it imports although its module may not.
-type Debt<'a> = (&'a str, &'a [&'a str]);
-
 #[rustfmt::skip]
 const MAY_IMPORT: &[Row] = &[
     ("base", &[]),
     ("simd", &["base"]),
     ("codec", &["base", "simd"]),
-    ("ids", &["base", "codec"]),
+    ("slots", &["base", "codec"]),
     ("handover", &[]),
     ("threads", &["base"]),
     ("soa", &["base", "simd", "codec", "threads"]),
@@ -34,29 +31,23 @@ const MAY_IMPORT: &[Row] = &[
     ("enclosed", &["base", "codec", "threads", "soa", "def", "springs"]),
     ("material", &["base", "mesh", "def", "elements"]),
     ("cutting", &["base", "codec", "strain"]),
-    ("contact", &["base", "simd", "codec", "ids", "soa", "nodes", "geometry", "mesh", "def", "raster"]),
+    ("contact", &["base", "simd", "codec", "soa", "nodes", "geometry", "mesh", "def", "raster"]),
     ("readers", &["base", "codec", "handover", "threads", "soa"]),
-    ("solver", &["base", "simd", "codec", "ids", "threads", "soa", "nodes", "geometry", "def", "springs", "elements", "terms",
+    ("solver", &["base", "simd", "codec", "threads", "soa", "nodes", "geometry", "def", "springs", "elements", "terms",
         "enclosed", "contact"]),
-    ("tissue", &["base", "codec", "ids", "threads", "soa", "nodes", "geometry", "mesh", "def", "contact", "solver"]),
-    ("body", &["base", "simd", "codec", "ids", "threads", "soa", "nodes", "geometry", "order", "mesh", "def", "springs",
+    ("tissue", &["base", "codec", "threads", "soa", "nodes", "geometry", "mesh", "def", "contact", "solver"]),
+    ("body", &["base", "simd", "codec", "slots", "threads", "soa", "nodes", "geometry", "order", "mesh", "def", "springs",
         "elements", "terms", "enclosed", "material", "cutting", "contact", "readers", "solver", "tissue"]),
-    ("haptics", &["base", "ids", "handover", "geometry", "def", "contact"]),
-    ("world", &["base", "simd", "codec", "ids", "handover", "threads", "soa", "geometry", "mesh", "def", "cutting", "contact",
+    ("haptics", &["base", "handover", "geometry", "def", "contact"]),
+    ("world", &["base", "simd", "codec", "slots", "handover", "threads", "soa", "geometry", "mesh", "def", "cutting", "contact",
         "readers", "solver", "tissue", "body", "haptics"]),
-    ("embedding", &["base", "ids", "geometry", "mesh", "def", "cutting", "body", "world"]),
-    ("query", &["base", "ids", "geometry", "def", "contact", "body", "world"]),
+    ("embedding", &["base", "geometry", "mesh", "def", "cutting", "body", "world"]),
+    ("query", &["base", "geometry", "def", "contact", "body", "world"]),
     ("detection", &["contact"]),
-    ("picture", &["base", "ids", "mesh", "def", "raster", "contact", "body", "world"]),
+    ("picture", &["base", "mesh", "def", "raster", "contact", "body", "world"]),
     ("debug_draw", &["base", "soa", "body", "world"]),
-    ("capi", &["base", "simd", "ids", "threads", "mesh", "def", "strain", "raster", "material", "cutting", "contact",
+    ("capi", &["base", "simd", "threads", "mesh", "def", "strain", "raster", "material", "cutting", "contact",
         "readers", "solver", "body", "world", "haptics", "embedding", "query", "detection", "picture", "debug_draw"]),
-];
-
-/// The imports that are left to remove. A debt that no longer exists fails the test: the list only shrinks.
-#[rustfmt::skip]
-const DEBTS: &[Debt] = &[
-    ("base/error.rs", &["world"]),
 ];
 
 /// A word, `::` or another sign of Rust text, and its line.
@@ -236,7 +227,7 @@ fn faults_of_table(table: &[Row]) -> Vec<String> {
 }
 
 /// What is wrong with files, given as their paths in `src` and their texts.
-fn faults(sources: &[(String, String)], table: &[Row], debts: &[Debt]) -> Vec<String> {
+fn faults(sources: &[(String, String)], table: &[Row]) -> Vec<String> {
     let mut faults = faults_of_table(table);
     let mut tests = BTreeSet::new();
     let mut root = BTreeMap::new();
@@ -255,16 +246,11 @@ fn faults(sources: &[(String, String)], table: &[Row], debts: &[Debt]) -> Vec<St
     files.retain(|(_, module, _)| !(1..=module.len()).any(|length| tests.contains(&module[..length])));
 
     let mut imported = BTreeSet::new();
-    let mut owed = BTreeSet::new();
     for (file, module, tokens) in &files {
         let Some((_, allowed)) = table.iter().find(|(name, _)| *name == module[0]) else {
             faults.push(format!("{file}: the table has no row of {}", module[0]));
             continue;
         };
-        let debt = debts
-            .iter()
-            .find(|(debtor, _)| debtor == file)
-            .map_or(&[][..], |(_, imports)| imports);
         for (line, path) in crate_paths(tokens, module) {
             let Some(&first) = path.first() else {
                 continue;
@@ -273,8 +259,6 @@ fn faults(sources: &[(String, String)], table: &[Row], debts: &[Debt]) -> Vec<St
             if import == module[0] {
             } else if allowed.contains(&import) {
                 imported.insert((module[0], import));
-            } else if debt.contains(&import) {
-                owed.insert((*file, import));
             } else {
                 faults.push(format!("{file}:{line}: {} may not import {import}", module[0]));
             }
@@ -288,13 +272,6 @@ fn faults(sources: &[(String, String)], table: &[Row], debts: &[Debt]) -> Vec<St
         for import in imports.iter().filter(|import| !imported.contains(&(module, **import))) {
             faults.push(format!(
                 "the table: {module} does not import {import}: remove the entry"
-            ));
-        }
-    }
-    for &(file, imports) in debts {
-        for import in imports.iter().filter(|import| !owed.contains(&(file, **import))) {
-            faults.push(format!(
-                "the debts: {file} does not import {import} any more: remove the entry"
             ));
         }
     }
@@ -326,12 +303,12 @@ fn modules_import_only_what_stands_below_them() {
     read_sources(&src, &src, &mut sources);
     sources.sort();
     assert!(sources.len() > 100, "src was read");
-    let faults = faults(&sources, MAY_IMPORT, DEBTS);
+    let faults = faults(&sources, MAY_IMPORT);
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 /// The faults of files that are planted beside a root and three modules that are as they should be.
-fn faults_beside(planted: &[(&str, &str)], debts: &[Debt]) -> Vec<String> {
+fn faults_beside(planted: &[(&str, &str)]) -> Vec<String> {
     let table: &[Row] = &[("low", &[]), ("middle", &["low"]), ("high", &["low", "middle"])];
     let whole = [
         (
@@ -348,12 +325,12 @@ fn faults_beside(planted: &[(&str, &str)], debts: &[Debt]) -> Vec<String> {
         .chain(planted)
         .map(|(file, text)| ((*file).to_owned(), (*text).to_owned()))
         .collect();
-    faults(&sources, table, debts)
+    faults(&sources, table)
 }
 
 #[test]
 fn a_planted_import_is_found_however_it_is_written() {
-    assert_eq!(faults_beside(&[], &[]), [""; 0]);
+    assert_eq!(faults_beside(&[]), [""; 0]);
     for planted in [
         "use crate::high::World;",
         "use crate::{low::LOW, high};",
@@ -370,10 +347,8 @@ fn a_planted_import_is_found_however_it_is_written() {
         "macro_rules! make { () => { $crate::high::World } }",
     ] {
         let text = format!("use crate::low;\n{planted}");
-        let found = faults_beside(&[("middle/part.rs", &text)], &[]);
+        let found = faults_beside(&[("middle/part.rs", &text)]);
         assert_eq!(found, ["middle/part.rs:2: middle may not import high"], "{planted}");
-        let owed = faults_beside(&[("middle/part.rs", &text)], &[("middle/part.rs", &["high"])]);
-        assert_eq!(owed, [""; 0], "{planted}");
     }
 }
 
@@ -391,22 +366,13 @@ fn what_is_no_import_is_none() {
         "use super::{low::{self as bottom}, super::low};",
         "pub(crate) fn f() {}",
     ] {
-        assert_eq!(
-            faults_beside(&[("middle/part.rs", harmless)], &[]),
-            [""; 0],
-            "{harmless}"
-        );
+        assert_eq!(faults_beside(&[("middle/part.rs", harmless)]), [""; 0], "{harmless}");
     }
 }
 
 #[test]
-fn a_debt_that_is_paid_and_a_module_without_a_row_are_found() {
-    let paid = faults_beside(&[], &[("middle.rs", &["high"])]);
-    assert_eq!(
-        paid,
-        ["the debts: middle.rs does not import high any more: remove the entry"]
-    );
-    let unknown = faults_beside(&[("other.rs", "")], &[]);
+fn a_module_without_a_row_is_found() {
+    let unknown = faults_beside(&[("other.rs", "")]);
     assert_eq!(unknown, ["other.rs: the table has no row of other"]);
 }
 

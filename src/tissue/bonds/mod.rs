@@ -16,11 +16,10 @@ mod thread;
 
 use glam::{DVec3, Vec3};
 
-use crate::base::{Result, StateHasher, memory};
+use crate::base::{Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
 use crate::def::Anchor;
 use crate::geometry::Bounds;
-use crate::ids::SlotId;
 use crate::solver::Outcome;
 use crate::solver::{System, Systems};
 
@@ -555,7 +554,7 @@ fn forget(bodies: &mut impl Systems, place: usize) {
 mod tests {
     use super::*;
     use crate::def::SurfacePoint;
-    use crate::ids::Slots;
+    use crate::slots::Slots;
 
     fn bound(body: usize, triangle: u32, nodes: &[(u32, f32)]) -> Bound {
         let mut all = [(0, 0.0); OF_POINT];

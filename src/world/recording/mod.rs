@@ -27,8 +27,8 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
-use super::{StepReport, World};
-use crate::base::{Error, Result, memory};
+use super::World;
+use crate::base::{Error, Result, StepReport, memory};
 use difference::difference;
 pub use player::{ReplayDifference, ReplayReport};
 

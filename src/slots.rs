@@ -1,6 +1,6 @@
 //! Things named by ids that outlive them: an id of something destroyed is recognised, even when its place is used again.
 
-use crate::base::{Error, Result};
+use crate::base::{Error, Result, SlotId};
 use crate::codec::{Reader, Saved, Writer, saved};
 
 /// Things in places that are used again.
@@ -60,22 +60,6 @@ impl<T> Slot<T> {
     /// What lives here.
     pub fn content_mut(&mut self) -> Option<&mut T> {
         self.content.as_mut()
-    }
-}
-
-/// A place, counted from 1, and which of the things that lived there is meant; all zero: none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct SlotId {
-    pub index1: u32,
-    pub generation: u32,
-}
-
-saved!(SlotId { index1, generation });
-
-impl SlotId {
-    /// The place, counted from 0, of what is known to live.
-    pub fn index(self) -> usize {
-        self.index1 as usize - 1
     }
 }
 
