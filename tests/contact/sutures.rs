@@ -585,6 +585,9 @@ fn a_thread_shorter_than_contacts_allow_does_not_pull_harder_and_harder() {
             assert!((0.85e-3..1.1e-3).contains(&apart), "{case}: {apart} m apart");
             let [_, before, after] = forces;
             assert!(after > 0.0 && after < 1.01 * before, "{case}: {forces:?} N");
+            let SutureReport { energy, length, .. } = sutured.report(suture);
+            let work = 0.5 * after * (apart - f64::from(length));
+            assert!((energy - work).abs() < 0.05 * work, "{case}: {energy} J of {work}");
             let kinetic: f64 = [sutured.above, sutured.below]
                 .iter()
                 .map(|&id| body(&sutured.world, id).energy(Vec3::ZERO).kinetic)

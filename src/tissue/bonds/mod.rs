@@ -487,7 +487,7 @@ impl Bonds {
                 bond.foreseen = bond.load.clamp(Vec3::MIN, Vec3::MAX);
                 bond.mean = (bond.sum / f64::from(dt)).as_vec3().clamp(Vec3::MIN, Vec3::MAX);
                 if let Some(thread) = &mut bond.thread {
-                    thread.length = thread.length_after(dt);
+                    thread.commit(dt);
                 }
             } else {
                 bond.mean = Vec3::ZERO;

@@ -48,10 +48,13 @@ pub(crate) struct Thread {
     /// How long velocities act on places in the substep, s, and forces on velocities.
     drift: f64,
     duration: f64,
-    /// By how much it is longer for an impulse, m/(N s), and by how much its points become faster against each other, 1/kg.
+    /// By how much it is longer for an impulse, m/(N s), where contacts keep its points apart at least, and by how much its points become faster
+    /// against each other, 1/kg.
     give: f64,
+    least_give: f64,
     answer: DVec3,
-    /// By how much it was longer for a force in the last substep, m/N.
+    // Of the last step.
+    /// By how much it was longer for a force, m/N.
     gave: f64,
 }
 
@@ -72,6 +75,7 @@ saved!(Thread {
     drift,
     duration,
     give,
+    least_give,
     answer,
     gave
 });
@@ -131,6 +135,7 @@ impl Thread {
             drift: 0.0,
             duration: 0.0,
             give: 0.0,
+            least_give: 0.0,
             answer: DVec3::ZERO,
             gave: compliance,
         }
@@ -169,6 +174,8 @@ impl Thread {
         self.drift = part * f64::from(moment.duration);
         self.duration = f64::from(duration);
         self.give = self.compliance / self.duration;
+        // The same for a force in a half kick as in a whole one.
+        self.least_give = LEAST_GIVE * answer.max_element() * f64::from(moment.duration).powi(2) / self.duration;
         self.answer = answer;
         let (apart, velocity) = (apart - self.led, velocity - self.speed);
         self.apart = apart;
@@ -181,14 +188,15 @@ impl Thread {
         self.gentle = if is_gentle { self.gentlest(distance) } else { 0.0 };
     }
 
+    /// How near its points come in this substep at most where it draws them together gently, m.
     fn gentlest(&self, distance: f64) -> f64 {
         distance - CLOSING_SPEED * self.drift
     }
 
-    /// Contacts keep its points apart in this substep.
+    /// Contacts keep its points apart in this substep: it gives way to them, and draws gently.
     pub fn loosen(&mut self) {
         if self.lead.is_none() {
-            self.give = self.give.max(LEAST_GIVE * self.answer.max_element() * self.drift);
+            self.give = self.give.max(self.least_give);
             self.gentle = self.gentlest(self.apart.length());
         }
     }
@@ -196,10 +204,15 @@ impl Thread {
     /// The substep is over.
     pub fn go_on(&mut self, moment: &Moment) {
         if moment.drifts {
-            self.gave = self.give * self.duration;
             self.current = (self.current + self.pace * self.drift).max(0.0);
             self.led += self.speed * self.drift;
         }
+    }
+
+    /// The step in progress, of `dt` seconds, is over.
+    pub fn commit(&mut self, dt: f32) {
+        self.length = self.length_after(dt);
+        self.gave = self.give * self.duration;
     }
 
     /// The impulse on its first point that this substep takes in all, N s, where the points go at this velocity against each other with what was
