@@ -530,7 +530,7 @@ impl Body {
 
     /// Moves the origin of its coordinates after it.
     fn follow(&mut self) {
-        let bounds = self.system.boxes.iter().fold(Bounds::EMPTY, Bounds::and);
+        let bounds = self.system.local_bounds();
         let shift = shift_towards(bounds);
         if shift == DVec3::ZERO {
             return;

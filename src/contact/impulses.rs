@@ -1,7 +1,7 @@
 //! What contacts with tools and contacts of tissue share: impulses, one contact after another, until they change no more.
 
 /// Sweeps over all contacts, at most: so many that tissue comes to rest.
-pub(crate) const SWEEPS: u32 = 128;
+pub(super) const SWEEPS: u32 = 128;
 
 /// What a sweep changes is nothing, as a part of what the first one did.
 const CONVERGED: f32 = 1e-5;
@@ -14,7 +14,7 @@ pub(crate) const PUSHED_OUT: f32 = 0.2;
 const PUSH_TIME: f32 = 1e-3;
 
 /// The part of how deep something began inside a tool that it is moved out by in a substep of so many seconds.
-pub(crate) fn pushed_out(substep: f32) -> f32 {
+pub(super) fn pushed_out(substep: f32) -> f32 {
     (substep / PUSH_TIME).min(PUSHED_OUT)
 }
 

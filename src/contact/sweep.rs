@@ -8,10 +8,10 @@ use super::mesh_solid::MeshSolid;
 use crate::geometry::Bounds;
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
-pub(crate) const TOUCHING: f32 = 1e-4;
+pub(super) const TOUCHING: f32 = 1e-4;
 
 /// A way of this part of half a mesh's least extent is not searched: it is too short to pass anything.
-pub(crate) const FLAT: f32 = 0.01;
+pub(super) const FLAT: f32 = 0.01;
 
 /// Advances of one search. A search that takes more grazes the tool, and ends where it is, still clear of it.
 const ADVANCES: u32 = 32;

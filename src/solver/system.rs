@@ -97,6 +97,7 @@ pub(crate) struct System {
     pub coarse: Option<CoarseStep>,
     /// For bodies that sleep.
     pub sleeper: Option<Box<Sleeper>>,
+    /// For bodies that may be cut.
     pub may_be_cut: Option<MayBeCut>,
     /// The part of the world's gravity that acts on it.
     pub gravity_scale: f32,
@@ -256,7 +257,7 @@ impl System {
 
     /// How far it reaches along an axis, m.
     pub fn extent(&self) -> f32 {
-        let bounds = self.boxes.iter().fold(Bounds::EMPTY, Bounds::and);
+        let bounds = self.local_bounds();
         (bounds.max - bounds.min).max_element()
     }
 

@@ -63,6 +63,24 @@ saved!(Link {
 });
 
 impl Side {
+    /// A node of a body.
+    pub fn of_node(body: usize, node: u32) -> Self {
+        Self {
+            body,
+            nodes: [node; 3],
+            weights: [1.0, 0.0, 0.0],
+        }
+    }
+
+    /// The point of an edge of a body that is this part of the way along it.
+    pub fn of_edge(body: usize, [from, to]: [u32; 2], along: f32) -> Self {
+        Self {
+            body,
+            nodes: [from, to, to],
+            weights: [1.0 - along, along, 0.0],
+        }
+    }
+
     /// Whose it is, whatever point of it.
     pub fn key(&self) -> (usize, [u32; 3]) {
         (self.body, self.nodes)

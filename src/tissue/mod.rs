@@ -28,8 +28,7 @@ use self::clearances::Clearances;
 use self::entangled::Entangled;
 use self::groups::Groups;
 use self::islands::{Islands, Reach};
-use self::link::Link;
-use self::link::Side;
+use self::link::{Link, Side};
 pub(crate) use self::lockstep::{Together, Walk};
 use self::pairs::Pairs;
 use self::search::{Measure, Party, Search};
@@ -583,7 +582,7 @@ impl Tissue {
                 });
             }
             has_begun = true;
-            bonds.loosen(links);
+            bonds.loosen(links, moment);
             let recalled = give_again(&mut links[known..], pushes.most(), skins);
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));

@@ -257,11 +257,7 @@ impl Search<'_> {
             }
             let nodes = of_faces.skin.triangles[triangle];
             let sides = [
-                Side {
-                    body: of_nodes.place,
-                    nodes: [node; 3],
-                    weights: [1.0, 0.0, 0.0],
-                },
+                Side::of_node(of_nodes.place, node),
                 Side {
                     body: of_faces.place,
                     nodes,
@@ -371,11 +367,7 @@ impl Search<'_> {
         self.measure(kept, Part::Edge(index), nearest);
         for (_, _, other, (found, clearance)) in touched.into_iter().flatten() {
             let sides = [
-                Side {
-                    body: first.place,
-                    nodes: [edge[0], edge[1], edge[1]],
-                    weights: [1.0 - found.along, found.along, 0.0],
-                },
+                Side::of_edge(first.place, edge, found.along),
                 Side {
                     body: second.place,
                     nodes: [other[0], other[1], other[1]],

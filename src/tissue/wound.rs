@@ -193,11 +193,7 @@ impl Search<'_> {
                 && over.height < -NOTHING * skin.least_thickness()
             {
                 let sides = [
-                    Side {
-                        body: party.place,
-                        nodes: [node; 3],
-                        weights: [1.0, 0.0, 0.0],
-                    },
+                    Side::of_node(party.place, node),
                     Side {
                         body: party.place,
                         nodes: skin.triangles[triangle],
@@ -274,11 +270,7 @@ impl Search<'_> {
             });
             if let Some((_, other, found, normal)) = deepest {
                 let sides = [
-                    Side {
-                        body: party.place,
-                        nodes: [edge[0], edge[1], edge[1]],
-                        weights: [1.0 - found.along, found.along, 0.0],
-                    },
+                    Side::of_edge(party.place, edge, found.along),
                     Side {
                         body: party.place,
                         nodes: [other[0], other[1], other[1]],

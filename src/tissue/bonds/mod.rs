@@ -20,8 +20,7 @@ use crate::base::{Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
 use crate::def::Anchor;
 use crate::geometry::Bounds;
-use crate::solver::Outcome;
-use crate::solver::{System, Systems};
+use crate::solver::{Outcome, System, Systems};
 
 pub(crate) use self::thread::{Lead, Thread};
 

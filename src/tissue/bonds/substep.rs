@@ -134,13 +134,13 @@ impl Bonds {
     }
 
     /// Has threads between bodies that keep each other apart by these contacts give way to them.
-    pub(in crate::tissue) fn loosen(&mut self, links: &[Link]) {
+    pub(in crate::tissue) fn loosen(&mut self, links: &[Link], moment: &Moment) {
         for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
             let [a, b] = bond.points.map(|point| point.body);
             if let Some(thread) = &mut bond.thread {
                 let mut pairs = links.iter().map(|link| link.sides.map(|side| side.body));
                 if pairs.any(|pair| pair == [a, b] || pair == [b, a]) {
-                    thread.loosen();
+                    thread.loosen(moment);
                 }
             }
         }

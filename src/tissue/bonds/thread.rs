@@ -48,10 +48,8 @@ pub(crate) struct Thread {
     /// How long velocities act on places in the substep, s, and forces on velocities.
     drift: f64,
     duration: f64,
-    /// By how much it is longer for an impulse, m/(N s), where contacts keep its points apart at least, and by how much its points become faster
-    /// against each other, 1/kg.
+    /// By how much it is longer for an impulse, m/(N s), and by how much its points become faster against each other, 1/kg.
     give: f64,
-    least_give: f64,
     answer: DVec3,
     // Of the last step.
     /// By how much it was longer for a force, m/N.
@@ -75,7 +73,6 @@ saved!(Thread {
     drift,
     duration,
     give,
-    least_give,
     answer,
     gave
 });
@@ -135,7 +132,6 @@ impl Thread {
             drift: 0.0,
             duration: 0.0,
             give: 0.0,
-            least_give: 0.0,
             answer: DVec3::ZERO,
             gave: compliance,
         }
@@ -174,8 +170,6 @@ impl Thread {
         self.drift = part * f64::from(moment.duration);
         self.duration = f64::from(duration);
         self.give = self.compliance / self.duration;
-        // The same for a force in a half kick as in a whole one.
-        self.least_give = LEAST_GIVE * answer.max_element() * f64::from(moment.duration).powi(2) / self.duration;
         self.answer = answer;
         let (apart, velocity) = (apart - self.led, velocity - self.speed);
         self.apart = apart;
@@ -194,9 +188,11 @@ impl Thread {
     }
 
     /// Contacts keep its points apart in this substep: it gives way to them, and draws gently.
-    pub fn loosen(&mut self) {
+    pub fn loosen(&mut self, moment: &Moment) {
         if self.lead.is_none() {
-            self.give = self.give.max(self.least_give);
+            // The same for a force in a half kick as in a whole one.
+            let least = LEAST_GIVE * self.answer.max_element() * f64::from(moment.duration).powi(2) / self.duration;
+            self.give = self.give.max(least);
             self.gentle = self.gentlest(self.apart.length());
         }
     }
