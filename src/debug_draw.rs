@@ -146,7 +146,8 @@ fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
     let positions = body.positions();
     for (node, &place) in positions.iter().enumerate() {
         let system = &body.system;
-        system.springs.visit(system.own(node as u32) as usize, &mut |link| {
+        let own = system.own(node as u32) as usize;
+        system.forces.springs.visit(own, &mut |link| {
             let other = system.callers(link.neighbour as usize);
             if other > node && link.rest_length > 0.0 {
                 let strain = place.distance(positions[other]) / link.rest_length - 1.0;

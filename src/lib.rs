@@ -12,6 +12,7 @@ pub mod detection;
 mod elements;
 mod embedding;
 mod enclosed;
+mod forces;
 mod geometry;
 mod handover;
 mod haptics;

@@ -102,6 +102,7 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
         .expect("room");
     let new: Vec<NewNode> = bound.iter().map(|&bound| NewNode::Bound(bound)).collect();
     body.system
+        .forces
         .springs
         .resize(body.node_count() + new.len())
         .expect("memory");

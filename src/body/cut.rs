@@ -7,9 +7,10 @@ use crate::base::{Error, Result, memory};
 use crate::contact::SurfaceChange;
 use crate::cutting::{BoundPoint, Changes, CutMaterial, Limits, Sweep};
 use crate::elements::PieceOfElement;
+use crate::forces::Parts;
 use crate::nodes::{Bound, NewNode};
 use crate::soa::NodeOrder;
-use crate::solver::close_beside;
+use crate::solver::{System, close_beside};
 use crate::springs::{Change, Rewiring};
 use crate::terms::Parting;
 use crate::tissue::{Skin, SkinChange, SurfaceToBe};
@@ -115,8 +116,8 @@ impl Body {
         before: [u32; 2],
     ) -> Result<CutReport> {
         let applied = self.try_apply(cuttable, skin, way, changes, before);
-        if let Some(terms) = self.system.terms.as_mut().filter(|_| applied.is_err()) {
-            terms.forget_parts();
+        if applied.is_err() {
+            self.system.forces.forget_parts();
         }
         applied
     }
@@ -150,7 +151,7 @@ impl Body {
             }
         }
         let nodes = self.new_nodes(changes)?;
-        let pieces = self.pieces_of_elements(material, changes)?;
+        let parts = self.parts(material, changes, &rewiring)?;
         let touched = self.touched(changes, &rewiring)?;
         let copies = changes.cells.iter().filter(|piece| piece.cell != piece.source);
         let items = material.items_changed(changes)?;
@@ -189,29 +190,22 @@ impl Body {
         let mut changing = memory::reserved(touched.len())?;
         changing.extend(touched.iter().map(|touched| touched.node));
         let candidates = memory::reserved(touched.len())?;
-        let of_pieces = pieces.iter().flat_map(|piece| piece.nodes);
-        let mut at_pieces = memory::reserved(4 * pieces.len() + touched.len())?;
-        if self.system.elements.is_some() {
+        let of_pieces = parts.elements.iter().flat_map(|piece| piece.nodes);
+        let mut at_pieces = memory::reserved(4 * parts.elements.len() + touched.len())?;
+        if self.system.forces.has_elements() {
             at_pieces.extend(of_pieces.chain(changing.iter().copied()));
             memory::sort_once(&mut at_pieces);
         }
-        if let Some(elements) = &mut self.system.elements {
-            let implicit = self.system.implicit.as_mut();
-            let sums = implicit.and_then(|implicit| implicit.changes_mut());
-            elements.reserve_pieces(&pieces, known + nodes.len(), sums)?;
-            elements.reserve_rings(changes.nodes.len())?;
-        }
+        let System { forces, implicit, .. } = &mut self.system;
+        let of_changes = implicit.as_mut().map(|implicit| &mut implicit.changes);
+        forces.prepare_parts(&parts, known + nodes.len(), of_changes)?;
         if let Some(tears) = &mut self.tears {
             tears.reserve(changes.springs.len().max(rewiring.added.len()))?;
         }
-        if let Some(terms) = &mut self.system.terms {
-            let parting = parting(&self.system.order, material, changes, &rewiring)?;
-            terms.prepare_parts(&parting, known + nodes.len())?;
-        }
-        self.system.springs.resize(known + nodes.len())?;
-        let rewired = self.rewire(&rewiring, 6 * pieces.len());
+        self.system.forces.springs.resize(known + nodes.len())?;
+        let rewired = self.rewire(&rewiring, 6 * parts.elements.len());
         if rewired.is_err() {
-            self.system.springs.resize(known)?;
+            self.system.forces.springs.resize(known)?;
             return rewired.map(|()| CutReport::default());
         }
         // From here on nothing fails.
@@ -223,14 +217,9 @@ impl Body {
         // Damping is to be that of masses as they are.
         self.system.scale_masses(0.0);
         self.add_nodes(&nodes)?;
-        if let Some(elements) = &mut self.system.elements {
-            let implicit = self.system.implicit.as_mut();
-            let sums = implicit.and_then(|implicit| implicit.changes_mut());
-            elements.rewire(&pieces, known + nodes.len(), sums);
-        }
-        if let Some(terms) = &mut self.system.terms {
-            terms.take_parts(known + nodes.len());
-        }
+        let System { forces, implicit, .. } = &mut self.system;
+        let of_changes = implicit.as_mut().map(|implicit| &mut implicit.changes);
+        forces.take_parts(&parts, known + nodes.len(), of_changes);
         if let Some(tears) = &mut self.tears {
             tears.grow(known + nodes.len());
             tears.follow(changes, &rewiring, &self.system.order);
@@ -263,33 +252,29 @@ impl Body {
 
     /// Parts the rings of nodes that fell apart.
     fn part_rings(&mut self, material: &CutMaterial, changes: &Changes) {
-        let Some(elements) = &mut self.system.elements else {
-            return;
-        };
-        let order = &self.system.order;
+        let System {
+            forces, order, state, ..
+        } = &mut self.system;
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let copies = pieces.iter().map(|piece| order.own(piece.node));
             let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
             let source = order.own(pieces[0].source);
-            elements.part_ring(source, copies, cells_at, self.system.state.positions());
+            forces.part_ring(source, copies, cells_at, state.positions());
         }
     }
 
     /// Opens the cavities of which triangles, given as they are now, had other corners.
     fn open_cavities(&mut self, changed: &[(u32, [u32; 3])]) {
-        let Some(enclosed) = &mut self.system.enclosed else {
-            return;
-        };
-        let mut opened = false;
-        for &(triangle, mut corners) in changed {
-            let mut before = self.system.surface[triangle as usize];
+        let System {
+            forces, order, surface, ..
+        } = &mut self.system;
+        let before = changed.iter().filter_map(|&(triangle, mut corners)| {
+            let mut before = surface[triangle as usize];
             before.sort_unstable();
             corners.sort_unstable();
-            if before != corners {
-                opened |= enclosed.open_at(before.map(|node| self.system.order.own(node)));
-            }
-        }
-        enclosed.forget_rates();
+            (before != corners).then(|| before.map(|node| order.own(node)))
+        });
+        let opened = forces.open_cavities(before);
         if let Some(implicit) = self.system.implicit.as_mut().filter(|_| opened) {
             // What a step of second order takes from the last, pressure gave.
             implicit.forget_history();
@@ -308,19 +293,26 @@ impl Body {
         }
     }
 
-    /// What becomes of tetrahedra that are elements.
-    fn pieces_of_elements(&self, material: &CutMaterial, changes: &Changes) -> Result<Vec<PieceOfElement>> {
-        if self.system.elements.is_none() {
-            return Ok(Vec::new());
+    /// What becomes of elements and terms.
+    fn parts(&self, material: &CutMaterial, changes: &Changes, rewiring: &Rewiring) -> Result<Parts> {
+        let System { forces, order, .. } = &self.system;
+        let mut parts = Parts {
+            ring_count: changes.nodes.len(),
+            ..Parts::default()
+        };
+        if forces.has_elements() {
+            parts.elements = memory::reserved(changes.cells.len())?;
+            parts.elements.extend(changes.cells.iter().map(|piece| PieceOfElement {
+                cell: piece.cell,
+                source: piece.source,
+                nodes: material.nodes_of(piece.cell).map(|node| order.own(node)),
+                part: piece.part as f32,
+            }));
         }
-        let mut pieces = memory::reserved(changes.cells.len())?;
-        pieces.extend(changes.cells.iter().map(|piece| PieceOfElement {
-            cell: piece.cell,
-            source: piece.source,
-            nodes: material.nodes_of(piece.cell).map(|node| self.system.order.own(node)),
-            part: piece.part as f32,
-        }));
-        Ok(pieces)
+        if forces.beside.has_terms() {
+            parts.terms = parting(order, material, changes, rewiring)?;
+        }
+        Ok(parts)
     }
 
     /// What becomes of its skin.

@@ -8,8 +8,8 @@ use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
 use crate::def::SMALLEST_MASS;
 use crate::soa::Masses;
-use crate::solver::{Candidate, make_up_for};
-use crate::springs::{Rewiring, pull};
+use crate::solver::{Candidate, System, make_up_for};
+use crate::springs::Rewiring;
 
 /// A node whose springs or mass a cut changes.
 pub(super) struct Touched {
@@ -70,15 +70,9 @@ impl Body {
         let mut force = Vec3::ZERO;
         if self.system.carry.closing.is_some() {
             let positions = self.system.state.positions();
-            let here = positions.get(node as usize);
-            self.system.springs.visit(node as usize, &mut |link| {
-                force += pull(
-                    node as usize,
-                    &link,
-                    positions.get(link.neighbour as usize) - here,
-                    None,
-                );
-            });
+            self.system
+                .forces
+                .add_spring_forces(node as usize, positions, &mut force);
         }
         force
     }
@@ -131,27 +125,20 @@ impl Body {
 
     /// The same for elements, at all nodes of pieces and all others of which masses or springs have changed.
     pub(super) fn follow_elements(&mut self, material: &CutMaterial, changes: &Changes, nodes: &[u32]) {
-        let Some(elements) = &mut self.system.elements else {
-            return;
-        };
         let order = &self.system.order;
-        let masses = Masses {
-            masses: &self.system.masses,
-            inverse_masses: &self.system.inverse_masses,
-            are_heavier: false,
-        };
+        let masses = Masses::new(&self.system.masses, &self.system.inverse_masses);
         let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
-        elements.find_rates_at(nodes, cells_at, &*self.system.springs, &masses);
-        if self.system.carry.closing.is_none() {
+        self.system.forces.find_rates_at(nodes, cells_at, &masses);
+        if self.system.carry.closing.is_none() || !self.system.forces.has_elements() {
             return;
         }
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let force_on = |body: &Self, node: u32| {
                 let cells = material.tetrahedra_at(node);
-                let elements = body.system.elements.as_ref();
-                elements.map_or(DVec3::ZERO, |elements| {
-                    elements.force_at(body.system.order.own(node), cells, body.system.state.positions())
-                })
+                let System {
+                    forces, order, state, ..
+                } = &body.system;
+                forces.force_at(order.own(node), cells, state.positions())
             };
             let whole: DVec3 = pieces.iter().map(|piece| force_on(self, piece.node)).sum();
             for piece in pieces {
@@ -174,18 +161,14 @@ impl Body {
             make_up_for(&mut self.system, touched.node, touched.before * touched.part - force);
         }
         self.system.follow_nodes();
-        let masses = Masses {
-            masses: &self.system.masses,
-            inverse_masses: &self.system.inverse_masses,
-            are_heavier: false,
-        };
+        let masses = Masses::new(&self.system.masses, &self.system.inverse_masses);
         let watched = (&mut self.system.watched, candidates);
         let positions = self.system.state.positions();
         self.system.carry.stability =
             self.system
                 .carry
                 .stability
-                .cut(nodes, &*self.system.springs, masses, positions, watched);
+                .cut(nodes, &*self.system.forces.springs, masses, positions, watched);
         if let Some(implicit) = &mut self.system.implicit {
             implicit.forget_matrix();
         }

@@ -46,9 +46,9 @@ impl Body {
         carried: &mut [f64],
     ) -> f64 {
         let mut highest = 0.0_f64;
-        let Some(elements) = &self.system.elements else {
+        if !self.system.forces.has_elements() {
             return highest;
-        };
+        }
         let source = self.system.order.own(pieces[0].source);
         for (piece, carried) in pieces.iter().zip(carried) {
             for cell in material.tetrahedra_at(piece.node) {
@@ -56,7 +56,7 @@ impl Body {
                     Ok(at) => (cells[at].source, cells[at].part),
                     Err(_) => (cell, 1.0),
                 };
-                let (of_cell, beside) = elements.carried_by(of, source, &self.system.inverse_masses);
+                let (of_cell, beside) = self.system.forces.carried_by(of, source, &self.system.inverse_masses);
                 *carried += part * of_cell;
                 highest = highest.max(beside);
             }
@@ -68,7 +68,7 @@ impl Body {
     fn carried_of_springs(&self, pieces: &[PieceOfNode], springs: &[PieceOfSpring], carried: &mut [f64]) -> f64 {
         let source = self.system.order.own(pieces[0].source);
         let mut highest = 0.0_f64;
-        self.system.springs.visit(source as usize, &mut |link| {
+        self.system.forces.springs.visit(source as usize, &mut |link| {
             let [a, b] = [pieces[0].source, self.system.order.caller(link.neighbour)];
             let ends = [a.min(b), a.max(b)];
             let first = springs.partition_point(|piece| piece.source < ends);
@@ -92,6 +92,7 @@ impl Body {
     fn spring_rate(&self, node: u32) -> f64 {
         let mut stiffness = 0.0;
         self.system
+            .forces
             .springs
             .visit(node as usize, &mut |link| stiffness += 2.0 * f64::from(link.stiffness));
         stiffness * f64::from(self.system.inverse_masses[node as usize])

@@ -11,15 +11,14 @@ impl Body {
     /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
     /// nothing where it fails.
     pub(super) fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
-        let beside = (self.system.terms.as_deref(), self.system.enclosed.as_deref());
         let roomier = match &self.system.implicit {
             Some(implicit) => {
                 let more = rewiring.added.len() + pairs;
-                implicit.roomier(&*self.system.springs, more, self.system.elements.as_deref(), beside)?
+                implicit.roomier(&self.system.forces, more)?
             }
             None => None,
         };
-        self.system.springs.rewire(rewiring)?;
+        self.system.forces.springs.rewire(rewiring)?;
         if let (Some(implicit), Some(roomier)) = (&mut self.system.implicit, roomier) {
             implicit.adopt(roomier);
         }
@@ -89,7 +88,7 @@ impl Body {
         let mut found = Vec::new();
         for &node in &nodes {
             let mut room = Ok(());
-            self.system.springs.visit(node as usize, &mut |link| {
+            self.system.forces.springs.visit(node as usize, &mut |link| {
                 let ends = ordered([node, link.neighbour]);
                 // Of two nodes that are both looked at the lower sees to it.
                 let is_seen = ends[0] != node && nodes.binary_search(&ends[0]).is_ok();

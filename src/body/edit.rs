@@ -6,7 +6,7 @@ use super::Body;
 use crate::base::{Error, Result, finite, memory, not_negative};
 use crate::def::{Spring, distance, expect_count, finite_vector, finite_vectors};
 use crate::geometry::Bounds;
-use crate::solver::{GravityKicks, Stability, close, make_up_for, mean_force};
+use crate::solver::{GravityKicks, Stability, close, make_up_for};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
@@ -220,15 +220,7 @@ impl Body {
         self.system.check_not_held(&"node", node)?;
         let pin = self.system.pins.get(self.system.order.own(node));
         let pin = pin.ok_or_else(|| not_pinned(node))?;
-        let closing = self.system.carry.closing.as_ref();
-        let positions = self.system.state.positions();
-        Ok(mean_force(
-            pin,
-            closing,
-            &*self.system.springs,
-            positions,
-            &self.system.masses,
-        ))
+        Ok(self.system.mean_force(pin))
     }
 
     /// Joins two nodes by a linear spring without damping: `stiffness` in N/m, `rest_length` in metres, `None`: the current
@@ -261,13 +253,13 @@ impl Body {
             damping: 0.0,
         };
         if let Some(implicit) = &mut self.system.implicit {
-            implicit.make_room(self.system.springs.spring_count() + 1)?;
+            implicit.make_room(self.system.forces.springs.spring_count() + 1)?;
         }
         if let Some(cuttable) = &mut self.cuttable {
             cuttable.reserve_spring([a, b], &self.system.order)?;
         }
         // What is invalid is told in the caller's numbers.
-        self.system.springs.add(&spring).map_err(|error| match error {
+        self.system.forces.springs.add(&spring).map_err(|error| match error {
             Error::InvalidArgument(_) => already_joined(a, b),
             error => error,
         })?;
@@ -305,16 +297,11 @@ impl Body {
                 cuttable.log.add_removed_spring([a, b]);
             }
         }
-        let elements = self.system.elements.as_mut();
-        let mut removed = elements.map_or(0, |elements| elements.remove_edge(own_a, own_b));
-        let terms = self.system.terms.as_mut();
-        removed += terms.map_or(0, |terms| terms.remove_edge(own_a, own_b));
-        let enclosed = self.system.enclosed.as_mut();
-        removed += enclosed.map_or(0, |enclosed| enclosed.remove_edge(own_a, own_b));
+        let removed = self.system.forces.remove_edge(own_a, own_b);
         if removed > 0 {
             self.system.forget_stiffness();
             // Rings of fewer tetrahedra have other pressures, of which nothing was deformed.
-            self.system.measure_anew();
+            self.system.forces.measure_anew(self.system.state.positions());
         }
         if link.is_none() && removed == 0 {
             return Err(not_joined(a, b));
@@ -330,12 +317,11 @@ impl Body {
     /// [`Error::InvalidArgument`]: the pressure is not finite, or the body was made with neither an `enclosed_stiffness` nor a `pressure`.
     pub fn set_pressure(&mut self, pressure: f32) -> Result<()> {
         finite("pressure", pressure)?;
-        let Some(enclosed) = &mut self.system.enclosed else {
+        if !self.system.forces.set_pressure(pressure) {
             return Err(Error::invalid(format!(
                 "pressure is {pressure} Pa, and the body was made with neither an enclosed_stiffness nor a pressure"
             )));
-        };
-        enclosed.set_pressure(pressure);
+        }
         self.system.forces_current = false;
         self.system.wake();
         self.system.forget_energy();
@@ -366,7 +352,7 @@ impl Body {
 
     /// Removes a spring, given as the first of its nodes sees it.
     fn remove_link(&mut self, [own_a, own_b]: [u32; 2], link: Link) -> Result<()> {
-        self.system.springs.remove(own_a, own_b)?;
+        self.system.forces.springs.remove(own_a, own_b)?;
         if let Some(tears) = &mut self.tears {
             tears.remove([own_a, own_b]);
         }
@@ -381,7 +367,7 @@ impl Body {
             self.system.scale_for_springs(&[own_a, own_b]);
         }
         // What was stable still is; nothing limits what has no springs.
-        if self.system.springs.spring_count() == 0 {
+        if self.system.forces.springs.spring_count() == 0 {
             self.system.carry.stability = Stability::UNKNOWN;
         }
         Ok(())
@@ -420,7 +406,7 @@ impl Body {
         self.system.state.velocities_mut().set(own, velocity);
         self.forget_velocities();
         self.system.carry.forget();
-        if self.system.springs.damped() {
+        if self.system.forces.springs.damped() {
             self.system.forces_current = false;
             self.system.wake();
         }

@@ -19,27 +19,11 @@ impl Energy {
                 energy.kinetic += 0.5 * mass * velocity.as_dvec3().length_squared();
             }
             energy.gravitational -= mass * gravity.dot(position + body.system.origin);
-            body.system.springs.visit(node, &mut |link| {
-                let neighbour = link.neighbour as usize;
-                // Each spring is met at both of its nodes.
-                if neighbour > node {
-                    let length = position.distance(positions.get(neighbour).as_dvec3());
-                    let stretch = length - f64::from(link.rest_length);
-                    energy.elastic += 0.5 * f64::from(link.stiffness) * stretch * stretch;
-                }
-            });
         }
-        if let Some(elements) = &body.system.elements {
-            let mut growths = vec![0.0; elements.ring_count()];
-            energy.elastic += elements.exact_energy(|node| positions.get(node).as_dvec3(), &mut growths);
-        }
-        if let Some(terms) = &body.system.terms {
-            energy.elastic += terms.energy(&|node| positions.get(node).as_dvec3());
-        }
-        if let Some(enclosed) = &body.system.enclosed {
-            let [stored, work] = enclosed.energy(&|node| positions.get(node).as_dvec3());
-            energy.elastic += stored - work;
-        }
+        let mut growths = vec![0.0; body.system.forces.ring_count()];
+        let at = |node: usize| positions.get(node).as_dvec3();
+        let [stored, work] = body.system.forces.exact_energy(at, &mut growths);
+        energy.elastic = stored - work;
         energy
     }
 }

@@ -13,7 +13,7 @@ impl Body {
         let mut vectors = vec![system.state.positions(), system.state.velocities()];
         vectors.extend(system.state.remainders());
         // Without damping the forces follow from the positions.
-        if system.springs.damped() && system.forces_current {
+        if system.forces.springs.damped() && system.forces_current {
             vectors.push(system.state.forces());
         }
         hasher.write_u64(u64::from(system.forces_applied));
@@ -36,21 +36,7 @@ impl Body {
             hasher.write_u64(u64::from(a) << 32 | u64::from(b));
             hasher.write_u64(u64::from(c));
         }
-        for node in 0..self.node_count() {
-            system.springs.visit(node, &mut |link| {
-                hasher.write_u64(u64::from(link.neighbour));
-                hasher.write_floats(&[link.stiffness, link.rest_length, link.damping]);
-            });
-        }
-        if let Some(elements) = &system.elements {
-            elements.hash(hasher);
-        }
-        if let Some(terms) = &system.terms {
-            terms.hash(hasher);
-        }
-        if let Some(enclosed) = &system.enclosed {
-            enclosed.hash(hasher);
-        }
+        system.forces.hash(hasher);
         for pin in system.pins.iter() {
             let led = u64::from(pin.target.is_some());
             hasher.write_u64(u64::from(pin.node) << 4 | u64::from(pin.axes.bitmask()) << 1 | led);

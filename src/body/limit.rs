@@ -14,36 +14,10 @@ impl Body {
             are_heavier: self.system.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
         };
         let positions = self.system.state.positions();
-        let (mut limit, mut shortest) = (self.limit_of(LimitKind::Cavity, &[]), f32::INFINITY);
-        if let Some(enclosed) = &self.system.enclosed {
-            shortest = enclosed.rates().limit();
-        }
-        if let Some((nodes, substep)) = Stability::tightest(&*self.system.springs, masses, positions)
-            && substep <= shortest
-        {
-            shortest = substep;
-            limit = self.limit_of(LimitKind::Spring, &nodes.map(|node| node as u32));
-        }
-        if let Some(elements) = &self.system.elements
-            && let Some((nodes, substep)) = elements.tightest(&masses, positions)
-            && substep <= shortest
-        {
-            shortest = substep;
-            limit = self.limit_of(LimitKind::Element, &nodes);
-        }
-        if let Some(terms) = &self.system.terms
-            && terms.rates().limit() < shortest
-        {
-            let (mut most, mut found) = (-1.0, None);
-            terms.show_carried(&masses, &mut |node, stiffness| {
-                let rate = stiffness * masses.inverse(node);
-                if rate > most {
-                    (most, found) = (rate, Some(node as u32));
-                }
-            });
-            limit = self.limit_of(LimitKind::Term, found.as_slice());
-        }
-        limit
+        let forces = &self.system.forces;
+        let spring = Stability::tightest(&*forces.springs, masses, positions);
+        let (kind, nodes, count) = forces.tightest(&masses, positions, spring);
+        self.limit_of(kind, &nodes[..count])
     }
 
     /// One of these nodes of its own, at most 4.

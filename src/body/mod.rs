@@ -41,7 +41,7 @@ use crate::def::{
 };
 use crate::geometry::Bounds;
 use crate::simd::ChosenKernel;
-use crate::soa::{NodeOrder, Records, Vectors, tile_count, tile_nodes};
+use crate::soa::{NodeOrder, Vectors, tile_count, tile_nodes};
 pub(crate) use blade::HoldAt;
 pub use change_log::{NewNodeSource, NewRimEdge, TopologyChanges};
 pub use cut::CutReport;
@@ -53,8 +53,7 @@ use crate::base::{BodyId, Error, Result, memory};
 use crate::codec::saved;
 use crate::contact::{Contact, Contacts, ToolPath};
 use crate::cutting::CutMaterial;
-use crate::elements::{Elements, Law};
-use crate::enclosed::Enclosed;
+use crate::forces::Forces;
 use crate::material::Made;
 use crate::nodes::{NodeDamping, Pins, State};
 use crate::readers::Shown;
@@ -63,8 +62,6 @@ use crate::solver::{
     Carry, CoarseStep, EnergyAccount, GravityKicks, Implicit, MassScaling, MayBeCut, Pace, RestStateDefinition,
     RestStateReport, Stability, Sums, Survey, System, Systems, Watched, rest_state,
 };
-use crate::springs::store;
-use crate::terms::Terms;
 use crate::threads::Team;
 pub(crate) use material_point::MaterialPoint;
 use order::{order_for_springs, order_for_tetrahedra};
@@ -153,19 +150,13 @@ impl Body {
             Storage::Packed => order_for_springs(definition.positions, &springs, definition.rounding())?,
             _ => NodeOrder::default(),
         };
-        let of_volume = (definition.volume_stiffness > 0.0).then(|| Law::of_volume(definition.volume_stiffness));
-        let elements = match law.or(of_volume) {
-            Some(law) => Some(memory::boxed(elements_of(law, definition, &order)?)?),
-            None => None,
-        };
-        let terms = Terms::new(needs.kernel, definition, &springs, &order)?;
         if springs.is_empty() {
             // Volume alone is viscous, and does not yield. Edges are springs, but where tetrahedra are elements.
             for (name, value, is_used) in [
                 (
                     "retardation_time",
                     definition.viscosity.retardation_time,
-                    elements.is_some(),
+                    law.is_some() || definition.volume_stiffness > 0.0,
                 ),
                 ("yield_strain", definition.yielding.strain, law.is_some()),
                 ("stiffness", definition.stiffnesses.uniform(), law.is_none()),
@@ -188,11 +179,8 @@ impl Body {
             // Outward however tetrahedra are turned.
             cuttable.take_surface(&mut surface)?;
         }
-        for spring in &mut springs {
-            spring.nodes = spring.nodes.map(|node| order.own(node));
-        }
+        let forces = Forces::new(needs.kernel, definition, law, &mut springs, &surface, &order)?;
         let tears = Tears::new(definition, &springs, law.is_some(), &order)?;
-        let springs = store(needs.kernel, definition, &springs)?;
         let mut pins = Pins::default();
         let mut masses = memory::reserved(node_count)?;
         let mut inverse_masses = memory::reserved(node_count)?;
@@ -212,18 +200,15 @@ impl Body {
             rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
             Some(NodeDamping::new(rates)?)
         };
-        let enclosed = Enclosed::new(definition, &surface, &order)?;
         let system = System {
             order,
-            predicted_velocities: springs.damped().then(|| Vectors::zeros(node_count)).transpose()?,
-            records: (springs.gathers() || elements.is_some() || terms.is_some())
-                .then(|| Records::zeros(node_count))
+            predicted_velocities: forces
+                .springs
+                .damped()
+                .then(|| Vectors::zeros(node_count))
                 .transpose()?,
-            elements,
-            terms,
-            enclosed,
             coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
-            springs,
+            forces,
             kernel: needs.kernel,
             uniform_inverse_mass: match definition.masses {
                 Values::Uniform(mass) => Some(1.0 / mass),
@@ -282,46 +267,25 @@ impl Body {
             user_data: 0,
         };
         body.place(definition.positions);
-        let BodyDefinition {
-            order,
-            iterations,
-            accuracy,
-            sleep,
-            ..
-        } = *definition;
-        let positions = body.system.state.positions();
-        let gathers = body.system.records.is_some();
-        body.system.implicit = match definition.solver {
-            Solver::Verlet | Solver::Auto => None,
-            Solver::Implicit => Some(memory::boxed(Implicit::new(
-                positions, gathers, order, iterations, accuracy,
-            )?)?),
-            Solver::Newton => {
-                let (springs, elements) = (&*body.system.springs, body.system.elements.as_deref());
-                let beside = (body.system.terms.as_deref(), body.system.enclosed.as_deref());
-                let implicit = Implicit::exact(positions, springs, elements, beside, [order, iterations], accuracy)?;
-                Some(memory::boxed(implicit)?)
-            }
-        };
-        if let (Some(implicit), Some(elements)) = (&mut body.system.implicit, &body.system.elements) {
-            implicit.join(elements)?;
-        }
-        if let (Some(implicit), Some(enclosed)) = (&mut body.system.implicit, &body.system.enclosed) {
-            implicit.enclose(enclosed)?;
-        }
+        let (forces, positions) = (&body.system.forces, body.system.state.positions());
+        body.system.implicit = Implicit::new(definition, positions, forces)?;
         if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
             let (uniform, damping) = (body.system.uniform_inverse_mass, body.system.damping.as_ref());
-            let beside = body.system.carried_beside_springs()?;
-            let (springs, part) = (&*body.system.springs, definition.mass_scaling);
-            let room = body.node_count() + definition.spare_nodes as usize;
-            let room = body.system.elements.as_ref().map_or(0, |_| room);
+            let (forces, masses) = (&body.system.forces, body.system.masses());
+            let beside = forces.carried_beside_springs(body.system.state.positions(), &masses)?;
+            let room = if forces.has_elements() {
+                body.node_count() + definition.spare_nodes as usize
+            } else {
+                0
+            };
+            let (springs, part) = (&*forces.springs, definition.mass_scaling);
             let scaling = MassScaling::new(springs, &beside, &body.system.masses, uniform, damping, room, part)?;
             body.system.scaling = scaling.map(memory::boxed).transpose()?;
         }
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
         }
-        body.system.make_sleeper(sleep)?;
+        body.system.make_sleeper(definition.sleep)?;
         if definition.spare_nodes > 0 {
             body.reserve_nodes(definition.spare_nodes as usize)?;
         }
@@ -366,10 +330,10 @@ impl Body {
     /// # Errors
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn spring_pairs(&self) -> Result<Vec<[u32; 2]>> {
-        let mut pairs = memory::reserved(self.system.springs.spring_count())?;
+        let mut pairs = memory::reserved(self.system.forces.springs.spring_count())?;
         for node in 0..self.node_count() as u32 {
             let own = self.system.order.own(node) as usize;
-            self.system.springs.visit(own, &mut |link| {
+            self.system.forces.springs.visit(own, &mut |link| {
                 let neighbour = self.system.order.caller(link.neighbour);
                 if neighbour > node {
                     pairs.push([node, neighbour]);
@@ -386,10 +350,10 @@ impl Body {
 
     /// How much memory its springs take.
     pub fn storage_report(&self) -> StorageReport {
-        let (bytes_used, bytes_reserved) = self.system.springs.bytes();
+        let (bytes_used, bytes_reserved) = self.system.forces.springs.bytes();
         StorageReport {
             node_count: self.node_count(),
-            spring_count: self.system.springs.spring_count(),
+            spring_count: self.system.forces.springs.spring_count(),
             bytes_used,
             bytes_reserved,
         }
@@ -398,8 +362,7 @@ impl Body {
     /// What its surface encloses, and the pressure there.
     pub fn enclosed(&self) -> EnclosedReport {
         let positions = self.system.state.positions();
-        let report = |enclosed: &Enclosed| enclosed.report(&|node| positions.get(node).as_dvec3());
-        self.system.enclosed.as_deref().map(report).unwrap_or_default()
+        self.system.forces.report_cavities(positions)
     }
 
     /// How its solver took the last step.
@@ -488,9 +451,7 @@ impl Body {
     /// Puts the nodes at these places, in the caller's coordinates.
     fn place(&mut self, positions: &[Vec3]) {
         self.system.origin = shift_towards(Bounds::of(positions.iter().copied()));
-        if let Some(terms) = &mut self.system.terms {
-            terms.move_origin(self.system.origin);
-        }
+        self.system.forces.move_origin(self.system.origin);
         let local = self.system.state.positions_mut();
         for (node, position) in (0..).zip(positions) {
             let own = self.system.order.own(node) as usize;
@@ -509,7 +470,7 @@ impl Body {
         }
         self.show(&Team::alone());
         self.system.grasp_anew();
-        self.system.relax();
+        self.system.forces.relax(self.system.state.positions());
         self.system.forget_motion();
     }
 
@@ -536,9 +497,7 @@ impl Body {
             return;
         }
         self.system.origin += shift;
-        if let Some(terms) = &mut self.system.terms {
-            terms.move_origin(self.system.origin);
-        }
+        self.system.forces.move_origin(self.system.origin);
         self.system.wake();
         let positions = self.system.state.positions_mut();
         for node in 0..positions.len() {
@@ -552,24 +511,4 @@ impl Body {
             contacts.forget();
         }
     }
-}
-
-/// The tetrahedra of a definition as elements, in the body's own numbers.
-fn elements_of(law: Law, definition: &BodyDefinition, order: &NodeOrder) -> Result<Elements> {
-    let mut tetrahedra = memory::reserved(definition.tetrahedra.len())?;
-    tetrahedra.extend(
-        definition
-            .tetrahedra
-            .iter()
-            .map(|corners| corners.map(|corner| order.own(corner))),
-    );
-    let rest = definition.rest_positions.unwrap_or(definition.positions);
-    let at_rest = |own: u32| rest[order.caller(own) as usize].as_dvec3();
-    let node_count = definition.positions.len();
-    let past = (definition.viscosity, definition.yielding);
-    let mut elements = Elements::new(law, past, &tetrahedra, at_rest, node_count)?;
-    if definition.spare_nodes > 0 {
-        elements.follow_cells(&tetrahedra)?;
-    }
-    Ok(elements)
 }

@@ -22,22 +22,11 @@ impl Body {
         let order = &self.system.order;
         let mut lowest: Vec<u32> = memory::reserved(count)?;
         lowest.extend(0..count as u32);
-        for node in 0..count as u32 {
-            let own = order.own(node) as usize;
-            self.system
-                .springs
-                .visit(own, &mut |link| unite(&mut lowest, node, order.caller(link.neighbour)));
-        }
+        let mut join = |a: u32, b: u32| unite(&mut lowest, order.caller(a), order.caller(b));
+        self.system.forces.show_joined(&mut join);
         for &[a, b, c] in &self.system.surface {
             unite(&mut lowest, a, b);
             unite(&mut lowest, a, c);
-        }
-        if let Some(elements) = &self.system.elements {
-            elements.visit(&mut |corners, _| {
-                for corner in &corners[1..] {
-                    unite(&mut lowest, order.caller(corners[0]), order.caller(*corner));
-                }
-            });
         }
         for bound in self.system.bindings.iter().flat_map(|bindings| bindings.iter()) {
             for (node, _) in bound.parts() {

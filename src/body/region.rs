@@ -29,20 +29,11 @@ impl Body {
         let region = Region::of(own);
         let scale = Scale { stiffness, length };
         let changes = self.springs_in(&region, scale)?;
-        if let Some(elements) = &self.system.elements {
-            elements.check_scale(&region, scale)?;
-        }
-        if let Some(terms) = &self.system.terms {
-            terms.check_scale(&region, scale)?;
-        }
+        self.system.forces.check_scale(&region, scale)?;
         self.change_springs(&changes)?;
-        let elements = self.system.elements.as_mut();
-        let mut scaled = elements.map_or(0, |elements| elements.scale(&region, scale));
-        let terms = self.system.terms.as_mut();
-        scaled += terms.map_or(0, |terms| terms.scale(&region, scale));
-        if scaled > 0 {
+        if self.system.forces.scale(&region, scale) > 0 {
             self.system.forget_stiffness();
-            self.system.measure_anew();
+            self.system.forces.measure_anew(self.system.state.positions());
         }
         Ok(())
     }
@@ -52,7 +43,7 @@ impl Body {
         let mut changes = Vec::new();
         let mut result = Ok(());
         for &node in region.nodes() {
-            self.system.springs.visit(node as usize, &mut |before| {
+            self.system.forces.springs.visit(node as usize, &mut |before| {
                 if before.neighbour < node || !region.has(before.neighbour) || result.is_err() {
                     return;
                 }

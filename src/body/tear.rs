@@ -240,7 +240,7 @@ impl Body {
         let here = positions.get(node as usize);
         let mut sums = [DVec3::ZERO; 2];
         let mut tensors = [DMat3::ZERO; 2];
-        self.system.springs.visit(node as usize, &mut |link| {
+        self.system.forces.springs.visit(node as usize, &mut |link| {
             let offset = positions.get(link.neighbour as usize) - here;
             let force = pull(node as usize, &link, offset, None).as_dvec3();
             let pushes = usize::from(force.dot(offset.as_dvec3()) < 0.0);

@@ -82,17 +82,14 @@ impl Body {
         if let Some(scaling) = &mut self.system.scaling {
             scaling.reserve(nodes.len())?;
         }
-        self.system.springs.set(changes)?;
+        self.system.forces.set_springs(changes)?;
         if changes.is_empty() {
             return Ok(());
-        }
-        if let Some(terms) = &mut self.system.terms {
-            changes.iter().for_each(|change| terms.set_spring(change));
         }
         if let Some(tears) = &mut self.tears {
             tears.change(changes);
         }
-        self.system.measure_anew();
+        self.system.forces.measure_anew(self.system.state.positions());
         self.system.forget_stiffness();
         self.make_up_for_changes(changes);
         self.system.scale_for_springs(&nodes);
@@ -132,7 +129,7 @@ impl Body {
     /// What the first of two nodes sees of their spring, in the body's own numbers.
     pub(super) fn link(&self, [node, neighbour]: [u32; 2]) -> Option<Link> {
         let mut found = None;
-        self.system.springs.visit(node as usize, &mut |link| {
+        self.system.forces.springs.visit(node as usize, &mut |link| {
             if link.neighbour == neighbour {
                 found = Some(link);
             }

@@ -140,8 +140,7 @@ impl Body {
 
     /// The pressure of its cavities at their volumes at rest, Pa: as it was made or set; 0 without cavities.
     pub fn pressure(&self) -> f32 {
-        let enclosed = self.system.enclosed.as_ref();
-        enclosed.map_or(0.0, |enclosed| enclosed.pressure())
+        self.system.forces.pressure()
     }
 
     /// What the caller keeps with it: 0 unless it was set, and after a snapshot.

@@ -155,7 +155,7 @@ fn loads(memory: Option<&Memory>, part: usize) -> &[Stresses] {
 }
 
 /// What is shown the nodes of a tetrahedron, the gradients of their functions, and how it is deformed.
-type See<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &Deformed) + 'a;
+pub(crate) type See<'a> = dyn FnMut([u32; 4], &[DVec3; 4], &Deformed) + 'a;
 
 /// What the nodes of a tile are given.
 #[derive(Clone, Copy)]
@@ -228,7 +228,8 @@ impl Elements {
 
     /// Room for sums that are made of ways.
     pub fn room_for_changes(&self) -> Result<Sums> {
-        Sums::new(self.forces.sums.len(), self.parts.len(), true, self.ring_count())
+        let ring_count = self.ring_count_of(self.stiffnesses.len());
+        Sums::new(self.forces.sums.len(), self.parts.len(), true, ring_count)
     }
 
     /// Works out the forces of all elements with nodes at `positions`.
@@ -351,16 +352,11 @@ impl Elements {
         self.settled = self.highest;
     }
 
-    /// What the forces that were worked out last give to nodes.
-    pub fn shares(&self) -> Shares<'_> {
-        self.shares_of(&self.forces)
-    }
-
-    /// What sums give to nodes.
-    pub fn shares_of<'a>(&'a self, sums: &'a Sums) -> Shares<'a> {
+    /// What these sums give to nodes; `None`: the forces that were worked out last.
+    pub fn shares<'a>(&'a self, sums: Option<&'a Sums>) -> Shares<'a> {
         Shares {
             copies: &self.copies,
-            sums: &sums.sums,
+            sums: &sums.unwrap_or(&self.forces).sums,
         }
     }
 
@@ -414,12 +410,7 @@ impl Elements {
         });
     }
 
-    /// How many numbers [`Self::exact_energy`] needs.
-    pub fn ring_count(&self) -> usize {
-        self.rings.as_ref().map_or(0, |rings| rings.volumes.len())
-    }
-
-    /// The same once there are so many nodes.
+    /// How many numbers [`Self::exact_energy`] needs once there are so many nodes.
     pub fn ring_count_of(&self, node_count: usize) -> usize {
         if self.rings.is_some() { node_count } else { 0 }
     }

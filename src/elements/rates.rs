@@ -179,24 +179,15 @@ impl Elements {
         self.rates_known = false;
     }
 
-    /// What bounds frequencies with the nodes where forces were last worked out.
-    pub fn rates(&self) -> Rates {
-        self.rates_of(self.highest)
-    }
-
-    /// The same with the nodes at the current state.
-    pub fn settled_rates(&self) -> Rates {
-        self.rates_of(self.settled)
-    }
-
     /// What springs of a node have beyond what all nodes are taken to have, 1/s².
     pub(super) fn beyond_all(&self, of_springs: Rates) -> f32 {
         (of_springs.stiffest - self.of_springs).max(0.0)
     }
 
-    fn rates_of(&self, highest: f32) -> Rates {
+    /// What bounds frequencies with the nodes at the current state, where `is_settled`, or where forces were last worked out.
+    pub fn rates(&self, is_settled: bool) -> Rates {
         let rates = Rates {
-            stiffest: self.of_springs + highest,
+            stiffest: self.of_springs + if is_settled { self.settled } else { self.highest },
             most_damped: self.most_damped,
         };
         self.memory

@@ -9,7 +9,7 @@ use crate::def::EnclosedReport;
 type At<'a> = &'a dyn Fn(usize) -> DVec3;
 
 /// Nodes, and what triangles have of the gradient of a volume by their places, m².
-type Gradients<'a> = &'a mut dyn Iterator<Item = (usize, DVec3)>;
+pub(crate) type Gradients<'a> = &'a mut dyn Iterator<Item = (usize, DVec3)>;
 
 impl Enclosed {
     /// The cavities that are closed.

@@ -16,6 +16,7 @@ use crate::codec::saved;
 use crate::def::BodyDefinition;
 use crate::soa::{NodeOrder, Rates, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
+pub(crate) use exact::Gradients;
 use surface::{Block, Surface};
 
 /// What is inside of one closed surface.
@@ -251,21 +252,12 @@ impl Enclosed {
         self.settled = self.highest;
     }
 
-    /// What the forces that were worked out last give to nodes.
-    pub fn shares(&self) -> Shares<'_> {
-        self.shares_times(&self.factors)
-    }
-
-    /// What changes give to nodes.
-    pub fn shares_of<'a>(&'a self, changes: &'a Changes) -> Shares<'a> {
-        self.shares_times(&changes.factors)
-    }
-
-    fn shares_times<'a>(&'a self, factors: &'a [f64]) -> Shares<'a> {
+    /// What these changes give to nodes; `None`: the forces that were worked out last.
+    pub fn shares<'a>(&'a self, changes: Option<&'a Changes>) -> Shares<'a> {
         Shares {
             surface: &self.surface,
             vectors: &self.vectors,
-            factors,
+            factors: changes.map_or(&self.factors, |changes| &changes.factors),
         }
     }
 

@@ -140,19 +140,10 @@ impl Enclosed {
         self.rates_known = false;
     }
 
-    /// What bounds frequencies with the nodes where forces were last worked out.
-    pub fn rates(&self) -> Rates {
-        self.rates_with(self.highest)
-    }
-
-    /// The same with the nodes at the current state.
-    pub fn settled_rates(&self) -> Rates {
-        self.rates_with(self.settled)
-    }
-
-    fn rates_with(&self, stiffest: f32) -> Rates {
+    /// What bounds frequencies with the nodes at the current state, where `is_settled`, or where forces were last worked out.
+    pub fn rates(&self, is_settled: bool) -> Rates {
         Rates {
-            stiffest: self.of_springs.stiffest + stiffest,
+            stiffest: self.of_springs.stiffest + if is_settled { self.settled } else { self.highest },
             ..self.of_springs
         }
     }

@@ -51,7 +51,16 @@ pub(crate) struct Masses<'a> {
     pub are_heavier: bool,
 }
 
-impl Masses<'_> {
+impl<'a> Masses<'a> {
+    /// Without what is added to them.
+    pub fn new(masses: &'a [f32], inverse_masses: &'a [f32]) -> Self {
+        Self {
+            masses,
+            inverse_masses,
+            are_heavier: false,
+        }
+    }
+
     /// 1/kg, 0 for a node that is pinned.
     #[inline(always)]
     pub fn inverse(&self, node: usize) -> f32 {

@@ -187,7 +187,7 @@ pub(crate) fn attempt(body: &mut System, request: &StepRequest, team: &Team) -> 
 
 /// What a step of VERLET begins with, and the longest stable substep as far as springs are not concerned, s.
 fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> (Carry, f32) {
-    if body.has_more_than_springs() {
+    if body.forces.are_more_than_springs() {
         // What else there is asks for substeps by the masses that the step is taken with.
         let ends = body.scaling.as_mut().is_some_and(|scaling| scaling.end_relief());
         let masses_for = fewer_substeps(body, request, 0.0).map_or(0.0, |(_, masses_for)| masses_for);
@@ -327,7 +327,7 @@ fn run_stably(
     loop {
         if attempt >= ATTEMPTS {
             let anywhere = start.stability.limit_anywhere();
-            if body.has_more_than_springs() {
+            if body.forces.are_more_than_springs() {
                 // Where elements, terms and cavities go there is no end to how stiff they may be.
                 guess *= 0.5;
                 stable_substep = stable_substep.min(anywhere);
@@ -435,7 +435,7 @@ pub(crate) fn fewer_substeps(body: &System, request: &StepRequest, stable_subste
     }
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let scaling = body.scaling.as_ref()?;
-    let needed = if body.has_more_than_springs() {
+    let needed = if body.forces.are_more_than_springs() {
         scaling.needed_at_rest(request.dt, unrelieved(body, request))
     } else {
         substeps_needed(request, stable_substep)
@@ -530,7 +530,7 @@ fn compare(body: &mut System, request: &StepRequest, carry: &Carry) -> f32 {
 
 /// The longest stable substep with the nodes where a step has led them, s; infinity where any is.
 fn newest_limit(body: &System, carry: &Carry) -> f32 {
-    let with = |limit: f32| limit.min(body.newest_limit_beside_springs());
+    let with = |limit: f32| limit.min(body.forces.newest_limit_beside_springs());
     carry.limit().map_or(f32::INFINITY, with)
 }
 

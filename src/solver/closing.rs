@@ -10,17 +10,14 @@ use glam::{DVec3, Vec3};
 
 use super::System;
 use super::gravity::GravityKicks;
-use super::kick::Inertia;
-use super::kick::{Kick, Survey, TileKick, look};
+use super::kick::{Inertia, Kick, Survey, TileKick, look};
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::elements::Shares;
-use crate::enclosed;
+use crate::forces::Sum;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
-use crate::springs::{Motion, Springs, pull};
-use crate::terms::Terms;
+use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
 /// A half kick that the velocities lack.
@@ -64,7 +61,7 @@ impl ClosingKick {
 /// Whether a step of `body` may be left open. Damping along springs, comparisons and tools that hold it need velocities at its end, and
 /// forces from outside end with it; those of elements, terms and cavities are not worked out by who only reads.
 pub(super) fn may_stay_open(body: &System) -> bool {
-    !body.has_more_than_springs()
+    !body.forces.are_more_than_springs()
         && body.predicted_velocities.is_none()
         && body.coarse.is_none()
         && !body.forces_applied
@@ -73,11 +70,8 @@ pub(super) fn may_stay_open(body: &System) -> bool {
 
 /// Velocities brought up to the time of the positions, to the side.
 pub(super) struct Closed<'a> {
-    pub springs: &'a dyn Springs,
-    /// What they give at these positions.
-    pub elements: Option<Shares<'a>>,
-    pub terms: Option<&'a Terms>,
-    pub enclosed: Option<enclosed::Shares<'a>>,
+    /// Forces at these positions.
+    pub forces: Sum<'a>,
     pub kernel: ChosenKernel,
     /// Half of one.
     pub kick: Kick<'a>,
@@ -90,17 +84,9 @@ impl Closed<'_> {
     pub fn write(&self, tile: usize, nodes: Range<usize>, closed: &mut [&mut [f32]; 3], pins: &[Pin]) {
         let mut forces = TileForces::ZERO;
         let forces = &mut forces;
-        let damped = self.springs.damped().then_some(self.velocities);
-        self.springs.forces(tile, &Motion::at(self.positions, damped), forces);
-        if let Some(elements) = &self.elements {
-            elements.add(tile, forces);
-        }
-        if let Some(terms) = self.terms {
-            terms.add_forces(tile, nodes.clone(), self.positions.view(), forces);
-        }
-        if let Some(enclosed) = &self.enclosed {
-            enclosed.add(tile, forces);
-        }
+        let damped = self.forces.springs.damped().then_some(self.velocities);
+        let motion = Motion::at(self.positions, damped);
+        self.forces.write(tile, nodes.clone(), &motion, forces);
         let velocities = self.velocities.slices(nodes.clone());
         for (closed, velocities) in closed.iter_mut().zip(velocities) {
             closed.copy_from_slice(velocities);
@@ -130,10 +116,7 @@ pub(super) fn close_aside(body: &mut System, closing: &ClosingKick, gravity: &mu
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
     let closed = Closed {
-        springs: &*body.springs,
-        elements: None,
-        terms: None,
-        enclosed: None,
+        forces: body.forces.sum(),
         kernel: body.kernel,
         kick: closing.kick(gravity.next(closing.fall()), inertia, body.damping.as_ref()),
         positions: state.positions,
@@ -165,16 +148,9 @@ pub(super) fn close_aside(body: &mut System, closing: &ClosingKick, gravity: &mu
 /// Brings the velocities of `body` up to the time of its positions, where they are older.
 pub(crate) fn close(body: &mut System) {
     if let Some(closed) = close_beside(body) {
-        let System {
-            pins,
-            springs,
-            state,
-            masses,
-            ..
-        } = body;
-        for pin in pins.iter_mut() {
-            pin.force = mean_force(pin, Some(&closed.closing), &**springs, state.positions(), masses);
-        }
+        let mut pins = std::mem::take(&mut body.pins);
+        pins.iter_mut().for_each(|pin| pin.force = body.mean_force(pin));
+        body.pins = pins;
         closed.commit(body);
     }
 }
@@ -182,7 +158,6 @@ pub(crate) fn close(body: &mut System) {
 /// Velocities that were brought up to the time of the positions beside those that there are, until they are committed. What follows does not have to
 /// be: then nothing has changed.
 pub(crate) struct ClosedBeside {
-    closing: ClosingKick,
     gravity: GravityKicks,
 }
 
@@ -192,23 +167,14 @@ pub(crate) fn close_beside(body: &mut System) -> Option<ClosedBeside> {
     let mut gravity = body.carry.gravity;
     body.state.begin();
     close_aside(body, &closing, &mut gravity, &Team::alone());
-    Some(ClosedBeside { closing, gravity })
+    Some(ClosedBeside { gravity })
 }
 
 impl ClosedBeside {
     /// What holds each pin, mean over the last step, N; to be asked for while springs and masses are those of the step.
     pub fn forces(&self, body: &System) -> Result<Vec<Vec3>> {
         let mut forces = memory::reserved(body.pins.iter().count())?;
-        let of_pin = |pin| {
-            mean_force(
-                pin,
-                Some(&self.closing),
-                &*body.springs,
-                body.state.positions(),
-                &body.masses,
-            )
-        };
-        forces.extend(body.pins.iter().map(of_pin));
+        forces.extend(body.pins.iter().map(|pin| body.mean_force(pin)));
         Ok(forces)
     }
 
@@ -232,10 +198,7 @@ pub(crate) fn show_closed(body: &System, closing: &ClosingKick, see: &mut See) -
     let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
     let fall = { body.carry.gravity }.next(closing.fall());
     let closed = Closed {
-        springs: &*body.springs,
-        elements: None,
-        terms: None,
-        enclosed: None,
+        forces: body.forces.sum(),
         kernel: body.kernel,
         kick: closing.kick(fall, inertia, body.damping.as_ref()),
         positions: body.state.positions(),
@@ -285,27 +248,16 @@ pub(crate) fn make_up_for(body: &mut System, node: u32, mut force: Vec3) {
     }
 }
 
-/// What holds a pinned node, mean over the last step, N.
-pub(crate) fn mean_force(
-    pin: &Pin,
-    closing: Option<&ClosingKick>,
-    springs: &dyn Springs,
-    positions: &Vectors,
-    masses: &[f32],
-) -> Vec3 {
-    let Some(closing) = closing.filter(|_| pin.closing_share > 0.0) else {
-        return pin.force;
-    };
-    let node = pin.node as usize;
-    let mut force = closing.gravity * masses[node];
-    springs.visit(node, &mut |link| {
-        force += pull(
-            node,
-            &link,
-            positions.get(link.neighbour as usize) - positions.get(node),
-            None,
-        );
-    });
-    let force = pin.force - pin.held(force) * pin.closing_share;
-    if force.is_finite() { force } else { pin.force }
+impl System {
+    /// What holds a pinned node, mean over the last step, N.
+    pub(crate) fn mean_force(&self, pin: &Pin) -> Vec3 {
+        let Some(closing) = self.carry.closing.filter(|_| pin.closing_share > 0.0) else {
+            return pin.force;
+        };
+        let node = pin.node as usize;
+        let mut force = closing.gravity * self.masses[node];
+        self.forces.add_spring_forces(node, self.state.positions(), &mut force);
+        let force = pin.force - pin.held(force) * pin.closing_share;
+        if force.is_finite() { force } else { pin.force }
+    }
 }

@@ -24,7 +24,6 @@ use super::System;
 use super::attempt::{Carry, StepRequest};
 use super::closing::Closed;
 use super::kick::Inertia;
-use super::substep::write_records;
 use super::substep::{Before, Part};
 use crate::base::StateHasher;
 use crate::codec::saved;
@@ -480,22 +479,17 @@ impl Loops for Product<'_> {
 /// What closed velocities add to the shadow energy, and the energy of all inner forces at the newest positions, less the work of a
 /// constant pressure, J.
 fn close(body: &mut System, carry: &Carry, team: &Team) -> [f64; 2] {
-    let (kernel, springs) = (body.kernel, &*body.springs);
-    let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
+    let kernel = body.kernel;
     let (inverse_masses, pins) = (&body.inverse_masses, &body.pins);
     let inertia = Inertia::of(body.uniform_inverse_mass, inverse_masses, body.scaling.as_deref());
     let state = body.state.substep();
     let (positions, velocities, shares) = (state.positions, &*state.velocities, &*state.next_positions);
-    if let Some(records) = &mut body.records {
-        write_records(kernel, positions, records, team);
-    }
-    let view = positions.view().with_records(body.records.as_ref());
+    body.forces.write_records(positions, team);
+    let forces = &body.forces;
+    let view = forces.view(positions);
     // Open velocities are closed to the side, so that comparing changes nothing.
     let closed = carry.closing.map(|closing| Closed {
-        springs,
-        elements: None,
-        terms: None,
-        enclosed: None,
+        forces: forces.sum(),
         kernel,
         kick: closing.kick({ carry.gravity }.next(closing.fall()), inertia, body.damping.as_ref()),
         positions,
@@ -517,23 +511,14 @@ fn close(body: &mut System, carry: &Carry, team: &Team) -> [f64; 2] {
         sums.shadow = products
             .map(|(velocities, shares)| kernel.run(Product([velocities, shares], &inverse_masses[nodes.clone()])))
             .sum();
-        sums.elastic = springs.half_energy(nodes, view);
-        if let Some(terms) = terms {
-            sums.elastic += terms.energy_of_tile(tile, &|node| view.get(node).as_dvec3());
-        }
+        sums.elastic = forces.energy_of_tile(tile, nodes, view);
     });
     let sums = body.tile_sums.iter();
     let [closing, of_tiles] = sums.fold([0.0; 2], |[closing, elastic], sums| {
         [closing + sums.shadow, elastic + sums.elastic]
     });
-    let of_elements = match (&mut body.elements, &body.records) {
-        (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
-        _ => 0.0,
-    };
-    let [of_cavities, work] = enclosed.map_or([0.0; 2], |enclosed| {
-        enclosed.energy(&|node| positions.get(node).as_dvec3())
-    });
-    [closing, of_tiles + of_elements + of_cavities - work]
+    let [elastic, work] = body.forces.energy(of_tiles, positions, team);
+    [closing, elastic - work]
 }
 
 /// Takes this much kinetic energy off the newest velocities, J, or all there is that nothing conserves: how much it was. A body that nothing

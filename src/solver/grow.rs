@@ -13,7 +13,8 @@ impl System {
     pub fn reserve_nodes(&mut self, more: usize) -> Result<()> {
         let count = self.node_count().checked_add(more).ok_or(Error::OutOfMemory)?;
         self.order.reserve(count)?;
-        self.springs.reserve_nodes(count)?;
+        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
+        self.forces.reserve_nodes(count, changes)?;
         for values in [&mut self.masses, &mut self.inverse_masses] {
             memory::reserve(values, count)?;
         }
@@ -27,23 +28,11 @@ impl System {
             sleeper.reserve(tile_count(count))?;
         }
         self.state.reserve(count)?;
-        if let Some(records) = &mut self.records {
-            records.reserve(count)?;
-        }
         if let Some(velocities) = &mut self.predicted_velocities {
             velocities.reserve(count)?;
         }
         if let Some(applied) = &mut self.applied {
             applied.reserve(count)?;
-        }
-        if let Some(elements) = &mut self.elements {
-            elements.reserve_nodes(count)?;
-        }
-        if let Some(terms) = &mut self.terms {
-            terms.reserve_nodes(count)?;
-        }
-        if let Some(sums) = self.implicit.as_mut().and_then(|implicit| implicit.changes_mut()) {
-            sums.reserve_rings(count)?;
         }
         if let Some(coarse) = &mut self.coarse {
             coarse.reserve(count)?;
@@ -66,14 +55,12 @@ impl System {
     pub fn add_nodes(&mut self, nodes: &[NewNode]) -> Result<()> {
         let known = self.node_count();
         let count = known + nodes.len();
-        self.springs.resize(count)?;
+        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
+        self.forces.add_nodes(count, changes)?;
         self.order.grow(count);
         self.masses.resize(count, 0.0);
         self.inverse_masses.resize(count, 0.0);
         self.state.grow(count);
-        if let Some(records) = &mut self.records {
-            records.grow(count);
-        }
         for vectors in [&mut self.predicted_velocities, &mut self.applied]
             .into_iter()
             .flatten()

@@ -14,7 +14,6 @@ mod kick;
 mod mass_scaling;
 mod newton;
 mod pace;
-mod past;
 mod pipeline;
 mod relief;
 mod sleep;
@@ -30,7 +29,7 @@ mod watched;
 pub(crate) use attempt::{
     Carry, Outcome, RESERVE, StepRequest, attempt, finish, needed, relieve_squeezed, substeps_alone, substeps_needed,
 };
-pub(crate) use closing::{close, close_beside, make_up_for, mean_force, show_closed};
+pub(crate) use closing::{close, close_beside, make_up_for, show_closed};
 pub(crate) use coarse_step::CoarseStep;
 pub(crate) use energy_monitor::{EnergyAccount, Sums};
 pub(crate) use grasp::Grip;

@@ -9,11 +9,9 @@ use std::array::from_fn;
 
 use super::System;
 use super::attempt::StepRequest;
-use super::kick::Inertia;
-use super::kick::Survey;
+use super::kick::{Inertia, Kick, Survey};
 use super::substep::{Part, Pass, Written};
-use crate::nodes::{NodeDamping, Pin};
-use crate::simd::ChosenKernel;
+use crate::nodes::Pin;
 use crate::soa::{TILE, TileForces, Vectors, View, tile_count, tile_nodes};
 use crate::springs::Springs;
 use crate::threads::{Items, Ragged, Team};
@@ -149,7 +147,8 @@ struct Stretch<'a> {
 
 impl Stretch<'_> {
     /// Takes a substep of a tile, after those that it depends on.
-    fn take(&mut self, tile: usize, substep: usize, common: &Common, forces: &mut TileForces) {
+    fn take(&mut self, tile: usize, part: (usize, &Part), common: &Pass, forces: &mut TileForces) {
+        let (substep, part) = part;
         let nodes = tile_nodes(tile, common.masses.len());
         let [even, odd] = &mut self.positions;
         let (before, after) = if substep.is_multiple_of(2) {
@@ -171,41 +170,15 @@ impl Stretch<'_> {
             pins: &mut self.pins[pins],
         };
         let positions = View::new(before.each_ref().map(|axis| &**axis), start);
-        let pass = common.pass(&common.parts[substep], positions);
+        let Kick { inertia, damping, .. } = common.kick;
+        let pass = Pass {
+            part,
+            kick: part.kick(common.request.gravity, inertia, damping),
+            positions,
+            ..*common
+        };
         let survey = pass.take(tile, nodes, &mut written, forces);
         self.surveys[substep] = self.surveys[substep].and(survey);
-    }
-}
-
-/// What all substeps and stretches read.
-struct Common<'a> {
-    springs: &'a dyn Springs,
-    kernel: ChosenKernel,
-    masses: &'a [f32],
-    request: &'a StepRequest<'a>,
-    parts: &'a [Part],
-    inertia: Inertia<'a>,
-    damping: Option<&'a NodeDamping>,
-}
-
-impl Common<'_> {
-    fn pass<'a>(&'a self, part: &'a Part, positions: View<'a>) -> Pass<'a> {
-        Pass {
-            springs: self.springs,
-            elements: None,
-            terms: None,
-            enclosed: None,
-            kernel: self.kernel,
-            masses: self.masses,
-            request: self.request,
-            part,
-            kick: part.kick(self.request.gravity, self.inertia, self.damping),
-            positions,
-            first_velocities: None,
-            first_forces: None,
-            damped_velocities: None,
-            first_remainders: None,
-        }
     }
 }
 
@@ -248,14 +221,20 @@ fn run_stretches(
     order: impl Fn(usize, &mut dyn FnMut(usize, usize)) + Sync,
 ) {
     let count = starts.len();
-    let common = Common {
-        springs: &*body.springs,
+    let inertia = Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref());
+    let common = Pass {
+        forces: body.forces.sum(),
         kernel: body.kernel,
         masses: &body.masses,
         request,
-        parts,
-        inertia: Inertia::of(body.uniform_inverse_mass, &body.inverse_masses, body.scaling.as_deref()),
-        damping: body.damping.as_ref(),
+        // Each substep has its own part, kick and positions.
+        part: &parts[0],
+        kick: parts[0].kick(request.gravity, inertia, body.damping.as_ref()),
+        positions: View::new([&[]; 3], 0),
+        first_velocities: None,
+        first_forces: None,
+        damped_velocities: None,
+        first_remainders: None,
     };
     let first_pins: [usize; MOST_STRETCHES] =
         from_fn(|stretch| starts.get(stretch).map_or(0, |&tile| body.pins.start(tile)));
@@ -263,7 +242,7 @@ fn run_stretches(
     let first_places: [usize; MOST_STRETCHES] =
         from_fn(|stretch| starts.get(stretch).map_or(0, |&tile| Vectors::piece_start(tile)));
     let ([latest, next, velocities], remainders) = body.state.two_substeps();
-    let parts = (
+    let written = (
         latest.pieces_mut(&first_places[..count]),
         next.pieces_mut(&first_places[..count]),
         by_stretches(velocities, &first_nodes[..count]),
@@ -273,7 +252,7 @@ fn run_stretches(
     );
     team.pass(
         count,
-        parts,
+        written,
         |stretch, (latest, next, velocities, remainders, pins, surveys)| {
             let mut forces = TileForces::ZERO;
             let mut stretch_data = Stretch {
@@ -285,7 +264,7 @@ fn run_stretches(
                 surveys,
             };
             order(stretch, &mut |tile, substep| {
-                stretch_data.take(tile, substep, &common, &mut forces)
+                stretch_data.take(tile, (substep, &parts[substep]), &common, &mut forces)
             });
         },
     );

@@ -17,16 +17,14 @@ impl System {
         if request.substeps > 0 || request.tolerance > 0.0 || !request.relieves {
             return None;
         }
-        let (Some(scaling), Some(elements)) = (&mut self.scaling, &self.elements) else {
-            return None;
-        };
+        let scaling = self.scaling.as_mut()?;
         let growths = scaling.begin_relief()?;
         let positions = if was_tried {
             self.state.newest().0
         } else {
             self.state.positions()
         };
-        elements.stiffenings(positions, &mut |corners, stiffening| {
+        self.forces.show_stiffenings(positions, &mut |corners, stiffening| {
             for node in corners {
                 if let Some(growth) = growths.get_mut(node as usize) {
                     *growth = growth.max(stiffening as f32);
@@ -39,8 +37,8 @@ impl System {
             are_heavier: scaling.step() > 0.0,
         };
         let rates = self.damping.as_ref().map(|damping| damping.rates());
-        scaling.relieve(&*self.springs, &self.masses, rates, |node| {
-            elements.carried_at_rest(node, in_use.inverse(node))
+        scaling.relieve(&*self.forces.springs, &self.masses, rates, |node| {
+            self.forces.carried_at_rest(node, in_use.inverse(node))
         });
         let (_, masses_for) = fewer_substeps(self, request, 0.0)?;
         self.scale_masses(masses_for);
@@ -82,12 +80,12 @@ mod tests {
             let moved: Vec<Vec3> = moved.collect();
             body.set_positions(&moved).expect("positions");
             let limit = f64::from(body.system.limit_beside_springs(&Team::alone()));
-            let elements = body.system.elements.as_deref().expect("elements");
+            let forces = &body.system.forces;
             let mut stiffest = 0.0_f64;
-            elements.stiffenings(body.system.state.positions(), &mut |corners, stiffening| {
+            forces.show_stiffenings(body.system.state.positions(), &mut |corners, stiffening| {
                 for node in corners {
                     let inverse_mass = body.system.inverse_masses[node as usize];
-                    let carried = elements.carried_at_rest(node as usize, inverse_mass);
+                    let carried = forces.carried_at_rest(node as usize, inverse_mass);
                     stiffest = stiffest.max(2.0 * stiffening * f64::from(carried.stiffness * inverse_mass));
                 }
             });

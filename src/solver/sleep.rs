@@ -270,7 +270,7 @@ impl System {
                 asleep_count: 0,
                 neighbours: Vec::new(),
                 starts: Vec::new(),
-                in_parts: self.implicit.is_none() && self.enclosed.is_none() && self.terms.is_none(),
+                in_parts: self.implicit.is_none() && !self.forces.beside.is_any(),
                 bounds: Bounds::EMPTY,
                 margin: 0.0,
                 step: 0.0,
@@ -286,35 +286,13 @@ impl System {
     /// Finds which tiles act on which.
     fn join_tiles(&self, sleeper: &mut Sleeper) -> Result<()> {
         let mut pairs: Vec<[u32; 2]> = Vec::new();
-        let mut join = |a: u32, b: u32| -> Result<()> {
-            let pair = [a, b].map(|node| node / TILE as u32);
-            if pair[0] != pair[1] {
-                pairs.try_reserve(2)?;
-                pairs.extend([pair, [pair[1], pair[0]]]);
-            }
-            Ok(())
-        };
-        for node in 0..self.node_count() as u32 {
-            let mut result = Ok(());
-            self.springs.visit(node as usize, &mut |link| {
-                if result.is_ok() && link.neighbour > node {
-                    result = join(node, link.neighbour);
-                }
-            });
-            result?;
-        }
         let mut result = Ok(());
-        if let Some(elements) = &self.elements {
-            elements.visit(&mut |corners, _| {
-                for (place, &a) in corners.iter().enumerate() {
-                    for &b in &corners[..place] {
-                        if result.is_ok() {
-                            result = join(a, b);
-                        }
-                    }
-                }
-            });
-        }
+        self.forces.show_joined(&mut |a, b| {
+            let [a, b] = [a, b].map(|node| node / TILE as u32);
+            if a != b && result.is_ok() {
+                result = memory::push(&mut pairs, [a, b]).and_then(|()| memory::push(&mut pairs, [b, a]));
+            }
+        });
         result?;
         memory::sort_once(&mut pairs);
         sleeper.starts = memory::reserved(sleeper.tiles.len() + 1)?;
@@ -453,7 +431,7 @@ impl System {
     fn stand_still(&mut self, tile: usize) {
         let nodes = tile_nodes(tile, self.node_count());
         self.state.stand_still(nodes.clone());
-        if let Some(records) = &mut self.records {
+        if let Some(records) = &mut self.forces.records {
             let axes = self.state.positions().slices(nodes.clone());
             let records = &mut records.as_mut_slice()[nodes];
             self.kernel.run(WriteRecords { axes, records });
@@ -507,12 +485,10 @@ impl System {
     fn pull_at(&self, tile: usize, sleep: Sleep, gravity: Vec3) -> f32 {
         let nodes = tile_nodes(tile, self.node_count());
         let mut forces = TileForces::ZERO;
-        let velocities = self.springs.damped().then(|| self.state.velocities());
-        self.springs
-            .forces(tile, &Motion::at(self.state.positions(), velocities), &mut forces);
-        if let Some(elements) = &self.elements {
-            elements.shares().add(tile, &mut forces);
-        }
+        let velocities = self.forces.springs.damped().then(|| self.state.velocities());
+        let motion = Motion::at(self.state.positions(), velocities);
+        let sum = self.forces.sum().of_springs_and_elements();
+        sum.write(tile, nodes.clone(), &motion, &mut forces);
         let (mut largest, mut sum, mut count) = (0.0_f32, Vec3::ZERO, 0.0);
         for (place, node) in nodes.enumerate() {
             let inverse_mass = self.inverse_masses[node];
@@ -527,7 +503,7 @@ impl System {
         }
         // By 4 over the square of the longest stable substep a node is drawn back to its place, at most.
         let of_springs = self.carry.limit().unwrap_or(f32::INFINITY);
-        let substep = of_springs.min(self.newest_limit_beside_springs());
+        let substep = of_springs.min(self.forces.newest_limit_beside_springs());
         let stiffest = 4.0 / (substep * substep);
         let least = sleep.speed / sleep.time + NOISE * stiffest * self.extent() * f32::EPSILON;
         // Where nothing is drawn back it is the mean that counts.

@@ -11,8 +11,7 @@ impl System {
         let of_nodes = [&self.predicted_velocities, &self.applied];
         (1..=u32::MAX as usize / 2).contains(&count)
             && self.inverse_masses.len() == count
-            && self.springs.node_count() == count
-            && (0..count).all(|node| self.springs_lead_to(node, count))
+            && self.forces.are_sound(count)
             && self.order.is_sound(count)
             && self.implicit.as_ref().is_none_or(|implicit| implicit.is_sound(count))
             && self.state.is_sound(count)
@@ -22,10 +21,6 @@ impl System {
             && self.tile_sums.len() == tiles
             && self.boxes.len() == tiles
             && of_nodes.into_iter().flatten().all(|vectors| vectors.len() == count)
-            && self
-                .records
-                .as_ref()
-                .is_none_or(|records| records.as_slice().len() == count)
             && self.surface.iter().flatten().all(|&node| (node as usize) < count)
             && self
                 .masses
@@ -34,12 +29,5 @@ impl System {
                 .all(|&mass| (0.0..f32::INFINITY).contains(&mass))
             && self.origin.is_finite()
             && self.gravity_scale.is_finite()
-    }
-
-    fn springs_lead_to(&self, node: usize, count: usize) -> bool {
-        let mut all = true;
-        self.springs
-            .visit(node, &mut |link| all &= (link.neighbour as usize) < count);
-        all
     }
 }

@@ -7,15 +7,12 @@ use glam::Vec3;
 use super::System;
 use super::attempt::StepRequest;
 use super::closing::{Closed, ClosingKick};
-use super::kick::Inertia;
-use super::kick::{Drift, Kick, Survey, TileKick, look};
-use crate::elements::{Elements, Shares};
-use crate::enclosed::{self, Enclosed};
+use super::kick::{Drift, Inertia, Kick, Survey, TileKick, look};
+use crate::forces::Sum;
 use crate::nodes::{NodeDamping, Pin};
 use crate::simd::ChosenKernel;
-use crate::soa::{Records, TileForces, Vectors, View, WriteRecords, tile_count, tile_nodes};
-use crate::springs::{Motion, Springs};
-use crate::terms::Terms;
+use crate::soa::{TileForces, Vectors, View, tile_count, tile_nodes};
+use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
 /// Where a kick's velocities come from.
@@ -136,31 +133,16 @@ pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Pa
     let sleeper = body.sleeper.as_deref();
     let is_asleep = |tile: usize| sleeper.is_some_and(|sleeper| sleeper.is_asleep(tile));
     let forces_known = part.before == Before::Current && body.forces_current;
-    if let Some(records) = body.records.as_mut().filter(|_| !forces_known) {
-        write_awake_records(body.kernel, state.positions, (records, &is_asleep), team);
+    if !forces_known {
+        body.forces.write_awake_records(state.positions, is_asleep, team);
+        body.forces.find(state.positions, team);
     }
-    if let (Some(elements), Some(records)) = (&mut body.elements, &body.records)
-        && !forces_known
-    {
-        elements.find_forces(body.kernel, records.as_slice(), team);
-    }
-    let elements = body.elements.as_deref().map(Elements::shares);
-    if let Some(terms) = body.terms.as_mut().filter(|_| !forces_known) {
-        terms.begin();
-    }
-    let terms = body.terms.as_deref();
-    if let Some(enclosed) = body.enclosed.as_mut().filter(|_| !forces_known) {
-        enclosed.find_forces(state.positions, team);
-    }
-    let enclosed = body.enclosed.as_deref().map(Enclosed::shares);
+    let forces = body.forces.sum();
     if part.before == Before::Open
         && let Some(predicted) = &mut body.predicted_velocities
     {
         let closed = Closed {
-            springs: &*body.springs,
-            elements,
-            terms,
-            enclosed,
+            forces,
             kernel: body.kernel,
             kick: Kick {
                 duration: 0.5 * part.substep,
@@ -185,22 +167,19 @@ pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Pa
         Some([first, newest]) => (Some(&*first), Some(newest)),
     };
     let pass = Pass {
-        springs: &*body.springs,
-        elements,
-        terms,
-        enclosed,
+        forces,
         kernel: body.kernel,
         masses: &body.masses,
         request,
         part,
         kick,
-        positions: state.positions.view().with_records(body.records.as_ref()),
+        positions: body.forces.view(state.positions),
         first_velocities: (part.before != Before::Open && part.before != Before::Closed)
             .then_some(state.first_velocities),
         first_forces: forces_known.then_some(state.first_forces),
         damped_velocities: match part.before {
             Before::Open => body.predicted_velocities.as_ref(),
-            _ => body.springs.damped().then_some(state.first_velocities),
+            _ => body.forces.springs.damped().then_some(state.first_velocities),
         },
         first_remainders: first_remainders.filter(|_| part.before != Before::Open),
     };
@@ -236,34 +215,10 @@ pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Pa
     body.surveys.iter().copied().fold(Survey::NOTHING, Survey::and)
 }
 
-/// Makes records of vectors, for springs that gather them.
-pub(crate) fn write_records(kernel: ChosenKernel, vectors: &Vectors, records: &mut Records, team: &Team) {
-    write_awake_records(kernel, vectors, (records, &|_| false), team);
-}
-
-/// The same but of tiles that sleep, which have theirs.
-fn write_awake_records(
-    kernel: ChosenKernel,
-    vectors: &Vectors,
-    (records, is_asleep): (&mut Records, &(impl Fn(usize) -> bool + Sync)),
-    team: &Team,
-) {
-    let node_count = vectors.len();
-    team.pass(tile_count(node_count), records.tiles_mut(), |tile, records| {
-        if is_asleep(tile) {
-            return;
-        }
-        let axes = vectors.slices(tile_nodes(tile, node_count));
-        kernel.run(WriteRecords { axes, records });
-    });
-}
-
 /// What all tiles of a substep read.
+#[derive(Clone, Copy)]
 pub(super) struct Pass<'a> {
-    pub springs: &'a dyn Springs,
-    pub elements: Option<Shares<'a>>,
-    pub terms: Option<&'a Terms>,
-    pub enclosed: Option<enclosed::Shares<'a>>,
+    pub forces: Sum<'a>,
     pub kernel: ChosenKernel,
     pub masses: &'a [f32],
     pub request: &'a StepRequest<'a>,
@@ -309,16 +264,7 @@ impl Pass<'_> {
                 velocities: self.damped_velocities,
                 soon: [vx, vy, vz, x, y, z],
             };
-            self.springs.forces(tile, &motion, forces);
-            if let Some(elements) = &self.elements {
-                elements.add(tile, forces);
-            }
-            if let Some(terms) = self.terms {
-                terms.add_forces(tile, nodes.clone(), self.positions, forces);
-            }
-            if let Some(enclosed) = &self.enclosed {
-                enclosed.add(tile, forces);
-            }
+            self.forces.write(tile, nodes.clone(), &motion, forces);
         }
         if let Some(first_velocities) = self.first_velocities {
             copy(&mut written.velocities, first_velocities.slices(nodes.clone()));

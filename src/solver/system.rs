@@ -6,20 +6,16 @@ use super::early::Early;
 use super::grasp::Grasps;
 use super::mass_scaling::Heavier;
 use super::sleep::Sleeper;
-use super::substep::write_records;
 use super::{Carry, CoarseStep, GravityKicks, Implicit, MassScaling, Stability, Sums, Survey, Watched, close};
-use crate::base::{Result, memory};
+use crate::base::Result;
 use crate::codec::saved;
 use crate::contact::{Contacts, ToolPath};
-use crate::def::{BodyContact, Carried};
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
+use crate::def::BodyContact;
+use crate::forces::Forces;
 use crate::geometry::Bounds;
 use crate::nodes::{Bindings, NodeDamping, Pins, State};
 use crate::simd::ChosenKernel;
-use crate::soa::{Masses, NodeOrder, Rates, Records, Vectors};
-use crate::springs::Springs;
-use crate::terms::Terms;
+use crate::soa::{Masses, NodeOrder, Vectors};
 use crate::threads::Team;
 
 /// How a body is cut.
@@ -38,13 +34,7 @@ saved!(MayBeCut { toughness, is_solid });
 pub(crate) struct System {
     /// The numbers of nodes inside are its own, but in `surface`.
     pub order: NodeOrder,
-    pub springs: Box<dyn Springs>,
-    /// For bodies whose tetrahedra are more than edges.
-    pub elements: Option<Box<Elements>>,
-    /// What a definition asks for beside springs and elements.
-    pub terms: Option<Box<Terms>>,
-    /// For bodies whose surface encloses what keeps its volume or its pressure.
-    pub enclosed: Option<Box<Enclosed>>,
+    pub forces: Forces,
     pub kernel: ChosenKernel,
     /// kg, 0 for nodes that are pinned for good.
     pub masses: Vec<f32>,
@@ -66,8 +56,6 @@ pub(crate) struct System {
     /// The triangles that are drawn and touched, in the caller's numbers.
     pub surface: Vec<[u32; 3]>,
     pub state: State,
-    /// The positions that forces are made of, for springs that gather them.
-    pub records: Option<Records>,
     /// Where the coordinates of the state begin.
     pub origin: DVec3,
     /// Velocities at the time of the positions, for bodies whose springs have damping.
@@ -103,7 +91,7 @@ pub(crate) struct System {
     pub gravity_scale: f32,
 }
 
-saved!(System { order, springs, elements, terms, enclosed, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, records, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale } where Self::is_sound);
+saved!(System { order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale } where Self::is_sound);
 
 impl System {
     /// How many nodes it has.
@@ -118,101 +106,46 @@ impl System {
 
     /// The masses as the caller gave them.
     pub fn masses(&self) -> Masses<'_> {
-        Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_heavier: false,
-        }
+        Masses::new(&self.masses, &self.inverse_masses)
     }
 
     /// Finds the nodes that set the longest stable substep.
     pub fn watch(&mut self) {
-        let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_heavier: false,
-        };
-        self.watched.gather(&*self.springs, masses);
+        let masses = Masses::new(&self.masses, &self.inverse_masses);
+        self.watched.gather(&*self.forces.springs, masses);
     }
 
     /// The axes along which anything holds it in its place.
     pub fn held_axes(&self) -> BVec3 {
-        if self.terms.as_ref().is_some_and(|terms| terms.hold_any()) {
+        if self.forces.beside.holds_any() {
             return BVec3::TRUE;
         }
         self.pins.iter().fold(BVec3::FALSE, |axes, pin| axes | pin.axes)
     }
 
-    /// Whether forces are made of more than springs.
-    pub fn has_more_than_springs(&self) -> bool {
-        self.elements.is_some() || self.terms.is_some() || self.enclosed.is_some()
-    }
-
-    /// What each node carries of elements, terms and what is enclosed; of no nodes where there are none.
-    pub fn carried_beside_springs(&self) -> Result<Vec<Carried>> {
-        if !self.has_more_than_springs() {
-            return Ok(Vec::new());
-        }
-        let mut carried = memory::filled(Carried::default(), self.node_count())?;
-        let masses = self.masses();
-        if let Some(elements) = &self.elements {
-            elements.add_to(&masses, &mut carried);
-        }
-        if let Some(terms) = &self.terms {
-            terms.add_to(&masses, &mut carried);
-        }
-        if let Some(enclosed) = &self.enclosed {
-            enclosed.add_to(self.state.positions(), &masses, &mut carried)?;
-        }
-        Ok(carried)
-    }
-
-    /// The longest substep that elements, terms and what is enclosed allow with the nodes as they are, s; infinity where there are none.
+    /// The longest substep that elements, terms and cavities allow with the nodes as they are, s; infinity where there are none.
     pub fn limit_beside_springs(&mut self, team: &Team) -> f32 {
         let masses = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
             are_heavier: self.scaling.as_ref().is_some_and(|scaling| scaling.step() > 0.0),
         };
-        let mut rates = Rates::ZERO;
-        if let Some(elements) = &mut self.elements {
-            let known = elements.find_rates(&*self.springs, &masses) && self.forces_current;
-            if let Some(records) = self.records.as_mut().filter(|_| !known) {
-                write_records(self.kernel, self.state.positions(), records, team);
-                elements.find_forces(self.kernel, records.as_slice(), team);
-                elements.settle();
-            }
-            rates = elements.settled_rates();
-        }
-        if let Some(terms) = &mut self.terms {
-            terms.find_rates(&*self.springs, &masses);
-            if !self.forces_current {
-                terms.settle_at(self.state.positions());
-            }
-            rates = rates.and(terms.settled_rates());
-        }
-        if let Some(enclosed) = &mut self.enclosed {
-            let springs = (self.elements.is_none() && self.terms.is_none()).then_some(&*self.springs);
-            if !(enclosed.find_rates(springs, &masses) && self.forces_current) {
-                enclosed.find_forces(self.state.positions(), team);
-                enclosed.settle();
-            }
-            rates = rates.and(enclosed.settled_rates());
-        }
-        rates.limit()
+        let positions = self.state.positions();
+        self.forces
+            .limit_beside_springs(positions, &masses, self.forces_current, team)
     }
 
-    /// The same with the nodes where forces were last worked out.
-    pub fn newest_limit_beside_springs(&self) -> f32 {
-        let of_elements = self.elements.as_ref().map_or(Rates::ZERO, |elements| elements.rates());
-        let of_terms = self.terms.as_ref().map_or(Rates::ZERO, |terms| terms.rates());
-        let of_enclosed = self.enclosed.as_ref().map_or(Rates::ZERO, |enclosed| enclosed.rates());
-        of_elements.and(of_terms).and(of_enclosed).limit()
+    /// What cuts left of how elements were deformed fades, over so many seconds.
+    pub fn fade(&mut self, time: f32, team: &Team) {
+        if self.forces.fade(time, self.state.positions(), team) {
+            self.forces_current = false;
+            self.forget_energy();
+        }
     }
 
     /// The longest stable substep with the nodes at these positions.
     pub fn estimate(&self, positions: &Vectors) -> Stability {
-        Stability::estimate(&*self.springs, self.masses(), positions, &self.watched)
+        Stability::estimate(&*self.forces.springs, self.masses(), positions, &self.watched)
     }
 
     /// Makes the nodes that need it heavy enough for substeps of `step` seconds; 0: masses as they are.
@@ -234,7 +167,7 @@ impl System {
             };
             scaling.apply(step, heavier);
             if differ {
-                self.forget_rates();
+                self.forces.forget_rates();
             }
         }
     }
@@ -284,7 +217,7 @@ impl System {
         if let Some(implicit) = &mut self.implicit {
             implicit.put_back();
         }
-        self.recall();
+        self.forces.recall();
         if self.scaling.as_mut().is_some_and(|scaling| scaling.unsettle()) {
             self.scale_masses(self.carry.masses_for);
         }
@@ -320,26 +253,9 @@ impl System {
     /// changed.
     pub fn see_stability_of(&mut self, nodes: &[u32]) {
         let stability = self.carry.stability;
-        let masses = Masses {
-            masses: &self.masses,
-            inverse_masses: &self.inverse_masses,
-            are_heavier: false,
-        };
+        let masses = Masses::new(&self.masses, &self.inverse_masses);
         let positions = self.state.positions();
-        self.carry.stability = stability.changed(nodes, &*self.springs, masses, positions, &mut self.watched);
-    }
-
-    /// Masses, pins or springs are not what they were.
-    pub fn forget_rates(&mut self) {
-        if let Some(elements) = &mut self.elements {
-            elements.forget_rates();
-        }
-        if let Some(terms) = &mut self.terms {
-            terms.forget_rates();
-        }
-        if let Some(enclosed) = &mut self.enclosed {
-            enclosed.forget_rates();
-        }
+        self.carry.stability = stability.changed(nodes, &*self.forces.springs, masses, positions, &mut self.watched);
     }
 
     /// What it is made of has another energy where it is.
@@ -355,7 +271,7 @@ impl System {
         self.forces_current = false;
         self.wake();
         self.carry.forget();
-        self.forget_rates();
+        self.forces.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -365,7 +281,7 @@ impl System {
     pub fn forget_matrix(&mut self) {
         self.carry.stability = Stability::UNKNOWN;
         self.carry.forget();
-        self.forget_rates();
+        self.forces.forget_rates();
         if let Some(implicit) = &mut self.implicit {
             implicit.forget_matrix();
         }
@@ -380,7 +296,7 @@ impl System {
         if let Some(scaling) = &mut self.scaling {
             let rates = self.damping.as_ref().map(|damping| damping.rates());
             for &node in nodes {
-                scaling.change(node, &*self.springs, &self.masses, rates);
+                scaling.change(node, &*self.forces.springs, &self.masses, rates);
             }
         }
         self.scale_masses(self.carry.masses_for);
@@ -404,7 +320,7 @@ impl System {
         }
         self.rest_grasps();
         self.follow_nodes();
-        self.relax();
+        self.forces.relax(self.state.positions());
         self.forget_motion();
     }
 
@@ -413,16 +329,8 @@ impl System {
         self.state.commit();
         self.carry = carry;
         self.forces_current = carry.closing.is_none() && self.implicit.is_none();
-        if let Some(elements) = &mut self.elements {
-            elements.settle();
-        }
-        if let Some(terms) = &mut self.terms {
-            terms.settle();
-        }
-        if let Some(enclosed) = &mut self.enclosed {
-            enclosed.settle();
-        }
-        self.keep();
+        self.forces.settle();
+        self.forces.keep();
         if let Some(scaling) = &mut self.scaling {
             scaling.settle(dt);
         }

@@ -59,7 +59,7 @@ pub(super) fn run(
     };
     // What must be known between substeps cannot be known in a pipeline.
     if substeps > 2 && may_stay_open(body) && !body.is_grasped() && !body.sleeps() {
-        step.pipeline = Plan::of(&*body.springs, body.node_count());
+        step.pipeline = Plan::of(&*body.forces.springs, body.node_count());
     }
     if let Some(taken) = step.take(body, start)? {
         return Ok(taken);
@@ -77,7 +77,7 @@ pub(crate) fn check(stability: &Stability, substep: f32) -> Result<(), TooLong> 
 
 /// The same for elements, terms and what is enclosed, as they were deformed where forces were last worked out.
 pub(crate) fn check_beside_springs(body: &System, substep: f32) -> Result<(), TooLong> {
-    let stable_substep = body.newest_limit_beside_springs();
+    let stable_substep = body.forces.newest_limit_beside_springs();
     if substep <= stable_substep {
         Ok(())
     } else {
@@ -178,7 +178,7 @@ impl<'a> Step<'a> {
                 finite = surveys[depth - 1].finite;
             } else {
                 finite = pass(body, request, &parts[0], &mut carry, team);
-                body.age(f64::from(substep), team);
+                body.forces.age(f64::from(substep), body.state.next_positions(), team);
             }
             for _ in parts {
                 body.state.advance();
@@ -330,7 +330,7 @@ pub(crate) fn pass(body: &mut System, request: &StepRequest, part: &Part, carry:
 pub(crate) fn begin(body: &mut System, request: &StepRequest) {
     body.state.begin();
     body.show_late();
-    body.recall();
+    body.forces.recall();
     for pin in body.pins.iter_mut() {
         let position = body.state.positions().get(pin.node as usize);
         pin.goal = match pin.target {

@@ -45,7 +45,7 @@ pub(crate) type Blocks = [[DMat3; 4]; 4];
 
 /// What is done to terms that remember.
 #[derive(Clone, Copy, Debug)]
-enum Moment {
+pub(crate) enum Moment {
     /// A step begins, from what is current.
     Recall,
     /// The step in progress is the current state.
@@ -57,7 +57,7 @@ enum Moment {
 }
 
 /// The terms of a body that follow one law.
-trait Term: Debug + Send + Sync {
+pub(crate) trait Term: Debug + Send + Sync {
     /// Writes which law it is, and its terms.
     fn save(&self, to: &mut Writer);
 
@@ -248,6 +248,16 @@ impl Terms {
         })?))
     }
 
+    /// Those of each law.
+    pub fn laws(&self) -> impl Iterator<Item = &dyn Term> {
+        self.laws.iter().map(|law| &**law)
+    }
+
+    /// The same, to be changed.
+    pub fn laws_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn Term>> {
+        self.laws.iter_mut()
+    }
+
     /// Adds the forces on the nodes of a tile, N.
     pub fn add_forces(&self, tile: usize, nodes: Range<usize>, positions: View, forces: &mut TileForces) {
         for law in &self.laws {
@@ -277,44 +287,9 @@ impl Terms {
             .sum()
     }
 
-    /// Shows the force on each node of each term, N.
-    pub fn show_forces(&self, at: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(usize, DVec3)) {
-        self.laws.iter().for_each(|law| law.show_forces(at, see));
-    }
-
-    /// Shows how the energy of each term changes where nodes go so much further, J.
-    pub fn show_changes(&self, at: &dyn Fn(usize) -> DVec3, more: &dyn Fn(usize) -> DVec3, see: &mut dyn FnMut(f64)) {
-        self.laws.iter().for_each(|law| law.show_changes(at, more, see));
-    }
-
-    /// Shows each term's nodes and blocks: all second derivatives, or what is positive semidefinite of them.
-    pub fn show_blocks(&self, at: &dyn Fn(usize) -> DVec3, is_exact: bool, see: &mut dyn FnMut(&[u32], &Blocks)) {
-        self.laws.iter().for_each(|law| law.show_blocks(at, is_exact, see));
-    }
-
-    /// Shows the nodes of each term and how stiff it is, those of no stiffness too.
-    pub fn show_nodes(&self, see: &mut dyn FnMut(&[u32], f32)) {
-        self.laws.iter().for_each(|law| law.show_nodes(see));
-    }
-
-    /// Whether a node is held against the world.
-    pub fn holds(&self, node: usize) -> bool {
-        self.laws.iter().any(|law| law.holds(node))
-    }
-
-    /// Whether any node is.
+    /// Whether any node is held against the world.
     pub fn hold_any(&self) -> bool {
         self.holds_any
-    }
-
-    /// Takes away what has an edge between two nodes: how many terms.
-    pub fn remove_edge(&mut self, a: u32, b: u32) -> usize {
-        self.laws.iter_mut().map(|law| law.remove_edge(a, b)).sum()
-    }
-
-    /// The spring between two nodes has another stiffness and rest length.
-    pub fn set_spring(&mut self, change: &Change) {
-        self.laws.iter_mut().for_each(|law| law.set_spring(change));
     }
 
     /// Makes room for so many nodes in all.
@@ -340,28 +315,14 @@ impl Terms {
         self.forget_rates();
     }
 
-    /// There is no cut.
-    pub fn forget_parts(&mut self) {
-        self.laws.iter_mut().for_each(|law| law.forget_parts());
-    }
-
-    /// Refuses to scale what would have a number that is none. Terms of springs go with those.
-    pub fn check_scale(&self, region: &Region, scale: Scale) -> Result<()> {
-        self.laws.iter().try_for_each(|law| law.check_scale(region, scale))
-    }
-
     /// Scales the terms with all nodes in a region, which must not be refused: how many.
     pub fn scale(&mut self, region: &Region, scale: Scale) -> usize {
         let count = self.laws.iter_mut().map(|law| law.scale(region, scale)).sum();
         if scale.stiffness == 0.0 && self.holds_any {
-            self.holds_any = (0..self.sums.len()).any(|node| self.holds(node));
+            let laws = &self.laws;
+            self.holds_any = (0..self.sums.len()).any(|node| laws.iter().any(|law| law.holds(node)));
         }
         count
-    }
-
-    /// Nodes are given from here on.
-    pub fn move_origin(&mut self, origin: DVec3) {
-        self.laws.iter_mut().for_each(|law| law.move_origin(origin));
     }
 
     /// Masses, pins or springs have changed.
@@ -401,11 +362,6 @@ impl Terms {
         }
     }
 
-    /// Shows what each node carries of each term, N/m, where those that are not free go no way.
-    pub fn show_carried(&self, masses: &Masses, see: &mut dyn FnMut(usize, f32)) {
-        self.laws.iter().for_each(|law| law.show_carried(masses, see));
-    }
-
     /// Forces are about to be worked out for other positions.
     pub fn begin(&mut self) {
         *self.stiffening.get_mut() = 1.0_f32.to_bits();
@@ -424,17 +380,10 @@ impl Terms {
         self.settled = f32::from_bits(*self.stiffening.get_mut());
     }
 
-    /// What bounds frequencies with the nodes where forces were last worked out.
-    pub fn rates(&self) -> Rates {
-        self.rates_times(f32::from_bits(self.stiffening.load(Ordering::Relaxed)))
-    }
-
-    /// The same with the nodes at the current state.
-    pub fn settled_rates(&self) -> Rates {
-        self.rates_times(self.settled)
-    }
-
-    fn rates_times(&self, stiffening: f32) -> Rates {
+    /// What bounds frequencies with the nodes at the current state, where `is_settled`, or where forces were last worked out.
+    pub fn rates(&self, is_settled: bool) -> Rates {
+        let newest = || f32::from_bits(self.stiffening.load(Ordering::Relaxed));
+        let stiffening = if is_settled { self.settled } else { newest() };
         let rates = Rates {
             stiffest: self.rates.stiffest * stiffening,
             ..self.rates
@@ -446,36 +395,11 @@ impl Terms {
         }
     }
 
-    /// Whether any remember anything.
-    pub fn remember(&self) -> bool {
-        self.laws.iter().any(|law| law.remembers())
-    }
-
-    /// A step begins, from what is current.
-    pub fn recall(&mut self) {
-        self.laws.iter_mut().for_each(|law| law.pass(Moment::Recall));
-    }
-
-    /// The step in progress is the current state.
-    pub fn keep(&mut self) {
-        self.laws.iter_mut().for_each(|law| law.pass(Moment::Keep));
-    }
-
-    /// An equation is to be solved for the end of so many seconds.
-    pub fn foresee(&mut self, time: f64) {
-        self.laws.iter_mut().for_each(|law| law.pass(Moment::Foresee(time)));
-    }
-
     /// Nodes have come to `positions`, and what is viscous along this course.
     pub fn age(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> Course, team: &Team) {
         let (kernel, course) = (self.kernel, course(self.viscosity));
         for law in &mut self.laws {
             law.age(kernel, positions.view(), course, team);
         }
-    }
-
-    /// What may change of them.
-    pub fn hash(&self, hasher: &mut StateHasher) {
-        self.laws.iter().for_each(|law| law.hash(hasher));
     }
 }

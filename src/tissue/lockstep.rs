@@ -227,7 +227,7 @@ impl Together<'_> {
                     body.state.advance();
                     return Ok(());
                 }
-                body.age(f64::from(substep), team);
+                body.forces.age(f64::from(substep), body.state.next_positions(), team);
                 body.state.advance();
                 let velocities = tissue.velocities(place, walk.carry.gravity.velocities);
                 walk.carry.gravity.velocities = velocities;

@@ -158,7 +158,7 @@ impl World {
         let explicit = self.bodies.iter().filter(|(_, body)| body.system.implicit.is_none());
         let known = explicit.filter_map(|(_, body)| {
             let limit = body.system.carry.limit()?;
-            Some(limit.min(body.system.newest_limit_beside_springs()))
+            Some(limit.min(body.system.forces.newest_limit_beside_springs()))
         });
         known.fold(f32::INFINITY, f32::min)
     }

@@ -367,7 +367,7 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
                 report.error_estimate = report.error_estimate.max(error);
                 carry
                     .limit()
-                    .map(|limit| limit.min(body.system.newest_limit_beside_springs()))
+                    .map(|limit| limit.min(body.system.forces.newest_limit_beside_springs()))
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);

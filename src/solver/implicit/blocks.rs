@@ -6,11 +6,9 @@ use glam::{BVec3, DMat3, Vec3};
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
+use crate::forces::Forces;
 use crate::soa::{TILE, Vectors, tile_count, tile_nodes};
 use crate::springs::{Springs, Tangent};
-use crate::terms::Terms;
 use crate::threads::{Team, Tiles};
 
 /// A symmetric matrix as xx, yy, zz, yz, zx, xy.
@@ -68,40 +66,26 @@ impl Blocks {
         }
     }
 
-    /// Takes in the springs at these positions.
-    pub fn gather(&mut self, springs: &dyn Springs, positions: &Vectors, tangent: Tangent, team: &Team) {
+    /// Takes in forces at these positions.
+    pub fn gather(&mut self, forces: &Forces, positions: &Vectors, tangent: Tangent, team: &Team) {
         let node_count = positions.len();
         let written = Tiles::new(&mut self.stiffness, TILE);
         team.pass(tile_count(node_count), written, |tile, blocks| {
             for (node, block) in tile_nodes(tile, node_count).zip(blocks) {
-                *block = block_of(node, springs, positions, tangent);
+                *block = block_of(node, &*forces.springs, positions, tangent);
             }
         });
-    }
-
-    /// Adds elements at these positions.
-    pub fn add_elements(&mut self, elements: &Elements, positions: &Vectors) {
-        elements.visit_deformed(positions, PART_OF_RINGS, &mut |corners, gradients, deformed| {
+        forces.show_deformed(positions, PART_OF_RINGS, &mut |corners, gradients, deformed| {
             for (node, &gradient) in corners.into_iter().zip(gradients) {
                 self.add(node, deformed.clamped_stiffness(gradient, gradient));
             }
         });
-    }
-
-    /// Adds terms at these positions.
-    pub fn add_terms(&mut self, terms: &Terms, positions: &Vectors) {
-        let at = |node: usize| positions.get(node).as_dvec3();
-        terms.show_blocks(&at, false, &mut |nodes, blocks| {
+        forces.show_term_blocks(positions, &mut |nodes, blocks| {
             for (place, &node) in nodes.iter().enumerate() {
                 self.add(node, blocks[place][place]);
             }
         });
-    }
-
-    /// Adds what is enclosed at these positions.
-    pub fn add_enclosed(&mut self, enclosed: &Enclosed, positions: &Vectors) {
-        let at = |node: usize| positions.get(node).as_dvec3();
-        enclosed.show_diagonal(&at, &mut |node, block| self.add(node as u32, block));
+        forces.show_cavity_diagonal(positions, &mut |node, block| self.add(node as u32, block));
     }
 
     fn add(&mut self, node: u32, matrix: DMat3) {

@@ -4,19 +4,19 @@
 //! once, by a small dense matrix (aggregation, as in Vanek, Mandel, Brezina 1996, without smoothing). Its inverse may be that
 //! of an older state of the body: then it is a worse preconditioner, and still one.
 
+use std::array::from_fn;
+
 use glam::{BVec3, DMat3, DVec3, Mat3, Vec3};
 
 use super::gradient::add_lanes;
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
+use crate::forces::Forces;
 use crate::nodes::Pins;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TILE, Vectors};
 use crate::solver::held::without_held;
-use crate::springs::{Springs, Tangent};
-use crate::terms::Terms;
+use crate::springs::Tangent;
 
 /// Nodes that always belong to one cluster together: as many as are worked on side by side.
 const BLOCK: usize = 16;
@@ -115,10 +115,10 @@ impl Coarse {
         self.count * MOTIONS
     }
 
-    /// Takes in the springs at these positions, and which nodes move. A node that is held along some axes takes part along the others.
+    /// Takes in forces at these positions, and which nodes move. A node that is held along some axes takes part along the others.
     pub fn gather(
         &mut self,
-        springs: &dyn Springs,
+        forces: &Forces,
         inverse_masses: &[f32],
         pins: &Pins,
         positions: &Vectors,
@@ -148,7 +148,7 @@ impl Coarse {
             if self.free[node] == 0.0 {
                 continue;
             }
-            springs.visit(node, &mut |link| {
+            forces.springs.visit(node, &mut |link| {
                 let neighbour = link.neighbour as usize;
                 if neighbour > node || self.free[neighbour] == 0.0 {
                     let way = positions.get(neighbour) - positions.get(node);
@@ -163,11 +163,14 @@ impl Coarse {
                 }
             });
         }
+        self.add_elements(forces, pins, positions);
+        self.add_terms(forces, pins, positions);
+        self.add_cavities(forces, positions);
     }
 
     /// Adds elements at these positions.
-    pub fn add_elements(&mut self, elements: &Elements, pins: &Pins, positions: &Vectors) {
-        elements.visit_deformed(positions, 1.0, &mut |corners, gradients, deformed| {
+    fn add_elements(&mut self, forces: &Forces, pins: &Pins, positions: &Vectors) {
+        forces.show_deformed(positions, 1.0, &mut |corners, gradients, deformed| {
             let nodes = corners.map(|node| node as usize);
             let clusters = nodes.map(|node| usize::from(self.clusters[node / BLOCK]));
             let parts = nodes.map(|node| self.part(node));
@@ -190,73 +193,62 @@ impl Coarse {
                 }
                 return;
             }
-            for (a, &of_a) in gradients.iter().enumerate() {
-                for (b, &of_b) in gradients.iter().enumerate() {
-                    let matrix = without_held(deformed.clamped_stiffness(of_a, of_b), [held[a], held[b]]);
-                    for row in 0..FUNCTIONS {
-                        for column in 0..FUNCTIONS {
-                            let factor = f64::from(parts[a][row] * parts[b][column]);
-                            if factor != 0.0 {
-                                self.add_block([clusters[a], row], [clusters[b], column], matrix * factor);
-                            }
-                        }
-                    }
-                }
-            }
+            let blocks = gradients.map(|a| gradients.map(|b| deformed.clamped_stiffness(a, b)));
+            self.add_blocks(&corners, blocks, pins, false);
         });
     }
 
     /// Adds terms at these positions.
-    pub fn add_terms(&mut self, terms: &Terms, pins: &Pins, positions: &Vectors) {
-        let at = |node: usize| positions.get(node).as_dvec3();
-        terms.show_blocks(&at, false, &mut |nodes, blocks| {
-            let cluster = |node: u32| usize::from(self.clusters[node as usize / BLOCK]);
-            let clusters = nodes.iter().map(|&node| cluster(node));
-            // Nodes of one cluster share its functions: their blocks are added up first.
-            let is_together = clusters.clone().all(|other| other == cluster(nodes[0]));
-            let parts: [[f32; FUNCTIONS]; 4] = std::array::from_fn(|place| {
-                nodes
-                    .get(place)
-                    .map_or([0.0; FUNCTIONS], |&node| self.part(node as usize))
-            });
-            let mut blocks = *blocks;
-            if pins.are_partial() {
-                for (a, &of_a) in nodes.iter().enumerate() {
-                    for (b, &of_b) in nodes.iter().enumerate() {
-                        let held = [of_a, of_b].map(|node| pins.partial_axes_of(node));
-                        blocks[a][b] = without_held(blocks[a][b], held);
-                    }
-                }
-            }
-            for row in 0..FUNCTIONS {
-                for column in 0..FUNCTIONS {
-                    let mut sum = DMat3::ZERO;
-                    for (a, &of_a) in nodes.iter().enumerate() {
-                        for (b, &of_b) in nodes.iter().enumerate() {
-                            let factor = f64::from(parts[a][row] * parts[b][column]);
-                            if is_together {
-                                sum += blocks[a][b] * factor;
-                            } else if factor != 0.0 {
-                                let clusters =
-                                    [of_a, of_b].map(|node| usize::from(self.clusters[node as usize / BLOCK]));
-                                self.add_block([clusters[0], row], [clusters[1], column], blocks[a][b] * factor);
-                            }
-                        }
-                    }
-                    if is_together {
-                        let cluster = usize::from(self.clusters[nodes[0] as usize / BLOCK]);
-                        self.add_block([cluster, row], [cluster, column], sum);
-                    }
-                }
-            }
+    fn add_terms(&mut self, forces: &Forces, pins: &Pins, positions: &Vectors) {
+        forces.show_term_blocks(positions, &mut |nodes, blocks| {
+            let cluster = |node: u32| self.clusters[node as usize / BLOCK];
+            let are_together = nodes.iter().all(|&node| cluster(node) == cluster(nodes[0]));
+            self.add_blocks(nodes, *blocks, pins, are_together);
         });
     }
 
-    /// Adds what is enclosed at these positions.
-    pub fn add_enclosed(&mut self, enclosed: &Enclosed, positions: &Vectors) {
-        let at = |node: usize| positions.get(node).as_dvec3();
+    /// Adds what acts between these nodes. Nodes of one cluster share its functions: their blocks are added up first, where they
+    /// `are_together`.
+    fn add_blocks(&mut self, nodes: &[u32], mut blocks: [[DMat3; 4]; 4], pins: &Pins, are_together: bool) {
+        if pins.are_partial() {
+            for (a, &of_a) in nodes.iter().enumerate() {
+                for (b, &of_b) in nodes.iter().enumerate() {
+                    let held = [of_a, of_b].map(|node| pins.partial_axes_of(node));
+                    blocks[a][b] = without_held(blocks[a][b], held);
+                }
+            }
+        }
+        let cluster = |&node: &u32| usize::from(self.clusters[node as usize / BLOCK]);
+        let clusters: [usize; 4] = from_fn(|place| nodes.get(place).map_or(0, cluster));
+        let parts: [[f32; FUNCTIONS]; 4] = from_fn(|place| {
+            nodes
+                .get(place)
+                .map_or([0.0; FUNCTIONS], |&node| self.part(node as usize))
+        });
+        for row in 0..FUNCTIONS {
+            for column in 0..FUNCTIONS {
+                let mut sum = DMat3::ZERO;
+                for a in 0..nodes.len() {
+                    for b in 0..nodes.len() {
+                        let factor = f64::from(parts[a][row] * parts[b][column]);
+                        if are_together {
+                            sum += blocks[a][b] * factor;
+                        } else if factor != 0.0 {
+                            self.add_block([clusters[a], row], [clusters[b], column], blocks[a][b] * factor);
+                        }
+                    }
+                }
+                if are_together {
+                    self.add_block([clusters[0], row], [clusters[0], column], sum);
+                }
+            }
+        }
+    }
+
+    /// Adds cavities at these positions.
+    fn add_cavities(&mut self, forces: &Forces, positions: &Vectors) {
         let size = self.size();
-        enclosed.show_factors(&at, &mut |stiffness, gradients| {
+        forces.show_cavity_factors(positions, &mut |stiffness, gradients| {
             // How the volume changes with each motion.
             self.sums.fill(0.0);
             for (node, gradient) in gradients {
@@ -309,7 +301,7 @@ impl Coarse {
         let [cluster_a, cluster_b] = [a, b].map(|node| usize::from(self.clusters[node / BLOCK]));
         let rows = if cluster_a == cluster_b {
             [
-                (cluster_a, std::array::from_fn(|f| of_a[f] - of_b[f])),
+                (cluster_a, from_fn(|f| of_a[f] - of_b[f])),
                 (cluster_a, [0.0; FUNCTIONS]),
             ]
         } else {

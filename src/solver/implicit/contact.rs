@@ -197,11 +197,9 @@ impl Substep<'_> {
             bindings: body.bindings.as_ref(),
             profile,
         };
-        let (springs, elements, masses) = (&body.springs, &body.elements, &body.masses);
+        let (forces, masses) = (&body.forces, &body.masses);
         act(contacts, meeting, &|node, per_mass| {
-            let mut stiffness = (f64::from(masses[node]) * per_mass) as f32;
-            springs.visit(node, &mut |link| stiffness += link.stiffness);
-            stiffness + elements.as_ref().map_or(0.0, |elements| elements.stiffness_of(node))
+            forces.stiffness_at(node, (f64::from(masses[node]) * per_mass) as f32)
         });
         watch.take_off(profile, Stage::Solver);
     }

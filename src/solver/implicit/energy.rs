@@ -5,14 +5,11 @@ use super::step::Substep;
 use super::{End, History, Implicit};
 use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
 use crate::nodes::Pins;
 use crate::simd::{ChosenKernel, Loops};
 use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::solver::energy_monitor::slow_down;
-use crate::solver::substep::write_records;
 use crate::springs::Motion;
 use crate::threads::{Items, Team};
 
@@ -88,7 +85,7 @@ impl Substep<'_> {
         let mut total = implicit.elastic(body, false, from, self.team);
         if travels {
             // With what viscous arms take up on that way.
-            body.foresee(self.step);
+            body.forces.foresee(self.step);
             let state = body.state.substep();
             state.next_positions.copy_from(state.positions);
             for pin in body.pins.iter() {
@@ -190,41 +187,23 @@ impl Substep<'_> {
             velocities.clear();
         }
         let positions = &*body.state.substep().next_positions;
-        if let Some(records) = &mut body.records {
-            write_records(body.kernel, positions, records, self.team);
-        }
-        if let (Some(elements), Some(records)) = (&mut body.elements, &body.records) {
-            elements.find_forces(body.kernel, records.as_slice(), self.team);
-        }
-        let elements = body.elements.as_deref().map(Elements::shares);
-        let terms = body.terms.as_deref();
-        if let Some(enclosed) = &mut body.enclosed {
-            enclosed.find_forces(positions, self.team);
-        }
-        let enclosed = body.enclosed.as_deref().map(Enclosed::shares);
+        body.forces.write_records(positions, self.team);
+        body.forces.find(positions, self.team);
+        let forces = body.forces.sum();
         let motion = Motion {
-            positions: positions.view().with_records(body.records.as_ref()),
+            positions: body.forces.view(positions),
             ..Motion::at(positions, body.predicted_velocities.as_ref())
         };
-        let (springs, masses, gravity) = (&*body.springs, &body.masses, self.request.gravity);
+        let (masses, gravity) = (&body.masses, self.request.gravity);
         let node_count = positions.len();
         self.team
             .pass(tile_count(node_count), body.pins.tiles_mut(), |tile, pins| {
                 if pins.is_empty() {
                     return;
                 }
-                let mut forces = TileForces::ZERO;
-                springs.forces(tile, &motion, &mut forces);
-                if let Some(elements) = &elements {
-                    elements.add(tile, &mut forces);
-                }
-                if let Some(terms) = terms {
-                    terms.add_forces(tile, tile_nodes(tile, node_count), motion.positions, &mut forces);
-                }
-                if let Some(enclosed) = &enclosed {
-                    enclosed.add(tile, &mut forces);
-                }
-                show_held(pins, &forces, gravity, masses);
+                let mut sums = TileForces::ZERO;
+                forces.write(tile, tile_nodes(tile, node_count), &motion, &mut sums);
+                show_held(pins, &sums, gravity, masses);
             });
     }
 
@@ -301,8 +280,6 @@ impl Implicit {
     /// The energy of what is inside a body with nodes where the substep began, or where they are next; they lack the remainders of this place
     /// where there are some, J.
     fn elastic(&mut self, body: &mut System, is_next: bool, place: usize, team: &Team) -> Total {
-        let (kernel, springs) = (body.kernel, &*body.springs);
-        let (terms, enclosed) = (body.terms.as_deref(), body.enclosed.as_deref());
         let state = body.state.substep();
         let positions = if is_next {
             &*state.next_positions
@@ -310,30 +287,20 @@ impl Implicit {
             state.positions
         };
         if let Some(newton) = &mut self.newton {
-            let elements = body.elements.as_deref();
-            let [stored, work] = newton.elastic(springs, elements, (terms, enclosed), positions, place);
+            let [stored, work] = newton.elastic(&body.forces, positions, place);
             return Total::of(stored, work);
         }
         let node_count = positions.len();
-        if let Some(records) = &mut body.records {
-            write_records(kernel, positions, records, team);
-        }
-        let view = positions.view().with_records(body.records.as_ref());
+        body.forces.write_records(positions, team);
+        let forces = &body.forces;
+        let view = forces.view(positions);
         let partials = Items::new(&mut self.partials);
         team.pass(tile_count(node_count), partials, |tile, partial| {
-            partial.first = springs.half_energy(tile_nodes(tile, node_count), view);
-            if let Some(terms) = terms {
-                partial.first += terms.energy_of_tile(tile, &|node| view.get(node).as_dvec3());
-            }
+            partial.first = forces.energy_of_tile(tile, tile_nodes(tile, node_count), view);
         });
         let of_tiles: f64 = self.partials.iter().map(|partial| partial.first).sum();
-        let of_elements = match (&mut body.elements, &body.records) {
-            (Some(elements), Some(records)) => elements.energy(kernel, records.as_slice(), team),
-            _ => 0.0,
-        };
-        let at = |node: usize| positions.get(node).as_dvec3();
-        let [of_cavities, work] = enclosed.map_or([0.0; 2], |enclosed| enclosed.energy(&at));
-        Total::of(of_tiles + of_elements + of_cavities, work)
+        let [stored, work] = body.forces.energy(of_tiles, positions, team);
+        Total::of(stored, work)
     }
 }
 

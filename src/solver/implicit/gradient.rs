@@ -115,40 +115,20 @@ impl Implicit {
         team: &Team,
     ) -> f64 {
         let node_count = positions.len();
-        if let (Some(elements), Some(changes)) = (&body.elements, &mut self.changes)
-            && let (Some(positions), Some(searches)) = (&body.records, &self.search_records)
-        {
-            let records = [positions.as_slice(), searches.as_slice()];
-            elements.find_changes(body.kernel, records, changes, team);
-        }
-        let elements = body.elements.as_deref().zip(self.changes.as_ref());
-        let elements = elements.map(|(elements, changes)| elements.shares_of(changes));
-        if let (Some(enclosed), Some(changes)) = (&body.enclosed, &mut self.pressure_changes) {
-            enclosed.find_changes(&self.searches, changes, team);
-        }
-        let enclosed = body.enclosed.as_deref().zip(self.pressure_changes.as_ref());
-        let enclosed = enclosed.map(|(enclosed, changes)| enclosed.shares_of(changes));
+        body.forces.find_changes(&self.searches, &mut self.changes, team);
+        let sum = body.forces.sum_of(&self.changes);
         let (searches, inertia) = (&self.searches, &self.inertia);
         let course = Course {
             node_count,
-            positions: positions.view().with_records(body.records.as_ref()),
-            ways: searches.view().with_records(self.search_records.as_ref()),
+            positions: body.forces.view(positions),
+            ways: searches.view().with_records(self.changes.records.as_ref()),
             tangent,
         };
         let written = (self.products.tiles_mut(), Items::new(&mut self.partials));
         team.pass(tile_count(node_count), written, |tile, (mut products, partial)| {
             let nodes = tile_nodes(tile, node_count);
             let mut changes = TileForces::ZERO;
-            body.springs.changes(tile, &course, &mut changes);
-            if let Some(elements) = &elements {
-                elements.add(tile, &mut changes);
-            }
-            if let Some(terms) = &body.terms {
-                terms.add_changes(tile, nodes.clone(), [course.positions, course.ways], &mut changes);
-            }
-            if let Some(enclosed) = &enclosed {
-                enclosed.add(tile, &mut changes);
-            }
+            sum.write_changes(tile, nodes.clone(), &course, &mut changes);
             partial.first = body.kernel.run(Product {
                 inertia: &inertia[nodes.clone()],
                 searches: searches.slices(nodes.clone()),
@@ -215,7 +195,7 @@ impl Implicit {
     fn search(&mut self, body: &System, growth: f64, team: &Team) {
         let node_count = self.inertia.len();
         let (coarse, preconditioned) = (&self.coarse, &self.preconditioned);
-        let records = self.search_records.as_mut().map(Records::tiles_mut);
+        let records = self.changes.records.as_mut().map(Records::tiles_mut);
         let written = (self.searches.tiles_mut(), records);
         team.pass(tile_count(node_count), written, |tile, (mut searches, records)| {
             body.kernel.run(Search {

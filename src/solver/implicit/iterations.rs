@@ -6,8 +6,6 @@ use super::Implicit;
 use super::gradient::Goal;
 use super::loops::{Add, Refine, Residual, Slope};
 use super::step::{MULTIPLIERS, Substep};
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
 use crate::nodes::Pin;
 use crate::simd::ChosenKernel;
 use crate::soa::{TILE, TileForces, Vectors, tile_count, tile_nodes};
@@ -46,24 +44,17 @@ impl Substep<'_> {
             contacts.holds.press(|node| implicit.pushes.get(node).as_dvec3());
         }
         let node_count = body.node_count();
-        if let (Some(elements), Some(records)) = (&mut body.elements, &body.records) {
-            elements.find_forces(body.kernel, records.as_slice(), self.team);
-        }
-        let elements = body.elements.as_deref().map(Elements::shares);
-        let terms = body.terms.as_deref();
         let state = body.state.substep();
-        if let Some(enclosed) = &mut body.enclosed {
-            enclosed.find_forces(state.next_positions, self.team);
-        }
-        let enclosed = body.enclosed.as_deref().map(Enclosed::shares);
+        body.forces.find(state.next_positions, self.team);
+        let forces = body.forces.sum();
         let (positions, velocities) = (&*state.next_positions, &*state.velocities);
         let holds = body.contacts.as_ref().map(|contacts| &contacts.holds);
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let pressed = implicit.histories[1 - implicit.settled].pressing();
         let rates = body.damping.as_ref().map(|damping| damping.rates());
-        let (springs, masses, kernel) = (&*body.springs, &body.masses, body.kernel);
+        let (masses, kernel) = (&body.masses, body.kernel);
         let motion = Motion {
-            positions: positions.view().with_records(body.records.as_ref()),
+            positions: body.forces.view(positions),
             ..Motion::at(positions, body.predicted_velocities.as_ref())
         };
         let (pushes, corrections, inertia) = (&implicit.pushes, &implicit.corrections, &implicit.inertia);
@@ -78,21 +69,12 @@ impl Substep<'_> {
             written,
             |tile, (mut residuals, partial, pins)| {
                 let nodes = tile_nodes(tile, node_count);
-                let mut forces = TileForces::ZERO;
-                springs.forces(tile, &motion, &mut forces);
-                if let Some(elements) = &elements {
-                    elements.add(tile, &mut forces);
-                }
-                if let Some(terms) = terms {
-                    terms.add_forces(tile, nodes.clone(), motion.positions, &mut forces);
-                }
-                if let Some(enclosed) = &enclosed {
-                    enclosed.add(tile, &mut forces);
-                }
-                show_held(pins, &forces, gravity, masses);
+                let mut sums = TileForces::ZERO;
+                forces.write(tile, nodes.clone(), &motion, &mut sums);
+                show_held(pins, &sums, gravity, masses);
                 kernel.run(Residual {
                     gravity,
-                    forces: &forces,
+                    forces: &sums,
                     applied: applied.map(|applied| applied.slices(nodes.clone())),
                     masses: &masses[nodes.clone()],
                     rates: rates.map(|rates| &rates[nodes.clone()]),

@@ -27,13 +27,10 @@ use glam::Vec3;
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::def::{MOST_ITERATIONS, SolverReport};
-use crate::elements::{Elements, Sums};
-use crate::enclosed::{self, Enclosed};
-use crate::soa::{Records, Vectors, tile_count};
+use crate::def::{BodyDefinition, MOST_ITERATIONS, Solver, SolverReport};
+use crate::forces::{Changes, Forces};
+use crate::soa::{Vectors, tile_count};
 use crate::solver::newton::Newton;
-use crate::springs::Springs;
-use crate::terms::Terms;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
 use energy::Total;
@@ -149,12 +146,8 @@ pub(crate) struct Implicit {
     corrections: Vectors,
     residuals: Vectors,
     searches: Vectors,
-    /// For springs that gather them, and elements.
-    search_records: Option<Records>,
-    /// What elements make of the search direction.
-    changes: Option<Sums>,
-    /// What it does to pressures.
-    pressure_changes: Option<enclosed::Changes>,
+    /// What forces make of the search direction.
+    pub changes: Changes,
     /// The matrix times the search direction, and what the preconditioner makes of the residual.
     products: Vectors,
     preconditioned: Vectors,
@@ -204,9 +197,7 @@ saved!(Implicit {
     corrections,
     residuals,
     searches,
-    search_records,
     changes,
-    pressure_changes,
     products,
     preconditioned,
     inertia,
@@ -242,34 +233,33 @@ impl Implicit {
         self.budget <= MOST_ITERATIONS
     }
 
-    /// For nodes at these positions, whose springs gather them or not; what is 0 is as by default.
-    pub fn new(positions: &Vectors, gathers: bool, order: u32, budget: u32, accuracy: f32) -> Result<Self> {
-        Self::solving(positions, positions.len(), gathers, order, budget, accuracy)
-    }
-
-    /// For so many nodes, with conjugate gradients for those at these positions.
-    fn solving(
-        positions: &Vectors,
-        node_count: usize,
-        gathers: bool,
-        order: u32,
-        budget: u32,
-        accuracy: f32,
-    ) -> Result<Self> {
-        /// A fraction of what a step of a length worth taking is off by itself.
-        const ACCURACY: f32 = 0.01;
-        /// More than a body that is to be stepped while somebody waits can need.
-        const BUDGET: u32 = 1000;
-        let budget = if budget == 0 { BUDGET } else { budget };
-        let solved_count = positions.len();
+    /// For nodes at these positions that these forces move, where a definition asks for it; what is 0 there is as by default.
+    pub fn new(definition: &BodyDefinition, positions: &Vectors, forces: &Forces) -> Result<Option<Box<Self>>> {
+        let node_count = positions.len();
+        let is_exact = definition.solver == Solver::Newton;
+        let (accuracy, budget) = match definition.solver {
+            Solver::Verlet | Solver::Auto => return Ok(None),
+            // A fraction of what a step of a length worth taking is off by itself, and more products than a body can need that is to be
+            // stepped while somebody waits.
+            Solver::Implicit => (0.01, 1000),
+            // As good as nothing, and far above what rounding makes; for bodies of a million nodes.
+            Solver::Newton => (1e-6, 100_000),
+        };
+        let nothing = Vectors::zeros(0)?;
+        let solved = if is_exact { &nothing } else { positions };
+        let newton = is_exact.then(|| Newton::new(forces)).transpose()?;
+        let changes = (!is_exact).then(|| forces.room_for_changes()).transpose()?;
+        let solved_count = solved.len();
         let vectors = || Vectors::zeros(solved_count);
-        let coarse = Coarse::new(positions)?;
-        Ok(Self {
-            order: if order == 0 { 2 } else { order },
-            budget,
+        let coarse = Coarse::new(solved)?;
+        let or = |given: u32, default| if given == 0 { default } else { given };
+        let given = definition.accuracy;
+        let it = Self {
+            order: or(definition.order, 2),
+            budget: or(definition.iterations, budget),
             left: 0,
             allowed: u32::MAX,
-            accuracy: if accuracy == 0.0 { ACCURACY } else { accuracy },
+            accuracy: if given > 0.0 { given } else { accuracy },
             is_deflected: false,
             histories: [
                 History::new(node_count, solved_count)?,
@@ -284,9 +274,7 @@ impl Implicit {
             corrections: vectors()?,
             residuals: vectors()?,
             searches: vectors()?,
-            search_records: gathers.then(|| Records::zeros(solved_count)).transpose()?,
-            changes: None,
-            pressure_changes: None,
+            changes: changes.unwrap_or_default(),
             products: vectors()?,
             preconditioned: vectors()?,
             inertia: memory::filled(0.0, solved_count)?,
@@ -303,10 +291,11 @@ impl Implicit {
             was_stale: true,
             memory: Experience::NONE,
             kept: Experience::NONE,
-            newton: None,
+            newton,
             report: SolverReport::BEFORE,
             told: SolverReport::default(),
-        })
+        };
+        Ok(Some(memory::boxed(it)?))
     }
 
     /// Makes room for so many nodes in all.
@@ -329,9 +318,6 @@ impl Implicit {
         self.solved_mut()
             .into_iter()
             .try_for_each(|vectors| vectors.reserve(count))?;
-        if let Some(records) = &mut self.search_records {
-            records.reserve(count)?;
-        }
         memory::reserve(&mut self.inertia, count)?;
         self.spectrum.reserve(count)?;
         self.blocks.reserve(count)?;
@@ -363,9 +349,6 @@ impl Implicit {
             return;
         }
         self.solved_mut().into_iter().for_each(|vectors| vectors.grow(count));
-        if let Some(records) = &mut self.search_records {
-            records.grow(count);
-        }
         self.inertia.resize(count, 0.0);
         self.blocks.grow(count);
         self.coarse.grow(count);
@@ -405,63 +388,15 @@ impl Implicit {
         }
     }
 
-    /// Where the equations are solved exactly, what that needs with the nodes that these springs have, and so many springs more.
-    pub fn roomier(
-        &self,
-        springs: &dyn Springs,
-        more: usize,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<Option<Newton>> {
-        let roomier = |newton: &Newton| newton.roomier(springs, more, elements, beside);
+    /// Where the equations are solved exactly, what that needs with the nodes that these forces have, and so many springs more.
+    pub fn roomier(&self, forces: &Forces, more: usize) -> Result<Option<Newton>> {
+        let roomier = |newton: &Newton| newton.roomier(forces, more);
         self.newton.as_ref().map(roomier).transpose()
     }
 
     /// Goes on with that.
     pub fn adopt(&mut self, newton: Newton) {
         self.newton = Some(newton);
-    }
-
-    /// What elements change by.
-    pub fn changes_mut(&mut self) -> Option<&mut Sums> {
-        self.changes.as_mut()
-    }
-
-    /// Makes room for what elements change by.
-    pub fn join(&mut self, elements: &Elements) -> Result<()> {
-        if self.newton.is_none() {
-            self.changes = Some(elements.room_for_changes()?);
-        }
-        Ok(())
-    }
-
-    /// Makes room for what pressures change by.
-    pub fn enclose(&mut self, enclosed: &Enclosed) -> Result<()> {
-        if self.newton.is_none() {
-            self.pressure_changes = Some(enclosed.room_for_changes()?);
-        }
-        Ok(())
-    }
-
-    /// As [`Self::new`], with the equations solved exactly, for these springs, elements, terms and cavities.
-    pub fn exact(
-        positions: &Vectors,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-        [order, budget]: [u32; 2],
-        accuracy: f32,
-    ) -> Result<Self> {
-        /// As good as nothing, and far above what rounding makes.
-        const ACCURACY: f32 = 1e-6;
-        /// For bodies of a million nodes.
-        const BUDGET: u32 = 100_000;
-        let budget = if budget == 0 { BUDGET } else { budget };
-        let accuracy = if accuracy == 0.0 { ACCURACY } else { accuracy };
-        Ok(Self {
-            newton: Some(Newton::new(positions.len(), springs, elements, beside)?),
-            ..Self::solving(&Vectors::zeros(0)?, positions.len(), false, order, budget, accuracy)?
-        })
     }
 
     /// Lets each step from now on take so many products at most; `u32::MAX`: as many as the definition allows.

@@ -297,8 +297,9 @@ impl Substep<'_> {
             if let Some(contacts) = &mut body.contacts {
                 contacts.remember(self.request.tools);
             }
-            body.age(self.step, self.team);
-            if body.remembers() {
+            let next = body.state.next_positions();
+            body.forces.age(self.step, next, self.team);
+            if body.forces.remember() {
                 // What was stored is lost by then.
                 implicit.histories[1 - implicit.settled].energy = None;
             }
@@ -322,7 +323,7 @@ impl Substep<'_> {
     }
 
     fn take(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
-        body.foresee(self.step);
+        body.forces.foresee(self.step);
         match self.foreseeing(body, implicit) {
             Some(foreseeing) => foreseeing.take_formula(body, implicit, before),
             None => End::Near,
@@ -372,31 +373,14 @@ impl Substep<'_> {
         const SIMILAR: f32 = 2.0;
         let time = self.formula.time as f32;
         let is_similar = (implicit.prepared / SIMILAR..=implicit.prepared * SIMILAR).contains(&time);
-        implicit.stale |= !is_similar && body.remembers();
+        implicit.stale |= !is_similar && body.forces.remember();
         let positions = body.state.newest().0;
         if implicit.stale {
+            let (forces, tangent) = (&body.forces, self.tangent());
+            implicit.blocks.gather(forces, positions, tangent, self.team);
             implicit
-                .blocks
-                .gather(&*body.springs, positions, self.tangent(), self.team);
-            implicit.coarse.gather(
-                &*body.springs,
-                &body.inverse_masses,
-                &body.pins,
-                positions,
-                self.tangent(),
-            );
-            if let Some(elements) = &body.elements {
-                implicit.blocks.add_elements(elements, positions);
-                implicit.coarse.add_elements(elements, &body.pins, positions);
-            }
-            if let Some(terms) = &body.terms {
-                implicit.blocks.add_terms(terms, positions);
-                implicit.coarse.add_terms(terms, &body.pins, positions);
-            }
-            if let Some(enclosed) = &body.enclosed {
-                implicit.blocks.add_enclosed(enclosed, positions);
-                implicit.coarse.add_enclosed(enclosed, positions);
-            }
+                .coarse
+                .gather(forces, &body.inverse_masses, &body.pins, positions, tangent);
             for pin in body.pins.partial() {
                 implicit.blocks.hold(pin.node as usize, pin.axes);
             }
@@ -469,7 +453,7 @@ impl Substep<'_> {
         let carried = self.formula.carried as f32;
         let (positions, velocities) = (state.positions, &*state.velocities);
         let predicted = body.predicted_velocities.as_mut().map(Vectors::tiles_mut);
-        let records = body.records.as_mut().map(Records::tiles_mut);
+        let records = body.forces.records.as_mut().map(Records::tiles_mut);
         let written = (
             state.next_positions.tiles_mut(),
             predicted,
@@ -520,7 +504,7 @@ impl Substep<'_> {
         let (history, pushes) = (&implicit.histories[place], &implicit.pushes);
         let time = self.formula.time as f32;
         let carried = self.formula.carried as f32;
-        let records = implicit.search_records.as_mut().map(Records::tiles_mut);
+        let records = implicit.changes.records.as_mut().map(Records::tiles_mut);
         let written = (implicit.searches.tiles_mut(), records);
         let kernel = body.kernel;
         self.team

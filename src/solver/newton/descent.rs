@@ -10,10 +10,7 @@ use super::matrix::Matrix;
 use super::network::Network;
 use crate::base::{Result, memory};
 use crate::codec::saved;
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
-use crate::springs::Springs;
-use crate::terms::Terms;
+use crate::forces::Forces;
 
 /// What may be missing of the solution of each linearised equation.
 const PART: f64 = 0.01;
@@ -78,14 +75,10 @@ pub(in crate::solver) struct Found {
 }
 
 impl Descent {
-    /// Of a body as it is.
-    pub fn new(
-        node_count: usize,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<Self> {
-        let network = Network::new(node_count, springs, elements, beside)?;
+    /// Of a body that these forces move.
+    pub fn new(forces: &Forces) -> Result<Self> {
+        let node_count = forces.springs.node_count();
+        let network = Network::new(forces)?;
         let pair_count = network.pair_count();
         Ok(Self {
             equation: Equation::new(node_count, network.ring_count(), network.member_count())?,
@@ -102,18 +95,6 @@ impl Descent {
         let pair_count = self.network.make_room(spring_count)?;
         self.matrix.make_room(pair_count)?;
         self.factor.make_room(pair_count)
-    }
-
-    /// Takes springs and elements as they are now, and terms and cavities themselves, until they are given back.
-    pub fn read(
-        &mut self,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        (terms, enclosed): (Option<Box<Terms>>, Option<Box<Enclosed>>),
-    ) {
-        self.network
-            .read(springs, elements, (terms.as_deref(), enclosed.as_deref()));
-        (self.network.terms, self.network.enclosed) = (terms, enclosed);
     }
 
     /// Writes what acts on each node.

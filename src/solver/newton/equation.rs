@@ -11,11 +11,9 @@ use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::contact::Holds;
 use crate::elements::Deformed;
-use crate::enclosed::Enclosed;
 use crate::nodes::Pins;
 use crate::solver::held::without_held;
 use crate::springs::Link;
-use crate::terms::Blocks;
 
 /// The function, and where on it we are.
 #[derive(Debug)]
@@ -150,12 +148,10 @@ impl Equation {
                 residuals[corner] += deformed.force(gradient);
             }
         }
-        if let Some(terms) = &network.terms {
-            terms.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
-        }
-        if let Some(enclosed) = &network.enclosed {
-            enclosed.show_forces(&|node| self.position(node), &mut |node, force| residuals[node] += force);
-        }
+        let at = |node: usize| self.position(node);
+        network
+            .beside
+            .show_forces(&at, &mut |node, force| residuals[node] += force);
         let way = |node: usize| self.ways[node];
         self.holds
             .show_forces(way, |node, force| residuals[node] += self.free_part(node, force));
@@ -210,12 +206,9 @@ impl Equation {
             }
         }
         let (way, more) = (|node: usize| self.ways[node], |node: usize| corrections[node] * part);
-        if let Some(terms) = &network.terms {
-            terms.show_changes(&|node| self.position(node), &more, &mut add);
-        }
-        if let Some(enclosed) = &network.enclosed {
-            enclosed.show_changes(&|node| self.position(node), &more, &mut add);
-        }
+        network
+            .beside
+            .show_changes(&|node| self.position(node), &more, &mut add);
         self.holds.show_changes(way, more, add);
         sums
     }
@@ -246,8 +239,8 @@ impl Equation {
             self.add_tetrahedron(element, tangent, matrix);
         }
         self.add_terms(network, tangent, matrix);
-        if let Some(enclosed) = network.enclosed.as_deref().filter(|_| tangent == Tangent::Exact) {
-            self.add_pressure(network, enclosed, matrix);
+        if tangent == Tangent::Exact {
+            self.add_pressure(network, matrix);
         }
         self.holds.show_blocks(|node, block| {
             if self.is_free(node) {
@@ -303,11 +296,8 @@ impl Equation {
     }
 
     fn add_terms(&self, network: &Network, tangent: Tangent, matrix: &mut Matrix) {
-        let Some(terms) = &network.terms else {
-            return;
-        };
-        let is_exact = tangent == Tangent::Exact;
-        terms.show_blocks(&|node| self.position(node), is_exact, &mut |nodes, blocks| {
+        let (at, is_exact) = (|node: usize| self.position(node), tangent == Tangent::Exact);
+        network.beside.show_blocks(&at, is_exact, &mut |nodes, blocks| {
             if tangent == Tangent::Factor && nodes.len() > 2 {
                 self.add_pairs(network, nodes, blocks, matrix);
                 return;
@@ -328,8 +318,9 @@ impl Equation {
 
     /// Adds what pressure does as a surface turns. It draws one way as much as it pushes another: there is nothing of it that a matrix
     /// without negative curvature could have.
-    fn add_pressure(&self, network: &Network, enclosed: &Enclosed, matrix: &mut Matrix) {
-        enclosed.show_blocks(&|node| self.position(node), &mut |[a, b], block| {
+    fn add_pressure(&self, network: &Network, matrix: &mut Matrix) {
+        let at = |node: usize| self.position(node);
+        network.beside.show_pressure_blocks(&at, &mut |[a, b], block| {
             if self.is_free(a as usize) && self.is_free(b as usize) {
                 matrix.beside[network.place([a, b])] += if a > b { block } else { block.transpose() };
             }
@@ -338,7 +329,7 @@ impl Equation {
 
     /// Adds to a matrix that is to be factorised a term of several nodes, as springs between those that draw each other: of a matrix
     /// whose nodes push each other too an incomplete factor may be anything.
-    fn add_pairs(&self, network: &Network, nodes: &[u32], blocks: &Blocks, matrix: &mut Matrix) {
+    fn add_pairs(&self, network: &Network, nodes: &[u32], blocks: &[[DMat3; 4]; 4], matrix: &mut Matrix) {
         for (a, &of_a) in nodes.iter().enumerate() {
             for (b, &of_b) in nodes[..a].iter().enumerate() {
                 let [x, y, z] = [0, 1, 2].map(|axis| blocks[a][b].col(axis)[axis]);
@@ -416,11 +407,10 @@ impl Equation {
         if !changes.is_empty() {
             self.add_products_of_rings(network, vectors, products, changes);
         }
-        if let Some(enclosed) = &network.enclosed {
-            enclosed.show_products(&|node| self.position(node), vectors, &mut |node, product| {
-                products[node] += self.free_part(node, product);
-            });
-        }
+        let at = |node: usize| self.position(node);
+        network.beside.show_products(&at, vectors, &mut |node, product| {
+            products[node] += self.free_part(node, product);
+        });
         let vector = |node: usize| vectors[node];
         self.holds.show_products(vector, |node, product| {
             products[node] += self.free_part(node, product);
@@ -476,10 +466,7 @@ impl Equation {
         for (pressure, volume) in self.pressures.iter().zip(&network.volumes) {
             of_elements += 0.5 * pressure * pressure * volume / network.kappa();
         }
-        let of_terms = network.terms.as_ref();
-        let of_terms = of_terms.map_or(0.0, |terms| terms.energy(&|node| self.position(node)));
-        let of_cavities = network.enclosed.as_ref();
-        let [stored, work] = of_cavities.map_or([0.0; 2], |enclosed| enclosed.energy(&|node| self.position(node)));
+        let [of_terms, stored, work] = network.beside.energy(&|node| self.position(node));
         let loads = self.loads.iter().enumerate();
         elastic + of_elements + of_terms + stored
             - work

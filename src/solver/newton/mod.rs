@@ -22,11 +22,8 @@ pub(super) use step::Aimed;
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::elements::Elements;
-use crate::enclosed::Enclosed;
+use crate::forces::Forces;
 use crate::soa::Vectors;
-use crate::springs::Springs;
-use crate::terms::Terms;
 use descent::Descent;
 use step::exact;
 
@@ -47,30 +44,20 @@ saved!(Newton {
 });
 
 impl Newton {
-    /// For a body as it is.
-    pub fn new(
-        node_count: usize,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<Self> {
+    /// For a body that these forces move.
+    pub fn new(forces: &Forces) -> Result<Self> {
+        let node_count = forces.springs.node_count();
         Ok(Self {
-            descent: Descent::new(node_count, springs, elements, beside)?,
+            descent: Descent::new(forces)?,
             remainders: [Vectors::zeros(node_count)?, Vectors::zeros(node_count)?],
-            growths: memory::filled(0.0, elements.map_or(0, |elements| elements.ring_count_of(node_count)))?,
+            growths: memory::filled(0.0, forces.ring_count())?,
         })
     }
 
-    /// The same for the nodes that these springs have now, with room for so many springs more; positions keep what they lack.
-    pub fn roomier(
-        &self,
-        springs: &dyn Springs,
-        more: usize,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<Self> {
-        let mut roomier = Self::new(springs.node_count(), springs, elements, beside)?;
-        roomier.make_room(springs.spring_count() + more)?;
+    /// The same for the nodes that these forces have now, with room for so many springs more; positions keep what they lack.
+    pub fn roomier(&self, forces: &Forces, more: usize) -> Result<Self> {
+        let mut roomier = Self::new(forces)?;
+        roomier.make_room(forces.springs.spring_count() + more)?;
         for (vectors, before) in roomier.remainders.iter_mut().zip(&self.remainders) {
             for (node, vector) in before.iter().enumerate() {
                 vectors.set(node, vector);
@@ -95,45 +82,11 @@ impl Newton {
         self.remainders[place].clear();
     }
 
-    /// The energy of springs, elements, terms and cavities, J, with nodes at these positions and what they lack; and the work that a
-    /// constant pressure has done.
-    pub fn elastic(
-        &mut self,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        (terms, enclosed): (Option<&Terms>, Option<&Enclosed>),
-        positions: &Vectors,
-        place: usize,
-    ) -> [f64; 2] {
-        let exact = |node: usize| exact(positions.get(node), self.remainders[place].get(node));
-        let mut sum = 0.0;
-        for node in 0..positions.len() {
-            let position = exact(node);
-            springs.visit(node, &mut |link| {
-                let neighbour = link.neighbour as usize;
-                if neighbour < node {
-                    let stretch = position.distance(exact(neighbour)) - f64::from(link.rest_length);
-                    sum += 0.5 * f64::from(link.stiffness) * stretch * stretch;
-                }
-            });
-        }
-        if let Some(elements) = elements {
-            let remainders = &self.remainders[place];
-            let position = |node: usize| step::exact(positions.get(node), remainders.get(node));
-            sum += elements.exact_energy(position, &mut self.growths);
-        }
-        if let Some(terms) = terms {
-            let remainders = &self.remainders[place];
-            sum += terms.energy(&|node| step::exact(positions.get(node), remainders.get(node)));
-        }
-        let mut work = 0.0;
-        if let Some(enclosed) = enclosed {
-            let remainders = &self.remainders[place];
-            let [stored, done] = enclosed.energy(&|node| step::exact(positions.get(node), remainders.get(node)));
-            sum += stored;
-            work = done;
-        }
-        [sum, work]
+    /// The energy of these forces, J, with nodes at these positions and what they lack; and the work that a constant pressure has done.
+    pub fn elastic(&mut self, forces: &Forces, positions: &Vectors, place: usize) -> [f64; 2] {
+        let remainders = &self.remainders[place];
+        let at = |node: usize| exact(positions.get(node), remainders.get(node));
+        forces.exact_energy(at, &mut self.growths)
     }
 
     /// What the next step depends on.

@@ -5,9 +5,8 @@ use std::ops::Range;
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::elements::{Elements, Law, Load, Rest};
-use crate::enclosed::Enclosed;
-use crate::springs::{Link, Springs};
-use crate::terms::Terms;
+use crate::forces::{Beside, Forces};
+use crate::springs::Link;
 
 /// For each node the springs to nodes of lower numbers, in their order; pairs of nodes that only elements or terms join are springs of
 /// no stiffness.
@@ -20,8 +19,7 @@ pub(super) struct Network {
     /// On each of them, where elements remember; none otherwise.
     loads: Vec<Load>,
     /// Lent by the body while it is solved.
-    pub terms: Option<Box<Terms>>,
-    pub enclosed: Option<Box<Enclosed>>,
+    pub beside: Beside,
     /// The pairs of nodes of tetrahedra, terms and closed surfaces, the higher number first.
     edges: Vec<[u32; 2]>,
     law: Option<Law>,
@@ -38,8 +36,7 @@ saved!(Network {
     links,
     tetrahedra,
     loads,
-    terms,
-    enclosed,
+    beside,
     edges,
     law,
     volumes,
@@ -76,49 +73,38 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
 }
 
 /// Shows the pairs of nodes of each term, and of each triangle of a closed surface.
-fn show_pairs((terms, enclosed): (Option<&Terms>, Option<&Enclosed>), see: &mut dyn FnMut([u32; 2])) {
-    let mut show = |nodes: &[u32]| {
+fn show_pairs(beside: &Beside, see: &mut dyn FnMut([u32; 2])) {
+    beside.show_nodes(&mut |nodes, _| {
         for (place, &a) in nodes.iter().enumerate() {
             nodes[..place].iter().for_each(|&b| see(ordered([a, b])));
         }
-    };
-    if let Some(terms) = terms {
-        terms.show_nodes(&mut |nodes, _| show(nodes));
-    }
-    if let Some(enclosed) = enclosed {
-        enclosed.show_triangles(&mut |corners| show(&corners));
-    }
+    });
 }
 
 impl Network {
-    /// That of a body as it is.
-    pub fn new(
-        node_count: usize,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-    ) -> Result<Self> {
+    /// That of a body that these forces move.
+    pub fn new(forces: &Forces) -> Result<Self> {
+        let (node_count, elements) = (forces.springs.node_count(), forces.elements());
         let mut pair_count = 6 * elements.map_or(0, Elements::count);
-        show_pairs(beside, &mut |_| pair_count += 1);
+        show_pairs(&forces.beside, &mut |_| pair_count += 1);
         let tetrahedron_count = elements.map_or(0, Elements::count);
-        let ring_count = elements.map_or(0, |elements| elements.ring_count_of(node_count));
+        let ring_count = forces.ring_count();
         let may_load_rings = elements.is_some_and(Elements::may_load_rings);
         let remember = elements.is_some_and(Elements::remember);
         let mut network = Self {
             starts: memory::filled(0, node_count + 1)?,
-            links: memory::reserved(springs.spring_count() + pair_count)?,
+            links: memory::reserved(forces.springs.spring_count() + pair_count)?,
             tetrahedra: memory::reserved(tetrahedron_count)?,
             loads: memory::reserved(if remember { tetrahedron_count } else { 0 })?,
             ring_loads: memory::reserved(if may_load_rings { ring_count } else { 0 })?,
-            terms: None,
-            enclosed: None,
+            beside: Beside::default(),
             edges: memory::reserved(pair_count)?,
             law: None,
             volumes: memory::filled(0.0, ring_count)?,
             ring_starts: memory::filled(0, if ring_count > 0 { ring_count + 1 } else { 0 })?,
             ring_members: memory::filled(0, if ring_count > 0 { 4 * tetrahedron_count } else { 0 })?,
         };
-        network.read(springs, elements, beside);
+        network.read(forces);
         Ok(network)
     }
 
@@ -129,18 +115,9 @@ impl Network {
         Ok(pair_count)
     }
 
-    /// Gives back what was lent.
-    pub fn give_back(&mut self) -> (Option<Box<Terms>>, Option<Box<Enclosed>>) {
-        (self.terms.take(), self.enclosed.take())
-    }
-
     /// Takes them from a body, which allocates nothing where there is room for all.
-    pub fn read(
-        &mut self,
-        springs: &dyn Springs,
-        elements: Option<&Elements>,
-        beside: (Option<&Terms>, Option<&Enclosed>),
-    ) {
+    pub fn read(&mut self, forces: &Forces) {
+        let elements = forces.elements();
         self.tetrahedra.clear();
         self.loads.clear();
         self.ring_loads.clear();
@@ -160,17 +137,17 @@ impl Network {
                 });
             });
         }
-        show_pairs(beside, &mut |pair| self.edges.push(pair));
+        show_pairs(&forces.beside, &mut |pair| self.edges.push(pair));
         self.edges.sort_unstable();
         self.edges.dedup();
-        if let Some(elements) = elements.filter(|elements| elements.ring_count() > 0) {
+        if let Some(elements) = elements.filter(|_| !self.volumes.is_empty()) {
             self.read_rings(elements);
         }
         self.links.clear();
         let mut edges = self.edges.iter().peekable();
         for node in 0..self.node_count() {
             let start = self.links.len();
-            springs.visit(node, &mut |link| {
+            forces.springs.visit(node, &mut |link| {
                 if (link.neighbour as usize) < node {
                     self.links.push(link);
                 }

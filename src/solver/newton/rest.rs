@@ -4,7 +4,6 @@ use glam::{BVec3, DVec3, Vec3};
 
 use super::descent::{Descent, Found, Goal};
 use crate::base::{Error, Result, memory};
-use crate::elements::Elements;
 use crate::solver::System;
 
 /// Linearised equations solved at most.
@@ -55,21 +54,19 @@ pub(crate) fn rest_state(
     definition: &RestStateDefinition,
 ) -> Result<RestStateReport> {
     // At rest nothing that is viscous holds anything.
-    body.release();
-    let beside = (body.terms.as_deref(), body.enclosed.as_deref());
-    let mut descent = Descent::new(body.node_count(), &*body.springs, body.elements.as_deref(), beside)?;
-    (descent.network.terms, descent.network.enclosed) = (body.terms.take(), body.enclosed.take());
+    body.forces.release(body.state.positions());
+    let mut descent = Descent::new(&body.forces)?;
+    descent.network.beside = std::mem::take(&mut body.forces.beside);
     descent.equation.pins = std::mem::take(&mut body.pins);
     let found = find(&mut descent, body, gravity, definition);
-    (body.terms, body.enclosed) = descent.network.give_back();
+    body.forces.beside = std::mem::take(&mut descent.network.beside);
     body.pins = std::mem::take(&mut descent.equation.pins);
     if found.is_err() {
-        body.recall();
+        body.forces.recall();
     }
     let report = found?;
-    let yields = |elements: &Elements| elements.yield_at(|node| descent.equation.position(node));
-    if body.elements.as_deref().is_some_and(yields) {
-        body.recall();
+    if body.forces.yield_at(|node| descent.equation.position(node)) {
+        body.forces.recall();
         return Err(Error::NotConverged(
             "tetrahedra would yield in the state of rest that was found: it is not one".into(),
         ));
@@ -227,22 +224,12 @@ impl Parts {
                 parts.lowest[a.max(b) as usize] = a.min(b);
             }
         }
-        if let Some(terms) = &descent.network.terms {
-            terms.show_nodes(&mut |nodes, stiffness| {
-                for &other in nodes[1..].iter().filter(|_| stiffness > 0.0) {
-                    let [a, b] = [nodes[0], other].map(|end| parts.find(end));
-                    parts.lowest[a.max(b) as usize] = a.min(b);
-                }
-            });
-        }
-        if let Some(enclosed) = &descent.network.enclosed {
-            enclosed.show_triangles(&mut |nodes| {
-                for &other in &nodes[1..] {
-                    let [a, b] = [nodes[0], other].map(|end| parts.find(end));
-                    parts.lowest[a.max(b) as usize] = a.min(b);
-                }
-            });
-        }
+        descent.network.beside.show_nodes(&mut |nodes, are_joined| {
+            for &other in nodes[1..].iter().filter(|_| are_joined) {
+                let [a, b] = [nodes[0], other].map(|end| parts.find(end));
+                parts.lowest[a.max(b) as usize] = a.min(b);
+            }
+        });
         for node in 0..node_count as u32 {
             parts.lowest[node as usize] = parts.find(node);
         }
@@ -275,8 +262,7 @@ impl Parts {
             sums.load += equation.loads[node];
             sums.size += equation.loads[node].length();
             sums.mass += equation.masses[node];
-            let terms = descent.network.terms.as_ref();
-            let is_held = !equation.is_free(node) || terms.is_some_and(|terms| terms.holds(node));
+            let is_held = !equation.is_free(node) || descent.network.beside.holds(node);
             sums.held |= BVec3::splat(is_held) | equation.pins.partial_axes_of(node as u32);
         }
         for (node, &part) in self.lowest.iter().enumerate() {

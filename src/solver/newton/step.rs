@@ -40,8 +40,8 @@ impl Newton {
     /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
     /// there.
     pub(in crate::solver) fn solve(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) -> Found {
-        let beside = (body.terms.take(), body.enclosed.take());
-        self.descent.read(&*body.springs, body.elements.as_deref(), beside);
+        self.descent.network.read(&body.forces);
+        self.descent.network.beside = std::mem::take(&mut body.forces.beside);
         self.set_up(body, aimed, pushes);
         self.descent.equation.pins = std::mem::take(&mut body.pins);
         if let Some(contacts) = &mut body.contacts {
@@ -61,7 +61,7 @@ impl Newton {
         });
         self.descent.weigh();
         self.descent.equation.press();
-        (body.terms, body.enclosed) = self.descent.network.give_back();
+        body.forces.beside = std::mem::take(&mut self.descent.network.beside);
         body.pins = std::mem::take(&mut self.descent.equation.pins);
         if let Some(contacts) = &mut body.contacts {
             contacts.holds = std::mem::take(&mut self.descent.equation.holds);
@@ -77,7 +77,7 @@ impl Newton {
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
         let dampings = body.damping.as_ref().map(|damping| damping.rates());
         let state = body.state.substep();
-        equation.rate = if body.springs.damped() { rate } else { 0.0 };
+        equation.rate = if body.forces.springs.damped() { rate } else { 0.0 };
         for node in 0..body.masses.len() {
             let velocity = state.velocities.get(node).as_dvec3();
             let mass = f64::from(body.masses[node]);
