@@ -25,6 +25,11 @@ pub(crate) const LEVERAGE: f32 = 4.0;
 /// Between two sweeps over all contacts so many go over those that press: what does not press seldom begins to.
 const BETWEEN: u32 = 3;
 
+/// Sweeps are slow where one over all changes this part of what the last such did, once that is little, as a part of what the first one did. Contacts
+/// that share what they give do so for long, and hardly move anything.
+const SLOW: f32 = 0.9;
+const LITTLE: f32 = 0.01;
+
 /// What a sweep goes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sweep {
@@ -40,6 +45,8 @@ pub(crate) struct Effort {
     pub sweeps: u32,
     /// What a sweep changes is nothing, as a part of what the first one did.
     pub converged: f32,
+    /// Whether what sweeps change slowly is left to the next substep, which begins with what they gave.
+    pub goes_on_later: bool,
 }
 
 impl Effort {
@@ -48,6 +55,7 @@ impl Effort {
         Self {
             sweeps,
             converged: CONVERGED,
+            goes_on_later: false,
         }
     }
 }
@@ -57,13 +65,17 @@ impl Effort {
 pub(crate) fn relax(effort: Effort, first: Option<f32>, mut sweep: impl FnMut(Sweep) -> f32) -> f32 {
     let mut first = first;
     let mut left = effort.sweeps;
+    let mut before = f32::INFINITY;
     while left > 0 {
         left -= 1;
         let largest = sweep(Sweep::All);
-        let still = effort.converged * *first.get_or_insert(largest);
-        if !(largest > still) {
+        let first = *first.get_or_insert(largest);
+        let still = effort.converged * first;
+        let is_slow = largest > SLOW * before && largest < LITTLE * first;
+        if !(largest > still) || effort.goes_on_later && is_slow {
             break;
         }
+        before = largest;
         for _ in 0..BETWEEN.min(left) {
             left -= 1;
             if !(sweep(Sweep::Pressing) > still) {

@@ -1,4 +1,4 @@
-//! When a moving node, edge or face first touches a moving tool: conservative advancement.
+//! When a moving node, edge or face first touches a moving tool: conservative advancement along the direction between the closest points (Mirtich 1996).
 
 use glam::Vec3;
 
@@ -9,6 +9,13 @@ use crate::geometry::Bounds;
 
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
 pub(super) const TOUCHING: f32 = 1e-4;
+
+/// The same of tissue, which is found where it is when the substep begins.
+const TISSUE_TOUCHING: f32 = 1e-2;
+
+/// What rounding does to places along a direction, as a part of them; the direction of an offset that is this part of them is known well enough.
+const ROUNDING: f32 = 1e-6;
+const SHORT: f32 = 1e-5;
 
 /// A way of this part of half a mesh's least extent is not searched: it is too short to pass anything.
 pub(super) const FLAT: f32 = 0.01;
@@ -68,6 +75,46 @@ impl Segment {
     /// How far its ends go.
     pub fn travel(&self) -> f32 {
         self.steps[0].length().max(self.steps[1].length())
+    }
+}
+
+/// Where the corners of a feature and the ends of a segment are along one direction, m, and how far they go along it in a substep, m. Both are
+/// convex: along the direction between their closest points they are no closer than these are, now or later.
+struct Along {
+    corners: [(f32, f32); 3],
+    ends: [(f32, f32); 2],
+    /// How much nearer rounding may have them be, m.
+    rounding: f32,
+}
+
+impl Along {
+    /// How far they are apart along it at least until after this part of a substep: now or then, as what is least of straight ways.
+    fn least_until(&self, time: f32) -> f32 {
+        let apart = |time: f32| {
+            let at = |&(place, step): &(f32, f32)| place + step * time;
+            let nearest = self.corners.iter().map(at).fold(f32::INFINITY, f32::min);
+            nearest - self.ends.iter().map(at).fold(f32::NEG_INFINITY, f32::max)
+        };
+        apart(0.0).min(apart(time)) - self.rounding
+    }
+
+    /// After which part of a substep the first of them come as close as `radius`, at the earliest.
+    fn time_to(&self, radius: f32) -> f32 {
+        let radius = radius + self.rounding;
+        let mut first = f32::INFINITY;
+        for corner in &self.corners {
+            for end in &self.ends {
+                let (gap, closing) = (corner.0 - end.0 - radius, end.1 - corner.1);
+                // Where rounding has the direction be another, they may be that close along it now.
+                if gap <= 0.0 {
+                    return 0.0;
+                }
+                if closing > 0.0 {
+                    first = first.min(gap / closing);
+                }
+            }
+        }
+        first
     }
 }
 
@@ -132,6 +179,32 @@ impl Corners {
         }
     }
 
+    /// What is along the direction of this offset at `time`; `None` where rounding decides that. A face is compared with the segment's first end
+    /// alone.
+    fn along(&self, segment: &Segment, offset: Vec3, time: f32) -> Option<Along> {
+        let distance = offset.length();
+        let normal = offset / distance;
+        let mut size = Vec3::ZERO;
+        let mut along = |place: Vec3, step: Vec3| {
+            let place = place - segment.ends[0];
+            size = size.max(place.abs() + step.abs());
+            let step_along = step.dot(normal);
+            (place.dot(normal) + step_along * time, step_along)
+        };
+        let last_end = usize::from(self.count < 3);
+        let ends = [0, last_end].map(|end| along(segment.ends[end], segment.steps[end]));
+        let corners = [0, 1, 2].map(|index| {
+            let corner = index.min(self.count - 1);
+            along(self.points[corner], self.steps[corner])
+        });
+        let size = size.max_element();
+        (distance > SHORT * size).then(|| Along {
+            corners,
+            ends,
+            rounding: ROUNDING * size,
+        })
+    }
+
     /// How much closer they can come over the whole substep.
     pub fn closing(&self, segment: &Segment) -> f32 {
         let mut closing = 0.0_f32;
@@ -146,14 +219,23 @@ impl Corners {
     /// The separation when they first touch, or at the end of the substep where they do not; `None` where they stay
     /// further apart than the radius and `margin`, as far as they do not touch.
     pub fn approach(&self, segment: &Segment, margin: f32) -> Option<Separation> {
-        self.approach_from(self.separation(segment, 0.0), segment, margin)
+        let touching = TOUCHING * segment.radius;
+        let start = self.separation(segment, 0.0);
+        self.approach_from(
+            start,
+            (segment, self.closing(segment)),
+            [touching, margin.max(touching)],
+        )
     }
 
-    /// The same, where the separation as the substep begins is known.
-    pub fn approach_from(&self, start: Separation, segment: &Segment, margin: f32) -> Option<Separation> {
-        let closing = self.closing(segment);
-        let touching = TOUCHING * segment.radius;
-        let margin = margin.max(touching);
+    /// The same, where the separation as the substep begins is known, how much closer they can come, and what gap counts as touching, m, no more than
+    /// the margin.
+    fn approach_from(
+        &self,
+        start: Separation,
+        (segment, closing): (&Segment, f32),
+        [touching, margin]: [f32; 2],
+    ) -> Option<Separation> {
         let mut separation = start;
         let mut gap = separation.offset.length() - segment.radius;
         if !(gap <= closing + margin) {
@@ -164,7 +246,14 @@ impl Corners {
             if gap <= touching {
                 return Some(separation);
             }
-            time += gap / closing;
+            // Whether they touch that are so close is for rounding to say.
+            let Some(along) = self.along(segment, separation.offset, time) else {
+                return Some(separation);
+            };
+            if along.least_until(1.0 - time) > segment.radius + margin {
+                return None;
+            }
+            time += (gap / closing).max(along.time_to(segment.radius));
             if !(time < 1.0) {
                 let last = self.separation(segment, 1.0);
                 return (last.offset.length() - segment.radius <= margin).then_some(last);
@@ -183,7 +272,8 @@ impl Corners {
         if !(gap <= closing + ahead) {
             return None;
         }
-        if let Some(touch) = self.approach_from(start, segment, 0.0) {
+        let touching = TISSUE_TOUCHING * segment.radius;
+        if let Some(touch) = self.approach_from(start, (segment, closing), [touching; 2]) {
             return Some((touch, false));
         }
         if gap <= ahead {
@@ -193,7 +283,8 @@ impl Corners {
             radius: segment.radius + ahead,
             ..*segment
         };
-        self.approach_from(start, &wider, 0.0).map(|found| (found, true))
+        self.approach_from(start, (&wider, closing), [touching; 2])
+            .map(|found| (found, true))
     }
 
     /// The same for what a mesh encloses, in whose own frame the corners are: also when that is, a fraction of the substep. They touch

@@ -50,6 +50,7 @@ const SEARCHES: u32 = 16;
 const EFFORT: Effort = Effort {
     sweeps: 32,
     converged: 2.5e-4,
+    goes_on_later: true,
 };
 
 /// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
