@@ -198,7 +198,7 @@ impl Corners {
             along(self.points[corner], self.steps[corner])
         });
         let size = size.max_element();
-        (distance > SHORT * size).then(|| Along {
+        (distance > SHORT * size).then_some(Along {
             corners,
             ends,
             rounding: ROUNDING * size,
