@@ -50,7 +50,7 @@ const SEARCHES: u32 = 16;
 const EFFORT: Effort = Effort {
     sweeps: 32,
     converged: 2.5e-4,
-    goes_on_later: false,
+    goes_on_later: true,
 };
 
 /// An edge meets so many edges at most. With the closest alone, an edge that lies across several would be held up by each in turn, and tremble.
@@ -552,12 +552,6 @@ impl Tissue {
     fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) -> bool {
         let mut first = None;
         let mut has_begun = false;
-        let mut members = self.islands.members(island).iter();
-        let effort = Effort {
-            // What long substeps leave is too much to be left to the next.
-            goes_on_later: members.all(|&place| bodies.at(place as usize).is_none_or(|body| body.implicit.is_none())),
-            ..EFFORT
-        };
         for _ in 0..SEARCHES {
             let known = self.links.len();
             if has_begun {
@@ -594,7 +588,7 @@ impl Tissue {
             if recalled > 0.0 {
                 first = Some(first.map_or(recalled, |first: f32| first.max(recalled)));
             }
-            first = Some(relax(effort, first, |sweep| {
+            first = Some(relax(EFFORT, first, |sweep| {
                 let links = links.iter_mut().filter(|link| sweep == Sweep::All || link.presses());
                 let changes = links.map(|link| link.solve(skins));
                 let mut changed = changes.fold(0.0, f32::max).max(bonds.sweep(skins, moment));
