@@ -255,11 +255,14 @@ impl Body {
         let System {
             forces, order, state, ..
         } = &mut self.system;
+        let Some(elements) = forces.elements_mut() else {
+            return;
+        };
         for pieces in changes.nodes.chunk_by(|a, b| a.source == b.source) {
             let copies = pieces.iter().map(|piece| order.own(piece.node));
             let cells_at = |node: u32| material.tetrahedra_at(order.caller(node));
             let source = order.own(pieces[0].source);
-            forces.part_ring(source, copies, cells_at, state.positions());
+            elements.part_ring(source, copies, cells_at, state.positions());
         }
     }
 

@@ -10,7 +10,8 @@ use crate::geometry::Bounds;
 /// A gap of this part of the tool's radius, or of half its least extent, counts as touching.
 pub(super) const TOUCHING: f32 = 1e-4;
 
-/// The same of tissue, which is found where it is when the substep begins.
+/// The same of tissue, as a part of what it keeps off. When the touch is found says only which way it presses: how far apart the sides are is taken
+/// as the substep begins.
 const TISSUE_TOUCHING: f32 = 1e-2;
 
 /// What rounding does to places along a direction, as a part of them; the direction of an offset that is this part of them is known well enough.

@@ -139,6 +139,11 @@ impl Forces {
         self.elements.as_deref()
     }
 
+    /// The same, to be changed.
+    pub fn elements_mut(&mut self) -> Option<&mut Elements> {
+        self.elements.as_deref_mut()
+    }
+
     /// `positions`, with what forces gather of them.
     pub fn view<'a>(&'a self, positions: &'a Vectors) -> View<'a> {
         positions.view().with_records(self.records.as_ref())
@@ -245,10 +250,14 @@ impl Forces {
         stiffness + self.elements().map_or(0.0, |elements| elements.stiffness_of(node))
     }
 
-    /// Shows the pairs of nodes that springs and elements join, some more than once.
+    /// Shows the pairs of nodes that springs and elements join, those of springs once.
     pub fn show_joined(&self, see: &mut dyn FnMut(u32, u32)) {
         for node in 0..self.springs.node_count() {
-            self.springs.visit(node, &mut |link| see(node as u32, link.neighbour));
+            self.springs.visit(node, &mut |link| {
+                if link.neighbour > node as u32 {
+                    see(node as u32, link.neighbour);
+                }
+            });
         }
         let mut show = |[a, b, c, d]: [u32; 4]| {
             let pairs = [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]];

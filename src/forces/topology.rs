@@ -81,19 +81,6 @@ impl Forces {
             .for_each(|terms| terms.take_parts(node_count));
     }
 
-    /// The rings of nodes that fell apart, of a source and its copies, have parts of how they are deformed; given the cells at each.
-    pub fn part_ring<Cells: Iterator<Item = u32>>(
-        &mut self,
-        source: u32,
-        copies: impl Iterator<Item = u32> + Clone,
-        cells_at: impl Fn(u32) -> Cells,
-        positions: &Vectors,
-    ) {
-        if let Some(elements) = &mut self.elements {
-            elements.part_ring(source, copies, cells_at, positions);
-        }
-    }
-
     /// Makes bounds of elements those of these masses, where a cut has changed the elements, springs or masses of these nodes; given the
     /// cells at each.
     pub fn find_rates_at<Cells: Iterator<Item = u32>>(
