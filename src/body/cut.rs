@@ -10,7 +10,7 @@ use crate::elements::PieceOfElement;
 use crate::forces::Parts;
 use crate::nodes::{Bound, NewNode};
 use crate::soa::NodeOrder;
-use crate::solver::{System, close_beside};
+use crate::solver::{Changed, System, close_beside};
 use crate::springs::{Change, Rewiring};
 use crate::terms::Parting;
 use crate::tissue::{Skin, SkinChange, SurfaceToBe};
@@ -277,10 +277,9 @@ impl Body {
             corners.sort_unstable();
             (before != corners).then(|| before.map(|node| order.own(node)))
         });
-        let opened = forces.open_cavities(before);
-        if let Some(implicit) = self.system.implicit.as_mut().filter(|_| opened) {
+        if forces.open_cavities(before) {
             // What a step of second order takes from the last, pressure gave.
-            implicit.forget_history();
+            self.system.changed(Changed::Course);
         }
     }
 

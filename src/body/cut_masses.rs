@@ -8,7 +8,7 @@ use crate::base::{Result, memory};
 use crate::cutting::{Changes, CutMaterial};
 use crate::def::SMALLEST_MASS;
 use crate::soa::Masses;
-use crate::solver::{Candidate, System, make_up_for};
+use crate::solver::{Candidate, Changed, System, make_up_for};
 use crate::springs::Rewiring;
 
 /// A node whose springs or mass a cut changes.
@@ -151,9 +151,7 @@ impl Body {
 
     /// Has nodes go on after their springs and masses have changed: closing the last step gives them what it would have given.
     pub(super) fn go_on(&mut self, touched: &[Touched], nodes: &[u32], candidates: Vec<Candidate>) {
-        self.system.forces_current = false;
-        self.system.carry.forget();
-        self.system.wake();
+        self.system.changed(Changed::Topology);
         self.forget_velocities();
         self.system.scale_for_springs(nodes);
         for touched in touched {
@@ -169,8 +167,5 @@ impl Body {
                 .carry
                 .stability
                 .cut(nodes, &*self.system.forces.springs, masses, positions, watched);
-        if let Some(implicit) = &mut self.system.implicit {
-            implicit.forget_matrix();
-        }
     }
 }

@@ -6,7 +6,7 @@ use super::Body;
 use crate::base::{Error, Result, finite, memory, not_negative};
 use crate::def::{Spring, distance, expect_count, finite_vector, finite_vectors};
 use crate::geometry::Bounds;
-use crate::solver::{GravityKicks, Stability, close, make_up_for};
+use crate::solver::{Changed, GravityKicks, close, make_up_for};
 use crate::springs::{Link, already_joined, not_joined, pull};
 
 impl Body {
@@ -107,9 +107,7 @@ impl Body {
     pub(super) fn follow_velocities(&mut self) {
         self.system.follow_nodes();
         self.system.carry.gravity = GravityKicks::new(Bounds::of(self.system.state.velocities().iter()));
-        if let Some(implicit) = &mut self.system.implicit {
-            implicit.forget_history();
-        }
+        self.system.changed(Changed::Course);
     }
 
     /// Holds `node` where it is, from now on; nothing where it is held already.
@@ -166,7 +164,7 @@ impl Body {
             applied.set(own as usize, Vec3::select(axes, Vec3::ZERO, force));
         }
         self.system.scale_masses(self.system.carry.masses_for);
-        self.system.forget_matrix();
+        self.system.changed(Changed::Pin);
         Ok(())
     }
 
@@ -186,7 +184,7 @@ impl Body {
             self.system.pins.remove(own);
             self.system.inverse_masses[own as usize] = 1.0 / mass;
             self.system.scale_masses(self.system.carry.masses_for);
-            self.system.forget_matrix();
+            self.system.changed(Changed::Pin);
         }
         Ok(())
     }
@@ -269,7 +267,7 @@ impl Body {
         if let Some(sleeper) = &mut self.system.sleeper {
             sleeper.join([a, b].map(|node| self.system.order.own(node)));
         }
-        self.system.forget_stiffness();
+        self.system.changed(Changed::Stiffness);
         self.make_up_for_spring(Link::ends(&spring), -1.0);
         let nodes = [nodes[0].min(nodes[1]), nodes[0].max(nodes[1])];
         self.system.scale_for_springs(&nodes);
@@ -299,7 +297,7 @@ impl Body {
         }
         let removed = self.system.forces.remove_edge(own_a, own_b);
         if removed > 0 {
-            self.system.forget_stiffness();
+            self.system.changed(Changed::Stiffness);
             // Rings of fewer tetrahedra have other pressures, of which nothing was deformed.
             self.system.forces.measure_anew(self.system.state.positions());
         }
@@ -322,9 +320,7 @@ impl Body {
                 "pressure is {pressure} Pa, and the body was made with neither an enclosed_stiffness nor a pressure"
             )));
         }
-        self.system.forces_current = false;
-        self.system.wake();
-        self.system.forget_energy();
+        self.system.changed(Changed::Pressure);
         Ok(())
     }
 
@@ -356,7 +352,7 @@ impl Body {
         if let Some(tears) = &mut self.tears {
             tears.remove([own_a, own_b]);
         }
-        self.system.forget_stiffness();
+        self.system.changed(Changed::Stiffness);
         let other = Link {
             neighbour: own_a,
             ..link
@@ -368,7 +364,7 @@ impl Body {
         }
         // What was stable still is; nothing limits what has no springs.
         if self.system.forces.springs.spring_count() == 0 {
-            self.system.carry.stability = Stability::UNKNOWN;
+            self.system.changed(Changed::Softer);
         }
         Ok(())
     }
@@ -405,11 +401,7 @@ impl Body {
         let own = self.system.order.own(node) as usize;
         self.system.state.velocities_mut().set(own, velocity);
         self.forget_velocities();
-        self.system.carry.forget();
-        if self.system.forces.springs.damped() {
-            self.system.forces_current = false;
-            self.system.wake();
-        }
+        self.system.changed(Changed::Velocity);
     }
 
     pub(crate) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {

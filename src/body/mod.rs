@@ -59,8 +59,8 @@ use crate::nodes::{NodeDamping, Pins, State};
 use crate::readers::Shown;
 use crate::slots::Slots;
 use crate::solver::{
-    Carry, CoarseStep, EnergyAccount, GravityKicks, Implicit, MassScaling, MayBeCut, Pace, RestStateDefinition,
-    RestStateReport, Stability, Sums, Survey, System, Systems, Watched, rest_state,
+    Carry, Changed, CoarseStep, EnergyAccount, GravityKicks, Implicit, MassScaling, MayBeCut, Pace,
+    RestStateDefinition, RestStateReport, Stability, Sums, Survey, System, Systems, Watched, rest_state,
 };
 use crate::threads::Team;
 pub(crate) use material_point::MaterialPoint;
@@ -471,7 +471,7 @@ impl Body {
         self.show(&Team::alone());
         self.system.grasp_anew();
         self.system.forces.relax(self.system.state.positions());
-        self.system.forget_motion();
+        self.system.changed(Changed::Positions);
     }
 
     /// Moves it to where it is at rest.
@@ -498,7 +498,7 @@ impl Body {
         }
         self.system.origin += shift;
         self.system.forces.move_origin(self.system.origin);
-        self.system.wake();
+        self.system.changed(Changed::Origin);
         let positions = self.system.state.positions_mut();
         for node in 0..positions.len() {
             positions.set(node, (positions.get(node).as_dvec3() - shift).as_vec3());
@@ -506,9 +506,6 @@ impl Body {
         // Exact, as for the nodes: their sides are coordinates of nodes.
         for bounds in &mut self.system.boxes {
             *bounds = bounds.moved(-shift);
-        }
-        if let Some(contacts) = &mut self.system.contacts {
-            contacts.forget();
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::Body;
 use crate::base::{Error, Result, above_zero, memory, not_negative};
 use crate::soa::{Region, Scale};
+use crate::solver::Changed;
 use crate::springs::{Change, Link};
 
 impl Body {
@@ -32,7 +33,7 @@ impl Body {
         self.system.forces.check_scale(&region, scale)?;
         self.change_springs(&changes)?;
         if self.system.forces.scale(&region, scale) > 0 {
-            self.system.forget_stiffness();
+            self.system.changed(Changed::Stiffness);
             self.system.forces.measure_anew(self.system.state.positions());
         }
         Ok(())

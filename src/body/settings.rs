@@ -5,7 +5,7 @@ use crate::base::{Result, memory, not_negative};
 use crate::def::{BodyContact, BodySettings, Sleep};
 use crate::nodes::NodeDamping;
 use crate::soa::{tile_count, tile_nodes};
-use crate::solver::close;
+use crate::solver::{Changed, close};
 
 impl Body {
     /// What of it can be set, as it was made or set.
@@ -68,8 +68,7 @@ impl Body {
         self.system.damping = is_damped.then_some(made);
         let step = self.system.scaling.as_ref().map_or(0.0, |scaling| scaling.step());
         self.system.scale_masses(step);
-        self.system.forget_matrix();
-        self.system.wake();
+        self.system.changed(Changed::Masses);
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 use super::Body;
 use crate::base::{Error, Result, memory};
 use crate::def::{Values, check_values};
-use crate::solver::{Stability, make_up_for};
+use crate::solver::{Changed, make_up_for};
 use crate::springs::{Change, Link, not_joined, pull};
 
 /// A spring as it is.
@@ -90,14 +90,14 @@ impl Body {
             tears.change(changes);
         }
         self.system.forces.measure_anew(self.system.state.positions());
-        self.system.forget_stiffness();
+        self.system.changed(Changed::Stiffness);
         self.make_up_for_changes(changes);
         self.system.scale_for_springs(&nodes);
         let limit = self.system.watched.limit();
         self.system.see_stability_of(&nodes);
         if self.system.watched.limit() > limit {
             // Longer substeps may be stable now.
-            self.system.carry.stability = Stability::UNKNOWN;
+            self.system.changed(Changed::Softer);
         }
         Ok(())
     }

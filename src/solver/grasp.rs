@@ -8,8 +8,8 @@ use std::fmt::Display;
 
 use glam::{DVec3, Vec3};
 
-use super::System;
 use super::closing::close;
+use super::{Changed, System};
 use crate::base::{Error, Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
 use crate::contact::{Frame, ToolPath};
@@ -526,9 +526,8 @@ impl System {
 
     /// Other nodes are held now.
     fn forget_held(&mut self) {
-        self.wake();
         self.scale_masses(self.carry.masses_for);
-        self.forget_matrix();
+        self.changed(Changed::Masses);
     }
 
     /// Nodes were put elsewhere: tools hold them there.

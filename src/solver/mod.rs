@@ -1,6 +1,7 @@
 //! How bodies move: the solvers and what they share.
 
 mod attempt;
+mod changed;
 mod closing;
 mod coarse_step;
 mod early;
@@ -29,6 +30,7 @@ mod watched;
 pub(crate) use attempt::{
     Carry, Outcome, RESERVE, StepRequest, attempt, finish, needed, relieve_squeezed, substeps_alone, substeps_needed,
 };
+pub(crate) use changed::Changed;
 pub(crate) use closing::{close, close_beside, make_up_for, show_closed};
 pub(crate) use coarse_step::CoarseStep;
 pub(crate) use energy_monitor::{EnergyAccount, Sums};

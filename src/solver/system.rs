@@ -6,7 +6,7 @@ use super::early::Early;
 use super::grasp::Grasps;
 use super::mass_scaling::Heavier;
 use super::sleep::Sleeper;
-use super::{Carry, CoarseStep, GravityKicks, Implicit, MassScaling, Stability, Sums, Survey, Watched, close};
+use super::{Carry, Changed, CoarseStep, GravityKicks, Implicit, MassScaling, Stability, Sums, Survey, Watched, close};
 use crate::base::Result;
 use crate::codec::saved;
 use crate::contact::{Contacts, ToolPath};
@@ -138,8 +138,7 @@ impl System {
     /// What cuts left of how elements were deformed fades, over so many seconds.
     pub fn fade(&mut self, time: f32, team: &Team) {
         if self.forces.fade(time, self.state.positions(), team) {
-            self.forces_current = false;
-            self.forget_energy();
+            self.changed(Changed::RestShape);
         }
     }
 
@@ -194,23 +193,6 @@ impl System {
         (bounds.max - bounds.min).max_element()
     }
 
-    /// Nothing is known any more of where the nodes were.
-    pub fn forget_motion(&mut self) {
-        self.wake();
-        self.forces_current = false;
-        self.carry.stability = Stability::UNKNOWN;
-        self.carry.forget();
-        self.state.forget_remainders();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_history();
-            implicit.forget_matrix();
-        }
-        if let Some(contacts) = &mut self.contacts {
-            contacts.forget();
-            contacts.holds.forget();
-        }
-    }
-
     /// Prepares again what an attempted step that is not committed has changed.
     pub fn put_back(&mut self) {
         self.sleep_again();
@@ -258,35 +240,6 @@ impl System {
         self.carry.stability = stability.changed(nodes, &*self.forces.springs, masses, positions, &mut self.watched);
     }
 
-    /// What it is made of has another energy where it is.
-    pub fn forget_energy(&mut self) {
-        self.carry.forget();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_energy();
-        }
-    }
-
-    /// Its springs, elements or terms are not what they were.
-    pub fn forget_stiffness(&mut self) {
-        self.forces_current = false;
-        self.wake();
-        self.carry.forget();
-        self.forces.forget_rates();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
-    }
-
-    /// Other nodes move now.
-    pub fn forget_matrix(&mut self) {
-        self.carry.stability = Stability::UNKNOWN;
-        self.carry.forget();
-        self.forces.forget_rates();
-        if let Some(implicit) = &mut self.implicit {
-            implicit.forget_matrix();
-        }
-    }
-
     /// Sees that other springs may ask for other masses of these nodes.
     pub fn scale_for_springs(&mut self, nodes: &[u32]) {
         if self.carry.masses_for > 0.0 {
@@ -321,7 +274,7 @@ impl System {
         self.rest_grasps();
         self.follow_nodes();
         self.forces.relax(self.state.positions());
-        self.forget_motion();
+        self.changed(Changed::Positions);
     }
 
     /// Makes the step in progress, of `substeps` substeps and `dt` seconds, the current state.

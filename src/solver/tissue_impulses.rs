@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::System;
 use super::closing::close;
+use super::{Changed, System};
 use crate::base::{Profile, Result};
 use crate::nodes::parts;
 
@@ -87,9 +87,15 @@ impl System {
     /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
     pub fn begin_bonds(&mut self) {
         close(self);
+        self.changed(Changed::Course);
+    }
+
+    /// The same, now that it is attached no more.
+    pub fn end_bonds(&mut self) {
         if let Some(implicit) = &mut self.implicit {
-            implicit.forget_history();
+            implicit.is_attached = false;
         }
+        self.changed(Changed::Course);
     }
 
     /// Its own numbers of the nodes that move one of the caller's, with their parts: itself where it is bound to none.

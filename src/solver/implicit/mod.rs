@@ -30,6 +30,7 @@ use crate::codec::saved;
 use crate::def::{BodyDefinition, MOST_ITERATIONS, Solver, SolverReport};
 use crate::forces::{Changes, Forces};
 use crate::soa::{Vectors, tile_count};
+use crate::solver::changed::Known;
 use crate::solver::newton::Newton;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
@@ -467,29 +468,9 @@ impl Implicit {
         }
     }
 
-    /// Nodes have been put elsewhere or given other velocities.
-    pub fn forget_history(&mut self) {
-        let history = &mut self.histories[self.settled];
-        history.step = 0.0;
-        history.remainders.clear();
-        if let Some(pressed) = &mut history.pressed {
-            pressed.forget();
-        }
-        if let Some(newton) = &mut self.newton {
-            newton.forget_remainders(self.settled);
-        }
-        self.forget_energy();
-    }
-
     /// How much faster a node became in the last step, m/s.
     pub fn gain_of(&self, node: usize) -> Vec3 {
         self.histories[self.settled].gains.get(node)
-    }
-
-    /// Springs or pins have changed.
-    pub fn forget_matrix(&mut self) {
-        self.stale = true;
-        self.forget_energy();
     }
 
     /// What the next step depends on beside the state.
@@ -528,9 +509,22 @@ impl Implicit {
         }
     }
 
-    /// The energy is not what it was when the last step ended.
-    pub fn forget_energy(&mut self) {
-        self.histories[self.settled].energy = None;
+    /// Forgets what a change has made invalid.
+    pub(in crate::solver) fn forget(&mut self, known: Known) {
+        let history = &mut self.histories[self.settled];
+        match known {
+            Known::Energy => history.energy = None,
+            Known::Matrix => self.stale = true,
+            Known::History => {
+                (history.step, history.energy) = (0.0, None);
+                history.remainders.clear();
+                history.pressed.iter_mut().for_each(Pressed::forget);
+                if let Some(newton) = &mut self.newton {
+                    newton.forget_remainders(self.settled);
+                }
+            }
+            _ => {}
+        }
     }
 
     /// What the step before the next substep left.

@@ -20,7 +20,7 @@ use crate::base::{Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
 use crate::def::Anchor;
 use crate::geometry::Bounds;
-use crate::solver::{Outcome, System, Systems};
+use crate::solver::{Outcome, Systems};
 
 pub(crate) use self::thread::{Lead, Thread};
 
@@ -539,13 +539,8 @@ impl End {
 
 /// A body goes on with nothing of the last step but positions and velocities.
 fn forget(bodies: &mut impl Systems, place: usize) {
-    if let Some(System {
-        implicit: Some(implicit),
-        ..
-    }) = bodies.at_mut(place)
-    {
-        implicit.is_attached = false;
-        implicit.forget_history();
+    if let Some(body) = bodies.at_mut(place) {
+        body.end_bonds();
     }
 }
 

@@ -1,0 +1,111 @@
+//! What a change between steps makes invalid. Callers name the change, and the table here says what it concerns.
+
+use super::{Stability, System};
+
+/// A change of a body between steps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Changed {
+    /// Nodes were put elsewhere.
+    Positions,
+    /// A node has another velocity.
+    Velocity,
+    /// The last step does not tell how nodes go on.
+    Course,
+    /// The coordinates begin elsewhere.
+    Origin,
+    /// A pin has come or gone, and what is about its node has been woken.
+    Pin,
+    /// Nodes have other masses or damping, or other nodes are held.
+    Masses,
+    /// Springs, elements or terms have come, gone or changed.
+    Stiffness,
+    /// Springs that may have set the longest stable substep are softer or gone.
+    Softer,
+    /// Cavities have another pressure.
+    Pressure,
+    /// Elements have another shape at rest.
+    RestShape,
+    /// A cut has parted nodes. Rates and the stability are updated for these nodes alone.
+    Topology,
+}
+
+/// What is known from the state or from earlier steps.
+#[derive(Clone, Copy)]
+pub(super) enum Known {
+    /// Which parts sleep.
+    Sleep,
+    /// The forces at the positions.
+    Forces,
+    /// The forces, where springs have damping.
+    DampingForces,
+    /// The longest stable substep of springs.
+    Stability,
+    /// The bounds on frequencies of all but springs.
+    Rates,
+    /// The energy account, and how many substeps the last steps took.
+    Energy,
+    /// What positions lack of where the nodes are.
+    Remainders,
+    /// What equations take from the last step.
+    History,
+    /// The preconditioner of equations.
+    Matrix,
+    /// The list of what is near tools.
+    Candidates,
+    /// What contacts within equations did.
+    Holds,
+}
+
+impl Changed {
+    /// What it makes invalid.
+    const fn concerns(self) -> &'static [Known] {
+        use Known::*;
+        match self {
+            Self::Positions => &[
+                Sleep, Forces, Stability, Energy, Remainders, History, Matrix, Candidates, Holds,
+            ],
+            Self::Velocity => &[DampingForces, Energy],
+            Self::Course => &[History],
+            Self::Origin => &[Sleep, Candidates],
+            Self::Pin => &[Stability, Rates, Energy, Matrix],
+            Self::Masses => &[Sleep, Stability, Rates, Energy, Matrix],
+            Self::Stiffness => &[Sleep, Forces, Rates, Energy, Matrix],
+            Self::Softer => &[Stability],
+            Self::Pressure => &[Sleep, Forces, Energy],
+            Self::RestShape => &[Forces, Energy],
+            Self::Topology => &[Sleep, Forces, Energy, Matrix],
+        }
+    }
+}
+
+impl System {
+    /// Forgets what a change has made invalid.
+    pub fn changed(&mut self, changed: Changed) {
+        for &known in changed.concerns() {
+            self.forget(known);
+        }
+    }
+
+    fn forget(&mut self, known: Known) {
+        if let Some(implicit) = &mut self.implicit {
+            implicit.forget(known);
+        }
+        match known {
+            Known::Sleep => self.wake(),
+            Known::Forces => self.forces_current = false,
+            Known::DampingForces => {
+                if self.forces.springs.damped() {
+                    self.forces_current = false;
+                    self.wake();
+                }
+            }
+            Known::Stability => self.carry.stability = Stability::UNKNOWN,
+            Known::Rates => self.forces.forget_rates(),
+            Known::Energy => self.carry.forget(),
+            Known::Remainders => self.state.forget_remainders(),
+            Known::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.forget()),
+            Known::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),
+            Known::History | Known::Matrix => {}
+        }
+    }
+}
