@@ -106,7 +106,7 @@ fn change(body: &mut Body, bound: &[Bound], change: &SurfaceChange) {
         .springs
         .resize(body.node_count() + new.len())
         .expect("memory");
-    body.rewire(&Rewiring::default(), 0).expect("memory");
+    body.system.rewire(&Rewiring::default(), 0).expect("memory");
     body.add_nodes(&new).expect("room");
     body.change_surface(change);
 }

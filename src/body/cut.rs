@@ -196,14 +196,12 @@ impl Body {
             at_pieces.extend(of_pieces.chain(changing.iter().copied()));
             memory::sort_once(&mut at_pieces);
         }
-        let System { forces, implicit, .. } = &mut self.system;
-        let of_changes = implicit.as_mut().map(|implicit| &mut implicit.changes);
-        forces.prepare_parts(&parts, known + nodes.len(), of_changes)?;
+        self.system.prepare_parts(&parts, known + nodes.len())?;
         if let Some(tears) = &mut self.tears {
             tears.reserve(changes.springs.len().max(rewiring.added.len()))?;
         }
         self.system.forces.springs.resize(known + nodes.len())?;
-        let rewired = self.rewire(&rewiring, 6 * parts.elements.len());
+        let rewired = self.system.rewire(&rewiring, 6 * parts.elements.len());
         if rewired.is_err() {
             self.system.forces.springs.resize(known)?;
             return rewired.map(|()| CutReport::default());
@@ -217,9 +215,7 @@ impl Body {
         // Damping is to be that of masses as they are.
         self.system.scale_masses(0.0);
         self.add_nodes(&nodes)?;
-        let System { forces, implicit, .. } = &mut self.system;
-        let of_changes = implicit.as_mut().map(|implicit| &mut implicit.changes);
-        forces.take_parts(&parts, known + nodes.len(), of_changes);
+        self.system.take_parts(&parts, known + nodes.len());
         if let Some(tears) = &mut self.tears {
             tears.grow(known + nodes.len());
             tears.follow(changes, &rewiring, &self.system.order);

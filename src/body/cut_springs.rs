@@ -8,23 +8,6 @@ use crate::def::Spring;
 use crate::springs::{Change, Link, Rewiring};
 
 impl Body {
-    /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
-    /// nothing where it fails.
-    pub(super) fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
-        let roomier = match &self.system.implicit {
-            Some(implicit) => {
-                let more = rewiring.added.len() + pairs;
-                implicit.roomier(&self.system.forces, more)?
-            }
-            None => None,
-        };
-        self.system.forces.springs.rewire(rewiring)?;
-        if let (Some(implicit), Some(roomier)) = (&mut self.system.implicit, roomier) {
-            implicit.adopt(roomier);
-        }
-        Ok(())
-    }
-
     /// What becomes of springs along edges of cells.
     pub(super) fn rewiring(&self, changes: &Changes) -> Result<Rewiring> {
         let mut rewiring = Rewiring::default();

@@ -250,9 +250,7 @@ impl Body {
             rest_length,
             damping: 0.0,
         };
-        if let Some(implicit) = &mut self.system.implicit {
-            implicit.make_room(self.system.forces.springs.spring_count() + 1)?;
-        }
+        self.system.reserve_spring()?;
         if let Some(cuttable) = &mut self.cuttable {
             cuttable.reserve_spring([a, b], &self.system.order)?;
         }

@@ -75,9 +75,7 @@ impl Body {
         for sliver in system.scaling.iter().flat_map(|scaling| scaling.slivers()) {
             hasher.write_u64(u64::from(sliver.node));
         }
-        if let Some(implicit) = &system.implicit {
-            implicit.hash(hasher);
-        }
+        system.hash_solver(hasher);
         if let Some(sleeper) = &system.sleeper {
             sleeper.hash(hasher);
         }

@@ -34,14 +34,12 @@ mod tears;
 mod tune;
 mod whole;
 
-use glam::{BVec3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
-use crate::def::{
-    BodyDefinition, EnclosedReport, Energy, Solver, SolverChoice, SolverReport, Storage, StorageReport, Values,
-};
+use crate::def::{BodyDefinition, EnclosedReport, Energy, SolverChoice, SolverReport, Storage, StorageReport};
 use crate::geometry::Bounds;
 use crate::simd::ChosenKernel;
-use crate::soa::{NodeOrder, Vectors, tile_count, tile_nodes};
+use crate::soa::{NodeOrder, tile_nodes};
 pub(crate) use blade::HoldAt;
 pub use change_log::{NewNodeSource, NewRimEdge, TopologyChanges};
 pub use cut::CutReport;
@@ -55,12 +53,10 @@ use crate::contact::{Contact, Contacts, ToolPath};
 use crate::cutting::CutMaterial;
 use crate::forces::Forces;
 use crate::material::Made;
-use crate::nodes::{NodeDamping, Pins, State};
 use crate::readers::Shown;
 use crate::slots::Slots;
 use crate::solver::{
-    Carry, Changed, CoarseStep, EnergyAccount, GravityKicks, Implicit, MassScaling, MayBeCut, Pace,
-    RestStateDefinition, RestStateReport, Stability, Sums, Survey, System, Systems, Watched, rest_state,
+    Carry, Changed, CoarseStep, MayBeCut, RestStateDefinition, RestStateReport, System, Systems, rest_state,
 };
 use crate::threads::Team;
 pub(crate) use material_point::MaterialPoint;
@@ -181,80 +177,12 @@ impl Body {
         }
         let forces = Forces::new(needs.kernel, definition, law, &mut springs, &surface, &order)?;
         let tears = Tears::new(definition, &springs, law.is_some(), &order)?;
-        let mut pins = Pins::default();
-        let mut masses = memory::reserved(node_count)?;
-        let mut inverse_masses = memory::reserved(node_count)?;
-        for node in 0..node_count as u32 {
-            let mass = definition.masses.get(order.caller(node) as usize);
-            masses.push(mass);
-            inverse_masses.push(if mass > 0.0 { 1.0 / mass } else { 0.0 });
-            if mass == 0.0 {
-                pins.hold(node, BVec3::TRUE)?;
-            }
-        }
-        let damping = if definition.node_dampings.all_zero() {
-            None
-        } else {
-            let mut rates = memory::reserved(node_count)?;
-            let damping = |node: usize| definition.node_dampings.get(order.caller(node as u32) as usize);
-            rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
-            Some(NodeDamping::new(rates)?)
-        };
-        let system = System {
-            order,
-            predicted_velocities: forces
-                .springs
-                .damped()
-                .then(|| Vectors::zeros(node_count))
-                .transpose()?,
-            coarse: needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?,
-            forces,
-            kernel: needs.kernel,
-            uniform_inverse_mass: match definition.masses {
-                Values::Uniform(mass) => Some(1.0 / mass),
-                Values::Each(_) => None,
-            },
-            masses,
-            inverse_masses,
-            damping,
-            watched: Watched::new(node_count)?,
-            scaling: None,
-            pins,
-            surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
-            tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
-            boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
-            surface,
-            state: State::new(node_count, definition.solver == Solver::Verlet)?,
-            origin: DVec3::ZERO,
-            implicit: None,
-            applied: None,
-            early: None,
-            contacts: None,
-            contact: definition.contact,
-            bindings: None,
-            node_room: 0,
-            is_cut_open: false,
-            grasps: None,
-            carry: Carry {
-                stability: Stability::UNKNOWN,
-                gravity: GravityKicks::new(Bounds {
-                    min: Vec3::ZERO,
-                    max: Vec3::ZERO,
-                }),
-                closing: None,
-                masses_for: 0.0,
-                energy: EnergyAccount::UNKNOWN,
-                pace: Pace::UNKNOWN,
-            },
-            forces_current: false,
-            forces_applied: false,
-            sleeper: None,
-            may_be_cut: cuttable.as_ref().map(|cuttable| MayBeCut {
-                toughness: definition.toughness,
-                is_solid: matches!(cuttable.material, CutMaterial::Solid(_)),
-            }),
-            gravity_scale: 1.0,
-        };
+        let mut system = System::new(definition, needs.kernel, order, forces, surface)?;
+        system.coarse = needs.tolerance.then(|| CoarseStep::new(node_count)).transpose()?;
+        system.may_be_cut = cuttable.as_ref().map(|cuttable| MayBeCut {
+            toughness: definition.toughness,
+            is_solid: matches!(cuttable.material, CutMaterial::Solid(_)),
+        });
         let mut body = Self {
             system,
             cuttable,
@@ -267,21 +195,7 @@ impl Body {
             user_data: 0,
         };
         body.place(definition.positions);
-        let (forces, positions) = (&body.system.forces, body.system.state.positions());
-        body.system.implicit = Implicit::new(definition, positions, forces)?;
-        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
-            let (uniform, damping) = (body.system.uniform_inverse_mass, body.system.damping.as_ref());
-            let (forces, masses) = (&body.system.forces, body.system.masses());
-            let beside = forces.carried_beside_springs(body.system.state.positions(), &masses)?;
-            let room = if forces.has_elements() {
-                body.node_count() + definition.spare_nodes as usize
-            } else {
-                0
-            };
-            let (springs, part) = (&*forces.springs, definition.mass_scaling);
-            let scaling = MassScaling::new(springs, &beside, &body.system.masses, uniform, damping, room, part)?;
-            body.system.scaling = scaling.map(memory::boxed).transpose()?;
-        }
+        body.system.make_solver(definition)?;
         if needs.tools > 0 {
             body.make_contacts(needs.tools)?;
         }
@@ -367,11 +281,7 @@ impl Body {
 
     /// How its solver took the last step.
     pub fn solver_report(&self) -> SolverReport {
-        let report = self.system.implicit.as_ref().map(|implicit| implicit.told);
-        SolverReport {
-            added_mass: self.system.scaling.as_ref().map_or(0.0, |scaling| scaling.added_mass()),
-            ..report.unwrap_or_default()
-        }
+        self.system.solver_report()
     }
 
     pub(crate) fn make_contacts(&mut self, tools: usize) -> Result<()> {

@@ -390,13 +390,6 @@ impl Contacts {
         memory::merge(&mut self.held, held, |&held| held);
     }
 
-    /// The tool holds this node no longer.
-    pub fn release(&mut self, node: u32, slot: usize) {
-        if let Ok(place) = self.held.binary_search(&(node, slot)) {
-            self.held.remove(place);
-        }
-    }
-
     /// Nodes that are not to stay are held no longer.
     pub fn retain_held(&mut self, stays: impl Fn(u32) -> bool) {
         self.held.retain(|&(node, _)| stays(node));

@@ -10,9 +10,10 @@ use super::implicit;
 use super::pace::Pace;
 use super::stability::Stability;
 use super::verlet::{self, Taken, TooLong};
-use crate::base::Profile;
+use crate::base::{Profile, StateHasher};
 use crate::codec::saved;
 use crate::contact::{DynamicTool, ToolPath};
+use crate::def::SolverReport;
 use crate::threads::Team;
 
 /// The part of the longest stable substep that is used.
@@ -282,9 +283,7 @@ fn as_count(substeps: f64) -> u32 {
 /// Takes a step that is stable however long it is.
 fn attempt_implicitly(body: &mut System, request: &StepRequest, team: &Team) -> Outcome {
     let start = body.carry;
-    if let Some(implicit) = &mut body.implicit {
-        implicit.attempt();
-    }
+    body.begin_attempt(false);
     let asked = request.substeps.max(1);
     let (substeps, taken) = match implicit::run(body, request, asked, middle(asked), start, team) {
         Ok(taken) => taken,
@@ -294,6 +293,41 @@ fn attempt_implicitly(body: &mut System, request: &StepRequest, team: &Team) -> 
         finish(body, substeps, taken, 0.0)
     } else {
         run_to_tolerance(body, request, substeps, start, taken.carry, team)
+    }
+}
+
+impl System {
+    /// Whether stability limits its substeps, as that of VERLET does.
+    pub fn is_explicit(&self) -> bool {
+        self.implicit.is_none()
+    }
+
+    /// Lets each step from now on take so many products at most, where it solves equations; `u32::MAX`: as many as the definition allows.
+    pub fn allow(&mut self, products: u32) {
+        self.implicit.iter_mut().for_each(|implicit| implicit.allow(products));
+    }
+
+    /// Begins to attempt a step, or to attempt it again. What was known before the step is known again where that is refused.
+    pub fn begin_attempt(&mut self, is_again: bool) {
+        match &mut self.implicit {
+            Some(implicit) if is_again => implicit.put_back(),
+            Some(implicit) => implicit.attempt(),
+            None => {}
+        }
+    }
+
+    /// How its solver took the last step.
+    pub fn solver_report(&self) -> SolverReport {
+        let report = self.implicit.as_ref().map(|implicit| implicit.told);
+        SolverReport {
+            added_mass: self.scaling.as_ref().map_or(0.0, |scaling| scaling.added_mass()),
+            ..report.unwrap_or_default()
+        }
+    }
+
+    /// What the next step depends on of what its solver keeps.
+    pub fn hash_solver(&self, hasher: &mut StateHasher) {
+        self.implicit.iter().for_each(|implicit| implicit.hash(hasher));
     }
 }
 

@@ -158,11 +158,8 @@ impl Grip {
 impl Grasps {
     /// The grasps of this name.
     pub fn get(&self, id: SlotId) -> Option<&Grasp> {
-        self.place_of_grasp(id).map(|place| &self.grasps[place])
-    }
-
-    fn place_of_grasp(&self, id: SlotId) -> Option<usize> {
-        self.grasps.binary_search_by_key(&id, |grasp| grasp.id).ok()
+        let place = self.grasps.binary_search_by_key(&id, |grasp| grasp.id);
+        place.ok().map(|place| &self.grasps[place])
     }
 
     /// Whether what is to be told of them is finite.
@@ -445,29 +442,8 @@ impl System {
 
     /// Ends a grasp.
     pub(crate) fn let_go(&mut self, id: SlotId) {
-        let Some(place) = self.grasps.as_ref().and_then(|grasps| grasps.place_of_grasp(id)) else {
-            return;
-        };
-        close(self);
-        let Some(grasps) = &mut self.grasps else {
-            return;
-        };
-        for (node, weight) in grasps.grasps.remove(place).held() {
-            let Ok(place) = grasps.place_of(node) else {
-                continue;
-            };
-            grasps.nodes[place].parts -= parts(weight);
-            if grasps.nodes[place].parts == 0 {
-                let HeldNode { node, tool, .. } = grasps.nodes.remove(place);
-                self.pins.remove(node);
-                self.inverse_masses[node as usize] = 1.0 / self.masses[node as usize];
-                if let Some(contacts) = &mut self.contacts {
-                    contacts.release(node, tool);
-                }
-            }
-        }
+        self.let_go_where(|grasp| grasp.id == id, |_| ());
         self.drop_room_for_grasps();
-        self.forget_held();
     }
 
     /// Ends all grasps of the tool in this place.

@@ -4,9 +4,11 @@ use super::System;
 use super::energy_monitor::Sums;
 use super::kick::Survey;
 use crate::base::{Error, Result, memory};
+use crate::forces::Parts;
 use crate::geometry::Bounds;
 use crate::nodes::NewNode;
 use crate::soa::{Vectors, tile_count};
+use crate::springs::Rewiring;
 
 impl System {
     /// Makes room for so many nodes more than there are.
@@ -49,6 +51,40 @@ impl System {
         self.node_room = count;
         let known = self.node_count();
         self.bindings.get_or_insert_default().reserve(more, known)
+    }
+
+    /// Makes room for one spring more in what its solver knows.
+    pub fn reserve_spring(&mut self) -> Result<()> {
+        let springs = self.forces.springs.spring_count() + 1;
+        let implicit = self.implicit.as_mut();
+        implicit.map_or(Ok(()), |implicit| implicit.make_room(springs))
+    }
+
+    /// Makes room for what a cut leaves in a body of so many nodes.
+    pub fn prepare_parts(&mut self, parts: &Parts, node_count: usize) -> Result<()> {
+        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
+        self.forces.prepare_parts(parts, node_count, changes)
+    }
+
+    /// Becomes what a cut leaves, for which there is room.
+    pub fn take_parts(&mut self, parts: &Parts, node_count: usize) {
+        let changes = self.implicit.as_mut().map(|implicit| &mut implicit.changes);
+        self.forces.take_parts(parts, node_count, changes);
+    }
+
+    /// Changes springs, of which there are nodes already, and what a solver knows of them and so many pairs of nodes of elements more. Changes
+    /// nothing where it fails.
+    pub fn rewire(&mut self, rewiring: &Rewiring, pairs: usize) -> Result<()> {
+        let more = rewiring.added.len() + pairs;
+        let implicit = self.implicit.as_ref();
+        let roomier = implicit
+            .map(|implicit| implicit.roomier(&self.forces, more))
+            .transpose()?;
+        self.forces.springs.rewire(rewiring)?;
+        if let (Some(implicit), Some(roomier)) = (&mut self.implicit, roomier.flatten()) {
+            implicit.adopt(roomier);
+        }
+        Ok(())
     }
 
     /// Adds nodes, for which there is room, in their own numbers: they follow those that there are. Changes nothing where it fails.

@@ -3,19 +3,24 @@
 use glam::{BVec3, DVec3, Vec3};
 
 use super::early::Early;
+use super::energy_monitor::{EnergyAccount, Sums};
 use super::grasp::Grasps;
-use super::mass_scaling::Heavier;
+use super::implicit::Implicit;
+use super::kick::Survey;
+use super::mass_scaling::{Heavier, MassScaling};
+use super::pace::Pace;
 use super::sleep::Sleeper;
-use super::{Carry, Changed, CoarseStep, GravityKicks, Implicit, MassScaling, Stability, Sums, Survey, Watched, close};
-use crate::base::Result;
+use super::watched::Watched;
+use super::{Carry, Changed, CoarseStep, GravityKicks, Stability, close};
+use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::contact::{Contacts, ToolPath};
-use crate::def::BodyContact;
+use crate::def::{BodyContact, BodyDefinition, Solver, Values};
 use crate::forces::Forces;
 use crate::geometry::Bounds;
 use crate::nodes::{Bindings, NodeDamping, Pins, State};
 use crate::simd::ChosenKernel;
-use crate::soa::{Masses, NodeOrder, Vectors};
+use crate::soa::{Masses, NodeOrder, Vectors, tile_count};
 use crate::threads::Team;
 
 /// How a body is cut.
@@ -61,7 +66,7 @@ pub(crate) struct System {
     /// Velocities at the time of the positions, for bodies whose springs have damping.
     pub predicted_velocities: Option<Vectors>,
     /// For bodies that are moved implicitly.
-    pub implicit: Option<Box<Implicit>>,
+    pub(super) implicit: Option<Box<Implicit>>,
     /// Forces from outside for the next step, N; kept from the first force on.
     pub applied: Option<Vectors>,
     /// Velocities from before the last half kick of a step, of the last one and of the one that is tried; for bodies that may press others.
@@ -94,6 +99,106 @@ pub(crate) struct System {
 saved!(System { order, forces, kernel, masses, inverse_masses, uniform_inverse_mass, damping, watched, scaling, pins, surveys, tile_sums, boxes, surface, state, origin, predicted_velocities, implicit, applied, early, contacts, contact, bindings, node_room, is_cut_open, grasps, carry, forces_current, forces_applied, coarse, sleeper, may_be_cut, gravity_scale } where Self::is_sound);
 
 impl System {
+    /// Of a definition, in this order, with these forces and the surface in the caller's numbers. Its nodes have no positions yet, and nothing
+    /// is kept for a solver.
+    pub fn new(
+        definition: &BodyDefinition,
+        kernel: ChosenKernel,
+        order: NodeOrder,
+        forces: Forces,
+        surface: Vec<[u32; 3]>,
+    ) -> Result<Self> {
+        let node_count = definition.positions.len();
+        let mut pins = Pins::default();
+        let mut masses = memory::reserved(node_count)?;
+        let mut inverse_masses = memory::reserved(node_count)?;
+        for node in 0..node_count as u32 {
+            let mass = definition.masses.get(order.caller(node) as usize);
+            masses.push(mass);
+            inverse_masses.push(if mass > 0.0 { 1.0 / mass } else { 0.0 });
+            if mass == 0.0 {
+                pins.hold(node, BVec3::TRUE)?;
+            }
+        }
+        let damping = if definition.node_dampings.all_zero() {
+            None
+        } else {
+            let mut rates = memory::reserved(node_count)?;
+            let damping = |node: usize| definition.node_dampings.get(order.caller(node as u32) as usize);
+            rates.extend((0..node_count).map(|node| damping(node) * inverse_masses[node]));
+            Some(NodeDamping::new(rates)?)
+        };
+        Ok(Self {
+            order,
+            predicted_velocities: forces
+                .springs
+                .damped()
+                .then(|| Vectors::zeros(node_count))
+                .transpose()?,
+            coarse: None,
+            forces,
+            kernel,
+            uniform_inverse_mass: match definition.masses {
+                Values::Uniform(mass) => Some(1.0 / mass),
+                Values::Each(_) => None,
+            },
+            masses,
+            inverse_masses,
+            damping,
+            watched: Watched::new(node_count)?,
+            scaling: None,
+            pins,
+            surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
+            tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
+            boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
+            surface,
+            state: State::new(node_count, definition.solver == Solver::Verlet)?,
+            origin: DVec3::ZERO,
+            implicit: None,
+            applied: None,
+            early: None,
+            contacts: None,
+            contact: definition.contact,
+            bindings: None,
+            node_room: 0,
+            is_cut_open: false,
+            grasps: None,
+            carry: Carry {
+                stability: Stability::UNKNOWN,
+                gravity: GravityKicks::new(Bounds::of([Vec3::ZERO].into_iter())),
+                closing: None,
+                masses_for: 0.0,
+                energy: EnergyAccount::UNKNOWN,
+                pace: Pace::UNKNOWN,
+            },
+            forces_current: false,
+            forces_applied: false,
+            sleeper: None,
+            may_be_cut: None,
+            gravity_scale: 1.0,
+        })
+    }
+
+    /// Makes what its solver keeps, for nodes that are in their places.
+    pub fn make_solver(&mut self, definition: &BodyDefinition) -> Result<()> {
+        let positions = self.state.positions();
+        self.implicit = Implicit::new(definition, positions, &self.forces)?;
+        if definition.solver == Solver::Verlet && definition.mass_scaling > 0.0 {
+            let (uniform, damping) = (self.uniform_inverse_mass, self.damping.as_ref());
+            let (forces, masses) = (&self.forces, self.masses());
+            let beside = forces.carried_beside_springs(positions, &masses)?;
+            let room = if forces.has_elements() {
+                self.node_count() + definition.spare_nodes as usize
+            } else {
+                0
+            };
+            let (springs, part) = (&*forces.springs, definition.mass_scaling);
+            let scaling = MassScaling::new(springs, &beside, &self.masses, uniform, damping, room, part)?;
+            self.scaling = scaling.map(memory::boxed).transpose()?;
+        }
+        Ok(())
+    }
+
     /// How many nodes it has.
     pub fn node_count(&self) -> usize {
         self.masses.len()
@@ -264,10 +369,7 @@ impl System {
             }
         }
         self.state.velocities_mut().clear();
-        self.carry.gravity = GravityKicks::new(Bounds {
-            min: Vec3::ZERO,
-            max: Vec3::ZERO,
-        });
+        self.carry.gravity = GravityKicks::new(Bounds::of([Vec3::ZERO].into_iter()));
         for pin in self.pins.iter_mut() {
             pin.force = pin.held(held(pin.node as usize));
         }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::closing::close;
 use super::{Changed, System};
 use crate::base::{Profile, Result};
-use crate::nodes::parts;
+use crate::nodes::{Bindings, parts};
 
 /// What of a step is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +84,13 @@ impl System {
         Ok(())
     }
 
+    /// It is attached in the step in progress.
+    pub fn attach(&mut self) {
+        self.implicit
+            .iter_mut()
+            .for_each(|implicit| implicit.is_attached = true);
+    }
+
     /// Goes on with nothing of the last step but positions and velocities, now that it is attached.
     pub fn begin_bonds(&mut self) {
         close(self);
@@ -92,9 +99,9 @@ impl System {
 
     /// The same, now that it is attached no more.
     pub fn end_bonds(&mut self) {
-        if let Some(implicit) = &mut self.implicit {
-            implicit.is_attached = false;
-        }
+        self.implicit
+            .iter_mut()
+            .for_each(|implicit| implicit.is_attached = false);
         self.changed(Changed::Course);
     }
 
@@ -126,6 +133,16 @@ impl System {
             None => self.state.substep().velocities.get(node),
             Some(implicit) => implicit.mean(node),
         }
+    }
+
+    /// What its points are bound to, and where each node begins a substep and how fast it goes on its way, m/s.
+    pub fn motion(&mut self) -> (Option<&Bindings>, impl Fn(usize) -> (Vec3, Vec3)) {
+        let (state, implicit) = (self.state.substep(), self.implicit.as_deref());
+        let motion_of = move |node| {
+            let mean = implicit.map_or_else(|| state.velocities.get(node), |implicit| implicit.mean(node));
+            (state.positions.get(node), mean)
+        };
+        (self.bindings.as_ref(), motion_of)
     }
 
     /// Has this force act on a node, N, instead of what was applied to it.

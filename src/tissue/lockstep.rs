@@ -6,7 +6,7 @@
 use super::Tissue;
 use crate::solver::{
     Carry, Moment, Outcome, Part, Step, StepRequest, System, Systems, Taken, TooLong, begin, begin_parts, check,
-    check_beside_springs, finish, needed, next_part, parts_near, pass, relieve_squeezed, substeps_needed,
+    check_beside_springs, end_part, finish, needed, next_part, parts_near, pass, relieve_squeezed, substeps_needed,
 };
 use crate::threads::Team;
 
@@ -126,12 +126,10 @@ impl Together<'_> {
                 let request = &self.request.of(body);
                 let (begun, wanted) = Walk::of(body, request, self.team);
                 substeps = substeps.max(wanted);
-                match &mut body.implicit {
-                    None => needed = needed.max(wanted),
-                    // What it knew before the step must be known again where that is refused, tried once or more.
-                    Some(implicit) if outcomes[place].is_none() => implicit.attempt(),
-                    Some(implicit) => implicit.put_back(),
+                if body.is_explicit() {
+                    needed = needed.max(wanted);
                 }
+                body.begin_attempt(outcomes[place].is_some());
                 self.walks[place] = Some(begun);
             }
         }
@@ -177,7 +175,7 @@ impl Together<'_> {
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
             let request = &request.of(body);
             walk.carry = walk.start;
-            if body.implicit.is_some() {
+            if !body.is_explicit() {
                 begin_parts(body, request, substeps);
                 return Ok(());
             }
@@ -202,7 +200,7 @@ impl Together<'_> {
             tissue.bonds.load(bodies);
             each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
                 let request = &request.of(body);
-                if body.implicit.is_some() {
+                if !body.is_explicit() {
                     // There may be no more parts to try it in.
                     let is_last = is_last || substeps >= PARTS;
                     let is_fine = next_part(body, request, [index, substeps], is_last, team);
@@ -222,9 +220,8 @@ impl Together<'_> {
             })?;
             tissue.meet(island, bodies, &moment);
             each(bodies, walks, tissue.islands.members(island), |place, body, walk| {
-                if let Some(implicit) = &mut body.implicit {
-                    implicit.settle_deflection();
-                    body.state.advance();
+                if !body.is_explicit() {
+                    end_part(body);
                     return Ok(());
                 }
                 body.forces.age(f64::from(substep), body.state.next_positions(), team);
@@ -245,7 +242,7 @@ impl Together<'_> {
         moment.begins = false;
         tissue.bonds.load(bodies);
         each(bodies, walks, tissue.islands.members(island), |_, body, walk| {
-            if body.implicit.is_some() {
+            if !body.is_explicit() {
                 return Ok(());
             }
             let request = &request.of(body);
@@ -265,7 +262,7 @@ impl Together<'_> {
 impl Walk {
     /// A body's way through a step that is to begin, and how many substeps it wants by itself.
     fn of(body: &mut System, request: &StepRequest, team: &Team) -> (Self, u32) {
-        let (mut start, masses_for, substeps) = if body.implicit.is_none() {
+        let (mut start, masses_for, substeps) = if body.is_explicit() {
             let need = needed(body, request, team);
             (need.start, need.masses_for, need.substeps)
         } else {

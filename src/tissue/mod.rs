@@ -481,10 +481,10 @@ impl Tissue {
     pub fn show_early(&self, bodies: &mut impl Systems) {
         for link in self.links.iter().filter(|link| link.presses()) {
             let places = link.sides.map(|side| side.body);
-            let are_implicit = places.map(|place| bodies.at(place).is_some_and(|body| body.implicit.is_some()));
+            let are_explicit = places.map(|place| bodies.at(place).is_none_or(System::is_explicit));
             for index in 0..2 {
-                if !are_implicit[index]
-                    && are_implicit[1 - index]
+                if are_explicit[index]
+                    && !are_explicit[1 - index]
                     && let Some(body) = bodies.at_mut(places[index])
                 {
                     body.show_early();

@@ -372,17 +372,8 @@ impl Skin {
         self.strayed = 0.0;
         let origin = body.origin;
         self.is_closed &= !body.is_cut_open;
-        let state = body.state.substep();
-        let (starts, velocities) = (state.positions, &*state.velocities);
-        let bindings = body.bindings.as_ref();
-        match &body.implicit {
-            None => self.take(origin, bindings, duration, |node| {
-                (starts.get(node), velocities.get(node))
-            }),
-            Some(implicit) => self.take(origin, bindings, duration, |node| {
-                (starts.get(node), implicit.mean(node))
-            }),
-        }
+        let (bindings, motion_of) = body.motion();
+        self.take(origin, bindings, duration, motion_of);
         let Self {
             changing,
             triangles,

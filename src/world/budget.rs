@@ -103,14 +103,14 @@ impl World {
             }
         };
         self.lag = (owed - length).max(0.0);
-        let solved = || self.bodies.iter().filter_map(|(_, body)| body.system.implicit.as_ref());
-        let products = solved().map(|implicit| implicit.told.iterations).max().unwrap_or(0);
+        let reports = || self.bodies.iter().map(|(_, body)| body.solver_report());
+        let products = reports().map(|report| report.iterations).max().unwrap_or(0);
         Ok(BudgetReport {
             step,
             work,
             work_done: products.max(step.substeps),
             lag: self.lag,
-            error: solved().map(|implicit| implicit.told.error).fold(0.0, f32::max),
+            error: reports().map(|report| report.error).fold(0.0, f32::max),
         })
     }
 
@@ -147,15 +147,13 @@ impl World {
     fn allow(&mut self, work: u32) {
         self.work = work;
         for (_, body) in self.bodies.iter_mut() {
-            if let Some(implicit) = &mut body.system.implicit {
-                implicit.allow(work);
-            }
+            body.system.allow(work);
         }
     }
 
     /// The longest explicit substep that is known to be stable, s; infinity where nothing is known.
     fn known_substep(&self) -> f32 {
-        let explicit = self.bodies.iter().filter(|(_, body)| body.system.implicit.is_none());
+        let explicit = self.bodies.iter().filter(|(_, body)| body.system.is_explicit());
         let known = explicit.filter_map(|(_, body)| {
             let limit = body.system.carry.limit()?;
             Some(limit.min(body.system.forces.newest_limit_beside_springs()))

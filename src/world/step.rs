@@ -185,7 +185,7 @@ impl World {
         let (id, body, stable_substep, error) = failed.min_by(|one, other| one.2.total_cmp(&other.2))?;
         let of = if error > 0.0 {
             SubstepLimit::of_all(LimitKind::Tolerance)
-        } else if body.system.implicit.is_some() {
+        } else if !body.system.is_explicit() {
             SubstepLimit::of_all(LimitKind::Parts)
         } else {
             body.substep_limit()

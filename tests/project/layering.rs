@@ -324,6 +324,33 @@ fn few_files_beside_forces_name_elements_terms_or_cavities() {
     assert!(files.len() <= 3, "{files:?}");
 }
 
+/// Where a file names the implicit solver otherwise than as `Solver::Implicit`, which `tokens` are those of.
+fn lines_naming_the_implicit_solver(tokens: &[Token]) -> Vec<usize> {
+    let names = |at: &usize| {
+        let is_of_definition = *at >= 2 && tokens[at - 2].text == "Solver" && tokens[at - 1].text == "::";
+        // A comment of a document is a token too.
+        let is_comment = tokens[*at].text.starts_with('/');
+        tokens[*at].text.to_lowercase().contains("implicit") && !is_of_definition && !is_comment
+    };
+    let found = (0..tokens.len()).filter(names);
+    found.map(|at| tokens[at].line).collect()
+}
+
+#[test]
+fn the_implicit_solver_is_not_named_outside_of_solvers() {
+    // A definition asks for it.
+    const ASK: [&str; 2] = ["def", "capi"];
+    for (file, text) in all_sources() {
+        let module = module_of(&file);
+        if module[0] != "solver" && !ASK.contains(&module[0]) {
+            let lines = lines_naming_the_implicit_solver(&tokens(&text));
+            assert!(lines.is_empty(), "{file} names it in lines {lines:?}");
+        }
+    }
+    let planted = "/// implicit\nfn f() {\nSolver::Implicit; // implicit\nbody.implicit.is_some() }";
+    assert_eq!(lines_naming_the_implicit_solver(&tokens(planted)), [4]);
+}
+
 #[test]
 fn modules_import_only_what_stands_below_them() {
     let sources = all_sources();

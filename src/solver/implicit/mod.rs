@@ -21,7 +21,7 @@ mod rigid;
 mod step;
 
 pub(super) use step::run;
-pub(crate) use step::{begin_parts, next_part, parts_near};
+pub(crate) use step::{begin_parts, end_part, next_part, parts_near};
 
 use glam::Vec3;
 

@@ -258,6 +258,14 @@ pub(crate) fn next_part(
     end == End::Fine
 }
 
+/// Ends such a part, after which other tissue may have changed where it led.
+pub(crate) fn end_part(body: &mut System) {
+    if let Some(implicit) = &mut body.implicit {
+        implicit.settle_deflection();
+    }
+    body.state.advance();
+}
+
 /// One solved equation.
 #[derive(Clone, Copy)]
 pub(super) struct Substep<'a> {

@@ -20,7 +20,7 @@ use crate::base::{Result, SlotId, StateHasher, memory};
 use crate::codec::saved;
 use crate::def::Anchor;
 use crate::geometry::Bounds;
-use crate::solver::{Outcome, Systems};
+use crate::solver::{Outcome, System, Systems};
 
 pub(crate) use self::thread::{Lead, Thread};
 
@@ -104,7 +104,7 @@ struct Bond {
     /// Whether it acts in this moment.
     acts: bool,
     /// Whether a body at it is not moved by VERLET.
-    is_implicit: bool,
+    has_equation: bool,
 }
 
 saved!(Bond {
@@ -123,7 +123,7 @@ saved!(Bond {
     gap,
     miss,
     acts,
-    is_implicit
+    has_equation
 });
 
 /// A node at which bonds are.
@@ -272,7 +272,7 @@ impl Bonds {
             gap: DVec3::ZERO,
             miss: 0.0,
             acts: false,
-            is_implicit: false,
+            has_equation: false,
         };
         memory::push(&mut self.bonds, bond)
     }
@@ -365,7 +365,8 @@ impl Bonds {
             let stays = !ends(bond);
             if !stays {
                 // What it did is no gain that goes on.
-                bond.used().for_each(|corner| forget(bodies, corner.body));
+                let bodies_of = bond.used().map(|corner| corner.body);
+                bodies_of.for_each(|place| bodies.at_mut(place).into_iter().for_each(System::end_bonds));
             }
             stays
         });
@@ -534,13 +535,6 @@ impl End {
             pending: Vec3::ZERO,
             is_pending: false,
         }
-    }
-}
-
-/// A body goes on with nothing of the last step but positions and velocities.
-fn forget(bodies: &mut impl Systems, place: usize) {
-    if let Some(body) = bodies.at_mut(place) {
-        body.end_bonds();
     }
 }
 

@@ -33,9 +33,7 @@ impl Bonds {
         for end in &mut self.ends {
             end.is_in_turn = is_of_group(end.body);
             if let Some(body) = bodies.at_mut(end.body).filter(|_| end.is_in_turn) {
-                if let Some(implicit) = &mut body.implicit {
-                    implicit.is_attached = true;
-                }
+                body.attach();
                 end.is_pending = body.forces_applied;
                 end.pending = match &body.applied {
                     Some(applied) if body.forces_applied => applied.get(end.node as usize),
@@ -44,8 +42,8 @@ impl Bonds {
             }
         }
         for bond in &mut self.bonds {
-            let is_implicit = |corner: Corner| bodies.at(corner.body).is_some_and(|body| body.implicit.is_some());
-            bond.is_implicit = bond.used().any(is_implicit);
+            let has_equation = |corner: Corner| bodies.at(corner.body).is_some_and(|body| !body.is_explicit());
+            bond.has_equation = bond.used().any(has_equation);
             bond.is_in_turn = bond.used().all(|corner| is_of_group(corner.body));
         }
     }
@@ -64,7 +62,7 @@ impl Bonds {
 
     /// How many substeps a step of `dt` seconds takes at least.
     pub fn substeps(&self, dt: f32) -> u32 {
-        if self.bonds.iter().any(|bond| bond.is_in_turn && bond.is_implicit) {
+        if self.bonds.iter().any(|bond| bond.is_in_turn && bond.has_equation) {
             (f64::from(dt) / LONGEST - ROUNDED)
                 .ceil()
                 .clamp(1.0, f64::from(u32::MAX / 4)) as u32
@@ -77,7 +75,7 @@ impl Bonds {
     pub fn load(&mut self, bodies: &mut impl Systems) {
         self.ends.iter_mut().for_each(|end| end.given = Vec3::ZERO);
         let Self { bonds, ends, .. } = self;
-        for bond in bonds.iter().filter(|bond| bond.is_in_turn && !bond.is_implicit) {
+        for bond in bonds.iter().filter(|bond| bond.is_in_turn && !bond.has_equation) {
             for corner in bond.used() {
                 ends[corner.end].given += bond.load * corner.weight;
             }
@@ -113,7 +111,7 @@ impl Bonds {
             end.shift = DVec3::ZERO;
         }
         for bond in &mut self.bonds {
-            bond.acts = bond.is_in_turn && (moment.drifts || !bond.is_implicit);
+            bond.acts = bond.is_in_turn && (moment.drifts || !bond.has_equation);
             if !bond.acts {
                 continue;
             }
@@ -197,7 +195,7 @@ impl Bonds {
         for bond in bonds.iter_mut().filter(|bond| bond.acts) {
             let duration = bond.duration(moment, *is_opening);
             let all = bond.load * duration + bond.impulse;
-            if !bond.is_implicit {
+            if !bond.has_equation {
                 bond.load += bond.impulse / duration;
             }
             for corner in bond.used() {
@@ -287,7 +285,7 @@ impl Bond {
 
     /// How long forces act in this moment, s.
     fn duration(&self, moment: &Moment, is_opening: bool) -> f32 {
-        let is_half = !self.is_implicit && (is_opening || !moment.drifts);
+        let is_half = !self.has_equation && (is_opening || !moment.drifts);
         if is_half {
             0.5 * moment.duration
         } else {
