@@ -126,13 +126,13 @@ impl World {
 }
 
 fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
-    let Some(sleeper) = body.system.sleeper.as_deref() else {
+    let Some(sleeper) = body.system().sleeper.as_deref() else {
         return;
     };
     let positions = body.positions();
     let count = body.node_count();
     let sleeps = |node: u32| {
-        let tile = body.system.own(node) as usize / TILE;
+        let tile = body.system().own(node) as usize / TILE;
         tile < tile_count(count) && sleeper.is_asleep(tile)
     };
     for triangle in body.surface() {
@@ -145,7 +145,7 @@ fn draw_sleeping(body: &Body, canvas: &mut dyn DebugCanvas) {
 fn draw_springs(body: &Body, full: f32, canvas: &mut dyn DebugCanvas) {
     let positions = body.positions();
     for (node, &place) in positions.iter().enumerate() {
-        let system = &body.system;
+        let system = body.system();
         let own = system.own(node as u32) as usize;
         system.forces.springs.visit(own, &mut |link| {
             let other = system.callers(link.neighbour as usize);
@@ -169,8 +169,8 @@ fn color_of(part: f32) -> Rgba {
 }
 
 fn draw_pins(body: &Body, canvas: &mut dyn DebugCanvas) {
-    for pin in body.system.pins.iter() {
-        let place = body.positions()[body.system.callers(pin.node as usize)];
+    for pin in body.system().pins.iter() {
+        let place = body.positions()[body.system().callers(pin.node as usize)];
         canvas.point(place, if pin.is_partial() { SLIDING } else { PINNED });
     }
 }

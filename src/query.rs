@@ -213,7 +213,7 @@ impl Body {
 
     /// The box about its nodes as they are published, and a little more.
     fn published_bounds(&self) -> Bounds {
-        let bounds = self.system.local_bounds().moved(self.origin());
+        let bounds = self.system().local_bounds().moved(self.origin());
         // By what rounding takes.
         let rounding = 1e-6 * bounds.magnitudes().max_element();
         bounds.extended(rounding)

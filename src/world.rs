@@ -25,7 +25,7 @@ use glam::{Quat, Vec3};
 
 use crate::base::{AttachmentId, BodyId, Error, Profile, Result, SlotId, StateHasher, ToolId, memory, not_negative};
 use crate::body::{Body, CutReport, MaterialPoint, Needs, Steps, Stroke};
-use crate::contact::{Contact, ContactChange, DynamicTool, Pose, Tool, ToolDefinition, ToolPath};
+use crate::contact::{Contact, ContactChange, Contacts, DynamicTool, Pose, Tool, ToolDefinition, ToolPath};
 use crate::cutting::Sweep;
 use crate::def::{Anchor, BodyDefinition, CollisionFilter, finite_vector};
 use crate::readers::Clock;
@@ -180,7 +180,7 @@ impl World {
     pub fn set_gravity(&mut self, gravity: Vec3) -> Result<()> {
         finite_vector("gravity", gravity)?;
         self.definition.gravity = gravity;
-        self.bodies.iter_mut().for_each(|(_, body)| body.system.wake());
+        self.bodies.iter_mut().for_each(|(_, body)| body.wake());
         Ok(())
     }
 
@@ -201,7 +201,7 @@ impl World {
             },
         };
         let mut body = Body::new(definition, needs)?;
-        if let Some(contacts) = &mut body.system.contacts {
+        if let Some(contacts) = &mut body.system_mut().contacts {
             contacts.reserve_dynamic(needs.tools, self.dynamic_count())?;
         }
         self.outcomes.try_reserve(self.bodies.places() + 1)?;
@@ -220,12 +220,12 @@ impl World {
     fn join_tissue(&mut self, id: SlotId) -> Result<()> {
         let place = self.bodies.place(id)?;
         let body = self.bodies.get_mut(id)?;
-        if !body.system.meets_tissue() {
+        if !body.system().meets_tissue() {
             return Ok(());
         }
-        body.system.reserve_pressed()?;
+        body.system_mut().reserve_pressed()?;
         make_walks(&mut self.walks, place)?;
-        memory::get_or_box(&mut self.tissue)?.join(place, &body.system)
+        memory::get_or_box(&mut self.tissue)?.join(place, body.system())
     }
 
     /// Removes a body, and with it what is attached of it.
@@ -376,7 +376,7 @@ impl World {
         self.check_not_attached(body)?;
         let gravity = self.definition.gravity;
         let body = self.bodies.get_mut(body.0)?;
-        let gravity = gravity * body.system.gravity_scale;
+        let gravity = gravity * body.system().gravity_scale;
         body.rest_state(gravity, definition)
     }
 
@@ -409,13 +409,15 @@ impl World {
         }
         let id = ToolId(id?);
         let index = self.tool_index(id)?;
-        for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.system.contacts {
-                contacts.add_tool(index);
-            }
-        }
+        self.contacts_mut().for_each(|contacts| contacts.add_tool(index));
         self.wake_near(id)?;
         Ok(id)
+    }
+
+    /// What bodies keep of contacts with tools.
+    fn contacts_mut(&mut self) -> impl Iterator<Item = &mut Contacts> {
+        let bodies = self.bodies.iter_mut();
+        bodies.filter_map(|(_, body)| body.system_mut().contacts.as_deref_mut())
     }
 
     /// How many tools come before this one.
@@ -428,7 +430,7 @@ impl World {
     fn wake_near(&mut self, tool: ToolId) -> Result<()> {
         let path = ToolPath::new(self.tools.place(tool.0)?, self.tools.get(tool.0)?);
         let bodies = self.bodies.iter_mut();
-        bodies.for_each(|(_, body)| body.system.wake_near(&path));
+        bodies.for_each(|(_, body)| body.system_mut().wake_near(&path));
         Ok(())
     }
 
@@ -447,11 +449,8 @@ impl World {
         if self.tool_places() == 0 {
             self.drop_contacts();
         }
-        for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.system.contacts {
-                contacts.forget_tool(slot, index);
-            }
-        }
+        self.contacts_mut()
+            .for_each(|contacts| contacts.forget_tool(slot, index));
         Ok(())
     }
 
@@ -466,9 +465,8 @@ impl World {
 
     /// A world without tools keeps nothing for them.
     fn drop_contacts(&mut self) {
-        for (_, body) in self.bodies.iter_mut() {
-            body.system.contacts = None;
-        }
+        let bodies = self.bodies.iter_mut();
+        bodies.for_each(|(_, body)| body.system_mut().contacts = None);
     }
 
     /// Moves a tool to `position`, in metres, over the next step, and turns it to `orientation`, `None`: it stays as it
@@ -516,11 +514,7 @@ impl World {
         self.wake_near(tool)?;
         self.tools.get_mut(tool.0)?.filter = filter;
         self.wake_near(tool)?;
-        for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.system.contacts {
-                contacts.look_again();
-            }
-        }
+        self.contacts_mut().for_each(|contacts| contacts.look_again());
         Ok(())
     }
 
@@ -574,7 +568,7 @@ impl World {
         self.bodies.iter_ids().flat_map(move |(body, content)| {
             self.tools.iter_ids().filter_map(move |(tool, _)| {
                 let slot = tool.index1 as usize - 1;
-                let [now, before] = content.system.contacts.as_ref()?.touched(slot);
+                let [now, before] = content.system().contacts.as_ref()?.touched(slot);
                 (now != before).then_some(ContactChange {
                     tool: ToolId(tool),
                     body: BodyId(body),

@@ -76,7 +76,7 @@ const FEW_NODES: usize = 32;
 /// Coordinates and indices are the caller's throughout.
 #[derive(Debug)]
 pub struct Body {
-    pub(crate) system: System,
+    system: System,
     /// For bodies that may be cut.
     cuttable: Option<Box<Cuttable>>,
     /// For bodies that tear.
@@ -209,6 +209,15 @@ impl Body {
     /// Whether what it has of each node is there for all of them.
     fn is_sound(&self) -> bool {
         self.published.is_sound(self.node_count())
+    }
+
+    /// What moves of it, as solvers and contact see it.
+    pub(crate) fn system(&self) -> &System {
+        &self.system
+    }
+
+    pub(crate) fn system_mut(&mut self) -> &mut System {
+        &mut self.system
     }
 
     /// How many nodes it has.

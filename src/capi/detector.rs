@@ -289,7 +289,7 @@ impl sinew_detector_def {
             )));
         }
         let (node_count, triangles) = (body.node_count(), body.surface());
-        let was_closed = mesh::is_closed(triangles)? && !body.system.is_cut_open;
+        let was_closed = mesh::is_closed(triangles)? && !body.system().is_cut_open;
         let surface = if was_closed {
             Surface::closed(node_count, triangles)
         } else {
@@ -356,7 +356,7 @@ impl sinew_detector {
     fn find(&mut self, world: &World) -> Result<()> {
         let Self { sides, method, found } = self;
         let bodies = [sides[0].body(0, world)?, sides[1].body(1, world)?];
-        let closed = [0, 1].map(|side| sides[side].was_closed && !bodies[side].system.is_cut_open);
+        let closed = [0, 1].map(|side| sides[side].was_closed && !bodies[side].system().is_cut_open);
         for (side, closed) in sides.iter_mut().zip(closed) {
             side.surface.set_closed(closed);
         }

@@ -79,12 +79,12 @@ mod tests {
             let moved = mesh.positions.iter().map(|&place| place + 2e-3 * random.vector());
             let moved: Vec<Vec3> = moved.collect();
             body.set_positions(&moved).expect("positions");
-            let limit = f64::from(body.system.limit_beside_springs(&Team::alone()));
-            let forces = &body.system.forces;
+            let limit = f64::from(body.system_mut().limit_beside_springs(&Team::alone()));
+            let forces = &body.system().forces;
             let mut stiffest = 0.0_f64;
-            forces.show_stiffenings(body.system.state.positions(), &mut |corners, stiffening| {
+            forces.show_stiffenings(body.system().state.positions(), &mut |corners, stiffening| {
                 for node in corners {
-                    let inverse_mass = body.system.inverse_masses[node as usize];
+                    let inverse_mass = body.system().inverse_masses[node as usize];
                     let carried = forces.carried_at_rest(node as usize, inverse_mass);
                     stiffest = stiffest.max(2.0 * stiffening * f64::from(carried.stiffness * inverse_mass));
                 }

@@ -402,7 +402,7 @@ mod tests {
 
     /// Whether it is what the skin of the body would be if it were made now, in some order.
     fn check(body: &Body, skin: &Skin) {
-        let surface = body.system.own_surface().expect("memory");
+        let surface = body.system().own_surface().expect("memory");
         assert_eq!(skin.triangles, surface);
         let mut edges: Vec<[u32; 2]> = skin.edges.iter().copied().filter(|&edge| edge != HOLE).collect();
         edges.sort_unstable();
@@ -425,9 +425,9 @@ mod tests {
         let mut nodes = skin.nodes.clone();
         nodes.sort_unstable();
         assert_eq!(nodes, corners);
-        let positions = body.system.state.positions();
+        let positions = body.system().state.positions();
         for corner in corners {
-            assert!(body.system.movers(corner).all(|(node, _)| skin.has(node)));
+            assert!(body.system().movers(corner).all(|(node, _)| skin.has(node)));
             let first = skin.firsts.as_ref().expect("it meets itself").get(corner as usize);
             assert!(first.distance(positions.get(corner as usize)) < 1e-6);
         }
@@ -467,7 +467,7 @@ mod tests {
                 })
                 .expect("a body");
             let body = world.body_mut(id).expect("a body");
-            let mut skin = Skin::new(&body.system).expect("memory");
+            let mut skin = Skin::new(body.system()).expect("memory");
             check(body, &skin);
             let mut random = Random(5);
             let mut within = |most: usize| (random.below(2 * most) as f32 - most as f32) * 1e-4;

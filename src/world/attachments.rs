@@ -130,7 +130,7 @@ impl World {
         for (index, &node) in nodes.iter().enumerate() {
             let name = Lazy(|| name(index));
             body.check_node(&name, node)?;
-            body.system.check_graspable(&name, node, tool.0.index())?;
+            body.system().check_graspable(&name, node, tool.0.index())?;
         }
         Ok(())
     }
@@ -156,19 +156,19 @@ impl World {
         let holder = Holder::Tool(tool);
         let count = grips.len();
         let answer = held
-            .system
+            .system_mut()
             .reserve_grasps(count)
             .and_then(|()| self.name(Attachment { body, holder }, count, &mut ids))
             .and_then(|()| {
                 let named = ids.iter().map(|id| id.0).zip(grips);
-                let system = &mut self.bodies.get_mut(body.0)?.system;
+                let system = self.bodies.get_mut(body.0)?.system_mut();
                 system.grasp(tool.0.index(), named, force_limit)
             });
         if let Err(error) = answer {
             for AttachmentId(id) in ids.into_iter().rev() {
                 self.attachments.take_back(id)?;
             }
-            self.bodies.get_mut(body.0)?.system.drop_room_for_grasps();
+            self.bodies.get_mut(body.0)?.system_mut().drop_room_for_grasps();
             return Err(error);
         }
         Ok(ids)
@@ -252,13 +252,13 @@ impl World {
         }
         memory::get_or_box(&mut self.tissue)?.reserve_bonds(places, pairs.len())?;
         for id in bodies {
-            self.bodies.get_mut(id.0)?.system.reserve_bonds()?;
+            self.bodies.get_mut(id.0)?.system_mut().reserve_bonds()?;
         }
         let [body, other] = bodies;
         let holder = Holder::Body(other);
         self.name(Attachment { body, holder }, pairs.len(), &mut ids)?;
         for id in bodies {
-            self.bodies.get_mut(id.0)?.system.begin_bonds();
+            self.bodies.get_mut(id.0)?.system_mut().begin_bonds();
         }
         if let Some(bonds) = self.bonds_mut() {
             for (&AttachmentId(id), &pair) in ids.iter().zip(pairs) {
@@ -283,7 +283,7 @@ impl World {
         // All corners of a triangle are bound to nodes of one cell.
         let mut nodes = [(0, 0.0); 4];
         for (&corner, weight) in grip.corners.iter().zip(grip.weights) {
-            for (node, part) in body.system.parts_of(corner) {
+            for (node, part) in body.system().parts_of(corner) {
                 let is_its = |(known, share): &&mut (u32, f32)| *known == node || *share == 0.0;
                 if weight * part != 0.0
                     && let Some(place) = nodes.iter_mut().find(is_its)
@@ -303,7 +303,7 @@ impl World {
     pub(super) fn bound_inside(&self, id: BodyId, nodes: [u32; 4], weights: [f64; 4]) -> Result<Bound> {
         let body = self.bodies.get(id.0)?;
         let sum: f64 = weights.iter().sum();
-        let own = |node: u32| body.system.parts_of(node).next().map_or(0, |(own, _)| own);
+        let own = |node: u32| body.system().parts_of(node).next().map_or(0, |(own, _)| own);
         Ok(Bound {
             body: self.bodies.place(id.0)?,
             anchor: None,
@@ -334,7 +334,7 @@ impl World {
         let Attachment { body, holder } = self.attachments.remove(attachment.0)?;
         match (holder, &mut self.tissue) {
             (Holder::Body(_), Some(tissue)) => tissue.bonds.end(&mut self.bodies, attachment.0),
-            _ => self.bodies.get_mut(body.0)?.system.let_go(attachment.0),
+            _ => self.bodies.get_mut(body.0)?.system_mut().let_go(attachment.0),
         }
         Ok(())
     }
@@ -350,16 +350,20 @@ impl World {
             return Ok(tissue.bonds.force_of(attachment.0));
         }
         let body = self.bodies.get(body.0)?;
-        let grasp = body.system.grasps.as_ref().and_then(|grasps| grasps.get(attachment.0));
+        let grasp = body
+            .system()
+            .grasps
+            .as_ref()
+            .and_then(|grasps| grasps.get(attachment.0));
         Ok(grasp.map_or(Vec3::ZERO, |grasp| grasp.force))
     }
 
     /// Shows both ends of what is attached, m: a tool and a node that it holds, or two points of tissue.
     pub(crate) fn show_attached(&self, mut see: impl FnMut([Vec3; 2])) {
         for (_, body) in self.bodies.iter() {
-            for (node, tool) in body.system.grasps.iter().flat_map(|grasps| grasps.held_nodes()) {
+            for (node, tool) in body.system().grasps.iter().flat_map(|grasps| grasps.held_nodes()) {
                 if let Some(tool) = self.tools.at(tool) {
-                    see([tool.pose.position, body.positions()[body.system.callers(node)]]);
+                    see([tool.pose.position, body.positions()[body.system().callers(node)]]);
                 }
             }
         }
@@ -409,7 +413,7 @@ impl World {
         } = self;
         attachments.retain(|attachment| attachment.holder != Holder::Tool(tool));
         for (_, body) in bodies.iter_mut() {
-            body.system.let_go_of(tool.0.index());
+            body.system_mut().let_go_of(tool.0.index());
         }
     }
 
@@ -426,7 +430,7 @@ impl World {
         slipped.clear();
         for (place, body) in bodies.iter_mut() {
             if let Some(Outcome::Done { .. }) = outcomes[place] {
-                body.system.slip(|id| {
+                body.system_mut().slip(|id| {
                     if attachments.remove(id).is_ok() {
                         slipped.push(AttachmentId(id));
                     }

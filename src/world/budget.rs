@@ -147,16 +147,16 @@ impl World {
     fn allow(&mut self, work: u32) {
         self.work = work;
         for (_, body) in self.bodies.iter_mut() {
-            body.system.allow(work);
+            body.system_mut().allow(work);
         }
     }
 
     /// The longest explicit substep that is known to be stable, s; infinity where nothing is known.
     fn known_substep(&self) -> f32 {
-        let explicit = self.bodies.iter().filter(|(_, body)| body.system.is_explicit());
+        let explicit = self.bodies.iter().filter(|(_, body)| body.system().is_explicit());
         let known = explicit.filter_map(|(_, body)| {
-            let limit = body.system.carry.limit()?;
-            Some(limit.min(body.system.forces.newest_limit_beside_springs()))
+            let limit = body.system().carry.limit()?;
+            Some(limit.min(body.system().forces.newest_limit_beside_springs()))
         });
         known.fold(f32::INFINITY, f32::min)
     }

@@ -127,11 +127,9 @@ impl World {
         if let Some(rigid) = &mut it.rigid {
             rigid.place(&pose);
         }
-        for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.system.contacts {
-                contacts.look_again();
-                contacts.holds.forget_tool(place);
-            }
+        for contacts in self.contacts_mut() {
+            contacts.look_again();
+            contacts.holds.forget_tool(place);
         }
         self.wake_near(tool)
     }
@@ -165,12 +163,8 @@ impl World {
     pub(super) fn reserve_dynamic(&mut self, count: usize) -> Result<()> {
         memory::reserve(&mut self.dynamic, count)?;
         let tools = self.tools.places();
-        for (_, body) in self.bodies.iter_mut() {
-            if let Some(contacts) = &mut body.system.contacts {
-                contacts.reserve_dynamic(tools, count)?;
-            }
-        }
-        Ok(())
+        self.contacts_mut()
+            .try_for_each(|contacts| contacts.reserve_dynamic(tools, count))
     }
 
     /// Begins a step: each dynamic tool is divided among the bodies that it pressed in the last.
@@ -185,7 +179,7 @@ impl World {
         dynamic.clear();
         for (index, (slot, tool)) in tools.iter().enumerate() {
             let Some(rigid) = &tool.rigid else { continue };
-            let contacts = bodies.iter().filter_map(|(_, body)| body.system.contacts.as_ref());
+            let contacts = bodies.iter().filter_map(|(_, body)| body.system().contacts.as_ref());
             let shares = contacts.filter(|contacts| contacts.touched(slot)[0]).count().max(1) as u32;
             dynamic.push(DynamicTool::new(index, rigid, definition.gravity, shares));
         }
@@ -206,7 +200,7 @@ impl World {
         for tool in dynamic.iter_mut() {
             let taken = bodies.iter().filter(|&(place, _)| is_done(&outcomes[place]));
             let pressed = taken.filter(|(_, body)| {
-                let contacts = body.system.contacts.as_ref();
+                let contacts = body.system().contacts.as_ref();
                 contacts.is_some_and(|contacts| contacts.loads()[tool.index].impulse != DVec3::ZERO)
             });
             let pressed = pressed.count().max(1) as u32;
@@ -257,7 +251,7 @@ impl World {
                 break;
             };
             let taken = bodies.iter().filter(|&(place, _)| is_done(&outcomes[place]));
-            let ends = taken.flat_map(|(_, body)| body.system.contacts.iter());
+            let ends = taken.flat_map(|(_, body)| body.system().contacts.iter());
             let ends = ends.filter_map(|contacts| contacts.dynamic_end(tool.index, dt));
             rigid.arrive(tool.joined(dt, ends));
             *pose = rigid.motion.pose(&rigid.mass);

@@ -207,7 +207,7 @@ impl World {
 
     /// Whether the tool at this place holds something.
     pub(super) fn is_holding(&self, place: usize) -> bool {
-        self.bodies.iter().any(|(_, body)| body.system.is_held_by(place))
+        self.bodies.iter().any(|(_, body)| body.system().is_held_by(place))
     }
 
     /// Takes over the most pressed contacts of the tool at this place.

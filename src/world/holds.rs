@@ -21,7 +21,7 @@ impl World {
         let Some(body) = self.bodies.at_mut(place).filter(|body| body.toughness().is_some()) else {
             return Ok(());
         };
-        body.system.reserve_bonds()?;
+        body.system_mut().reserve_bonds()?;
         make_walks(&mut self.walks, place)?;
         let tissue = memory::get_or_box(&mut self.tissue)?;
         tissue.bonds.reserve_rebinding(place)?;
@@ -52,7 +52,7 @@ impl World {
             });
         }
         if proxy.holds.is_empty() && bounds[0].is_some() {
-            self.bodies.get_mut(proxy.body.0)?.system.begin_bonds();
+            self.bodies.get_mut(proxy.body.0)?.system_mut().begin_bonds();
         }
         let Self {
             bodies,

@@ -42,7 +42,7 @@ impl World {
             return Ok(());
         };
         let at = blade.proxy(id)?;
-        if !blade.filter.meets(body.system.contact.filter) {
+        if !blade.filter.meets(body.system().contact.filter) {
             let proxy = &mut blade.proxies[at];
             self.let_go_of_blade(proxy);
             proxy.was_outside = None;

@@ -8,13 +8,13 @@ use crate::tissue::Tissue;
 
 /// Wakes what tools come near to, and with each body those that fell asleep with it.
 pub(super) fn rouse_groups(tissue: &mut Tissue, bodies: &mut Slots<Body>, tools: &[ToolPath]) {
-    bodies.iter_mut().for_each(|(_, body)| body.system.rouse(tools));
+    bodies.iter_mut().for_each(|(_, body)| body.system_mut().rouse(tools));
     let mut woken = std::mem::take(&mut tissue.groups);
-    let is_asleep = |bodies: &Slots<Body>, place: usize| bodies.at(place).is_some_and(|body| body.system.is_asleep());
+    let is_asleep = |bodies: &Slots<Body>, place: usize| bodies.at(place).is_some_and(|body| body.system().is_asleep());
     woken.find_woken(|place| is_asleep(bodies, place));
     for place in woken.woken() {
         if let Some(body) = bodies.at_mut(place) {
-            body.system.wake_to_step();
+            body.system_mut().wake_to_step();
         }
     }
     tissue.groups = woken;
@@ -28,8 +28,8 @@ pub(super) fn wake_islands(tissue: &Tissue, bodies: &mut Slots<Body>, outcomes: 
         }
         for &place in tissue.islands.members(island) {
             let place = place as usize;
-            if let Some(body) = bodies.at_mut(place).filter(|body| body.system.sleeps()) {
-                body.system.wake_to_step();
+            if let Some(body) = bodies.at_mut(place).filter(|body| body.system().sleeps()) {
+                body.system_mut().wake_to_step();
                 // It has tried nothing yet.
                 outcomes[place] = None;
             }
@@ -40,7 +40,7 @@ pub(super) fn wake_islands(tissue: &Tissue, bodies: &mut Slots<Body>, outcomes: 
 /// After a step: an island of which all have been at rest for long enough falls asleep. `took` tells whether a body took the step.
 pub(super) fn rest_islands(tissue: &mut Tissue, bodies: &mut Slots<Body>, took: impl Fn(usize) -> bool) {
     for (place, body) in bodies.iter() {
-        if !body.system.is_asleep() {
+        if !body.system().is_asleep() {
             tissue.groups.leave(place);
         }
     }
@@ -49,7 +49,7 @@ pub(super) fn rest_islands(tissue: &mut Tissue, bodies: &mut Slots<Body>, took: 
         if members.iter().all(|&place| took(place as usize)) && tissue.is_at_rest(island, bodies) {
             for &place in members {
                 if let Some(body) = bodies.at_mut(place as usize) {
-                    body.system.fall_asleep();
+                    body.system_mut().fall_asleep();
                 }
             }
             tissue.groups.lie_down(tissue.islands.members(island));

@@ -1,6 +1,6 @@
 //! Settings of a world and of its bodies that change between steps.
 
-use super::{World, make_walks};
+use super::World;
 use crate::base::{BodyId, Error, Result, memory};
 use crate::def::{BodyContact, BodySettings};
 use crate::solver::CoarseStep;
@@ -21,16 +21,16 @@ impl World {
         }
         if self.definition.tolerance > 0.0 && substeps == 0 {
             // What a tolerance compares is kept from now on.
-            let bodies = || self.bodies.iter().filter(|(_, body)| body.system.coarse.is_none());
+            let bodies = || self.bodies.iter().filter(|(_, body)| body.system().coarse.is_none());
             let mut made = memory::reserved(bodies().count())?;
             for (place, body) in bodies() {
                 let mut coarse = CoarseStep::new(body.node_count())?;
-                coarse.reserve(body.node_count() + body.system.spare_nodes())?;
+                coarse.reserve(body.node_count() + body.system().spare_nodes())?;
                 made.push((place, coarse));
             }
             for (place, coarse) in made {
                 if let Some(body) = self.bodies.at_mut(place) {
-                    body.system.coarse = Some(coarse);
+                    body.system_mut().coarse = Some(coarse);
                 }
             }
         }
@@ -46,7 +46,7 @@ impl World {
     /// to meet changes, other than to nothing. [`Error::OutOfMemory`]. Nothing has changed then.
     pub fn set_body_settings(&mut self, body: BodyId, settings: BodySettings) -> Result<()> {
         let it = self.bodies.get(body.0)?;
-        let before = it.system.contact;
+        let before = it.system().contact;
         let contact = BodyContact {
             thickness: settings.thickness,
             friction: settings.friction,
@@ -68,7 +68,7 @@ impl World {
             it.set_contact(BodyContact {
                 thickness: contact.thickness,
                 friction: contact.friction,
-                ..it.system.contact
+                ..it.system().contact
             });
             if let Some(skin) = self.tissue.as_mut().and_then(|tissue| tissue.skin_mut(place)) {
                 skin.forget_nearby();
@@ -81,7 +81,7 @@ impl World {
     fn set_meets(&mut self, body: BodyId, with_bodies: bool, with_itself: bool) -> Result<()> {
         let place = self.bodies.place(body.0)?;
         let it = self.bodies.get_mut(body.0)?;
-        let before = it.system.contact;
+        let before = it.system().contact;
         if (before.with_bodies, before.with_itself) == (with_bodies, with_itself) {
             return Ok(());
         }
@@ -91,25 +91,18 @@ impl World {
                 "meets_bodies and meets_itself of a body that was cut or torn can only both become 0".into(),
             ));
         }
-        it.system.contact = BodyContact {
+        it.system_mut().contact = BodyContact {
             with_bodies,
             with_itself,
             ..before
         };
-        it.system.wake();
-        let joined = if it.system.meets_tissue() {
-            make_walks(&mut self.walks, place)
-                .and_then(|()| it.system.reserve_pressed())
-                .and_then(|()| memory::get_or_box(&mut self.tissue))
-                .and_then(|tissue| tissue.join(place, &it.system))
-        } else {
-            if let Some(tissue) = &mut self.tissue {
-                tissue.shed(place);
-            }
-            Ok(())
-        };
+        it.wake();
+        if let Some(tissue) = self.tissue.as_mut().filter(|_| !it.system().meets_tissue()) {
+            tissue.shed(place);
+        }
+        let joined = self.join_tissue(body.0);
         if joined.is_err() {
-            it.system.contact = before;
+            self.bodies.get_mut(body.0)?.system_mut().contact = before;
         }
         joined
     }

@@ -185,7 +185,7 @@ impl World {
         let (id, body, stable_substep, error) = failed.min_by(|one, other| one.2.total_cmp(&other.2))?;
         let of = if error > 0.0 {
             SubstepLimit::of_all(LimitKind::Tolerance)
-        } else if !body.system.is_explicit() {
+        } else if !body.system().is_explicit() {
             SubstepLimit::of_all(LimitKind::Parts)
         } else {
             body.substep_limit()
@@ -200,7 +200,9 @@ impl World {
 
     /// Takes back what bodies have tried.
     fn put_back(&mut self) {
-        self.bodies.iter_mut().for_each(|(_, body)| body.system.put_back());
+        self.bodies
+            .iter_mut()
+            .for_each(|(_, body)| body.system_mut().put_back());
     }
 
     /// Makes the step that was tried the current state.
@@ -279,14 +281,14 @@ fn wrench(
 ) -> [DVec3; 2] {
     let mut wrench = [DVec3::ZERO; 2];
     for (place, body) in bodies.iter() {
-        if let (Some(Outcome::Asleep), Some(contacts)) = (&outcomes[place], &body.system.contacts) {
+        if let (Some(Outcome::Asleep), Some(contacts)) = (&outcomes[place], &body.system().contacts) {
             let load = contacts.loads()[index];
-            wrench[0] += load.impulse / f64::from(body.system.last_step());
-            wrench[1] += load.angular_impulse / f64::from(body.system.last_step());
+            wrench[0] += load.impulse / f64::from(body.system().last_step());
+            wrench[1] += load.angular_impulse / f64::from(body.system().last_step());
         }
-        if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.system.contacts) {
+        if let (Some(Outcome::Done { substeps, .. }), Some(contacts)) = (&outcomes[place], &body.system().contacts) {
             let load = contacts.loads()[index];
-            let [force, torque] = body.system.pull_of(path.slot, *substeps);
+            let [force, torque] = body.system().pull_of(path.slot, *substeps);
             wrench[0] += load.impulse / f64::from(dt) - force;
             wrench[1] += load.angular_impulse / f64::from(dt) - torque;
         }
@@ -305,7 +307,7 @@ fn reported(bodies: &Slots<Body>, outcomes: &[Option<Outcome>]) -> std::result::
 
 /// Whether there is work for more than one thread.
 fn is_worth_sharing(bodies: &Slots<Body>) -> bool {
-    let awake = || bodies.iter().filter(|(_, body)| !body.system.is_asleep());
+    let awake = || bodies.iter().filter(|(_, body)| !body.system().is_asleep());
     let sizes = || awake().map(|(_, body)| body.node_count());
     sizes().any(|size| size >= SHARED_FROM) || (sizes().count() > 1 && sizes().sum::<usize>() >= WORTH_SHARING)
 }
@@ -334,7 +336,7 @@ fn attempt_bodies(
                     && body.node_count() < SHARED_FROM
                     && goes_alone(place)
                 {
-                    *outcome = Some(attempt(&mut body.system, request, &Team::alone()));
+                    *outcome = Some(attempt(body.system_mut(), request, &Team::alone()));
                 }
             },
         );
@@ -343,9 +345,9 @@ fn attempt_bodies(
         if outcomes[place].is_none() && goes_alone(place) {
             let alone = body.node_count() < SHARED_FROM;
             outcomes[place] = Some(if alone {
-                attempt(&mut body.system, request, &Team::alone())
+                attempt(body.system_mut(), request, &Team::alone())
             } else {
-                attempt(&mut body.system, request, team)
+                attempt(body.system_mut(), request, team)
             });
         }
     }
@@ -367,16 +369,16 @@ fn report(bodies: &Slots<Body>, outcomes: &[Option<Outcome>], crossings: u32) ->
                 report.error_estimate = report.error_estimate.max(error);
                 carry
                     .limit()
-                    .map(|limit| limit.min(body.system.forces.newest_limit_beside_springs()))
+                    .map(|limit| limit.min(body.system().forces.newest_limit_beside_springs()))
             }
             Some(Outcome::Unstable { stable_substep, error }) => {
                 report.error_estimate = report.error_estimate.max(error);
                 Some(stable_substep)
             }
-            Some(Outcome::Asleep) => body.system.carry.limit(),
+            Some(Outcome::Asleep) => body.system().carry.limit(),
             Some(Outcome::NotFinite) | None => {
                 report.bodies_restored += 1;
-                body.system.carry.limit()
+                body.system().carry.limit()
             }
         };
         report.stable_substep = report.stable_substep.min(stable_substep.unwrap_or(f32::INFINITY));
@@ -397,17 +399,18 @@ fn commit_bodies(
                 let alone = Team::alone();
                 let team = if body.node_count() < SHARED_FROM { &alone } else { team };
                 body.commit((substeps, dt), carry, tools, team);
-                body.system.fade(dt, team);
+                let system = body.system_mut();
+                system.fade(dt, team);
                 if goes_alone(place) {
-                    body.system.doze(dt, (tools, gravity * body.system.gravity_scale), team);
+                    system.doze(dt, (tools, gravity * system.gravity_scale), team);
                 } else {
-                    body.system.doze_together(dt);
+                    system.doze_together(dt);
                 }
                 body.find_tears(team);
             }
-            Some(Outcome::Asleep) => body.system.sleep_on(),
+            Some(Outcome::Asleep) => body.system_mut().sleep_on(),
             _ => {
-                body.system.stay();
+                body.system_mut().stay();
                 body.find_tears(team);
             }
         }

@@ -351,6 +351,40 @@ fn the_implicit_solver_is_not_named_outside_of_solvers() {
     assert_eq!(lines_naming_the_implicit_solver(&tokens(planted)), [4]);
 }
 
+/// The fields of a struct, each with whether other modules see it.
+fn fields<'a>(tokens: &[Token<'a>], name: &str) -> Vec<(&'a str, bool)> {
+    let start = tokens
+        .windows(3)
+        .position(|window| window[0].text == "struct" && window[1].text == name && window[2].text == "{");
+    let mut depth = 0;
+    let mut fields = Vec::new();
+    let mut is_seen = false;
+    for pair in tokens[start.expect("the struct") + 2..].windows(2) {
+        match pair[0].text {
+            "{" | "(" | "<" => depth += 1,
+            "}" if depth == 1 => break,
+            "}" | ")" | ">" => depth -= 1,
+            "pub" => is_seen = true,
+            "," if depth == 1 => is_seen = false,
+            field if depth == 1 && pair[1].text == ":" => fields.push((field, is_seen)),
+            _ => {}
+        }
+    }
+    fields
+}
+
+#[test]
+fn a_body_has_a_dozen_fields_at_most_and_keeps_them_to_itself() {
+    let sources = all_sources();
+    let (_, text) = sources.iter().find(|(file, _)| file == "body/mod.rs").expect("bodies");
+    let found = fields(&tokens(text), "Body");
+    assert!((2..=12).contains(&found.len()), "{found:?}");
+    assert!(found.iter().all(|(_, is_seen)| !is_seen), "{found:?}");
+    let planted = "pub struct Body { a: Box<Vec<u8>>, #[doc(hidden)] pub(crate) b: u8, c: [u8; 2] } struct C { d: u8 }";
+    let expected = [("a", false), ("b", true), ("c", false)];
+    assert_eq!(fields(&tokens(planted), "Body"), expected);
+}
+
 #[test]
 fn modules_import_only_what_stands_below_them() {
     let sources = all_sources();
