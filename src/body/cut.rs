@@ -41,7 +41,11 @@ impl Body {
             .cuttable
             .take()
             .ok_or_else(|| Error::Unsupported("spare_nodes is 0: the body was not made to be cut".into()))?;
-        let report = self.cut_with(&mut cuttable, sweep, skin);
+        let stroke = cuttable.material.stroke();
+        let report = self.cut_from(&mut cuttable, *sweep, skin);
+        if report.is_err() {
+            cuttable.material.take_back(stroke);
+        }
         self.cuttable = Some(cuttable);
         report
     }
@@ -73,16 +77,7 @@ impl Body {
         self.cuttable.as_ref().map_or(0, |cuttable| cuttable.log.version())
     }
 
-    fn cut_with(&mut self, cuttable: &mut Cuttable, sweep: &Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
-        let stroke = cuttable.material.stroke();
-        let report = self.cut_from(cuttable, *sweep, skin);
-        if report.is_err() {
-            cuttable.material.take_back(stroke);
-        }
-        report
-    }
-
-    /// The same, with another stroke of the material's where it fails.
+    /// The same with what it is cut by, which has another stroke where it fails.
     fn cut_from(&mut self, cuttable: &mut Cuttable, mut sweep: Sweep, skin: Option<&mut Skin>) -> Result<CutReport> {
         if let Some(start) = cuttable.stroke.carried(&sweep, &cuttable.material, self.positions()) {
             sweep.start = start;

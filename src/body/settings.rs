@@ -85,11 +85,7 @@ impl Body {
             sleeper.set_sleep(sleep);
             self.system.wake();
         } else {
-            let made = self.system.make_sleeper(sleep).and_then(|()| self.reserve_sleep());
-            if made.is_err() {
-                self.system.sleeper = None;
-            }
-            return made;
+            return self.system.make_sleeper(sleep);
         }
         Ok(())
     }
@@ -108,12 +104,5 @@ impl Body {
     /// Has all of it be stepped again, until it has been at rest for as long as it takes.
     pub fn wake(&mut self) {
         self.system.wake();
-    }
-
-    /// Makes room for the tiles that cuts may add.
-    fn reserve_sleep(&mut self) -> Result<()> {
-        let tiles = tile_count(self.node_count().max(self.system.node_room));
-        let sleeper = self.system.sleeper.as_mut();
-        sleeper.map_or(Ok(()), |sleeper| sleeper.reserve(tiles))
     }
 }

@@ -270,11 +270,6 @@ pub(crate) fn needed(body: &mut System, request: &StepRequest, team: &Team) -> N
     need
 }
 
-/// How many substeps a step of VERLET takes with the nodes where they are.
-pub(crate) fn substeps_alone(body: &mut System, request: &StepRequest, team: &Team) -> u32 {
-    needed(body, request, team).substeps
-}
-
 /// A number of substeps, 1 at least.
 fn as_count(substeps: f64) -> u32 {
     substeps.clamp(1.0, f64::from(u32::MAX)) as u32

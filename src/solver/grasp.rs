@@ -310,8 +310,7 @@ impl System {
 
     /// Refuses a node that a tool holds.
     pub(crate) fn check_not_held(&self, name: &dyn Display, node: u32) -> Result<()> {
-        let own = self.order.own(node);
-        if self.grasps.as_ref().is_some_and(|grasps| grasps.place_of(own).is_ok()) {
+        if self.is_held_by_tool(self.order.own(node)) {
             return Err(Error::invalid(format!("{name} is {node}: a tool holds it")));
         }
         Ok(())
@@ -449,9 +448,7 @@ impl System {
     /// Ends all grasps of the tool in this place.
     pub(crate) fn let_go_of(&mut self, tool: usize) {
         self.let_go_where(|grasp| grasp.tool == tool, |_| ());
-        if !self.is_grasped() {
-            self.grasps = None;
-        }
+        self.drop_room_for_grasps();
     }
 
     /// Ends the grasps whose limit the last step went beyond, and shows them. Needs no memory.

@@ -30,12 +30,7 @@ impl System {
             sleeper.reserve(tile_count(count))?;
         }
         self.state.reserve(count)?;
-        if let Some(velocities) = &mut self.predicted_velocities {
-            velocities.reserve(count)?;
-        }
-        if let Some(applied) = &mut self.applied {
-            applied.reserve(count)?;
-        }
+        self.vectors_mut().try_for_each(|vectors| vectors.reserve(count))?;
         if let Some(coarse) = &mut self.coarse {
             coarse.reserve(count)?;
         }
@@ -45,9 +40,6 @@ impl System {
         let triangles = self.surface.len() + 2 * more;
         memory::reserve(&mut self.surface, triangles)?;
         self.forget_early();
-        for early in self.early.iter_mut().flatten() {
-            early.velocities.reserve(count)?;
-        }
         self.node_room = count;
         let known = self.node_count();
         self.bindings.get_or_insert_default().reserve(more, known)
@@ -97,12 +89,7 @@ impl System {
         self.masses.resize(count, 0.0);
         self.inverse_masses.resize(count, 0.0);
         self.state.grow(count);
-        for vectors in [&mut self.predicted_velocities, &mut self.applied]
-            .into_iter()
-            .flatten()
-        {
-            vectors.grow(count);
-        }
+        self.vectors_mut().for_each(|vectors| vectors.grow(count));
         if let Some(coarse) = &mut self.coarse {
             coarse.grow(count);
         }
@@ -110,9 +97,6 @@ impl System {
             implicit.grow(count);
         }
         self.forget_early();
-        for early in self.early.iter_mut().flatten() {
-            early.velocities.grow(count);
-        }
         self.surveys.resize(tile_count(count), Survey::NOTHING);
         self.tile_sums.resize(tile_count(count), Sums::default());
         self.boxes.resize(tile_count(count), Bounds::EMPTY);
@@ -138,6 +122,12 @@ impl System {
         }
         self.follow_nodes();
         Ok(())
+    }
+
+    /// What there is for each node beside its state and what its solver keeps.
+    fn vectors_mut(&mut self) -> impl Iterator<Item = &mut Vectors> {
+        let early = self.early.iter_mut().flatten().map(|early| &mut early.velocities);
+        early.chain(&mut self.predicted_velocities).chain(&mut self.applied)
     }
 
     fn copy_motion(&mut self, source: usize, node: usize) {

@@ -28,7 +28,7 @@ mod verlet;
 mod watched;
 
 pub(crate) use attempt::{
-    Carry, Outcome, RESERVE, StepRequest, attempt, finish, needed, relieve_squeezed, substeps_alone, substeps_needed,
+    Carry, Outcome, RESERVE, StepRequest, attempt, finish, needed, relieve_squeezed, substeps_needed,
 };
 pub(crate) use changed::Changed;
 pub(crate) use closing::{close, close_beside, make_up_for, show_closed};

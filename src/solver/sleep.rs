@@ -259,7 +259,7 @@ impl System {
         self.sleeper.as_ref().map_or(0.0, |sleeper| sleeper.step)
     }
 
-    /// Makes it one that sleeps.
+    /// Makes it one that sleeps, with room for the tiles that cuts may add. Changes nothing where it fails.
     pub(crate) fn make_sleeper(&mut self, sleep: Sleep) -> Result<()> {
         if sleep.speed > 0.0 {
             let tiles = tile_count(self.node_count());
@@ -278,6 +278,7 @@ impl System {
                 knew_forces: false,
             };
             self.join_tiles(&mut sleeper)?;
+            sleeper.reserve(tile_count(self.node_count().max(self.node_room)))?;
             self.sleeper = Some(memory::boxed(sleeper)?);
         }
         Ok(())

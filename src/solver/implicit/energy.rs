@@ -5,8 +5,7 @@ use super::step::Substep;
 use super::{End, History, Implicit};
 use crate::codec::saved;
 use crate::contact::Contacts;
-use crate::nodes::Pins;
-use crate::simd::{ChosenKernel, Loops};
+use crate::simd::Loops;
 use crate::soa::{TileForces, Vectors, tile_count, tile_nodes};
 use crate::solver::System;
 use crate::solver::energy_monitor::slow_down;
@@ -74,13 +73,7 @@ impl Substep<'_> {
         {
             return Before { total, credit };
         }
-        let state = body.state.substep();
-        let velocities = if self.is_first {
-            state.first_velocities
-        } else {
-            &*state.velocities
-        };
-        let kinetic = kinetic(velocities, &body.masses, &body.inverse_masses, &body.pins, body.kernel);
+        let kinetic = kinetic(body, self.is_first);
         let from = implicit.place(self.is_first);
         let mut total = implicit.elastic(body, false, from, self.team);
         if travels {
@@ -105,14 +98,7 @@ impl Substep<'_> {
 
     /// Compares the energy after the step with what there was and what was put in.
     pub(super) fn account(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
-        let state = body.state.substep();
-        let kinetic = kinetic(
-            state.velocities,
-            &body.masses,
-            &body.inverse_masses,
-            &body.pins,
-            body.kernel,
-        );
+        let kinetic = kinetic(body, false);
         let next = 1 - implicit.settled;
         let elastic = implicit.elastic(body, true, next, self.team);
         let work = self.work(body, &implicit.histories[next]);
@@ -146,14 +132,8 @@ impl Substep<'_> {
             let held = body.held_axes();
             slow_down(body, held, excess.max(0.0), true)
         });
+        let kinetic = kinetic(body, false);
         let state = body.state.substep();
-        let kinetic = kinetic(
-            state.velocities,
-            &body.masses,
-            &body.inverse_masses,
-            &body.pins,
-            body.kernel,
-        );
         let history = &mut implicit.histories[next];
         if let (Some(total), Some(excess), Some(taken)) = (known, excess, taken)
             && excess - taken <= kinetic
@@ -304,16 +284,23 @@ impl Implicit {
     }
 }
 
-/// The kinetic energy of what is free to move, J: not of what is led, though it be along some axes alone.
-fn kinetic(velocities: &Vectors, masses: &[f32], inverse_masses: &[f32], pins: &Pins, kernel: ChosenKernel) -> f64 {
-    let led = pins.partial().map(|pin| {
+/// The kinetic energy of what is free to move, J, before the first substep or now: not of what is led, though it be along some axes alone.
+fn kinetic(body: &mut System, is_first: bool) -> f64 {
+    let state = body.state.substep();
+    let velocities = if is_first {
+        state.first_velocities
+    } else {
+        &*state.velocities
+    };
+    let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
+    let led = body.pins.partial().map(|pin| {
         let node = pin.node as usize;
         0.5 * f64::from(masses[node]) * pin.held(velocities.get(node)).as_dvec3().length_squared()
     });
     let moving: f64 = (0..tile_count(masses.len()))
         .map(|tile| {
             let nodes = tile_nodes(tile, masses.len());
-            kernel.run(Kinetic {
+            body.kernel.run(Kinetic {
                 velocities: velocities.slices(nodes.clone()),
                 masses: &masses[nodes.clone()],
                 inverse_masses: &inverse_masses[nodes],

@@ -301,24 +301,10 @@ impl Implicit {
 
     /// Makes room for so many nodes in all.
     pub fn reserve_nodes(&mut self, count: usize) -> Result<()> {
-        for history in &mut self.histories {
-            for vectors in [&mut history.ways, &mut history.gains] {
-                vectors.reserve(count)?;
-            }
-            if let Some(pressed) = &mut history.pressed {
-                pressed.reserve(count)?;
-            }
-        }
-        self.pushes.reserve(count)?;
-        if let Some(means) = &mut self.means {
-            means.reserve(count)?;
-        }
+        self.vectors_mut().try_for_each(|vectors| vectors.reserve(count))?;
         if self.newton.is_some() {
             return Ok(());
         }
-        self.solved_mut()
-            .into_iter()
-            .try_for_each(|vectors| vectors.reserve(count))?;
         memory::reserve(&mut self.inertia, count)?;
         self.spectrum.reserve(count)?;
         self.blocks.reserve(count)?;
@@ -334,22 +320,11 @@ impl Implicit {
 
     /// Adds nodes, for which there is room, up to so many in all; NEWTON has been made roomier.
     pub fn grow(&mut self, count: usize) {
-        for history in &mut self.histories {
-            history.ways.grow(count);
-            history.gains.grow(count);
-            if let Some(pressed) = &mut history.pressed {
-                pressed.grow(count);
-            }
-        }
+        self.vectors_mut().for_each(|vectors| vectors.grow(count));
         self.prepared = 0.0;
-        self.pushes.grow(count);
-        if let Some(means) = &mut self.means {
-            means.grow(count);
-        }
         if self.newton.is_some() {
             return;
         }
-        self.solved_mut().into_iter().for_each(|vectors| vectors.grow(count));
         self.inertia.resize(count, 0.0);
         self.blocks.grow(count);
         self.coarse.grow(count);
@@ -357,18 +332,22 @@ impl Implicit {
         self.partials.resize(tile_count(count), Partial::default());
     }
 
-    /// What there is for each node whose equation is solved by conjugate gradients.
-    fn solved_mut(&mut self) -> [&mut Vectors; 7] {
-        let [first, second] = &mut self.histories;
-        [
-            &mut first.remainders,
-            &mut second.remainders,
+    /// What there is for each node: beside histories, pushes and means where its equation is solved by conjugate gradients.
+    fn vectors_mut(&mut self) -> impl Iterator<Item = &mut Vectors> {
+        let is_exact = self.newton.is_some();
+        let solved = [
             &mut self.corrections,
             &mut self.residuals,
             &mut self.searches,
             &mut self.products,
             &mut self.preconditioned,
-        ]
+        ];
+        let solved = solved.into_iter().filter(move |_| !is_exact);
+        let histories = self
+            .histories
+            .iter_mut()
+            .flat_map(move |history| history.vectors_mut(is_exact));
+        histories.chain([&mut self.pushes]).chain(&mut self.means).chain(solved)
     }
 
     /// Has a new node go on as another does.

@@ -8,7 +8,6 @@
 use glam::Vec3;
 
 use super::{History, Implicit};
-use crate::base::Result;
 use crate::codec::saved;
 use crate::soa::Vectors;
 
@@ -27,14 +26,6 @@ pub(super) struct Pressed {
 saved!(Pressed { forces, acts });
 
 impl Pressed {
-    pub fn reserve(&mut self, count: usize) -> Result<()> {
-        self.forces.reserve(count)
-    }
-
-    pub fn grow(&mut self, count: usize) {
-        self.forces.grow(count);
-    }
-
     /// Nothing presses.
     pub fn forget(&mut self) {
         if self.acts {
@@ -45,6 +36,16 @@ impl Pressed {
 }
 
 impl History {
+    /// What there is for each node; remainders, but where the equations are solved exactly.
+    pub(super) fn vectors_mut(&mut self, is_exact: bool) -> impl Iterator<Item = &mut Vectors> {
+        let forces = self.pressed.as_mut().map(|pressed| &mut pressed.forces);
+        let remainders = Some(&mut self.remainders).filter(|_| !is_exact);
+        [&mut self.ways, &mut self.gains]
+            .into_iter()
+            .chain(remainders)
+            .chain(forces)
+    }
+
     /// Whether it holds vectors of so many nodes.
     pub(super) fn is_sound(&self, count: usize) -> bool {
         let forces = self.pressed.as_ref().map(|pressed| &pressed.forces);
