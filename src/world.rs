@@ -33,7 +33,7 @@ use crate::simd::{ChosenKernel, Kernel};
 use crate::slots::Slots;
 use crate::solver::{Outcome, RestStateDefinition, RestStateReport};
 use crate::threads::{RunTasks, Threads};
-use crate::tissue::{Skin, Tissue, Walk};
+use crate::tissue::{CoupledBody, Skin, Tissue};
 use attachments::{Attachment, Which};
 use blade::Blade;
 pub use blade::{BladeDefinition, BladeReport};
@@ -99,7 +99,7 @@ pub struct World {
     /// Contacts of tissue with tissue, where bodies ask for them.
     pub(crate) tissue: Option<Box<Tissue>>,
     /// The bodies that take their substeps together, by their places; none where none can.
-    walks: Vec<Option<Walk>>,
+    walks: Vec<Option<CoupledBody>>,
     /// How the step in progress ended for each body, at its place.
     outcomes: Vec<Option<Outcome>>,
     /// What tools hold.
@@ -611,7 +611,7 @@ impl World {
 }
 
 /// Makes room for the body at this place to take its substeps together with others.
-fn make_walks(walks: &mut Vec<Option<Walk>>, place: usize) -> Result<()> {
+fn make_walks(walks: &mut Vec<Option<CoupledBody>>, place: usize) -> Result<()> {
     walks.try_reserve((place + 1).saturating_sub(walks.len()))?;
     walks.resize((place + 1).max(walks.len()), None);
     Ok(())

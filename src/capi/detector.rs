@@ -153,7 +153,7 @@ unsafe impl Versioned for sinew_detector_report {
 pub struct sinew_detector {
     sides: [Side; 2],
     method: Method,
-    found: Found,
+    found: Overlaps,
 }
 
 /// One of the two bodies.
@@ -172,7 +172,7 @@ enum Method {
 }
 
 /// What the last detection found; as it was where one fails.
-struct Found {
+struct Overlaps {
     /// Whether volumes are measured.
     has_volume: bool,
     report: sinew_detector_report,
@@ -272,7 +272,7 @@ impl sinew_detector_def {
             }
             Method::Exact(solids, overlaps)
         };
-        let found = Found::reserved(&sides, &method, has_volume)?;
+        let found = Overlaps::reserved(&sides, &method, has_volume)?;
         Ok(sinew_detector { sides, method, found })
     }
 
@@ -389,7 +389,7 @@ impl sinew_detector {
     }
 }
 
-impl Found {
+impl Overlaps {
     fn reserved(sides: &[Side; 2], method: &Method, has_volume: bool) -> Result<Self> {
         let node_counts = [0, 1].map(|side| sides[side].surface.node_count());
         let edges = sides.iter().map(|side| side.surface.edges().len()).max().unwrap_or(0);

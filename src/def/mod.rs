@@ -30,5 +30,5 @@ pub use spring_law::SpringLaw;
 pub(crate) use tearing::Withheld;
 pub use tearing::{TearReport, Tearing};
 pub use viscosity::Viscosity;
-pub(crate) use viscosity::{Carried, Course};
+pub(crate) use viscosity::{Carried, RelaxationStep};
 pub use yielding::Yielding;

@@ -34,16 +34,16 @@ const LONGEST: f32 = 1e6;
 /// What becomes of an arm in some time: its stress is the part `decay` of what it was, and `gain` times what the elastic stress changed
 /// by. Exact where strain changes evenly (Taylor, Pister, Goudreau 1970).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Course {
+pub(crate) struct RelaxationStep {
     pub decay: f64,
     pub gain: f64,
     /// Whether what is deformed beyond its yield strain stays so.
     pub yields: bool,
 }
 
-saved!(Course { decay, gain, yields });
+saved!(RelaxationStep { decay, gain, yields });
 
-impl Course {
+impl RelaxationStep {
     /// None: arms hold what they held.
     pub const NOTHING: Self = Self {
         decay: 1.0,
@@ -97,10 +97,10 @@ impl Viscosity {
     }
 
     /// In so many seconds, above 0.
-    pub(crate) fn over(&self, time: f64) -> Course {
+    pub(crate) fn over(&self, time: f64) -> RelaxationStep {
         let (retardation, relaxation) = (f64::from(self.retardation_time), f64::from(self.relaxation_time));
         let ratio = time / relaxation;
-        Course {
+        RelaxationStep {
             decay: libm::exp(-ratio),
             gain: retardation / time * -libm::expm1(-ratio),
             yields: true,

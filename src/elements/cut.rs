@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::parts::{Copy, Part, in_group};
+use super::parts::{Copy, FemPart, in_group};
 use super::tetrahedra::{GROUP, Group, Groups};
 use super::{Deformed, Elements, Load, Rest, Sums};
 use crate::base::{Result, memory};
@@ -38,7 +38,7 @@ pub(super) struct Cells {
     /// How many are in the last part that came later.
     used: usize,
     /// Parts that are to come.
-    spare: Vec<Part>,
+    spare: Vec<FemPart>,
 }
 
 saved!(Cells { places, used, spare });
@@ -123,7 +123,7 @@ impl Elements {
         // All of them may have to go elsewhere.
         let more = pieces.len().saturating_sub(LATER - cells.used).div_ceil(LATER);
         while cells.spare.len() < more {
-            let part = Part {
+            let part = FemPart {
                 groups: Groups::new(memory::filled(Group::EMPTY, GROUPS)?, NODES),
                 nodes: memory::reserved(NODES)?,
                 is_later: true,

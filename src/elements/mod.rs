@@ -20,14 +20,14 @@ use glam::{DMat3, DVec3};
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::def::{Course, Viscosity, Yielding};
+use crate::def::{RelaxationStep, Viscosity, Yielding};
 use crate::simd::{ChosenKernel, Record};
 use crate::soa::{TILE, TileForces, Vectors};
 use crate::threads::{Items, Ragged, Team};
 pub(crate) use cut::PieceOfElement;
 pub(crate) use law::{Deformed, Law, Load, Rest};
 use offsets::Offsets;
-use parts::{Copies, Part};
+use parts::{Copies, FemPart};
 use past::Memory;
 pub(crate) use rates::LEAST_SHEAR;
 use rings::{Pressures, Rings};
@@ -38,7 +38,7 @@ use tetrahedra::Stresses;
 pub(crate) struct Elements {
     law: Law,
     count: usize,
-    parts: Vec<Part>,
+    parts: Vec<FemPart>,
     /// Of bodies that may be cut.
     cells: Option<Box<cut::Cells>>,
     /// Where the copies of each part's nodes begin.
@@ -520,7 +520,7 @@ impl Elements {
         &mut self,
         kernel: ChosenKernel,
         positions: &[Record],
-        course: impl Fn(Viscosity) -> Course,
+        course: impl Fn(Viscosity) -> RelaxationStep,
         team: &Team,
     ) {
         let Some(memory) = &self.memory else {

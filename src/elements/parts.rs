@@ -15,7 +15,7 @@ pub(super) const PART: usize = 4096;
 
 /// Some tetrahedra, and their nodes.
 #[derive(Debug)]
-pub(super) struct Part {
+pub(super) struct FemPart {
     /// In order, but for a part that came later.
     pub nodes: Vec<u32>,
     pub groups: Groups,
@@ -23,7 +23,7 @@ pub(super) struct Part {
     pub is_later: bool,
 }
 
-saved!(Part {
+saved!(FemPart {
     nodes,
     groups,
     is_later
@@ -33,11 +33,11 @@ saved!(Part {
 pub(super) type See<'a> = dyn FnMut([u32; 4], &Rest, [usize; 2]) + 'a;
 
 /// Cuts tetrahedra into parts.
-pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<Part>> {
+pub(super) fn split(tetrahedra: &[[u32; 4]], rest: impl Fn(u32) -> DVec3) -> Result<Vec<FemPart>> {
     let order = in_order(tetrahedra)?;
     let mut parts = memory::reserved(order.len().div_ceil(PART))?;
     for of_part in order.chunks(PART) {
-        parts.push(Part::new(tetrahedra, of_part, &rest)?);
+        parts.push(FemPart::new(tetrahedra, of_part, &rest)?);
     }
     Ok(parts)
 }
@@ -74,7 +74,7 @@ pub(super) fn in_group(place: usize, group_count: usize) -> [usize; 2] {
     [place % group_count, place / group_count]
 }
 
-impl Part {
+impl FemPart {
     fn new(tetrahedra: &[[u32; 4]], of_part: &[u32], rest: impl Fn(u32) -> DVec3) -> Result<Self> {
         let mut nodes: Vec<u32> = memory::reserved(4 * of_part.len())?;
         nodes.extend(of_part.iter().flat_map(|&index| tetrahedra[index as usize]));
@@ -234,7 +234,7 @@ pub(super) struct Copies {
 saved!(Copies { copies, starts, later });
 
 impl Copies {
-    pub fn new(parts: &[Part], node_count: usize) -> Result<Self> {
+    pub fn new(parts: &[FemPart], node_count: usize) -> Result<Self> {
         let tiles = tile_count(node_count);
         let mut starts = memory::filled(0_u32, tiles + 1)?;
         let nodes = || parts.iter().flat_map(|part| &part.nodes).map(|&node| node as usize);

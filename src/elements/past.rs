@@ -7,12 +7,12 @@
 
 use super::cut::Place;
 use super::law::{Law, Load};
-use super::parts::Part;
+use super::parts::FemPart;
 use super::set::{Bounds, Set};
 use super::tetrahedra::{GROUP, Group, Stresses};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Saved, saved};
-use crate::def::{Course, Viscosity, Yielding};
+use crate::def::{RelaxationStep, Viscosity, Yielding};
 use crate::simd::ChosenKernel;
 
 #[derive(Debug)]
@@ -106,7 +106,7 @@ impl<T: Numbers> Past<T> {
     }
 
     /// Makes loads `decay` times the arms' stresses less `gain` times what is elastic.
-    fn foresee(&mut self, course: Course) {
+    fn foresee(&mut self, course: RelaxationStep) {
         let stresses = self.arms.iter().zip(&self.elastic);
         for (load, (arm, elastic)) in self.loads.iter_mut().zip(stresses) {
             let numbers = arm.numbers().iter().zip(elastic.numbers());
@@ -117,7 +117,7 @@ impl<T: Numbers> Past<T> {
     }
 
     /// What is elastic has become this.
-    pub fn age(&mut self, course: Course, newest: &[T]) {
+    pub fn age(&mut self, course: RelaxationStep, newest: &[T]) {
         let stresses = self.arms.iter_mut().zip(&mut self.elastic).zip(&mut self.loads);
         for (((arm, elastic), load), newest) in stresses.zip(newest) {
             let numbers = arm.numbers_mut().iter_mut().zip(elastic.numbers_mut());
@@ -173,7 +173,7 @@ impl OfPart {
 
     /// The newest elastic stresses are those now.
     /// They yield where there are bounds.
-    pub fn age(&mut self, kernel: ChosenKernel, course: Course, bounds: Option<Bounds>) {
+    pub fn age(&mut self, kernel: ChosenKernel, course: RelaxationStep, bounds: Option<Bounds>) {
         self.past.age(course, &self.newest);
         if let (Some(set), Some(bounds)) = (&mut self.set, bounds) {
             set.flow(kernel, bounds, &self.newest);
@@ -225,7 +225,7 @@ impl Memory {
         law: Law,
         viscosity: Viscosity,
         yielding: Yielding,
-        parts: &[Part],
+        parts: &[FemPart],
         ring_count: usize,
     ) -> Result<Option<Box<Self>>> {
         // Volume alone does not yield.

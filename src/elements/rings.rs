@@ -1,6 +1,6 @@
 //! Volume by rings: the tetrahedra about a node keep their volume together, and press with the mean of their nodes' pressures.
 
-use super::parts::{Copies, Part};
+use super::parts::{Copies, FemPart};
 use crate::base::{Result, memory};
 use crate::codec::saved;
 use crate::simd::Record;
@@ -16,7 +16,7 @@ pub(super) struct Rings {
 saved!(Rings { volumes });
 
 /// The rings of all tetrahedra.
-pub(super) fn of(parts: &[Part], node_count: usize) -> Result<Rings> {
+pub(super) fn of(parts: &[FemPart], node_count: usize) -> Result<Rings> {
     let mut volumes = memory::filled(0.0_f32, node_count)?;
     for part in parts {
         part.visit(&mut |corners, rest, _| {

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::Elements;
-use super::parts::{PART, Part};
+use super::parts::{FemPart, PART};
 use super::tetrahedra::{GROUP, Group};
 use crate::base::{Error, Result};
 use crate::soa::{Region, Scale};
@@ -17,7 +17,7 @@ struct Inside([u64; 4 * PART / 64]);
 
 impl Inside {
     /// `None`: no node is.
-    fn of(part: &Part, region: &Region) -> Option<Self> {
+    fn of(part: &FemPart, region: &Region) -> Option<Self> {
         let mut bits = [0; 4 * PART / 64];
         let mut any = false;
         if part.is_later {

@@ -49,7 +49,7 @@ pub(crate) struct Enclosed {
     surface: Surface,
     /// The vectors of triangles where forces were last worked out, m².
     vectors: Vec<Vec3>,
-    sums: Vec<Sums>,
+    sums: Vec<BlockSums>,
     /// Pressures, over 6: what a triangle's vector gives to each of its nodes.
     factors: Vec<f64>,
     /// For each triangle, what its vector and its longest edge count for in the bound on frequencies.
@@ -78,13 +78,13 @@ saved!(Enclosed {
 
 /// What there is to know of the triangles of a block.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sums {
+struct BlockSums {
     /// Six times their volume, m³.
     volume: f64,
     bounds: rates::Bounds,
 }
 
-saved!(Sums { volume, bounds });
+saved!(BlockSums { volume, bounds });
 
 /// How pressures change where nodes go some ways.
 #[derive(Debug)]
@@ -132,7 +132,7 @@ impl Enclosed {
             stiffness: definition.enclosed_stiffness,
             pressure: definition.pressure,
             vectors: memory::filled(Vec3::ZERO, triangle_count)?,
-            sums: memory::filled(Sums::default(), surface.blocks.len())?,
+            sums: memory::filled(BlockSums::default(), surface.blocks.len())?,
             factors: memory::filled(0.0, cavities.len())?,
             weights: memory::filled(rates::Weights::default(), triangle_count)?,
             cavities,
@@ -179,7 +179,7 @@ impl Enclosed {
             let at = |node: u32| positions.get(node as usize).as_dvec3();
             // Volumes are those of the tetrahedra with one of the surface's own nodes, so that nothing is lost far away.
             let apex = at(surface.triangles[cavity.triangles[0] as usize][0]);
-            *sums = Sums::default();
+            *sums = BlockSums::default();
             let triangles = surface.triangles[start..end].iter().zip(&weights[start..end]);
             for (vector, (corners, weights)) in vectors.iter_mut().zip(triangles) {
                 let [a, b, c] = corners.map(at);
@@ -198,7 +198,7 @@ impl Enclosed {
         let mut bounds = rates::Sum::new(self.surface.nodes_are_shared);
         let mut blocks = self.surface.blocks.iter().zip(&self.sums).peekable();
         for (index, cavity) in self.cavities.iter_mut().enumerate() {
-            let mut sums = Sums::default();
+            let mut sums = BlockSums::default();
             while let Some((_, of_block)) = blocks.next_if(|(block, _)| block.cavity == index) {
                 sums.volume += of_block.volume;
                 sums.bounds.and(&of_block.bounds);

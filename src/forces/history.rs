@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::Forces;
-use crate::def::{Course, Viscosity};
+use crate::def::{RelaxationStep, Viscosity};
 use crate::elements::Elements;
 use crate::soa::Vectors;
-use crate::terms::Moment;
+use crate::terms::Event;
 use crate::threads::Team;
 
 impl Forces {
@@ -18,19 +18,19 @@ impl Forces {
     /// A step begins, from what is current.
     pub fn recall(&mut self) {
         self.elements.iter_mut().for_each(|elements| elements.recall());
-        self.beside.laws_mut().for_each(|law| law.pass(Moment::Recall));
+        self.beside.laws_mut().for_each(|law| law.pass(Event::Recall));
     }
 
     /// The step in progress is the current state.
     pub fn keep(&mut self) {
         self.elements.iter_mut().for_each(|elements| elements.keep());
-        self.beside.laws_mut().for_each(|law| law.pass(Moment::Keep));
+        self.beside.laws_mut().for_each(|law| law.pass(Event::Keep));
     }
 
     /// An equation is to be solved for the end of so many seconds.
     pub fn foresee(&mut self, time: f64) {
         self.elements.iter_mut().for_each(|elements| elements.foresee(time));
-        self.beside.laws_mut().for_each(|law| law.pass(Moment::Foresee(time)));
+        self.beside.laws_mut().for_each(|law| law.pass(Event::Foresee(time)));
     }
 
     /// What cuts left of how rings were deformed fades, over so many seconds, with nodes at `positions`: whether there was any.
@@ -54,7 +54,7 @@ impl Forces {
     /// What is elastic has changed where nodes are, at `positions`: arms hold what they held.
     pub fn measure_anew(&mut self, positions: &Vectors) {
         if self.remember() {
-            self.follow(positions, |_| Course::NOTHING, &Team::alone());
+            self.follow(positions, |_| RelaxationStep::NOTHING, &Team::alone());
             self.keep();
         }
     }
@@ -68,7 +68,7 @@ impl Forces {
     /// The same until [`Self::recall`].
     pub fn release(&mut self, positions: &Vectors) {
         self.elements.iter_mut().for_each(|elements| elements.release_rings());
-        self.follow(positions, |_| Course::FOREVER, &Team::alone());
+        self.follow(positions, |_| RelaxationStep::FOREVER, &Team::alone());
     }
 
     /// Whether any element would yield with nodes at these places.
@@ -77,7 +77,7 @@ impl Forces {
     }
 
     /// What remembers follows nodes to `positions`, along this course.
-    fn follow(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> Course, team: &Team) {
+    fn follow(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> RelaxationStep, team: &Team) {
         if !self.remember() {
             return;
         }

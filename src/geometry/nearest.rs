@@ -4,7 +4,7 @@ use glam::DVec3;
 
 /// What a point of a triangle lies on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Part {
+pub(crate) enum Spot {
     Face,
     /// From this corner to the next.
     Edge(usize),
@@ -12,40 +12,40 @@ pub(crate) enum Part {
 }
 
 /// The point of triangle `a b c` that is closest to `point`, as weights, and what it lies on (Ericson 2005, chapter 5).
-pub(crate) fn nearest_on_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> ([f64; 3], Part) {
+pub(crate) fn nearest_on_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> ([f64; 3], Spot) {
     let (ab, ac) = (b - a, c - a);
     let from_a = point - a;
     let (d1, d2) = (ab.dot(from_a), ac.dot(from_a));
     if d1 <= 0.0 && d2 <= 0.0 {
-        return ([1.0, 0.0, 0.0], Part::Corner(0));
+        return ([1.0, 0.0, 0.0], Spot::Corner(0));
     }
     let from_b = point - b;
     let (d3, d4) = (ab.dot(from_b), ac.dot(from_b));
     if d3 >= 0.0 && d4 <= d3 {
-        return ([0.0, 1.0, 0.0], Part::Corner(1));
+        return ([0.0, 1.0, 0.0], Spot::Corner(1));
     }
     let weight_c = d1 * d4 - d3 * d2;
     if weight_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
         let t = d1 / (d1 - d3);
-        return ([1.0 - t, t, 0.0], Part::Edge(0));
+        return ([1.0 - t, t, 0.0], Spot::Edge(0));
     }
     let from_c = point - c;
     let (d5, d6) = (ab.dot(from_c), ac.dot(from_c));
     if d6 >= 0.0 && d5 <= d6 {
-        return ([0.0, 0.0, 1.0], Part::Corner(2));
+        return ([0.0, 0.0, 1.0], Spot::Corner(2));
     }
     let weight_b = d5 * d2 - d1 * d6;
     if weight_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
         let t = d2 / (d2 - d6);
-        return ([1.0 - t, 0.0, t], Part::Edge(2));
+        return ([1.0 - t, 0.0, t], Spot::Edge(2));
     }
     let weight_a = d3 * d6 - d5 * d4;
     if weight_a <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
         let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return ([0.0, 1.0 - t, t], Part::Edge(1));
+        return ([0.0, 1.0 - t, t], Spot::Edge(1));
     }
     let sum = weight_a + weight_b + weight_c;
-    ([weight_a / sum, weight_b / sum, weight_c / sum], Part::Face)
+    ([weight_a / sum, weight_b / sum, weight_c / sum], Spot::Face)
 }
 
 /// How far along the segments from `a` to `b` and from `c` to `d` their closest points lie, 0 to 1 each. Of parallel ones these are in the

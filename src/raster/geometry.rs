@@ -17,11 +17,11 @@ pub(crate) struct Geometry {
     pub triangles: Vec<[u32; 3]>,
     /// For each triangle its part.
     pub part_of: Vec<u32>,
-    pub parts: Vec<Part>,
+    pub parts: Vec<MeshPart>,
 }
 
 /// What a run of triangles belongs to.
-pub(crate) struct Part {
+pub(crate) struct MeshPart {
     pub look: Look,
     /// The look's colour as light.
     pub colour: Vec3,
@@ -208,7 +208,7 @@ impl Geometry {
         self.normals.try_reserve_exact(positions)?;
         self.triangles.try_reserve_exact(triangles)?;
         self.part_of.try_reserve_exact(triangles)?;
-        self.parts.push(Part {
+        self.parts.push(MeshPart {
             look,
             colour: linear(look.colour),
             kind,
@@ -225,7 +225,7 @@ impl Geometry {
     }
 
     /// The part that a triangle belongs to.
-    pub fn part(&self, triangle: u32) -> &Part {
+    pub fn part(&self, triangle: u32) -> &MeshPart {
         &self.parts[self.part_of[triangle as usize] as usize]
     }
 

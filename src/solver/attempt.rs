@@ -9,7 +9,7 @@ use super::gravity::GravityKicks;
 use super::implicit;
 use super::pace::Pace;
 use super::stability::Stability;
-use super::verlet::{self, Taken, TooLong};
+use super::verlet::{self, StepResult, TooLong};
 use crate::base::{Profile, StateHasher};
 use crate::codec::saved;
 use crate::contact::{DynamicTool, ToolPath};
@@ -334,7 +334,7 @@ fn run(
     middle: u32,
     start: Carry,
     team: &Team,
-) -> Result<Taken, TooLong> {
+) -> Result<StepResult, TooLong> {
     if body.implicit.is_some() {
         implicit::run(body, request, substeps, middle, start, team).map(|(_, taken)| taken)
     } else {
@@ -349,7 +349,7 @@ fn run_stably(
     start: Carry,
     beside_springs: f32,
     team: &Team,
-) -> Result<(u32, Taken), TooLong> {
+) -> Result<(u32, StepResult), TooLong> {
     let mut stable_substep = first_substep(body, &start, beside_springs);
     let mut beside_springs = beside_springs;
     let (mut attempt, mut reliefs, mut was_tried, mut guess) = (0, 0, false, 1.0);
@@ -563,7 +563,7 @@ fn newest_limit(body: &System, carry: &Carry) -> f32 {
     carry.limit().map_or(f32::INFINITY, with)
 }
 
-pub(crate) fn finish(body: &System, substeps: u32, taken: Taken, error: f32) -> Outcome {
+pub(crate) fn finish(body: &System, substeps: u32, taken: StepResult, error: f32) -> Outcome {
     if taken.finite && sums_fit(body) {
         Outcome::Done {
             substeps,

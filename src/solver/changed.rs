@@ -31,7 +31,7 @@ pub(crate) enum Changed {
 
 /// What is known from the state or from earlier steps.
 #[derive(Clone, Copy)]
-pub(super) enum Known {
+pub(super) enum Cached {
     /// Which parts sleep.
     Sleep,
     /// The forces at the positions.
@@ -58,8 +58,8 @@ pub(super) enum Known {
 
 impl Changed {
     /// What it makes invalid.
-    const fn concerns(self) -> &'static [Known] {
-        use Known::*;
+    const fn concerns(self) -> &'static [Cached] {
+        use Cached::*;
         match self {
             Self::Positions => &[
                 Sleep, Forces, Stability, Energy, Remainders, History, Matrix, Candidates, Holds,
@@ -86,26 +86,26 @@ impl System {
         }
     }
 
-    fn forget(&mut self, known: Known) {
+    fn forget(&mut self, known: Cached) {
         if let Some(implicit) = &mut self.implicit {
             implicit.forget(known);
         }
         match known {
-            Known::Sleep => self.wake(),
-            Known::Forces => self.forces_current = false,
-            Known::DampingForces => {
+            Cached::Sleep => self.wake(),
+            Cached::Forces => self.forces_current = false,
+            Cached::DampingForces => {
                 if self.forces.springs.damped() {
                     self.forces_current = false;
                     self.wake();
                 }
             }
-            Known::Stability => self.carry.stability = Stability::UNKNOWN,
-            Known::Rates => self.forces.forget_rates(),
-            Known::Energy => self.carry.forget(),
-            Known::Remainders => self.state.forget_remainders(),
-            Known::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.forget()),
-            Known::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),
-            Known::History | Known::Matrix => {}
+            Cached::Stability => self.carry.stability = Stability::UNKNOWN,
+            Cached::Rates => self.forces.forget_rates(),
+            Cached::Energy => self.carry.forget(),
+            Cached::Remainders => self.state.forget_remainders(),
+            Cached::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.forget()),
+            Cached::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),
+            Cached::History | Cached::Matrix => {}
         }
     }
 }

@@ -24,7 +24,7 @@ use super::System;
 use super::attempt::{Carry, StepRequest};
 use super::closing::Closed;
 use super::kick::Inertia;
-use super::substep::{Before, Part};
+use super::substep::{Part, VelocityTime};
 use crate::base::StateHasher;
 use crate::codec::saved;
 use crate::simd::Loops;
@@ -221,13 +221,13 @@ impl<'a> Account<'a> {
     pub fn keep_velocities(&self, body: &mut System, last: &Part) {
         let state = body.state.substep();
         state.forces.copy_from(match last.before {
-            Before::Current | Before::CurrentOpen => state.first_velocities,
-            Before::Closed | Before::Open => state.velocities,
+            VelocityTime::Current | VelocityTime::CurrentOpen => state.first_velocities,
+            VelocityTime::Closed | VelocityTime::Open => state.velocities,
         });
     }
 
     /// Takes the step into account. `sums` are those of the open velocities, if it ends with a comparison.
-    pub fn settle(&self, body: &mut System, carry: &mut Carry, sums: Option<Sums>, team: &Team) {
+    pub fn settle(&self, body: &mut System, carry: &mut Carry, sums: Option<TileSums>, team: &Team) {
         let account = &mut carry.energy;
         if !self.watches {
             account.forget();
@@ -275,7 +275,7 @@ impl<'a> Account<'a> {
     }
 
     /// Takes off the excess energy, and decides how short the next substeps are.
-    fn compare(&self, body: &mut System, carry: &mut Carry, open: Sums, team: &Team) {
+    fn compare(&self, body: &mut System, carry: &mut Carry, open: TileSums, team: &Team) {
         let held = body.held_axes();
         let [closing, elastic] = close(body, carry, team);
         let energy = open.shadow + closing + elastic - open.moment.dot(self.request.gravity.as_dvec3());
@@ -303,7 +303,7 @@ impl<'a> Account<'a> {
 
 /// What the nodes of a tile, or of a body, add up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Sums {
+pub(crate) struct TileSums {
     /// Of what is free to move, J.
     kinetic: f64,
     /// Of what is free to move, kg m/s.
@@ -317,7 +317,7 @@ pub(crate) struct Sums {
     elastic: f64,
 }
 
-saved!(Sums {
+saved!(TileSums {
     kinetic,
     momentum,
     moment,
@@ -327,7 +327,7 @@ saved!(Sums {
     elastic
 });
 
-impl Sums {
+impl TileSums {
     fn plus(self, other: &Self) -> Self {
         Self {
             kinetic: self.kinetic + other.kinetic,
@@ -353,7 +353,7 @@ impl Sums {
         let written = (state.next_positions.tiles_mut(), Items::new(&mut body.tile_sums));
         team.pass(tile_count(count), written, |tile, (mut changes, sums)| {
             let nodes = tile_nodes(tile, count);
-            *sums = Sums::default();
+            *sums = TileSums::default();
             for (axis, changes) in changes.iter_mut().enumerate() {
                 kernel.run(OfAxis {
                     axis,
@@ -384,7 +384,7 @@ impl Sums {
         let mut sums = body
             .tile_sums
             .iter()
-            .fold(Sums::default(), |sums, tile| sums.plus(tile));
+            .fold(TileSums::default(), |sums, tile| sums.plus(tile));
         sums.moment += sums.mass * body.origin;
         sums
     }
@@ -402,7 +402,7 @@ struct OfAxis<'a> {
     masses: &'a [f32],
     inverse_masses: &'a [f32],
     shares: &'a mut [f32],
-    sums: &'a mut Sums,
+    sums: &'a mut TileSums,
 }
 
 /// Sums that are made side by side, so that none waits for itself.

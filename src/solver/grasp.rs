@@ -59,7 +59,7 @@ pub(crate) struct HeldNode {
     pub torque: Vec3,
     /// How much faster it was led in the last step than before it, m/s.
     gain: Vec3,
-    course: Course,
+    course: HeldMotion,
 }
 
 saved!(HeldNode {
@@ -90,7 +90,7 @@ pub(crate) struct Grip {
 
 /// The step in progress of a held node.
 #[derive(Clone, Copy, Debug, Default)]
-struct Course {
+struct HeldMotion {
     offset: DVec3,
     /// How far the node is from where the tool has it when the step begins, m; nothing, but for a body that was put back.
     gap: DVec3,
@@ -104,7 +104,7 @@ struct Course {
     torque_sum: DVec3,
 }
 
-saved!(Course {
+saved!(HeldMotion {
     offset,
     gap,
     velocity,
@@ -164,7 +164,7 @@ impl Grasps {
 
     /// Whether what is to be told of them is finite.
     pub fn sums_fit(&self, fits: impl Fn(DVec3) -> bool) -> bool {
-        let fit = |course: &Course| fits(course.force_sum) && fits(course.torque_sum);
+        let fit = |course: &HeldMotion| fits(course.force_sum) && fits(course.torque_sum);
         self.nodes.iter().all(|held| fit(&held.course))
     }
 
@@ -394,7 +394,7 @@ impl System {
                 force: Vec3::ZERO,
                 torque: Vec3::ZERO,
                 gain: gain.unwrap_or_default(),
-                course: Course::default(),
+                course: HeldMotion::default(),
             });
             self.inverse_masses[node as usize] = 0.0;
             if let Some(applied) = &mut self.applied {
@@ -521,12 +521,12 @@ impl System {
             let node = held.node as usize;
             let position = state.positions().get(node).as_dvec3();
             let offset = held.offset.unwrap_or_else(|| frame.offset(position));
-            held.course = Course {
+            held.course = HeldMotion {
                 offset,
                 gap: position - frame.carried(offset),
                 velocity: state.velocities().get(node),
                 gain: held.gain,
-                ..Course::default()
+                ..HeldMotion::default()
             };
         }
     }
@@ -613,7 +613,7 @@ impl System {
     }
 }
 
-impl Course {
+impl HeldMotion {
     /// Adds what held the node of this pin, with its mass, kg, and what damps it, N s/m, at the end of this arm, m.
     fn feel(&mut self, pin: &Pin, velocities: &Vectors, [mass, drag]: [f64; 2], lapse: &Lapse, arm: DVec3) {
         let velocity = velocities.get(pin.node as usize);

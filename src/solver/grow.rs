@@ -1,7 +1,7 @@
 //! Nodes that come after a body was made, as cuts make them: room for them is made at the door, so that adding one moves nothing.
 
 use super::System;
-use super::energy_monitor::Sums;
+use super::energy_monitor::TileSums;
 use super::kick::Survey;
 use crate::base::{Error, Result, memory};
 use crate::forces::Parts;
@@ -98,7 +98,7 @@ impl System {
         }
         self.forget_early();
         self.surveys.resize(tile_count(count), Survey::NOTHING);
-        self.tile_sums.resize(tile_count(count), Sums::default());
+        self.tile_sums.resize(tile_count(count), TileSums::default());
         self.boxes.resize(tile_count(count), Bounds::EMPTY);
         self.wake();
         if let Some(sleeper) = &mut self.sleeper {

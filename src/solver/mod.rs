@@ -41,6 +41,6 @@ pub use newton::{RestStateDefinition, RestStateReport};
 pub(crate) use stability::Stability;
 pub(crate) use substep::Part;
 pub(crate) use system::{MayBeCut, System, Systems};
-pub(crate) use tissue_impulses::Moment;
-pub(crate) use verlet::{Step, Taken, TooLong, begin, check, check_beside_springs, pass};
+pub(crate) use tissue_impulses::Span;
+pub(crate) use verlet::{Step, StepResult, TooLong, begin, check, check_beside_springs, pass};
 pub(crate) use watched::Candidate;

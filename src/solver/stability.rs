@@ -118,7 +118,7 @@ impl Stability {
     ///
     /// Where the watched nodes show a limit that no other node can go below, wherever it is, no other is looked at.
     pub fn estimate(springs: &dyn Springs, masses: Masses, positions: &Vectors, watched: &Watched) -> Self {
-        let mut found = Found {
+        let mut found = Tightest {
             limit: f32::INFINITY,
             shortest: f32::INFINITY,
         };
@@ -126,13 +126,13 @@ impl Stability {
             if candidate.limit >= found.limit {
                 break;
             }
-            if let Some(sums) = Sums::of(candidate.node as usize, springs, &masses, positions) {
+            if let Some(sums) = NodeBound::of(candidate.node as usize, springs, &masses, positions) {
                 found.take(&sums);
             }
         }
         if watched.limit_of_others() < found.limit {
             for node in 0..masses.masses.len() {
-                if let Some(sums) = Sums::of(node, springs, &masses, positions) {
+                if let Some(sums) = NodeBound::of(node, springs, &masses, positions) {
                     found.take(&sums);
                 }
             }
@@ -151,7 +151,7 @@ impl Stability {
         let mut tightest = None;
         let mut shortest = f32::INFINITY;
         for node in 0..masses.masses.len() {
-            if let Some(sums) = Sums::of(node, springs, &masses, positions)
+            if let Some(sums) = NodeBound::of(node, springs, &masses, positions)
                 && sums.anywhere.limit() < shortest
             {
                 let limit = sums.limit_below(shortest);
@@ -185,7 +185,7 @@ impl Stability {
         let Some(now) = self.now else {
             return self;
         };
-        let mut found = Found {
+        let mut found = Tightest {
             limit: now,
             shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
         };
@@ -194,7 +194,7 @@ impl Stability {
             watched.renew(nodes, springs, masses);
         }
         for &node in nodes {
-            let Some(sums) = Sums::of(node as usize, springs, &masses, positions) else {
+            let Some(sums) = NodeBound::of(node as usize, springs, &masses, positions) else {
                 continue;
             };
             if is_few {
@@ -217,12 +217,12 @@ impl Stability {
         let Some(now) = self.now else {
             return self;
         };
-        let mut found = Found {
+        let mut found = Tightest {
             limit: now,
             shortest: self.reach / TRAVEL_BEFORE_ESTIMATE,
         };
         for &node in nodes {
-            if let Some(sums) = Sums::of(node as usize, springs, &masses, positions) {
+            if let Some(sums) = NodeBound::of(node as usize, springs, &masses, positions) {
                 let limit = sums.anywhere.limit();
                 candidates.push(Candidate { limit, node });
                 found.take_changed(&sums, self.is_coarse());
@@ -232,7 +232,7 @@ impl Stability {
         self.with(&found, watched)
     }
 
-    fn with(self, found: &Found, watched: &Watched) -> Self {
+    fn with(self, found: &Tightest, watched: &Watched) -> Self {
         Self {
             now: Some(found.limit),
             found: self.found.min(found.limit),
@@ -248,16 +248,16 @@ impl Stability {
 }
 
 /// What the nodes show that have been looked at.
-struct Found {
+struct Tightest {
     /// s
     limit: f32,
     /// The shortest length over which the matrix of a node changes that may set the limit, m.
     shortest: f32,
 }
 
-impl Found {
+impl Tightest {
     /// Takes a node in that has changed; `is_coarse`: wherever it goes.
-    fn take_changed(&mut self, sums: &Sums, is_coarse: bool) {
+    fn take_changed(&mut self, sums: &NodeBound, is_coarse: bool) {
         if is_coarse {
             self.limit = self.limit.min(sums.anywhere.limit());
         } else {
@@ -266,7 +266,7 @@ impl Found {
     }
 
     /// Takes a node in. Nothing that moves can make a node matter whose springs are too weak even together.
-    fn take(&mut self, sums: &Sums) {
+    fn take(&mut self, sums: &NodeBound) {
         if sums.anywhere.limit() < self.limit {
             self.limit = self.limit.min(sums.limit_below(self.limit));
             self.shortest = self.shortest.min(sums.shortest);
@@ -275,7 +275,7 @@ impl Found {
 }
 
 /// The springs of one node, added up.
-struct Sums {
+struct NodeBound {
     /// The directed part of the matrices of stiffness, 1/s².
     along: Symmetric,
     /// The part that is the same in all directions, 1/s².
@@ -288,7 +288,7 @@ struct Sums {
     shortest: f32,
 }
 
-impl Sums {
+impl NodeBound {
     /// `None`: the node is pinned.
     fn of(node: usize, springs: &dyn Springs, masses: &Masses, positions: &Vectors) -> Option<Self> {
         let inverse_mass = masses.inverse(node);

@@ -17,7 +17,7 @@ use crate::threads::{Items, Team};
 
 /// Where a kick's velocities come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Before {
+pub(super) enum VelocityTime {
     /// The current state, at the time of the positions.
     Current,
     /// The current state, half a substep before the positions.
@@ -31,7 +31,7 @@ pub(super) enum Before {
 /// One pass over a body: a kick, and the drift that follows it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Part {
-    pub(super) before: Before,
+    pub(super) before: VelocityTime,
     /// Whether it is the last of the step.
     pub last: bool,
     /// Whether the nodes drift after the kick; where they do not, the spring forces are kept.
@@ -55,7 +55,7 @@ impl Part {
     /// The half kick that opens a step.
     pub fn opening(substep: f32) -> Self {
         Self {
-            before: Before::Current,
+            before: VelocityTime::Current,
             last: false,
             drifts: true,
             half: true,
@@ -84,14 +84,14 @@ impl Part {
 
     /// The kick that closes the last step becomes part of this one.
     pub fn join(&mut self, closing: &ClosingKick) {
-        self.before = Before::CurrentOpen;
+        self.before = VelocityTime::CurrentOpen;
         self.half = false;
         self.duration += 0.5 * closing.substep;
     }
 
     /// The full kick of a later substep, in which gravity gives `fall`.
     pub fn go_on(&mut self, fall: Vec3) {
-        self.before = Before::Open;
+        self.before = VelocityTime::Open;
         self.half = false;
         self.duration = self.substep;
         self.share = 1.0;
@@ -101,7 +101,7 @@ impl Part {
     /// The half kick that closes the step, in which gravity gives `fall`.
     pub fn close(&mut self, fall: Vec3) {
         *self = Self {
-            before: Before::Open,
+            before: VelocityTime::Open,
             last: true,
             drifts: false,
             fall,
@@ -132,13 +132,13 @@ pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Pa
     let tiles = tile_count(node_count);
     let sleeper = body.sleeper.as_deref();
     let is_asleep = |tile: usize| sleeper.is_some_and(|sleeper| sleeper.is_asleep(tile));
-    let forces_known = part.before == Before::Current && body.forces_current;
+    let forces_known = part.before == VelocityTime::Current && body.forces_current;
     if !forces_known {
         body.forces.write_awake_records(state.positions, is_asleep, team);
         body.forces.find(state.positions, team);
     }
     let forces = body.forces.sum();
-    if part.before == Before::Open
+    if part.before == VelocityTime::Open
         && let Some(predicted) = &mut body.predicted_velocities
     {
         let closed = Closed {
@@ -174,14 +174,14 @@ pub(super) fn kick_and_drift(body: &mut System, request: &StepRequest, part: &Pa
         part,
         kick,
         positions: body.forces.view(state.positions),
-        first_velocities: (part.before != Before::Open && part.before != Before::Closed)
+        first_velocities: (part.before != VelocityTime::Open && part.before != VelocityTime::Closed)
             .then_some(state.first_velocities),
         first_forces: forces_known.then_some(state.first_forces),
         damped_velocities: match part.before {
-            Before::Open => body.predicted_velocities.as_ref(),
+            VelocityTime::Open => body.predicted_velocities.as_ref(),
             _ => body.forces.springs.damped().then_some(state.first_velocities),
         },
-        first_remainders: first_remainders.filter(|_| part.before != Before::Open),
+        first_remainders: first_remainders.filter(|_| part.before != VelocityTime::Open),
     };
     let written = (
         state.velocities.tiles_mut(),

@@ -3,7 +3,7 @@
 use glam::{BVec3, DVec3, Vec3};
 
 use super::early::Early;
-use super::energy_monitor::{EnergyAccount, Sums};
+use super::energy_monitor::{EnergyAccount, TileSums};
 use super::grasp::Grasps;
 use super::implicit::Implicit;
 use super::kick::Survey;
@@ -55,7 +55,7 @@ pub(crate) struct System {
     /// What a substep found in each tile.
     pub surveys: Vec<Survey>,
     /// What was added up of each tile when its energy was compared last.
-    pub tile_sums: Vec<Sums>,
+    pub tile_sums: Vec<TileSums>,
     /// The box about the nodes of each tile when they were last published or put, in its own coordinates as they are now.
     pub boxes: Vec<Bounds>,
     /// The triangles that are drawn and touched, in the caller's numbers.
@@ -149,7 +149,7 @@ impl System {
             scaling: None,
             pins,
             surveys: memory::filled(Survey::NOTHING, tile_count(node_count))?,
-            tile_sums: memory::filled(Sums::default(), tile_count(node_count))?,
+            tile_sums: memory::filled(TileSums::default(), tile_count(node_count))?,
             boxes: memory::filled(Bounds::EMPTY, tile_count(node_count))?,
             surface,
             state: State::new(node_count, definition.solver == Solver::Verlet)?,

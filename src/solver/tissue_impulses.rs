@@ -9,7 +9,7 @@ use crate::nodes::{Bindings, parts};
 
 /// What of a step is looked at.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Moment<'a> {
+pub(crate) struct Span<'a> {
     /// Of the substep or step, s.
     pub duration: f32,
     /// Whether positions change: not with the last half kick of a step.
@@ -20,7 +20,7 @@ pub(crate) struct Moment<'a> {
     pub profile: Option<&'a Profile>,
 }
 
-impl Moment<'_> {
+impl Span<'_> {
     /// Whether a body has a part in it: that which closes a step is VERLET's.
     pub fn concerns(&self, body: &System) -> bool {
         self.drifts || body.implicit.is_none()
@@ -54,7 +54,7 @@ impl System {
     }
 
     /// Gives a node this mean velocity, m/s, in a substep: it has received `impulse`, N s, which a pinned node hands on.
-    pub fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+    pub fn nudge(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Span) {
         let held = self.pins.axes_of(node as u32);
         if let Some(pin) = self.pins.get_mut(node as u32) {
             pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);
@@ -118,7 +118,7 @@ impl System {
 
     /// What damping leaves of the speed that an impulse gives to a node, so that the impulse is what the force behind it
     /// would have given undamped.
-    pub fn left_by_damping(&self, node: u32, moment: &Moment) -> f32 {
+    pub fn left_by_damping(&self, node: u32, moment: &Span) -> f32 {
         match (&self.implicit, &self.damping) {
             (Some(_), Some(damping)) => 1.0 / (1.0 + damping.rates()[node as usize] * moment.duration),
             // A kick of VERLET gives (1 - exp(-x)) / x of what its forces would undamped: 1 - x / 2 but for terms of order 2.
@@ -154,7 +154,7 @@ impl System {
     }
 
     /// Gives a node that is attached this mean velocity, m/s, in a substep: it has received `impulse` in all, N s, which a pinned node hands on.
-    pub fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Moment) {
+    pub fn draw(&mut self, node: usize, velocity: Vec3, impulse: Vec3, moment: &Span) {
         let held = self.pins.axes_of(node as u32);
         if let Some(pin) = self.pins.get_mut(node as u32) {
             pin.force_sum -= pin.held(impulse).as_dvec3() / f64::from(moment.duration);

@@ -11,12 +11,12 @@ use glam::DVec3;
 use super::System;
 use super::attempt::{Carry, StepRequest};
 use super::closing::{ClosingKick, close_aside, may_stay_open};
-use super::energy_monitor::{Account, Sums, keep_energy};
+use super::energy_monitor::{Account, TileSums, keep_energy};
 use super::grasp::Lapse;
 use super::pipeline::{self, DEEPEST, Plan};
 use super::sleep::Sleeper;
 use super::stability::Stability;
-use super::substep::{Before, Part, kick_and_drift};
+use super::substep::{Part, VelocityTime, kick_and_drift};
 use crate::base::{Stage, Stopwatch};
 use crate::contact::{Contacts, Meeting};
 use crate::geometry::Bounds;
@@ -32,7 +32,7 @@ pub(crate) struct TooLong {
 
 /// A step that was taken, and is not current yet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Taken {
+pub(crate) struct StepResult {
     /// What it carries on to the next.
     pub carry: Carry,
     /// Whether its positions and velocities are finite.
@@ -48,7 +48,7 @@ pub(super) fn run(
     start: Carry,
     masses_for: f32,
     team: &Team,
-) -> Result<Taken, TooLong> {
+) -> Result<StepResult, TooLong> {
     let substep = (f64::from(request.dt) / f64::from(substeps)) as f32;
     if masses_for == 0.0 {
         check(&start.stability, substep)?;
@@ -113,7 +113,7 @@ impl<'a> Step<'a> {
     }
 
     /// Takes it; `None`: in a pipeline the body has moved further than is known to be stable.
-    fn take(&self, body: &mut System, start: Carry) -> Result<Option<Taken>, TooLong> {
+    fn take(&self, body: &mut System, start: Carry) -> Result<Option<StepResult>, TooLong> {
         let Self {
             request,
             substep,
@@ -199,7 +199,7 @@ impl<'a> Step<'a> {
             }
             check_beside_springs(body, substep)?;
         }
-        let sums = account.compares.then(|| Sums::of_open(body, &part, team));
+        let sums = account.compares.then(|| TileSums::of_open(body, &part, team));
         // What a tool touches is closed with it.
         if may_stay_open && body.contacts.as_deref().is_none_or(Contacts::are_far) {
             carry.closing = Some(ClosingKick {
@@ -216,7 +216,7 @@ impl<'a> Step<'a> {
             check_beside_springs(body, substep)?;
         }
         account.settle(body, &mut carry, sums, team);
-        Ok(Some(Taken { carry, finite }))
+        Ok(Some(StepResult { carry, finite }))
     }
 
     /// Whether what is known of stability still holds after a substep with velocities in this box. Masses that were made for
@@ -242,14 +242,14 @@ impl<'a> Step<'a> {
             Some(closing) => {
                 body.use_masses_for(carry.masses_for);
                 close_aside(body, &closing, &mut carry.gravity, team);
-                part.before = Before::Closed;
+                part.before = VelocityTime::Closed;
             }
         }
         body.use_masses_for(self.masses_for);
         carry.masses_for = self.masses_for;
         if body.scaling.as_ref().is_some_and(|scaling| scaling.has_changed()) {
             keep_energy(body, &mut carry.energy);
-            part.before = Before::Closed;
+            part.before = VelocityTime::Closed;
         }
         part.fall = carry.gravity.next(change);
         part

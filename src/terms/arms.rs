@@ -8,10 +8,10 @@ use glam::{DMat3, DVec3};
 use super::nonlinear::Curve;
 use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
-use super::{Moment, Term};
+use super::{Event, Term};
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::def::{BodyDefinition, Course, Spring, SpringLaw, Viscosity};
+use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Viscosity};
 use crate::soa::NodeOrder;
 
 /// Beside springs of a law.
@@ -22,7 +22,7 @@ pub(super) struct Arms {
     viscosity: Viscosity,
     stiffening: f64,
     /// Of the equation that is being solved; nothing where there is none.
-    course: Course,
+    course: RelaxationStep,
 }
 
 saved!(Arms {
@@ -71,7 +71,7 @@ pub(super) fn new(definition: &BodyDefinition, springs: &[Spring], order: &NodeO
         curve: Curve::new(definition.spring_law),
         viscosity,
         stiffening,
-        course: Course::NOTHING,
+        course: RelaxationStep::NOTHING,
     };
     Ok(Some(memory::boxed(Stencils::new(
         law,
@@ -183,24 +183,22 @@ impl Law<2> for Arms {
         Some(Arm { rest_length, ..*before })
     }
 
-    fn begin(&mut self, moment: Moment) {
+    fn begin(&mut self, moment: Event) {
         self.course = match moment {
-            Moment::Foresee(time) => self.viscosity.over(time),
-            Moment::Recall | Moment::Keep | Moment::Age => Course::NOTHING,
+            Event::Foresee(time) => self.viscosity.over(time),
+            Event::Recall | Event::Keep | Event::Age => RelaxationStep::NOTHING,
         };
     }
 
-    fn pass(&self, moment: Moment, arm: &mut Arm) {
+    fn pass(&self, moment: Event, arm: &mut Arm) {
         match moment {
-            Moment::Recall => {
-                (arm.stress, arm.elastic, arm.load) = (arm.kept_stress, arm.kept_elastic, arm.kept_stress)
-            }
-            Moment::Keep => (arm.kept_stress, arm.kept_elastic) = (arm.stress, arm.elastic),
-            Moment::Foresee(_) => {
-                let Course { decay, gain, .. } = self.course;
+            Event::Recall => (arm.stress, arm.elastic, arm.load) = (arm.kept_stress, arm.kept_elastic, arm.kept_stress),
+            Event::Keep => (arm.kept_stress, arm.kept_elastic) = (arm.stress, arm.elastic),
+            Event::Foresee(_) => {
+                let RelaxationStep { decay, gain, .. } = self.course;
                 arm.load = (decay * f64::from(arm.stress) - gain * f64::from(arm.elastic)) as f32;
             }
-            Moment::Age => {}
+            Event::Age => {}
         }
     }
 
@@ -235,7 +233,7 @@ impl Law<2> for Arms {
     }
 
     #[inline(always)]
-    fn age(&self, arm: &mut Arm, elastic: f32, Course { decay, gain, .. }: Course) {
+    fn age(&self, arm: &mut Arm, elastic: f32, RelaxationStep { decay, gain, .. }: RelaxationStep) {
         let longer = f64::from(elastic) - f64::from(arm.elastic);
         let stress = (decay * f64::from(arm.stress) + gain * longer) as f32;
         // Nothing is held by what is beyond the range of numbers.

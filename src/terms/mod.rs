@@ -25,7 +25,7 @@ use glam::{DMat3, DVec3};
 
 use crate::base::{Result, StateHasher, memory};
 use crate::codec::{Reader, Saved, Writer, saved, shape_with};
-use crate::def::{BodyDefinition, Carried, Course, Spring, Viscosity};
+use crate::def::{BodyDefinition, Carried, RelaxationStep, Spring, Viscosity};
 use crate::simd::ChosenKernel;
 use crate::soa::{Masses, NodeOrder, Rates, Region, Scale, TileForces, Vectors, View, tile_count};
 use crate::springs::{Change, Springs, rates_anywhere};
@@ -45,7 +45,7 @@ pub(crate) type Blocks = [[DMat3; 4]; 4];
 
 /// What is done to terms that remember.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Moment {
+pub(crate) enum Event {
     /// A step begins, from what is current.
     Recall,
     /// The step in progress is the current state.
@@ -133,10 +133,10 @@ pub(crate) trait Term: Debug + Send + Sync {
     /// Whether they remember anything.
     fn remembers(&self) -> bool;
 
-    fn pass(&mut self, moment: Moment);
+    fn pass(&mut self, moment: Event);
 
     /// Nodes have come to `positions`, and what is viscous along this course.
-    fn age(&mut self, kernel: ChosenKernel, positions: View, course: Course, team: &Team);
+    fn age(&mut self, kernel: ChosenKernel, positions: View, course: RelaxationStep, team: &Team);
 
     /// What may change of them.
     fn hash(&self, hasher: &mut StateHasher);
@@ -396,7 +396,7 @@ impl Terms {
     }
 
     /// Nodes have come to `positions`, and what is viscous along this course.
-    pub fn age(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> Course, team: &Team) {
+    pub fn age(&mut self, positions: &Vectors, course: impl Fn(Viscosity) -> RelaxationStep, team: &Team) {
         let (kernel, course) = (self.kernel, course(self.viscosity));
         for law in &mut self.laws {
             law.age(kernel, positions.view(), course, team);

@@ -9,10 +9,10 @@ use glam::{DMat3, DVec3};
 
 use super::stencils::{Law, Stencils, directed, direction, lengthening, of_springs};
 use super::strings::Tension;
-use super::{Moment, Term};
+use super::{Event, Term};
 use crate::base::{Error, Result, StateHasher, memory};
 use crate::codec::saved;
-use crate::def::{BodyDefinition, Course, Spring, SpringLaw, Yielding};
+use crate::def::{BodyDefinition, RelaxationStep, Spring, SpringLaw, Yielding};
 use crate::soa::NodeOrder;
 
 /// What springs pull less than before they yielded, over their stiffness.
@@ -158,11 +158,11 @@ impl Law<2> for Sets {
         (rest_length > 0.0).then_some(Set { rest_length, ..*before })
     }
 
-    fn pass(&self, moment: Moment, set: &mut Set) {
+    fn pass(&self, moment: Event, set: &mut Set) {
         match moment {
-            Moment::Recall => set.longer = set.kept,
-            Moment::Keep => set.kept = set.longer,
-            Moment::Foresee(_) | Moment::Age => {}
+            Event::Recall => set.longer = set.kept,
+            Event::Keep => set.kept = set.longer,
+            Event::Foresee(_) | Event::Age => {}
         }
     }
 
@@ -198,7 +198,7 @@ impl Law<2> for Sets {
     }
 
     #[inline(always)]
-    fn age(&self, set: &mut Set, length: f32, course: Course) {
+    fn age(&self, set: &mut Set, length: f32, course: RelaxationStep) {
         if course.yields {
             set.longer = self.longer_at(set, f64::from(length)).0 as f32;
         }

@@ -8,10 +8,10 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::parting::Parting;
 use super::strings::{Aging, OfTile, Tension};
-use super::{Blocks, Moment, Term};
+use super::{Blocks, Event, Term};
 use crate::base::{Error, Result, StateHasher, memory};
 use crate::codec::{Saved, Writer, saved};
-use crate::def::{Course, Spring};
+use crate::def::{RelaxationStep, Spring};
 use crate::simd::ChosenKernel;
 use crate::soa::{Masses, NodeOrder, Region, Scale, TILE, TileForces, Vectors, View, tile_count};
 use crate::springs::Change;
@@ -119,12 +119,12 @@ pub(super) trait Law<const N: usize>: Saved + Debug + Send + Sync + 'static {
     const REMEMBERS: bool = false;
 
     /// Something is about to be done to all terms.
-    fn begin(&mut self, _moment: Moment) {}
+    fn begin(&mut self, _moment: Event) {}
 
-    fn pass(&self, _moment: Moment, _shape: &mut Self::Shape) {}
+    fn pass(&self, _moment: Event, _shape: &mut Self::Shape) {}
 
     /// Nodes have come to where this is elastic of it, m.
-    fn age(&self, _shape: &mut Self::Shape, _elastic: f32, _course: Course) {}
+    fn age(&self, _shape: &mut Self::Shape, _elastic: f32, _course: RelaxationStep) {}
 
     fn hash(&self, _shape: &Self::Shape, _hasher: &mut StateHasher) {}
 }
@@ -672,7 +672,7 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         L::REMEMBERS
     }
 
-    fn pass(&mut self, moment: Moment) {
+    fn pass(&mut self, moment: Event) {
         if L::REMEMBERS {
             self.law.begin(moment);
             for stencil in &mut self.all {
@@ -681,9 +681,9 @@ impl<L: Law<N>, const N: usize> Term for Stencils<L, N> {
         }
     }
 
-    fn age(&mut self, kernel: ChosenKernel, positions: View, course: Course, team: &Team) {
+    fn age(&mut self, kernel: ChosenKernel, positions: View, course: RelaxationStep, team: &Team) {
         if L::REMEMBERS {
-            self.law.begin(Moment::Age);
+            self.law.begin(Event::Age);
             let (law, tiles) = (&self.law, self.starts.len() - 1);
             let strings = Ragged::new(&mut self.all, &self.starts[..tiles]);
             team.pass(tiles, strings, |_, strings| {

@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::Vec4;
 
 use super::stencils::{Law, Stencil};
-use crate::def::Course;
+use crate::def::RelaxationStep;
 use crate::simd::Loops;
 use crate::soa::{TILE, TileForces, View};
 
@@ -254,7 +254,7 @@ pub(super) struct Aging<'a, L: Law<N>, const N: usize> {
     pub law: &'a L,
     pub strings: &'a mut [Stencil<L::Shape, N>],
     pub positions: View<'a>,
-    pub course: Course,
+    pub course: RelaxationStep,
 }
 
 impl<L: Law<N>, const N: usize> Loops for Aging<'_, L, N> {

@@ -48,7 +48,7 @@ saved!(Clearances { corners, edges, is_new });
 
 /// A corner or an edge of a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Part {
+pub(super) enum SurfaceFeature {
     Corner(usize),
     Edge(usize),
 }
@@ -63,31 +63,31 @@ impl Clearances {
         })
     }
 
-    fn get_mut(&mut self, part: Part) -> Option<&mut Clearance> {
+    fn get_mut(&mut self, part: SurfaceFeature) -> Option<&mut Clearance> {
         match part {
-            Part::Corner(corner) => self.corners.get_mut(corner),
-            Part::Edge(edge) => self.edges.get_mut(edge),
+            SurfaceFeature::Corner(corner) => self.corners.get_mut(corner),
+            SurfaceFeature::Edge(edge) => self.edges.get_mut(edge),
         }
     }
 
     /// How near a part may come, m; infinity: it is not reduced.
-    pub fn allowed(&self, part: Part) -> f32 {
+    pub fn allowed(&self, part: SurfaceFeature) -> f32 {
         let known = match part {
-            Part::Corner(corner) => self.corners.get(corner),
-            Part::Edge(edge) => self.edges.get(edge),
+            SurfaceFeature::Corner(corner) => self.corners.get(corner),
+            SurfaceFeature::Edge(edge) => self.edges.get(edge),
         };
         known.map_or(f32::INFINITY, |known| known.allowed)
     }
 
     /// Reduces the clearance of a part to this distance, m.
-    pub fn reduce(&mut self, part: Part, distance: f32) {
+    pub fn reduce(&mut self, part: SurfaceFeature, distance: f32) {
         if let Some(known) = self.get_mut(part) {
             known.allowed = known.allowed.min(distance);
         }
     }
 
     /// Takes into account how far from a part something is, m.
-    pub fn see(&mut self, part: Part, distance: f32) {
+    pub fn see(&mut self, part: SurfaceFeature, distance: f32) {
         if let Some(known) = self.get_mut(part) {
             known.nearest = known.nearest.min(distance);
         }

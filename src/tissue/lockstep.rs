@@ -5,7 +5,7 @@
 
 use super::Tissue;
 use crate::solver::{
-    Carry, Moment, Outcome, Part, Step, StepRequest, System, Systems, Taken, TooLong, begin, begin_parts, check,
+    Carry, Outcome, Part, Span, Step, StepRequest, StepResult, System, Systems, TooLong, begin, begin_parts, check,
     check_beside_springs, end_part, finish, needed, next_part, parts_near, pass, relieve_squeezed, substeps_needed,
 };
 use crate::threads::Team;
@@ -18,7 +18,7 @@ const PARTS: u32 = 256;
 
 /// A body on its way through a step.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Walk {
+pub(crate) struct CoupledBody {
     start: Carry,
     masses_for: f32,
     carry: Carry,
@@ -26,14 +26,14 @@ pub(crate) struct Walk {
 }
 
 /// The bodies that go together, in islands, as `tissue` tells; `walks` has a place for each body.
-pub(crate) struct Together<'a> {
+pub(crate) struct CoupledGroup<'a> {
     pub tissue: &'a mut Tissue,
-    pub walks: &'a mut [Option<Walk>],
+    pub walks: &'a mut [Option<CoupledBody>],
     pub request: &'a StepRequest<'a>,
     pub team: &'a Team<'a>,
 }
 
-impl Together<'_> {
+impl CoupledGroup<'_> {
     /// Takes the step of all islands without making it current.
     pub fn attempt(&mut self, bodies: &mut impl Systems, outcomes: &mut [Option<Outcome>]) {
         self.tissue.pushes.begin();
@@ -54,7 +54,7 @@ impl Together<'_> {
         if substeps == 0 {
             return;
         }
-        let Together { tissue, walks, .. } = self;
+        let CoupledGroup { tissue, walks, .. } = self;
         tissue
             .bonds
             .attempt(bodies, |place| walks.get(place).is_some_and(Option::is_some));
@@ -99,7 +99,7 @@ impl Together<'_> {
                 continue;
             };
             outcomes[place] = Some(if is_taken {
-                let taken = Taken {
+                let taken = StepResult {
                     carry: walk.carry,
                     finite: body.state.newest_is_finite(),
                 };
@@ -124,7 +124,7 @@ impl Together<'_> {
             let place = place as usize;
             if let Some(body) = bodies.at_mut(place) {
                 let request = &self.request.of(body);
-                let (begun, wanted) = Walk::of(body, request, self.team);
+                let (begun, wanted) = CoupledBody::of(body, request, self.team);
                 substeps = substeps.max(wanted);
                 if body.is_explicit() {
                     needed = needed.max(wanted);
@@ -189,7 +189,7 @@ impl Together<'_> {
             }
             Ok(())
         })?;
-        let mut moment = Moment {
+        let mut moment = Span {
             duration: substep,
             drifts: true,
             begins: true,
@@ -259,7 +259,7 @@ impl Together<'_> {
     }
 }
 
-impl Walk {
+impl CoupledBody {
     /// A body's way through a step that is to begin, and how many substeps it wants by itself.
     fn of(body: &mut System, request: &StepRequest, team: &Team) -> (Self, u32) {
         let (mut start, masses_for, substeps) = if body.is_explicit() {
@@ -284,9 +284,9 @@ impl Walk {
 /// Does something with each body that is on its way.
 fn each(
     bodies: &mut impl Systems,
-    walks: &mut [Option<Walk>],
+    walks: &mut [Option<CoupledBody>],
     members: &[u32],
-    mut act: impl FnMut(usize, &mut System, &mut Walk) -> Result<(), TooLong>,
+    mut act: impl FnMut(usize, &mut System, &mut CoupledBody) -> Result<(), TooLong>,
 ) -> Result<(), TooLong> {
     for &place in members {
         let place = place as usize;

@@ -29,7 +29,7 @@ use self::entangled::Entangled;
 use self::groups::Groups;
 use self::islands::{Islands, Reach};
 use self::link::{Link, Side};
-pub(crate) use self::lockstep::{Together, Walk};
+pub(crate) use self::lockstep::{CoupledBody, CoupledGroup};
 use self::pairs::Pairs;
 use self::search::{Measure, Party, Search};
 pub(crate) use self::skin::Skin;
@@ -41,7 +41,7 @@ use crate::codec::saved;
 use crate::contact::Contacts;
 use crate::contact::impulses::{Effort, PUSHED_OUT, Sweep, relax};
 use crate::geometry::Bounds;
-use crate::solver::{Moment, System, Systems};
+use crate::solver::{Span, System, Systems};
 
 /// How often what meets is searched for: impulses lead nodes elsewhere.
 const SEARCHES: u32 = 16;
@@ -395,7 +395,7 @@ impl Tissue {
     }
 
     /// Stops what meets in a substep of the bodies of an island.
-    pub fn meet(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) {
+    pub fn meet(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
         let watch = Stopwatch::start(moment.profile);
         if moment.begins {
             let members = self.islands.members(island);
@@ -428,7 +428,7 @@ impl Tissue {
         }
     }
 
-    fn stop_what_meets(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) {
+    fn stop_what_meets(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
         let have_acted = self.solve(island, bodies, moment);
         for &place in self.islands.members(island) {
             let place = place as usize;
@@ -505,7 +505,7 @@ impl Tissue {
     }
 
     /// Gives nodes and tools what contacts with tools have done beside those of tissue.
-    fn end_with_tools(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) {
+    fn end_with_tools(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) {
         let members = self.islands.members(island);
         each_pressed(members, &mut self.skins, bodies, moment, |skin, body, contacts| {
             let Skin { velocities, given, .. } = skin;
@@ -518,7 +518,7 @@ impl Tissue {
     }
 
     /// Draws what of each surface is near others that it is found by in images, as the substep begins.
-    fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Moment) {
+    fn draw(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
         for member in 0..self.islands.members(island).len() {
             let a = self.islands.members(island)[member] as usize;
             // It is written to while others are read.
@@ -549,7 +549,7 @@ impl Tissue {
     }
 
     /// Finds contacts and gives their impulses, with those of tools, until they lead to no others: whether there were any.
-    fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Moment) -> bool {
+    fn solve(&mut self, island: usize, bodies: &mut impl Systems, moment: &Span) -> bool {
         let mut first = None;
         let mut has_begun = false;
         for _ in 0..SEARCHES {
@@ -602,7 +602,7 @@ impl Tissue {
     }
 
     /// Has what impulses did to nodes be seen in what is bound to them.
-    fn go_on(&mut self, island: usize, bodies: &impl Systems, moment: &Moment) {
+    fn go_on(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
         for &place in self.islands.members(island) {
             let place = place as usize;
             if let (Some(Some(skin)), Some(body)) = (self.skins.get_mut(place), bodies.at(place))
@@ -614,7 +614,7 @@ impl Tissue {
     }
 
     /// Whether what may meet where impulses have led nodes was found before they acted.
-    fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Moment) -> bool {
+    fn has_foreseen(&self, island: usize, bodies: &impl Systems, moment: &Span) -> bool {
         let of_one = self.islands.members(island).iter().map(|&place| [place as usize; 2]);
         let mut all = of_one.chain(self.islands.pairs(island));
         all.all(|pair| {
@@ -643,7 +643,7 @@ impl Tissue {
         (skins, entangled): (&'a [Option<Skin>], &Entangled),
         [a, b]: [usize; 2],
         bodies: &impl Systems,
-        moment: &Moment,
+        moment: &Span,
     ) -> Option<Search<'a>> {
         let party = |place: usize| {
             let skin = skins.get(place)?.as_ref()?;
@@ -674,13 +674,13 @@ impl Tissue {
         skins: (&'a [Option<Skin>], &Entangled),
         pair: [usize; 2],
         bodies: &impl Systems,
-        moment: &Moment,
+        moment: &Span,
     ) -> Option<Search<'a>> {
         Self::search(skins, pair, bodies, moment).filter(|search| !search.in_images)
     }
 
     /// Has what is near be known of the pairs of an island, or trees be where surfaces are.
-    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Moment) {
+    fn know_pairs(&mut self, island: usize, bodies: &impl Systems, moment: &Span) {
         let Self {
             skins,
             entangled,
@@ -714,7 +714,7 @@ impl Tissue {
     }
 
     /// Adds the contacts that are not known yet, of those that meet; again in the same substep: where impulses have led further than was looked.
-    fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Moment, again: bool) {
+    fn find(&mut self, island: usize, bodies: &impl Systems, moment: &Span, again: bool) {
         let measures = moment.begins && !again;
         self.know_pairs(island, bodies, moment);
         let Self {
@@ -797,7 +797,7 @@ fn each_pressed(
     members: &[u32],
     skins: &mut [Option<Skin>],
     bodies: &mut impl Systems,
-    moment: &Moment,
+    moment: &Span,
     mut act: impl FnMut(&mut Skin, &mut System, &mut Contacts),
 ) {
     for &place in members {

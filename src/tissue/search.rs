@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::EDGES;
-use super::clearances::{Clearances, Part};
+use super::clearances::{Clearances, SurfaceFeature};
 use super::link::Side;
 use super::pairs::{Known, Near};
 use super::skin::{Clearance, NONE, PARTED, Skin};
@@ -146,14 +146,14 @@ impl Search<'_> {
     }
 
     /// How far a part of a surface keeps from another body, m.
-    fn radius_of(&self, kept: Option<&Clearances>, part: Part) -> f32 {
+    fn radius_of(&self, kept: Option<&Clearances>, part: SurfaceFeature) -> f32 {
         let allowed = kept.map_or(f32::INFINITY, |kept| kept.allowed(part));
         let [first, second] = self.parties.map(|party| party.skin.least_thickness());
         self.radius.min(allowed.max(first.min(second)))
     }
 
     /// Remembers how near to a part of a surface another body is where the step begins.
-    fn measure(&self, kept: Option<&mut Clearances>, part: Part, nearest: f32) {
+    fn measure(&self, kept: Option<&mut Clearances>, part: SurfaceFeature, nearest: f32) {
         if let Some(kept) = kept.filter(|_| nearest < self.radius) {
             match self.measures {
                 Measure::Nothing => {}
@@ -181,7 +181,7 @@ impl Search<'_> {
         let shift = shift(of_nodes.skin, of_faces.skin);
         let node = of_nodes.skin.nodes[corner];
         let (place, step) = self.way(of_nodes, node, shift, of_faces.skin.drift);
-        let radius = self.radius_of(kept.as_deref(), Part::Corner(corner));
+        let radius = self.radius_of(kept.as_deref(), SurfaceFeature::Corner(corner));
         let segment = Segment {
             ends: [place; 2],
             steps: [step; 2],
@@ -237,7 +237,7 @@ impl Search<'_> {
             Some(_) => 0.0,
             None => front,
         };
-        self.measure(kept, Part::Corner(corner), nearest_there);
+        self.measure(kept, SurfaceFeature::Corner(corner), nearest_there);
         // On the wrong side it is led out, or let out where it is deep.
         let is_behind = behind.is_some();
         if let Some((triangle, start)) = behind {
@@ -288,7 +288,7 @@ impl Search<'_> {
         let segment = Segment {
             ends: ways.map(|(place, _)| place),
             steps: ways.map(|(_, step)| step),
-            radius: self.radius_of(kept.as_deref(), Part::Edge(index)),
+            radius: self.radius_of(kept.as_deref(), SurfaceFeature::Edge(index)),
         };
         let far = self.reach_of_edges();
         let near = Bounds::of(segment.ends.into_iter()).extended(far);
@@ -364,7 +364,7 @@ impl Search<'_> {
                 }
             }
         }
-        self.measure(kept, Part::Edge(index), nearest);
+        self.measure(kept, SurfaceFeature::Edge(index), nearest);
         for (_, _, other, (found, clearance)) in touched.into_iter().flatten() {
             let sides = [
                 Side::of_edge(first.place, edge, found.along),

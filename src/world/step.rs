@@ -13,7 +13,7 @@ use crate::def::ChoiceReason;
 use crate::slots::Slots;
 use crate::solver::{Outcome, RESERVE, StepRequest, attempt};
 use crate::threads::{Items, Team};
-use crate::tissue::Together;
+use crate::tissue::CoupledGroup;
 
 /// A body of so many nodes or more is shared by all threads; smaller ones are not worth the waiting.
 const SHARED_FROM: usize = 8192;
@@ -156,7 +156,7 @@ impl World {
             wake_islands(tissue, bodies, outcomes);
             tissue.find_crossings(bodies, false);
             watch.stop(profile, Stage::NarrowPhase);
-            let mut together = Together {
+            let mut together = CoupledGroup {
                 tissue,
                 walks,
                 request: &request,

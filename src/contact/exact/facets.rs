@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::base::{Result, memory};
-use crate::geometry::nearest::Part;
+use crate::geometry::nearest::Spot;
 use crate::geometry::tree::Tree;
 use crate::mesh::{ClosedSurface, TRIANGLE_EDGES, pack, unpack};
 
@@ -197,12 +197,12 @@ impl Facets {
 
     /// Towards the outside, of any length, at a part of the triangle at a place: what is outside and closest there is on this side of it
     /// (Baerentzen, Aanaes 2005).
-    pub fn normal(&self, place: usize, part: Part) -> DVec3 {
+    pub fn normal(&self, place: usize, part: Spot) -> DVec3 {
         let triangle = &self.triangles[place];
         match part {
-            Part::Face => normal_of(triangle.nodes.map(|node| self.positions[node as usize].as_dvec3())),
-            Part::Edge(edge) => self.edges[triangle.edges[edge] as usize].normal,
-            Part::Corner(corner) => self.node_normals[triangle.nodes[corner] as usize],
+            Spot::Face => normal_of(triangle.nodes.map(|node| self.positions[node as usize].as_dvec3())),
+            Spot::Edge(edge) => self.edges[triangle.edges[edge] as usize].normal,
+            Spot::Corner(corner) => self.node_normals[triangle.nodes[corner] as usize],
         }
     }
 
@@ -217,7 +217,7 @@ impl Facets {
         let own = move |side: &usize| triangle.own >> side & 1 == 1;
         (0..3).filter(own).map(move |side| {
             let [a, b] = TRIANGLE_EDGES[side].map(|end| triangle.nodes[end] as usize);
-            let face = self.normal(place, Part::Face).normalize_or_zero();
+            let face = self.normal(place, Spot::Face).normalize_or_zero();
             let others = self.edges[triangle.edges[side] as usize].normal - face;
             ([self.positions[a], self.positions[b]], others)
         })

@@ -7,7 +7,7 @@ use super::deepest::{Deepest, deepest, lies_between};
 use super::{ExactSolid, ROUNDING, TOUCHING};
 use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
-use crate::geometry::nearest::{Part, nearest_of_segments, nearest_on_triangle};
+use crate::geometry::nearest::{Spot, nearest_of_segments, nearest_on_triangle};
 use crate::geometry::predicates::pierce;
 use crate::geometry::tree::Placed;
 
@@ -159,7 +159,7 @@ impl ExactSolid {
                     offset,
                     squared: offset.length_squared(),
                 };
-                pairs.see(pair, || part == Part::Face && self.facets.leads_off_node(node, offset));
+                pairs.see(pair, || part == Spot::Face && self.facets.leads_off_node(node, offset));
             }
             pairs.limit as f32
         });
@@ -191,7 +191,7 @@ impl ExactSolid {
         if lies_beside(triangle, face) || lies_beside(face, triangle) {
             return None;
         }
-        let normal = self.facets.normal(place, Part::Face);
+        let normal = self.facets.normal(place, Spot::Face);
         for ([p, q], others) in self.facets.edges(place) {
             let (p, q) = (p.as_dvec3(), q.as_dvec3());
             if let Some((fraction, _)) = pierce(p, q, face, [0, 1, 2]) {

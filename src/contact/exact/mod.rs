@@ -19,7 +19,7 @@ use self::deepest::Signed;
 use self::facets::Facets;
 use crate::base::Result;
 use crate::geometry::Bounds;
-use crate::geometry::nearest::{Part, nearest_on_triangle};
+use crate::geometry::nearest::{Spot, nearest_on_triangle};
 use crate::geometry::predicates::pierce;
 use crate::geometry::tree::Tree;
 use crate::mesh::ClosedSurface;
@@ -45,7 +45,7 @@ pub(crate) struct ExactSolid {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nearest {
     place: usize,
-    part: Part,
+    part: Spot,
     /// From the surface to the point.
     offset: DVec3,
     squared: f64,
@@ -239,7 +239,7 @@ impl ExactSolid {
             // Edges folded flat look nowhere: then the face.
             normal
                 .try_normalize()
-                .unwrap_or_else(|| self.facets.normal(nearest.place, Part::Face).normalize_or(DVec3::Y))
+                .unwrap_or_else(|| self.facets.normal(nearest.place, Spot::Face).normalize_or(DVec3::Y))
         };
         Signed {
             distance: side * distance,

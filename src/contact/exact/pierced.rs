@@ -11,7 +11,7 @@ use super::ExactSolid;
 use super::facets::Facets;
 use crate::contact::closest::Closest;
 use crate::geometry::Bounds;
-use crate::geometry::nearest::{Part, nearest_on_triangle};
+use crate::geometry::nearest::{Spot, nearest_on_triangle};
 use crate::geometry::tree::Placed;
 
 /// Edges of a solid that an edge has passed, at most.
@@ -104,7 +104,7 @@ impl ExactSolid {
         let bounds = Bounds::of(corners.iter().copied());
         self.tree.near(&bounds, 0.0, |place| {
             if passes(place) {
-                let normal = self.facets.normal(place, Part::Face).normalize_or_zero();
+                let normal = self.facets.normal(place, Spot::Face).normalize_or_zero();
                 let on_side = self.tree.placed(place).exact()[0];
                 let ways = corners.iter().map(|corner| (on_side - corner.as_dvec3()).dot(normal));
                 let way = ways.fold(0.0, f64::max);
@@ -154,7 +154,7 @@ impl ExactSolid {
                     continue;
                 }
                 let (weights, part) = nearest_on_triangle(self.facets.position(node), face);
-                if part == Part::Face {
+                if part == Spot::Face {
                     *side = Some(Way { weights, depth, normal });
                 }
             }

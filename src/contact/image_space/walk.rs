@@ -56,7 +56,7 @@ impl Sample {
 
 /// A part of a face, seen in its middle.
 #[derive(Clone, Copy)]
-struct Part {
+struct FacePart {
     corners: [[f32; 3]; 3],
     middle: Sample,
     /// From its middle to the furthest corner, at most.
@@ -182,7 +182,7 @@ impl LayeredImage {
                 best = if corner.distance <= best.distance { corner } else { best };
             }
         }
-        let part = Part {
+        let part = FacePart {
             corners: whole,
             middle,
             reach: radius,
@@ -223,14 +223,14 @@ impl LayeredImage {
                 let middle = self.sample(corners, weights)?;
                 best = best.deeper(middle, self.pixel());
                 bend = bend.max(middle.normal.distance(part.middle.normal));
-                parts[count] = Part {
+                parts[count] = FacePart {
                     corners: smaller,
                     middle,
                     ..part
                 };
                 count += 1;
             }
-            parts[count] = Part {
+            parts[count] = FacePart {
                 corners: [ab, bc, ca],
                 ..part
             };

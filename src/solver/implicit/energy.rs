@@ -37,7 +37,7 @@ saved!(Total { energy, size });
 
 /// The energy before a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Before {
+pub(super) struct EnergyBefore {
     /// The pins are already where the step leads them.
     total: Total,
     /// What was lost and may come back, or below 0 what was gained and is to be lost again, J.
@@ -64,14 +64,14 @@ impl Total {
 
 impl Substep<'_> {
     /// The energy before the step.
-    pub(super) fn energy_before(&self, body: &mut System, implicit: &mut Implicit) -> Before {
+    pub(super) fn energy_before(&self, body: &mut System, implicit: &mut Implicit) -> EnergyBefore {
         let history = implicit.last(self.is_first);
         let credit = history.credit;
         let travels = body.pins.iter().any(|pin| pin.travel != glam::Vec3::ZERO);
         if let Some(total) = history.energy
             && !travels
         {
-            return Before { total, credit };
+            return EnergyBefore { total, credit };
         }
         let kinetic = kinetic(body, self.is_first);
         let from = implicit.place(self.is_first);
@@ -90,14 +90,14 @@ impl Substep<'_> {
                 size: total.size.max(there.size),
             };
         }
-        Before {
+        EnergyBefore {
             total: total.plus(kinetic),
             credit,
         }
     }
 
     /// Compares the energy after the step with what there was and what was put in.
-    pub(super) fn account(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
+    pub(super) fn account(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
         let kinetic = kinetic(body, false);
         let next = 1 - implicit.settled;
         let elastic = implicit.elastic(body, true, next, self.team);
@@ -123,7 +123,7 @@ impl Substep<'_> {
     }
 
     /// Takes off what was gained: first of the velocities within the body, then of all; where that is not enough, nothing moves but the pins.
-    pub(super) fn slow_down(&self, body: &mut System, implicit: &mut Implicit, before: Before) {
+    pub(super) fn slow_down(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) {
         let next = 1 - implicit.settled;
         let known = implicit.histories[next].energy;
         let work = self.work(body, &implicit.histories[next]);

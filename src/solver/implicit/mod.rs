@@ -30,7 +30,7 @@ use crate::codec::saved;
 use crate::def::{BodyDefinition, MOST_ITERATIONS, Solver, SolverReport};
 use crate::forces::{Changes, Forces};
 use crate::soa::{Vectors, tile_count};
-use crate::solver::changed::Known;
+use crate::solver::changed::Cached;
 use crate::solver::newton::Newton;
 use blocks::{Blocks, Noise};
 use coarse::Coarse;
@@ -489,12 +489,12 @@ impl Implicit {
     }
 
     /// Forgets what a change has made invalid.
-    pub(in crate::solver) fn forget(&mut self, known: Known) {
+    pub(in crate::solver) fn forget(&mut self, known: Cached) {
         let history = &mut self.histories[self.settled];
         match known {
-            Known::Energy => history.energy = None,
-            Known::Matrix => self.stale = true,
-            Known::History => {
+            Cached::Energy => history.energy = None,
+            Cached::Matrix => self.stale = true,
+            Cached::History => {
                 (history.step, history.energy) = (0.0, None);
                 history.remainders.clear();
                 history.pressed.iter_mut().for_each(Pressed::forget);

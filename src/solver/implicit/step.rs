@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::energy::Before;
+use super::energy::EnergyBefore;
 use super::loops::{Add, Finish, Lack, Place, Predict, Remain};
 use super::{End, Experience, Implicit, contact};
 use crate::base::{Stage, Stopwatch};
@@ -14,7 +14,7 @@ use crate::solver::attempt::{Carry, StepRequest};
 use crate::solver::grasp::Lapse;
 use crate::solver::kick::{Survey, look};
 use crate::solver::newton::{Aimed, Newton};
-use crate::solver::verlet::{Taken, TooLong, begin};
+use crate::solver::verlet::{StepResult, TooLong, begin};
 use crate::springs::Tangent;
 use crate::threads::{Items, Team};
 
@@ -72,7 +72,7 @@ pub(in crate::solver) fn run(
     middle: u32,
     start: Carry,
     team: &Team,
-) -> Result<(u32, Taken), TooLong> {
+) -> Result<(u32, StepResult), TooLong> {
     let mut end = End::NotFinite;
     let mut parts = 1;
     if let Some(mut implicit) = body.implicit.take() {
@@ -128,7 +128,7 @@ pub(in crate::solver) fn run(
         }
         body.implicit = Some(implicit);
     }
-    let taken = Taken {
+    let taken = StepResult {
         carry: start,
         finite: end == End::Fine,
     };
@@ -330,7 +330,7 @@ impl Substep<'_> {
         }
     }
 
-    fn take(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
+    fn take(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
         body.forces.foresee(self.step);
         match self.foreseeing(body, implicit) {
             Some(foreseeing) => foreseeing.take_formula(body, implicit, before),
@@ -338,7 +338,7 @@ impl Substep<'_> {
         }
     }
 
-    fn take_formula(&self, body: &mut System, implicit: &mut Implicit, before: Before) -> End {
+    fn take_formula(&self, body: &mut System, implicit: &mut Implicit, before: EnergyBefore) -> End {
         if let Some(mut newton) = implicit.newton.take() {
             self.aim(body, implicit);
             self.solve_exactly(body, implicit, &mut newton);

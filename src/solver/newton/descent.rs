@@ -66,7 +66,7 @@ pub(super) struct Goal {
 
 /// How a descent ended.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::solver) struct Found {
+pub(in crate::solver) struct DescentReport {
     pub iterations: u32,
     pub products: u32,
     /// The longest way of the last correction, m.
@@ -103,10 +103,10 @@ impl Descent {
     }
 
     /// Goes down until the goal is reached.
-    pub fn run(&mut self, goal: &Goal) -> Found {
-        let mut found = Found {
+    pub fn run(&mut self, goal: &Goal) -> DescentReport {
+        let mut found = DescentReport {
             error: f64::INFINITY,
-            ..Found::default()
+            ..DescentReport::default()
         };
         let mut shift = goal.shift;
         let mut vain = 0;
@@ -162,7 +162,7 @@ impl Descent {
 
     /// Finds a direction in which the function bends down, where it is level, and goes some way along it: whether there is
     /// one.
-    pub fn leave_saddle(&mut self, shift: f64, length: f64, found: &mut Found, budget: u32) -> bool {
+    pub fn leave_saddle(&mut self, shift: f64, length: f64, found: &mut DescentReport, budget: u32) -> bool {
         self.equation
             .assemble(&self.network, Tangent::Factor, shift, &mut self.factor);
         factor::factorise(&mut self.factor, &self.network);
@@ -223,7 +223,7 @@ impl Descent {
     }
 
     /// Solves the linearised equation; whether its matrix was found indefinite.
-    fn correct(&mut self, tangent: Tangent, shift: f64, goal: &Goal, found: &mut Found) -> bool {
+    fn correct(&mut self, tangent: Tangent, shift: f64, goal: &Goal, found: &mut DescentReport) -> bool {
         self.equation.press();
         self.equation
             .assemble(&self.network, Tangent::Factor, shift, &mut self.factor);

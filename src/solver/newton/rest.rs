@@ -2,7 +2,7 @@
 
 use glam::{BVec3, DVec3, Vec3};
 
-use super::descent::{Descent, Found, Goal};
+use super::descent::{Descent, DescentReport, Goal};
 use crate::base::{Error, Result, memory};
 use crate::solver::System;
 
@@ -162,7 +162,7 @@ fn extent(descent: &Descent) -> f64 {
 }
 
 /// Goes down, and on from where it is level without being lowest.
-fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> Found {
+fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> DescentReport {
     descent.weigh();
     let equation = &descent.equation;
     let free = (0..descent.residuals.len()).filter(|&node| equation.is_free(node));
@@ -174,7 +174,7 @@ fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> Fo
     if !(shift > 0.0 && shift.is_finite()) {
         shift = 1.0;
     }
-    let mut found = Found::default();
+    let mut found = DescentReport::default();
     for _ in 0..SADDLES {
         let part = descent.run(&Goal {
             absolute: tolerance,
@@ -186,7 +186,7 @@ fn settle(descent: &mut Descent, tolerance: f64, extent: f64, budget: u32) -> Fo
             least_shift: 1e-10 * shift,
             next_shift: shift,
         });
-        found = Found {
+        found = DescentReport {
             iterations: found.iterations + part.iterations,
             products: found.products + part.products,
             ..part
@@ -249,14 +249,14 @@ impl Parts {
     /// off them, by mass: it would carry the part away.
     fn balance(&self, descent: &mut Descent, body: &System) -> Result<()> {
         #[derive(Clone, Copy, Default)]
-        struct Sums {
+        struct PieceSums {
             load: DVec3,
             size: f64,
             mass: f64,
             held: BVec3,
         }
         let equation = &mut descent.equation;
-        let mut sums = memory::filled(Sums::default(), self.lowest.len())?;
+        let mut sums = memory::filled(PieceSums::default(), self.lowest.len())?;
         for (node, &part) in self.lowest.iter().enumerate() {
             let sums = &mut sums[part as usize];
             sums.load += equation.loads[node];
@@ -266,7 +266,7 @@ impl Parts {
             sums.held |= BVec3::splat(is_held) | equation.pins.partial_axes_of(node as u32);
         }
         for (node, &part) in self.lowest.iter().enumerate() {
-            let Sums { load, size, mass, held } = sums[part as usize];
+            let PieceSums { load, size, mass, held } = sums[part as usize];
             if held.all() {
                 continue;
             }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::Newton;
-use super::descent::{Found, Goal};
+use super::descent::{DescentReport, Goal};
 use crate::soa::Vectors;
 use crate::solver::System;
 
@@ -39,7 +39,7 @@ pub(in crate::solver) struct Aimed<'a> {
 impl Newton {
     /// Solves the step's equation, from these pushes on; leaves the positions at its end and the pushes that lead
     /// there.
-    pub(in crate::solver) fn solve(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) -> Found {
+    pub(in crate::solver) fn solve(&mut self, body: &mut System, aimed: &Aimed, pushes: &mut Vectors) -> DescentReport {
         self.descent.network.read(&body.forces);
         self.descent.network.beside = std::mem::take(&mut body.forces.beside);
         self.set_up(body, aimed, pushes);

@@ -223,7 +223,7 @@ saved!(Columns {
 
 /// A link's place.
 #[derive(Clone, Copy)]
-enum Found {
+enum LinkPlace {
     Run(usize),
     OwnRun(usize),
     Near(usize),
@@ -612,10 +612,10 @@ impl Columns {
             }
         });
         let lanes = match place {
-            Some(Found::Run(run)) => &mut self.runs[run].lanes,
-            Some(Found::OwnRun(run)) => &mut self.own_runs[run].lanes,
-            Some(Found::Near(near)) => &mut self.near[near].lanes,
-            Some(Found::Far(far)) => &mut self.far[far].lanes,
+            Some(LinkPlace::Run(run)) => &mut self.runs[run].lanes,
+            Some(LinkPlace::OwnRun(run)) => &mut self.own_runs[run].lanes,
+            Some(LinkPlace::Near(near)) => &mut self.near[near].lanes,
+            Some(LinkPlace::Far(far)) => &mut self.far[far].lanes,
             None => return self.strays.remove(node, neighbour),
         };
         *lanes &= !(1 << ((node - self.first) % LANES));
@@ -624,7 +624,7 @@ impl Columns {
 
     /// Shows the columns in which `node` has a link: place, place in the table of materials, place among those with parameters
     /// of their own, and the neighbour.
-    fn columns_of(&self, node: usize, see: &mut dyn FnMut(Found, Option<usize>, usize, usize)) {
+    fn columns_of(&self, node: usize, see: &mut dyn FnMut(LinkPlace, Option<usize>, usize, usize)) {
         let place = node - self.first;
         let (block, lane) = (place / LANES, place % LANES);
         let (start, end) = self.ends(block);
@@ -640,7 +640,7 @@ impl Columns {
         for index in start.runs as usize..end.runs as usize {
             let run = &self.runs[index];
             see(
-                Found::Run(index),
+                LinkPlace::Run(index),
                 run.lanes,
                 Some(usize::from(run.material)),
                 at(run.offset),
@@ -648,17 +648,17 @@ impl Columns {
         }
         for index in start.own_runs as usize..end.own_runs as usize {
             let run = &self.own_runs[index];
-            see(Found::OwnRun(index), run.lanes, None, at(run.offset));
+            see(LinkPlace::OwnRun(index), run.lanes, None, at(run.offset));
         }
         for index in start.near as usize..end.near as usize {
             let gather = self.near[index];
             let neighbour = self.window + usize::from(self.near_indices[index].0[lane]);
-            see(Found::Near(index), gather.lanes, gather.material(), neighbour);
+            see(LinkPlace::Near(index), gather.lanes, gather.material(), neighbour);
         }
         for index in start.far as usize..end.far as usize {
             let gather = self.far[index];
             let neighbour = self.far_indices[index].0[lane] as usize;
-            see(Found::Far(index), gather.lanes, gather.material(), neighbour);
+            see(LinkPlace::Far(index), gather.lanes, gather.material(), neighbour);
         }
     }
 

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::super::link::Link;
 use super::super::skin::Skin;
 use super::{Bond, Bonds, CLOSING_SPEED, Corner, End};
-use crate::solver::{Moment, Systems};
+use crate::solver::{Span, Systems};
 
 /// What is apart comes together within so many seconds, but for an e-th; at most by `LARGEST_PART` in a substep.
 const CLOSING_TIME: f64 = 0.02;
@@ -100,7 +100,7 @@ impl Bonds {
     }
 
     /// Takes a substep as it is to be, after the skins.
-    pub(in crate::tissue) fn follow(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Moment) {
+    pub(in crate::tissue) fn follow(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Span) {
         for end in self.ends.iter_mut().filter(|end| end.is_in_turn) {
             let Some(body) = bodies.at_mut(end.body) else { continue };
             let skin = skins.get(end.body).and_then(Option::as_ref);
@@ -132,7 +132,7 @@ impl Bonds {
     }
 
     /// Has threads between bodies that keep each other apart by these contacts give way to them.
-    pub(in crate::tissue) fn loosen(&mut self, links: &[Link], moment: &Moment) {
+    pub(in crate::tissue) fn loosen(&mut self, links: &[Link], moment: &Span) {
         for bond in self.bonds.iter_mut().filter(|bond| bond.acts) {
             let [a, b] = bond.points.map(|point| point.body);
             if let Some(thread) = &mut bond.thread {
@@ -146,7 +146,7 @@ impl Bonds {
 
     /// Makes the velocities of the points of each bond equal, or those that its thread asks for, one after the other: the largest difference
     /// that there was, m/s.
-    pub(in crate::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Moment) -> f32 {
+    pub(in crate::tissue) fn sweep(&mut self, skins: &mut [Option<Skin>], moment: &Span) -> f32 {
         let Self {
             bonds,
             ends,
@@ -185,7 +185,7 @@ impl Bonds {
     }
 
     /// Gives bodies what was found, and foresees the same for the next substep.
-    pub(in crate::tissue) fn give(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Moment) {
+    pub(in crate::tissue) fn give(&mut self, bodies: &mut impl Systems, skins: &[Option<Skin>], moment: &Span) {
         let Self {
             bonds,
             ends,
@@ -284,7 +284,7 @@ impl Bond {
     }
 
     /// How long forces act in this moment, s.
-    fn duration(&self, moment: &Moment, is_opening: bool) -> f32 {
+    fn duration(&self, moment: &Span, is_opening: bool) -> f32 {
         let is_half = !self.has_equation && (is_opening || !moment.drifts);
         if is_half {
             0.5 * moment.duration

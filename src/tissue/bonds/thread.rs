@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::CLOSING_SPEED;
 use crate::codec::saved;
-use crate::solver::Moment;
+use crate::solver::Span;
 
 /// Points that move against each other by no more than this part of their distance in a substep keep to their line.
 const RESOLVED: f64 = 0.5;
@@ -164,7 +164,7 @@ impl Thread {
 
     /// Takes a substep as it is to be: its points are `apart` as it begins and go at this velocity against each other; forces act for `duration`
     /// seconds.
-    pub fn follow(&mut self, apart: DVec3, velocity: DVec3, answer: DVec3, duration: f32, moment: &Moment) {
+    pub fn follow(&mut self, apart: DVec3, velocity: DVec3, answer: DVec3, duration: f32, moment: &Span) {
         // The half kick that closes a step is to leave velocities that go on as they should.
         let part = if moment.drifts { 1.0 } else { 0.5 };
         self.drift = part * f64::from(moment.duration);
@@ -188,7 +188,7 @@ impl Thread {
     }
 
     /// Contacts keep its points apart in this substep: it gives way to them, and draws gently.
-    pub fn loosen(&mut self, moment: &Moment) {
+    pub fn loosen(&mut self, moment: &Span) {
         if self.lead.is_none() {
             // The same for a force in a half kick as in a whole one.
             let least = LEAST_GIVE * self.answer.max_element() * f64::from(moment.duration).powi(2) / self.duration;
@@ -198,7 +198,7 @@ impl Thread {
     }
 
     /// The substep is over.
-    pub fn go_on(&mut self, moment: &Moment) {
+    pub fn go_on(&mut self, moment: &Span) {
         if moment.drifts {
             self.current = (self.current + self.pace * self.drift).max(0.0);
             self.led += self.speed * self.drift;
