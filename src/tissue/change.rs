@@ -186,6 +186,7 @@ impl Skin {
         let edges = change.edge_count.saturating_sub(self.edges.len());
         self.edges.try_reserve(edges)?;
         self.pierces.try_reserve(edges)?;
+        self.flatness.reserve(change.node_count, self.edges.len() + edges)?;
         let triangles = change.triangles.len();
         self.triangles.try_reserve(triangles)?;
         self.owned.try_reserve(triangles)?;

@@ -10,6 +10,7 @@ mod change;
 mod clearances;
 mod crossing;
 mod entangled;
+mod flatness;
 mod groups;
 mod images;
 mod islands;
@@ -756,14 +757,12 @@ impl Tissue {
             };
             if measures && [&*kept_a, &*kept_b].into_iter().flatten().any(|kept| kept.is_new) {
                 search.measures = Measure::Reductions;
-                search.run(
-                    [&mut *kept_a, &mut *kept_b],
-                    number.and_then(|number| pairs.of(number)),
-                    |_| {},
-                );
+                let known = number.and_then(|number| pairs.of(number));
+                search.run([&mut *kept_a, &mut *kept_b], known, |_| {});
             }
             search.measures = if measures { Measure::Distances } else { Measure::Nothing };
-            search.run([kept_a, kept_b], number.and_then(|number| pairs.of(number)), |touch| {
+            let near = number.and_then(|number| pairs.of(number));
+            search.run([kept_a, kept_b], near, |touch| {
                 let sides = touch.sides.map(|side| side.key());
                 let is_known = known
                     .binary_search_by_key(&sides, |&link| key(&links[link as usize]))

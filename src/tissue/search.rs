@@ -284,6 +284,8 @@ impl Search<'_> {
         if first.skin.pierces[index] || edge[0] == NONE {
             return f32::INFINITY;
         }
+        let ridge = first.skin.flatness.of(index);
+        let is_measured = self.is_measured(kept.as_deref(), index);
         let ways = edge.map(|node| self.way(first, node, shift, second.skin.drift));
         let segment = Segment {
             ends: ways.map(|(place, _)| place),
@@ -297,9 +299,10 @@ impl Search<'_> {
         let mut touched: [Option<Met<[u32; 2]>>; EDGES] = [None; EDGES];
         let mut see_edges = |edges: [u32; 3]| {
             let mut least = f32::INFINITY;
-            for (other, pierces) in second.skin.edges_of(edges) {
+            for (other, pierces, other_ridge) in second.skin.edges_of(edges) {
                 // Of what passes through tissue there is no telling which side it belongs to; it is near all the same.
-                if pierces && self.measures == Measure::Nothing {
+                let meets = !pierces && !ridge.is_flat_beside(&other_ridge, self.radius);
+                if !meets && !is_measured {
                     continue;
                 }
                 if self.is_of_one()
@@ -318,7 +321,7 @@ impl Search<'_> {
                 let start = from_start.offset.length();
                 least = least.min(start);
                 nearest = nearest.min(start);
-                if pierces || start > far {
+                if !meets || start > far {
                     continue;
                 }
                 let met = self.approach(second.skin, (edge, &segment), (&other, &corners), from_start);
@@ -377,6 +380,15 @@ impl Search<'_> {
             self.show(sides, -found.offset, (clearance, shift), see);
         }
         least
+    }
+
+    /// Whether it counts how near others are to an edge that it does not meet.
+    fn is_measured(&self, kept: Option<&Clearances>, edge: usize) -> bool {
+        match self.measures {
+            Measure::Nothing => false,
+            Measure::Distances => kept.is_some_and(|kept| kept.allowed(SurfaceFeature::Edge(edge)) < f32::INFINITY),
+            Measure::Reductions => true,
+        }
     }
 
     /// Where a node or an edge comes too close to a face or an edge, how far they keep apart, and whether it only comes near.

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::LEAST_THICKNESS;
 use super::change::Changing;
+use super::flatness::{Flatness, Ridge};
 use super::images::Images;
 use super::nearby::Nearby;
 use super::wound::Wound;
@@ -33,7 +34,9 @@ pub(crate) struct Skin {
     pub is_closed: bool,
     /// The edges that pass through other tissue, or the body's own, as the step begins.
     pub pierces: Vec<bool>,
-    /// How many times they do, as that was looked for last.
+    /// Where they need not meet others, as the step begins.
+    pub(super) flatness: Flatness,
+    /// How many times edges pass through tissue, as that was looked for last.
     pub crossings: u32,
     /// Where the body's coordinates begin.
     pub origin: DVec3,
@@ -85,6 +88,7 @@ saved!(Skin {
     room,
     is_closed,
     pierces,
+    flatness,
     crossings,
     origin,
     starts,
@@ -168,6 +172,7 @@ impl Skin {
             }
         }
         let pierces = memory::filled(false, edges.len())?;
+        let spare = body.spare_nodes();
         let mut nodes = memory::copied(triangles.as_flattened())?;
         nodes.sort_unstable();
         nodes.dedup();
@@ -211,6 +216,7 @@ impl Skin {
             resolution,
             images: None,
             nodes,
+            flatness: Flatness::new(body.node_count() + spare, edges.len() + 3 * spare)?,
             edges,
             owned,
             forest,
@@ -232,7 +238,6 @@ impl Skin {
             nearby: None,
             is_fitted: true,
         };
-        let spare = body.spare_nodes();
         skin.nodes.try_reserve_exact(spare)?;
         for values in [&mut skin.triangles, &mut skin.owned] {
             values.try_reserve_exact(2 * spare)?;
@@ -382,6 +387,9 @@ impl Skin {
         } = self;
         if let Some(wound) = changing.as_mut().and_then(|changing| changing.wound.as_mut()) {
             wound.turn(triangles, starts);
+        }
+        if begins {
+            self.flatness.measure(&self.starts, &self.triangles, &self.edges);
         }
         self.know_nearby(&body.contact);
     }
@@ -555,10 +563,13 @@ impl Skin {
         self.owned[triangle]
     }
 
-    /// These edges, and whether they pass through tissue.
-    pub fn edges_of(&self, edges: [u32; 3]) -> impl Iterator<Item = ([u32; 2], bool)> + '_ {
+    /// These edges, whether they pass through tissue, and how the surface turns there.
+    pub(super) fn edges_of(&self, edges: [u32; 3]) -> impl Iterator<Item = ([u32; 2], bool, Ridge)> + '_ {
         let edges = edges.into_iter().filter(|&edge| edge != NONE);
-        edges.map(|edge| (self.edges[edge as usize], self.pierces[edge as usize]))
+        edges.map(|edge| {
+            let edge = edge as usize;
+            (self.edges[edge], self.pierces[edge], self.flatness.of(edge))
+        })
     }
 }
 
