@@ -179,7 +179,9 @@ impl World {
     /// [`Error::InvalidArgument`]: it is not finite.
     pub fn set_gravity(&mut self, gravity: Vec3) -> Result<()> {
         finite_vector("gravity", gravity)?;
-        self.definition.gravity = gravity;
+        if std::mem::replace(&mut self.definition.gravity, gravity) == gravity {
+            return Ok(());
+        }
         self.bodies.iter_mut().for_each(|(_, body)| body.wake());
         Ok(())
     }

@@ -117,9 +117,9 @@ typedef struct sinew_body_def {
   float accuracy;
   uint32_t reserved1;              ///< Reserved; must be 0.
   /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to
-  /// 1; ten times that where a step would be refused. Default 0.001; 0 is off. Mass is added only
-  /// if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance. It
-  /// adds inertia but no weight. See sinew_solver_report.
+  /// 1; as much as it takes where a step would be refused. Default 0.001; 0 is off. Mass is added
+  /// only if it saves at least 1/4 of the substeps, and never with fixed substeps or a tolerance.
+  /// It adds inertia but no weight. See sinew_solver_report.
   float mass_scaling;
   uint32_t reserved2;              ///< Reserved; must be 0.
   /// 8 * cell_count node indices of equal lattice cubes; nullable: no cells. Corner bits: x 1, y 2,

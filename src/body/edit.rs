@@ -396,10 +396,8 @@ impl Body {
     }
 
     pub(super) fn set_velocity(&mut self, node: u32, velocity: Vec3) {
-        let own = self.system.order.own(node) as usize;
-        self.system.state.velocities_mut().set(own, velocity);
+        self.system.set_velocity(self.system.order.own(node) as usize, velocity);
         self.forget_velocities();
-        self.system.changed(Changed::Velocity);
     }
 
     pub(crate) fn check_node(&self, name: &dyn std::fmt::Display, node: u32) -> Result<()> {

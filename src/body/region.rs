@@ -27,6 +27,9 @@ impl Body {
             self.check_node(&format_args!("nodes[{index}]"), node)?;
             own.push(self.system.order.own(node));
         }
+        if stiffness == 1.0 && length == 1.0 {
+            return Ok(());
+        }
         let region = Region::of(own);
         let scale = Scale { stiffness, length };
         let changes = self.springs_in(&region, scale)?;

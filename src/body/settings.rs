@@ -68,7 +68,7 @@ impl Body {
         self.system.damping = is_damped.then_some(made);
         let step = self.system.scaling.as_ref().map_or(0.0, |scaling| scaling.step());
         self.system.scale_masses(step);
-        self.system.changed(Changed::Masses);
+        self.system.changed(Changed::Damping);
         Ok(())
     }
 

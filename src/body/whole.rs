@@ -119,8 +119,9 @@ impl Body {
     /// [`Error::InvalidArgument`]: it is not finite.
     pub fn set_gravity_scale(&mut self, scale: f32) -> Result<()> {
         finite("gravity_scale", scale)?;
-        self.system.gravity_scale = scale;
-        self.system.wake();
+        if std::mem::replace(&mut self.system.gravity_scale, scale) != scale {
+            self.system.wake();
+        }
         Ok(())
     }
 

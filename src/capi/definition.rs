@@ -130,8 +130,8 @@ pub struct sinew_body_def {
     pub accuracy: f32,
     /// Reserved; must be 0.
     pub reserved1: u32,
-    /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to 1; ten times
-    /// that where a step would be refused.
+    /// VERLET: largest fraction of the body's mass added to the nodes that shorten the substep, 0 to 1; as much
+    /// as it takes where a step would be refused.
     ///
     /// Default 0.001; 0 is off. Mass is added only if it saves at least 1/4 of the substeps, and never with fixed
     /// substeps or a tolerance. It adds inertia but no weight. See sinew_solver_report.

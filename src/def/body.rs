@@ -191,7 +191,7 @@ pub struct BodyDefinition<'a> {
     /// substeps short, as those of slivers are; from 0 to 1; 0: none.
     ///
     /// Mass is added where that saves a quarter of the substeps or more, and no more than they need; where motion makes elements so stiff that a
-    /// step would be refused, up to ten times this part for a quarter of a second. Never where the
+    /// step would be refused, as much as it takes for a quarter of a second, but no more than the body has. Never where the
     /// world's `substeps` are fixed or a tolerance is asked for. It is inertia alone: weight, and the force on a pin, stay
     /// as they are. See [`SolverReport::added_mass`](crate::SolverReport::added_mass).
     pub mass_scaling: f32,

@@ -26,7 +26,7 @@ const RESERVE_ANYWHERE: f32 = 0.9;
 const ATTEMPTS: u32 = 4;
 
 /// How often masses are made within a step for elements that its motion made stiff.
-const RELIEFS: u32 = 8;
+const RELIEFS: i32 = 8;
 
 /// Near tools and other tissue a step of IMPLICIT or NEWTON is cut into as many parts as this, whatever is allowed otherwise: 4 s of them.
 const MOST_PARTS: u32 = 1 << 12;
@@ -121,6 +121,11 @@ impl Carry {
         self.pace = Pace::UNKNOWN;
     }
 
+    /// The longest substep that keeps the energy of a body that is stable in substeps of `limit` seconds: those of the last second were no longer.
+    pub fn limit_by_energy(&self, limit: f32) -> f32 {
+        limit.min(self.pace.shortest() / RESERVE) / self.energy.refinement() as f32
+    }
+
     /// The longest stable substep with the masses in use, s, where it is known.
     pub fn limit(&self) -> Option<f32> {
         if self.masses_for > 0.0 {
@@ -199,7 +204,7 @@ fn prepare(body: &mut System, request: &StepRequest, team: &Team) -> (Carry, f32
     }
     let mut beside_springs = body.limit_beside_springs(team);
     if substeps_needed(request, beside_springs) > f64::from(unrelieved(body, request)) {
-        beside_springs = body.relieve(request, false, team).unwrap_or(beside_springs);
+        beside_springs = body.relieve(request, false, 1, team).unwrap_or(beside_springs);
     }
     let known = body.carry.stability;
     let are_scaled = body.carry.masses_for > 0.0;
@@ -367,7 +372,7 @@ fn run_stably(
         let known = Need::new(body, request, start, stable_substep, beside_springs);
         if known.substeps > request.max_substeps || known.substeps == u32::MAX {
             reliefs += 1;
-            match body.relieve(request, was_tried, team) {
+            match body.relieve(request, was_tried, reliefs, team) {
                 Some(limit) if reliefs <= RELIEFS => {
                     (attempt, guess, beside_springs) = (0, 1.0, limit);
                     stable_substep = first_substep(body, &start, limit);
@@ -484,7 +489,7 @@ pub(crate) fn relieve_squeezed(
     if body.implicit.is_some() || !is_squeezed {
         return None;
     }
-    let limit = body.relieve(request, true, team)?;
+    let limit = body.relieve(request, true, 1, team)?;
     let (substeps, masses_for) = fewer_substeps(body, request, 0.0)?;
     Some((substeps.max(as_count(substeps_needed(request, limit))), masses_for))
 }

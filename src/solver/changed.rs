@@ -15,8 +15,10 @@ pub(crate) enum Changed {
     Origin,
     /// A pin has come or gone, and what is about its node has been woken.
     Pin,
-    /// Nodes have other masses or damping, or other nodes are held.
+    /// Nodes have other masses, or other nodes are held.
     Masses,
+    /// Nodes have other damping.
+    Damping,
     /// Springs, elements or terms have come, gone or changed.
     Stiffness,
     /// Springs that may have set the longest stable substep are softer or gone.
@@ -44,6 +46,8 @@ pub(super) enum Cached {
     Rates,
     /// The energy account, and how many substeps the last steps took.
     Energy,
+    /// The energy that equations took the last step to end with.
+    EquationEnergy,
     /// What positions lack of where the nodes are.
     Remainders,
     /// What equations take from the last step.
@@ -64,11 +68,13 @@ impl Changed {
             Self::Positions => &[
                 Sleep, Forces, Stability, Energy, Remainders, History, Matrix, Candidates, Holds,
             ],
-            Self::Velocity => &[DampingForces, Energy],
+            // The energy account is told what the change puts in.
+            Self::Velocity => &[DampingForces, EquationEnergy],
             Self::Course => &[History],
             Self::Origin => &[Sleep, Candidates],
             Self::Pin => &[Stability, Rates, Energy, Matrix],
             Self::Masses => &[Sleep, Stability, Rates, Energy, Matrix],
+            Self::Damping => &[Sleep, Stability, Rates, EquationEnergy, Matrix],
             Self::Stiffness => &[Sleep, Forces, Rates, Energy, Matrix],
             Self::Softer => &[Stability],
             Self::Pressure => &[Sleep, Forces, Energy],
@@ -105,7 +111,7 @@ impl System {
             Cached::Remainders => self.state.forget_remainders(),
             Cached::Candidates => self.contacts.iter_mut().for_each(|contacts| contacts.forget()),
             Cached::Holds => self.contacts.iter_mut().for_each(|contacts| contacts.holds.forget()),
-            Cached::History | Cached::Matrix => {}
+            Cached::EquationEnergy | Cached::History | Cached::Matrix => {}
         }
     }
 }

@@ -120,6 +120,11 @@ impl EnergyAccount {
         self.start_over();
     }
 
+    /// So much energy was put in from outside, J; what is not finite is not known.
+    pub fn gain(&mut self, energy: f64) {
+        self.lose(energy.is_finite().then_some(-energy));
+    }
+
     /// So much energy is gone with mass that was taken away, J, or unknown.
     fn lose(&mut self, energy: Option<f64>) {
         match energy {
@@ -207,8 +212,8 @@ pub(super) struct Account<'a> {
 
 impl<'a> Account<'a> {
     pub fn new(body: &System, carry: &Carry, request: &'a StepRequest<'a>, substeps: u32) -> Self {
-        // What is held by a tool, or sleeps in part, is not alone; fixed substeps are taken as they are.
-        let watches = request.substeps == 0 && !body.is_grasped() && !body.sleeps();
+        // What sleeps in part is not alone; fixed substeps are taken as they are.
+        let watches = request.substeps == 0 && !body.sleeps();
         Self {
             request,
             substeps,
@@ -255,9 +260,19 @@ impl<'a> Account<'a> {
                 work += applied.get(node).as_dvec3().dot(way);
             }
         }
-        for pin in body.pins.iter().filter(|pin| pin.travel != Vec3::ZERO) {
-            let force = pin.force_sum / f64::from(self.substeps);
-            work += DVec3::select(pin.axes, force, DVec3::ZERO).dot(pin.travel.as_dvec3());
+        let is_grasped = body.is_grasped();
+        for pin in body.pins.iter() {
+            // Tools lead what they hold.
+            let way = if is_grasped && body.is_held_by_tool(pin.node) {
+                let node = pin.node as usize;
+                last.get(node).as_dvec3() - first.get(node).as_dvec3()
+            } else {
+                pin.travel.as_dvec3()
+            };
+            if way != DVec3::ZERO {
+                let force = pin.force_sum / f64::from(self.substeps);
+                work += DVec3::select(pin.axes, force, DVec3::ZERO).dot(way);
+            }
         }
         let loads = body.contacts.iter().flat_map(|contacts| contacts.loads());
         let tools = self.request.tools.iter().zip(loads).enumerate();

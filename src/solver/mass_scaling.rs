@@ -26,11 +26,15 @@ const RESERVE: f64 = 0.9;
 /// Bodies that could not take steps so many times as long are not prepared for it.
 const WORTH_KEEPING: f64 = 1.125;
 
-/// How many times as stiff elements may become as they are where masses are made for that, before it is done again.
-const MARGIN: f32 = 1.3;
+/// How many times as stiff elements may become as they are where masses are made for that, before it is done again: at least.
+pub(super) const MARGIN: f32 = 1.3;
 
-/// How many times as much mass may be added as otherwise where a step would be refused without.
-const RESCUE: f64 = 10.0;
+/// The same, at most.
+const MOST_MARGIN: f32 = 10.0;
+
+/// How many times as much mass may be added as otherwise for elements that motion has made stiff. Where a step would be refused with so much it may
+/// be as much as the body has.
+const MORE: f64 = 10.0;
 
 /// After so long, s, masses are those for elements at rest again.
 const RELIEF: f32 = 0.25;
@@ -48,7 +52,7 @@ pub(crate) struct Sliver {
     stiffness: f32,
     /// N s/m, along them.
     damping: f32,
-    /// How many times as stiff the elements at it are taken to be as at rest.
+    /// How many times as stiff the elements at it were seen to be as at rest.
     growth: f32,
     /// The same as the last step ended; `None`: it was not in the list.
     settled_growth: Option<f32>,
@@ -88,9 +92,9 @@ impl Sliver {
         }
     }
 
-    /// The mass that makes a substep of `step` seconds stable, kg.
-    fn needs(&self, step: f64) -> f64 {
-        let more = (f64::from(self.growth) - 1.0) * f64::from(self.beside.stiffness);
+    /// The mass that makes a substep of `step` seconds stable, kg, where elements may become so many times as stiff as they are deformed.
+    fn needs(&self, step: f64, margin: f32) -> f64 {
+        let more = (f64::from(margin * self.growth) - 1.0).max(0.0) * f64::from(self.beside.stiffness);
         step * (0.5 * step * (f64::from(self.stiffness) + more) + f64::from(self.damping))
     }
 
@@ -129,6 +133,8 @@ pub(crate) struct Heavier<'a> {
 pub(crate) struct MassScaling {
     /// kg, in all.
     most: f64,
+    /// The mass of the body, kg.
+    total: f64,
     /// The part that is used of the substep that masses are made for.
     reserve: f64,
     /// The longest stable substep with masses as they are, s, wherever nodes are or at rest.
@@ -143,16 +149,20 @@ pub(crate) struct MassScaling {
     step: f32,
     /// How many times as stiff as at rest the elements at each node are; of no nodes where masses are not made for that.
     growths: Vec<f32>,
+    /// How many times as stiff as that they may become; 1 at rest.
+    margin: f32,
     /// For how long masses have been made for that, s.
     relief: Option<f32>,
     /// The same as the last step ended.
     settled_relief: Option<f32>,
+    settled_margin: f32,
     /// Whether the step in progress has changed for what masses are made.
     changed: bool,
 }
 
 saved!(MassScaling {
     most,
+    total,
     reserve,
     unscaled,
     uniform_inverse_mass,
@@ -160,8 +170,10 @@ saved!(MassScaling {
     complete_to,
     step,
     growths,
+    margin,
     relief,
     settled_relief,
+    settled_margin,
     changed
 });
 
@@ -220,6 +232,7 @@ impl MassScaling {
         slivers.sort_unstable_by_key(|sliver| sliver.node);
         Ok(Some(Self {
             most,
+            total,
             reserve: if beside.is_empty() {
                 RESERVE
             } else {
@@ -231,8 +244,10 @@ impl MassScaling {
             complete_to,
             step: 0.0,
             growths: memory::filled(0.0, room)?,
+            margin: 1.0,
             relief: None,
             settled_relief: None,
+            settled_margin: 1.0,
             changed: false,
         }))
     }
@@ -296,7 +311,7 @@ impl MassScaling {
         let listed = self.slivers.len();
         let mut next = 0;
         for (node, &mass) in masses.iter().enumerate() {
-            let growth = MARGIN * self.growths.get(node).copied().unwrap_or(0.0);
+            let growth = self.growths.get(node).copied().unwrap_or(0.0);
             if let Some(sliver) = self.slivers[..listed]
                 .get_mut(next)
                 .filter(|sliver| sliver.node as usize == node)
@@ -311,12 +326,17 @@ impl MassScaling {
                     ..Sliver::new(node as u32, at_rest(node), rate)
                 };
                 sliver.add_up(springs);
-                if sliver.needs(self.complete_to) > f64::from(mass) {
+                if sliver.needs(self.complete_to, MOST_MARGIN) > f64::from(mass) {
                     self.slivers.push(sliver);
                 }
             }
         }
         self.slivers.sort_unstable_by_key(|sliver| sliver.node);
+    }
+
+    /// Has masses be made for elements that become so many times as stiff as they were seen to be.
+    pub fn set_margin(&mut self, margin: f32) {
+        self.margin = margin;
     }
 
     /// Makes masses for elements at rest again, after a while: whether that has to be done.
@@ -330,7 +350,7 @@ impl MassScaling {
 
     fn rest(&mut self) {
         self.slivers.iter_mut().for_each(|sliver| sliver.growth = 1.0);
-        self.relief = None;
+        (self.relief, self.margin) = (None, 1.0);
         self.changed = true;
     }
 
@@ -344,7 +364,7 @@ impl MassScaling {
         if let Some(age) = &mut self.relief {
             *age += dt;
         }
-        self.settled_relief = self.relief;
+        (self.settled_relief, self.settled_margin) = (self.relief, self.margin);
         self.changed = false;
         for sliver in &mut self.slivers {
             (sliver.settled_growth, sliver.settled) = (Some(sliver.growth), sliver.added);
@@ -353,7 +373,7 @@ impl MassScaling {
 
     /// Makes masses for what they were made for as the last step ended: whether that differs.
     pub fn unsettle(&mut self) -> bool {
-        self.relief = self.settled_relief;
+        (self.relief, self.margin) = (self.settled_relief, self.settled_margin);
         if self.changed {
             self.slivers.retain(|sliver| sliver.settled_growth.is_some());
             for sliver in &mut self.slivers {
@@ -381,8 +401,12 @@ impl MassScaling {
         if self.relief.is_some() {
             // Only as much as is needed for as many as are asked for, or where that is too much for some more.
             let mut substeps = (needed.min(f64::from(u32::MAX)) as u32).max(1);
-            while !fits_in(substeps, RESCUE * self.most) {
+            let most = self.total.max(self.most);
+            while !fits_in(substeps, most.min(MORE * self.most)) {
                 if substeps >= max_substeps {
+                    if fits_in(substeps, most) {
+                        break;
+                    }
                     return None;
                 }
                 substeps = substeps.saturating_add(substeps / 8 + 1).min(max_substeps);
@@ -416,7 +440,7 @@ impl MassScaling {
         self.slivers.chunks(TOGETHER).all(|slivers| {
             let adds = slivers.iter().map(|sliver| {
                 let node = sliver.node as usize;
-                let lacks = sliver.needs(step) - f64::from(masses[node]);
+                let lacks = sliver.needs(step, self.margin) - f64::from(masses[node]);
                 if inverse_masses[node] > 0.0 {
                     lacks.max(0.0)
                 } else {
@@ -438,7 +462,7 @@ impl MassScaling {
             let mass = body.masses[node];
             sliver.added = 0.0;
             if body.inverse_masses[node] > 0.0 {
-                let heavier = mass.max(sliver.needs(f64::from(step)) as f32);
+                let heavier = mass.max(sliver.needs(f64::from(step), self.margin) as f32);
                 sliver.added = heavier - mass;
                 body.inverse_masses[node] = 1.0 / heavier;
                 if let Some(damping) = &mut damping {

@@ -31,10 +31,15 @@ impl Pace {
         age: 0.0,
     };
 
+    /// The shortest of the last second, s; infinity: none is known.
+    pub fn shortest(&self) -> f32 {
+        let [one, other] = self.shortest;
+        one.min(other)
+    }
+
     /// How many substeps a step of `dt` seconds takes that needs so many, as far as more are `allowed`.
     pub fn keep(&self, needed: u32, dt: f32, allowed: u32) -> u32 {
-        let [one, other] = self.shortest;
-        let kept = (f64::from(dt) / f64::from(one.min(other)) - ROUNDING).ceil();
+        let kept = (f64::from(dt) / f64::from(self.shortest()) - ROUNDING).ceil();
         needed.max((kept as u32).min(allowed))
     }
 

@@ -3,34 +3,37 @@
 //! Where a step would take more substeps than are allowed, each node is asked for the mass that it needs with its elements as they are
 //! deformed, and masses are made for as many substeps as are allowed, with more mass than otherwise if need be. They stay so for a while. Nodes keep
 //! their velocities but for what the added mass would add to the kinetic energy of the deformation, which is taken off all of it.
+//!
+//! Elements are looked at where the step begins and where it has come to: what is stiff now may be soft then. Each time they are taken to become
+//! stiffer still, as far as there is mass for that.
 
 use super::System;
 use super::attempt::{StepRequest, fewer_substeps};
+use super::mass_scaling::MARGIN;
 use super::verlet::begin;
 use crate::soa::Masses;
 use crate::threads::Team;
 
 impl System {
-    /// Makes masses for elements as they are deformed: at the current state, or where a step that `was_tried` has come to. The longest stable
-    /// substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for that.
-    pub(crate) fn relieve(&mut self, request: &StepRequest, was_tried: bool, team: &Team) -> Option<f32> {
+    /// Makes masses for elements as they are deformed: at the current state, and where a step that `was_tried` has come to; so many `times` in this
+    /// step. The longest stable substep that the step then begins with, as far as springs are not concerned, s; `None`: there is not enough mass for
+    /// that.
+    pub(crate) fn relieve(&mut self, request: &StepRequest, was_tried: bool, times: i32, team: &Team) -> Option<f32> {
         if request.substeps > 0 || request.tolerance > 0.0 || !request.relieves {
             return None;
         }
         let scaling = self.scaling.as_mut()?;
         let growths = scaling.begin_relief()?;
-        let positions = if was_tried {
-            self.state.newest().0
-        } else {
-            self.state.positions()
-        };
-        self.forces.show_stiffenings(positions, &mut |corners, stiffening| {
-            for node in corners {
-                if let Some(growth) = growths.get_mut(node as usize) {
-                    *growth = growth.max(stiffening as f32);
+        let tried = was_tried.then(|| self.state.newest().0);
+        for positions in [Some(self.state.positions()), tried].into_iter().flatten() {
+            self.forces.show_stiffenings(positions, &mut |corners, stiffening| {
+                for node in corners {
+                    if let Some(growth) = growths.get_mut(node as usize) {
+                        *growth = growth.max(stiffening as f32);
+                    }
                 }
-            }
-        });
+            });
+        }
         let in_use = Masses {
             masses: &self.masses,
             inverse_masses: &self.inverse_masses,
@@ -40,7 +43,12 @@ impl System {
         scaling.relieve(&*self.forces.springs, &self.masses, rates, |node| {
             self.forces.carried_at_rest(node, in_use.inverse(node))
         });
-        let (_, masses_for) = fewer_substeps(self, request, 0.0)?;
+        // With as much margin as there is mass for.
+        let margins = (1..=times).rev().map(|power| MARGIN.powi(power));
+        let masses_for = margins.into_iter().find_map(|margin| {
+            self.scaling.as_mut()?.set_margin(margin);
+            Some(fewer_substeps(self, request, 0.0)?.1)
+        })?;
         self.scale_masses(masses_for);
         begin(self, request);
         Some(self.limit_beside_springs(team))

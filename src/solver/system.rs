@@ -360,6 +360,18 @@ impl System {
         self.scale_masses(self.carry.masses_for);
     }
 
+    /// Gives a node another velocity, m/s: the energy account is told of what that puts in.
+    pub fn set_velocity(&mut self, node: usize, velocity: Vec3) {
+        let velocities = self.state.velocities_mut();
+        let change = velocity.as_dvec3().length_squared() - velocities.get(node).as_dvec3().length_squared();
+        velocities.set(node, velocity);
+        let inverse_mass = f64::from(self.inverse_masses[node]);
+        if inverse_mass > 0.0 {
+            self.carry.energy.gain(0.5 * change / inverse_mass);
+        }
+        self.changed(Changed::Velocity);
+    }
+
     /// Puts the nodes at rest at these places, in its own coordinates and numbers, where this holds its pins.
     pub fn rest_at(&mut self, place: impl Fn(usize) -> Vec3, held: impl Fn(usize) -> Vec3) {
         close(self);

@@ -151,12 +151,13 @@ impl World {
         }
     }
 
-    /// The longest explicit substep that is known to be stable, s; infinity where nothing is known.
+    /// The longest explicit substep that is known to be stable and to keep the energy, s; infinity where nothing is known.
     fn known_substep(&self) -> f32 {
         let explicit = self.bodies.iter().filter(|(_, body)| body.system().is_explicit());
         let known = explicit.filter_map(|(_, body)| {
             let limit = body.system().carry.limit()?;
-            Some(limit.min(body.system().forces.newest_limit_beside_springs()))
+            let stable = limit.min(body.system().forces.newest_limit_beside_springs());
+            Some(body.system().carry.limit_by_energy(stable))
         });
         known.fold(f32::INFINITY, f32::min)
     }

@@ -2,6 +2,7 @@
 
 mod auto;
 mod budget;
+mod energy_kept;
 mod implicit;
 mod implicit_budget_near_tools;
 mod implicit_motion;
@@ -14,6 +15,7 @@ mod mass_scaling;
 mod newton;
 mod organ;
 mod pin_axes;
+mod real_meshes;
 mod rest_state;
 mod rigid_motion;
 mod settings;

@@ -492,7 +492,7 @@ impl Implicit {
     pub(in crate::solver) fn forget(&mut self, known: Cached) {
         let history = &mut self.histories[self.settled];
         match known {
-            Cached::Energy => history.energy = None,
+            Cached::Energy | Cached::EquationEnergy => history.energy = None,
             Cached::Matrix => self.stale = true,
             Cached::History => {
                 (history.step, history.energy) = (0.0, None);

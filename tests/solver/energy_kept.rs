@@ -1,0 +1,162 @@
+//! An undamped organ of springs that hangs folds under its weight, and leapfrog gains energy where it does: the energy monitor keeps that off, whatever
+//! holds the organ and whatever is set on the way.
+
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, BodyId, Material, Model, Shape, Solver, ToolDefinition, World, WorldDefinition};
+
+const DT: f32 = 1.0 / 60.0;
+
+/// An organ of springs of 5.4 kPa, its nodes at one end, and the one that is furthest from there.
+fn organ() -> (World, BodyId, Vec<u32>, u32) {
+    let mesh = Mesh::organ(0.15, 0.012).expect("an organ");
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let body = world.create_body(&BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(Material {
+            model: Model::Springs,
+            young_modulus: 5400.0,
+            density: 1060.0,
+            ..Material::default()
+        }),
+        solver: Solver::Verlet,
+        ..Default::default()
+    });
+    let along = |node: &u32| mesh.positions[*node as usize].x;
+    let nodes = 0..mesh.positions.len() as u32;
+    let [low, high] = [f32::min, f32::max].map(|of| nodes.clone().map(|node| along(&node)).reduce(of).expect("nodes"));
+    let end: Vec<u32> = nodes
+        .clone()
+        .filter(|node| along(node) < low + 0.1 * (high - low))
+        .collect();
+    let tip = nodes.max_by(|a, b| along(a).total_cmp(&along(b))).expect("nodes");
+    (world, body.expect("a body"), end, tip)
+}
+
+/// Steps it for so many frames as `step` does, and compares all energy with that at the start, as a part of the most that there is of kinetic and
+/// elastic energy in the first two seconds: it swings about its rest then.
+fn gain((world, body): (&mut World, BodyId), frames: usize, mut step: impl FnMut(&mut World)) -> f64 {
+    let energy = |world: &World| {
+        let energy = world.body(body).expect("a body").energy(world.gravity());
+        let inner = energy.kinetic + energy.elastic;
+        (inner, inner + energy.gravitational)
+    };
+    let (_, start) = energy(world);
+    let (mut most, mut gained) = (0.0_f64, 0.0_f64);
+    for frame in 0..frames {
+        step(world);
+        let (inner, all) = energy(world);
+        if frame < 120 {
+            most = most.max(inner);
+        }
+        gained = gained.max(all - start);
+    }
+    gained / most
+}
+
+fn plain(world: &mut World) {
+    world.step(DT).expect("a step");
+}
+
+#[test]
+fn what_tools_hold_gains_no_energy() {
+    for holds_end in [true, false] {
+        let (mut world, body, end, tip) = organ();
+        let tool = world.create_tool(&ToolDefinition {
+            pose: sinew::Pose {
+                position: Vec3::Y,
+                ..sinew::Pose::IDENTITY
+            },
+            ..ToolDefinition::new(Shape::Sphere { radius: 0.002 })
+        });
+        let tool = tool.expect("a tool");
+        for &node in &end {
+            if holds_end {
+                world.attach_node(body, node, tool, 0.0).expect("an attachment");
+            } else {
+                world.body_mut(body).expect("a body").pin(node).expect("a pin");
+            }
+        }
+        if !holds_end {
+            world.attach_node(body, tip, tool, 0.0).expect("an attachment");
+        }
+        let gained = gain((&mut world, body), 900, plain);
+        assert!(gained < 0.01, "{holds_end}: {:.2} %", 100.0 * gained);
+    }
+}
+
+#[test]
+fn what_is_set_in_each_frame_gains_no_energy() {
+    type Setting = (&'static str, fn(&mut World, BodyId));
+    let settings: [Setting; 3] = [
+        ("node damping", |world, body| {
+            let body = world.body_mut(body).expect("a body");
+            body.set_node_damping(0.0).expect("no damping");
+        }),
+        ("its own velocities", |world, body| {
+            let body = world.body_mut(body).expect("a body");
+            let velocities = body.velocities().to_vec();
+            body.set_velocities(&velocities).expect("velocities");
+        }),
+        ("a region as it is", |world, body| {
+            let body = world.body_mut(body).expect("a body");
+            body.scale_region(&[0, 1, 2], 1.0, 1.0).expect("a region");
+        }),
+    ];
+    for (name, set) in settings {
+        let (mut world, body, end, _) = organ();
+        for &node in &end {
+            world.body_mut(body).expect("a body").pin(node).expect("a pin");
+        }
+        let gained = gain((&mut world, body), 1200, |world| {
+            set(world, body);
+            plain(world);
+        });
+        assert!(gained < 0.01, "{name}: {:.2} %", 100.0 * gained);
+    }
+}
+
+#[test]
+fn impulses_put_in_what_they_give_and_no_more() {
+    let (mut world, body, end, tip) = organ();
+    for &node in &end {
+        world.body_mut(body).expect("a body").pin(node).expect("a pin");
+    }
+    let energy = |world: &World| world.body(body).expect("a body").energy(world.gravity());
+    let all = |world: &World| energy(world).kinetic + energy(world).elastic + energy(world).gravitational;
+    let start = all(&world);
+    let (mut given, mut most) = (0.0, 0.0_f64);
+    for frame in 0..900 {
+        plain(&mut world);
+        most = most.max(energy(&world).kinetic + energy(&world).elastic);
+        let gained = all(&world) - start - given;
+        assert!(
+            gained < 0.01 * most,
+            "frame {frame}: {gained} J beside {given} J, most {most} J"
+        );
+        if frame % 20 == 0 {
+            let before = energy(&world).kinetic;
+            let sign = if frame % 40 == 0 { 1.0 } else { -1.0 };
+            let body = world.body_mut(body).expect("a body");
+            body.apply_impulses(&[tip], &[Vec3::Z * (2e-4 * sign)])
+                .expect("an impulse");
+            given += energy(&world).kinetic - before;
+        }
+    }
+    assert!(given > 0.0, "{given} J");
+}
+
+#[test]
+fn steps_of_little_work_let_the_world_lag_and_gain_no_energy() {
+    for work in [5, 11] {
+        let (mut world, body, end, _) = organ();
+        for &node in &end {
+            world.body_mut(body).expect("a body").pin(node).expect("a pin");
+        }
+        let gained = gain((&mut world, body), 1200, |world| {
+            world.step_with_budget(DT, work).expect("a step");
+        });
+        assert!(gained < 0.01, "{work}: {:.2} %", 100.0 * gained);
+    }
+}

@@ -1,0 +1,86 @@
+//! Real organs with all defaults: no step is refused where their thin elements are stretched to many times their stiffness.
+
+use glam::Vec3;
+use sinew::mesh::Mesh;
+use sinew::{BodyDefinition, BodyId, Material, Model, Shape, ToolDefinition, World, WorldDefinition};
+
+use crate::support::solid::real;
+
+fn world_of(mesh: &Mesh, model: Model, young_modulus: f32, volume_stiffness: f32) -> (World, BodyId) {
+    let mut world = World::new(WorldDefinition::default()).expect("a world");
+    let body = world.create_body(&BodyDefinition {
+        positions: &mesh.positions,
+        tetrahedra: &mesh.tetrahedra,
+        material: Some(Material {
+            model,
+            young_modulus,
+            poisson_ratio: if model == Model::Springs { 0.25 } else { 0.3 },
+            density: 1000.0,
+            ..Material::default()
+        }),
+        volume_stiffness,
+        ..Default::default()
+    });
+    (world, body.expect("a body"))
+}
+
+/// Takes so many steps, and looks at what was done for that: nothing is refused, no more mass is added than there is, and nodes stay where they may be.
+fn takes(world: &mut World, body: BodyId, steps: usize, dt: f32) {
+    let masses: f64 = {
+        let body = world.body(body).expect("a body");
+        (0..body.node_count() as u32)
+            .map(|node| f64::from(body.node_mass(node).expect("a mass")))
+            .sum()
+    };
+    for step in 0..steps {
+        let report = world.step(dt).unwrap_or_else(|error| panic!("step {step}: {error}"));
+        assert_eq!(report.bodies_restored, 0, "step {step}");
+        let body = world.body(body).expect("a body");
+        let added = body.solver_report().added_mass;
+        assert!((0.0..=masses).contains(&added), "step {step}: {added} kg of {masses}");
+        assert!(body.positions().iter().all(|place| place.abs().max_element() < 1.0));
+    }
+}
+
+fn pin_top(world: &mut World, body: BodyId, mesh: &Mesh) {
+    let top = mesh.positions.iter().map(|place| place.y).fold(f32::MIN, f32::max);
+    for (node, _) in (0..).zip(&mesh.positions).filter(|(_, place)| place.y > top - 0.01) {
+        world.body_mut(body).expect("a body").pin(node).expect("a pin");
+    }
+}
+
+#[test]
+fn a_gallbladder_falls_on_a_plane() {
+    let Some(mut mesh) = real("gallbladder_volumetric.vtk", 1e-3) else {
+        return;
+    };
+    let low = mesh.positions.iter().map(|place| place.y).fold(f32::MAX, f32::min);
+    mesh.positions
+        .iter_mut()
+        .for_each(|place| *place += Vec3::Y * (0.05 - low));
+    let (mut world, body) = world_of(&mesh, Model::Springs, 6000.0, 3000.0);
+    world.create_tool(&ToolDefinition::new(Shape::Plane)).expect("a plane");
+    takes(&mut world, body, 60, 1.0 / 60.0);
+}
+
+/// It was refused at 0.17 s.
+#[test]
+fn a_stomach_of_springs_hangs() {
+    let Some(mesh) = real("stomach.msh", 1e-3) else {
+        return;
+    };
+    let (mut world, body) = world_of(&mesh, Model::Springs, 1900.0, 950.0);
+    pin_top(&mut world, body, &mesh);
+    takes(&mut world, body, 14, 1.0 / 60.0);
+}
+
+/// It was refused at 0.5 s.
+#[test]
+fn a_stomach_of_elements_hangs() {
+    let Some(mesh) = real("stomach.msh", 1e-3) else {
+        return;
+    };
+    let (mut world, body) = world_of(&mesh, Model::Tetrahedra, 5000.0, 0.0);
+    pin_top(&mut world, body, &mesh);
+    takes(&mut world, body, 17, 1.0 / 30.0);
+}
