@@ -260,10 +260,9 @@ impl<'a> Account<'a> {
                 work += applied.get(node).as_dvec3().dot(way);
             }
         }
-        let is_grasped = body.is_grasped();
         for pin in body.pins.iter() {
             // Tools lead what they hold.
-            let way = if is_grasped && body.is_held_by_tool(pin.node) {
+            let way = if body.is_held_by_tool(pin.node) {
                 let node = pin.node as usize;
                 last.get(node).as_dvec3() - first.get(node).as_dvec3()
             } else {

@@ -401,10 +401,9 @@ impl MassScaling {
         if self.relief.is_some() {
             // Only as much as is needed for as many as are asked for, or where that is too much for some more.
             let mut substeps = (needed.min(f64::from(u32::MAX)) as u32).max(1);
-            let most = self.total.max(self.most);
-            while !fits_in(substeps, most.min(MORE * self.most)) {
+            while !fits_in(substeps, self.total.min(MORE * self.most)) {
                 if substeps >= max_substeps {
-                    if fits_in(substeps, most) {
+                    if fits_in(substeps, self.total) {
                         break;
                     }
                     return None;

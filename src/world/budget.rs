@@ -103,14 +103,16 @@ impl World {
             }
         };
         self.lag = (owed - length).max(0.0);
-        let reports = || self.bodies.iter().map(|(_, body)| body.solver_report());
-        let products = reports().map(|report| report.iterations).max().unwrap_or(0);
+        let reports = self.bodies.iter().map(|(_, body)| body.solver_report());
+        let (products, error) = reports.fold((0, 0.0_f32), |(products, error), report| {
+            (report.iterations.max(products), report.error.max(error))
+        });
         Ok(BudgetReport {
             step,
             work,
             work_done: products.max(step.substeps),
             lag: self.lag,
-            error: reports().map(|report| report.error).fold(0.0, f32::max),
+            error,
         })
     }
 

@@ -34,6 +34,15 @@ fn organ() -> (World, BodyId, Vec<u32>, u32) {
     (world, body.expect("a body"), end, tip)
 }
 
+/// The same, pinned at that end, with its furthest node.
+fn pinned() -> (World, BodyId, u32) {
+    let (mut world, body, end, tip) = organ();
+    for node in end {
+        world.body_mut(body).expect("a body").pin(node).expect("a pin");
+    }
+    (world, body, tip)
+}
+
 /// Steps it for so many frames as `step` does, and compares all energy with that at the start, as a part of the most that there is of kinetic and
 /// elastic energy in the first two seconds: it swings about its rest then.
 fn gain((world, body): (&mut World, BodyId), frames: usize, mut step: impl FnMut(&mut World)) -> f64 {
@@ -105,10 +114,7 @@ fn what_is_set_in_each_frame_gains_no_energy() {
         }),
     ];
     for (name, set) in settings {
-        let (mut world, body, end, _) = organ();
-        for &node in &end {
-            world.body_mut(body).expect("a body").pin(node).expect("a pin");
-        }
+        let (mut world, body, _) = pinned();
         let gained = gain((&mut world, body), 1200, |world| {
             set(world, body);
             plain(world);
@@ -119,10 +125,7 @@ fn what_is_set_in_each_frame_gains_no_energy() {
 
 #[test]
 fn impulses_put_in_what_they_give_and_no_more() {
-    let (mut world, body, end, tip) = organ();
-    for &node in &end {
-        world.body_mut(body).expect("a body").pin(node).expect("a pin");
-    }
+    let (mut world, body, tip) = pinned();
     let energy = |world: &World| world.body(body).expect("a body").energy(world.gravity());
     let all = |world: &World| energy(world).kinetic + energy(world).elastic + energy(world).gravitational;
     let start = all(&world);
@@ -150,10 +153,7 @@ fn impulses_put_in_what_they_give_and_no_more() {
 #[test]
 fn steps_of_little_work_let_the_world_lag_and_gain_no_energy() {
     for work in [5, 11] {
-        let (mut world, body, end, _) = organ();
-        for &node in &end {
-            world.body_mut(body).expect("a body").pin(node).expect("a pin");
-        }
+        let (mut world, body, _) = pinned();
         let gained = gain((&mut world, body), 1200, |world| {
             world.step_with_budget(DT, work).expect("a step");
         });
