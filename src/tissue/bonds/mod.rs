@@ -96,6 +96,8 @@ struct Bond {
     /// What was given beside that in this substep, N s, and all in the step.
     impulse: Vec3,
     sum: DVec3,
+    /// What closing the gap has put in, J.
+    work: f64,
     /// How much impulse makes the points faster against each other, along each axis, kg; 0 where neither moves.
     masses: Vec3,
     /// How far the points are to be apart at the end of the substep, and how far they may miss that, m.
@@ -119,6 +121,7 @@ saved!(Bond {
     load,
     impulse,
     sum,
+    work,
     masses,
     gap,
     miss,
@@ -268,6 +271,7 @@ impl Bonds {
             load: Vec3::ZERO,
             impulse: Vec3::ZERO,
             sum: DVec3::ZERO,
+            work: 0.0,
             masses: Vec3::ZERO,
             gap: DVec3::ZERO,
             miss: 0.0,
