@@ -351,6 +351,12 @@ impl BodyDefinition<'_> {
         not_negative("enclosed_stiffness", self.enclosed_stiffness)?;
         finite("pressure", self.pressure)?;
         not_negative("toughness", self.toughness)?;
+        if self.toughness > 0.0 && self.spare_nodes == 0 {
+            return Err(Error::invalid(format!(
+                "toughness is {} while spare_nodes is 0: the body cannot be cut",
+                self.toughness
+            )));
+        }
         if let Some(material) = &self.material {
             material.check(self)?;
         }

@@ -464,7 +464,7 @@ impl MassScaling {
         })
     }
 
-    /// Makes masses those for a substep of `step` seconds; 0: as they are. `is_free`: nothing holds the body.
+    /// Makes masses those for a substep of `step` seconds; 0: as they are. `is_free`: nothing holds the body, though damping may.
     pub fn apply(&mut self, step: f32, body: Heavier, is_free: bool) {
         self.step = step;
         *body.uniform_inverse_mass = self.uniform_inverse_mass.filter(|_| step == 0.0);
@@ -483,7 +483,8 @@ impl MassScaling {
             }
         }
         let added = self.added_mass();
-        self.weight_share = (is_free && added > 0.0).then(|| (self.total / (self.total + added)) as f32);
+        self.weight_share =
+            (is_free && damping.is_none() && added > 0.0).then(|| (self.total / (self.total + added)) as f32);
     }
 
     /// Nodes are damped at these rates from now on, 1/s, with their masses as they are.

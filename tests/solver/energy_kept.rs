@@ -1,7 +1,7 @@
 //! An undamped organ of springs that hangs folds under its weight, and leapfrog gains energy where it does: the energy monitor keeps that off, whatever
 //! holds the organ and whatever is set on the way.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use sinew::mesh::Mesh;
 use sinew::{
     Anchor, BodyDefinition, BodyId, Material, Model, Shape, Solver, SutureDefinition, ToolDefinition, World,
@@ -203,5 +203,80 @@ fn organs_that_hang_from_each_other_gain_no_energy() {
         }
         let gained = gain_of_all((&mut world, &[first, second]), 360, plain);
         assert!(gained < 0.01, "{is_sutured}: {:.2} %", 100.0 * gained);
+    }
+}
+
+/// The energy of a fall is none that the body has within: what is lost or gained of its spin is not hidden by it.
+#[test]
+fn what_spins_while_it_falls_keeps_its_spin() {
+    for (solver, model) in [
+        (Solver::Implicit, Model::Tetrahedra),
+        (Solver::Implicit, Model::Springs),
+        (Solver::Newton, Model::Springs),
+    ] {
+        let mesh = Mesh::organ(0.15, 0.018).expect("an organ");
+        let mut world = World::new(WorldDefinition::default()).expect("a world");
+        let body = world.create_body(&BodyDefinition {
+            positions: &mesh.positions,
+            tetrahedra: &mesh.tetrahedra,
+            material: Some(Material {
+                model,
+                young_modulus: 20e3,
+                density: 1060.0,
+                ..Material::default()
+            }),
+            solver,
+            ..Default::default()
+        });
+        let body = body.expect("a body");
+        let masses: Vec<f64> = {
+            let body = world.body(body).expect("a body");
+            let nodes = 0..body.node_count() as u32;
+            nodes
+                .map(|node| f64::from(body.node_mass(node).expect("a mass")))
+                .collect()
+        };
+        let mean = |vectors: &[Vec3]| {
+            let sum: DVec3 = vectors
+                .iter()
+                .zip(&masses)
+                .map(|(vector, mass)| vector.as_dvec3() * *mass)
+                .sum();
+            sum / masses.iter().sum::<f64>()
+        };
+        let centre = mean(&mesh.positions).as_vec3();
+        // 0.28 rad in a step.
+        let spin = Vec3::Z * 16.8;
+        let velocities: Vec<Vec3> = mesh.positions.iter().map(|place| spin.cross(*place - centre)).collect();
+        world
+            .body_mut(body)
+            .expect("a body")
+            .set_velocities(&velocities)
+            .expect("velocities");
+        // The energy about the middle, and the angular momentum about it.
+        let own = |world: &World| {
+            let body = world.body(body).expect("a body");
+            let (places, velocities) = (body.positions(), body.velocities());
+            let (centre, mean) = (mean(places), mean(velocities));
+            let (mut energy, mut turn) = (body.energy(Vec3::ZERO).elastic, DVec3::ZERO);
+            for ((place, velocity), mass) in places.iter().zip(velocities).zip(&masses) {
+                let velocity = velocity.as_dvec3() - mean;
+                energy += 0.5 * mass * velocity.length_squared();
+                turn += (place.as_dvec3() - centre).cross(velocity) * *mass;
+            }
+            (energy, turn)
+        };
+        let (energy, turn) = own(&world);
+        for frame in 0..300 {
+            plain(&mut world);
+            let (now, turns) = own(&world);
+            let (gained, off) = (now / energy - 1.0, (turns - turn).length() / turn.length());
+            assert!(gained < 3e-4, "{solver:?} {model:?} {frame}: {:.4} %", 100.0 * gained);
+            assert!(
+                off < 5e-4,
+                "{solver:?} {model:?} {frame}: {:.4} % of its spin",
+                100.0 * off
+            );
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! What a step does to the energy: an implicit step loses some and gains none, unless its equation was not solved.
 
+use glam::{BVec3, DVec3};
+
 use super::iterations::show_held;
 use super::step::Substep;
 use super::{End, History, Implicit};
@@ -24,7 +26,13 @@ const CREDIT: f64 = 0.1;
 /// What steps may have gained in all, as a part of that energy: rounding, and what the formula of order 2 has of its own.
 const DEBT: f64 = 2e-4;
 
-/// Kinetic and elastic energy.
+/// Equations leave at least this part of the ways that gravity leads nodes.
+const SOLVED: f64 = 1e-4;
+
+/// How many times what rounded coordinates store on the mean it may be.
+const NOISY: f64 = 8.0;
+
+/// Kinetic and elastic energy. Where nothing holds a body, its motion as a whole is none of it: what falls fast would hide what it gains within.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Total {
     /// J; below 0 where a constant pressure has done more work than is stored.
@@ -104,7 +112,16 @@ impl Substep<'_> {
         let work = self.work(body, &implicit.histories[next]);
         let after = elastic.plus(kinetic);
         let has = before.total.energy + work;
-        let rounding = ROUNDING * (before.total.size + after.size + work.abs()) + implicit.noise(body.extent()).energy;
+        let mass = total_mass(body);
+        let fall = mean(body, &implicit.histories[next].ways).dot(self.request.gravity.as_dvec3());
+        let has = has + f64::from(implicit.accuracy).max(SOLVED).powi(2) * mass * fall.abs();
+        // Rounding of velocities, a part of what they are in all, and of coordinates.
+        let speed = mean(body, body.state.newest().1).length() * f64::from(f32::EPSILON);
+        let reach = body.local_bounds().magnitudes().max_element();
+        let speed = speed + f64::EPSILON * f64::from(reach) / f64::from(self.step);
+        let noise = mass * speed * speed + NOISY * implicit.noise(reach).energy;
+        let size = after.size + work.abs();
+        let rounding = ROUNDING * (before.total.size + size) + noise + 2.0 * (noise * size).sqrt();
         if !(after.energy.is_finite() && after.size.is_finite() && work.is_finite()) {
             return End::NotFinite;
         }
@@ -113,7 +130,6 @@ impl Substep<'_> {
         let most_credit = if implicit.is_attached { 0.0 } else { CREDIT };
         let history = &mut implicit.histories[next];
         history.energy = Some(after);
-        let size = after.size + work.abs();
         history.credit = (has + before.credit - after.energy).min(most_credit * size);
         if history.credit >= -(DEBT * size + rounding) || is_rounding {
             End::Fine
@@ -132,6 +148,7 @@ impl Substep<'_> {
             .filter(|excess| excess.is_finite())
             .map(|excess| slow_down(body, excess, true));
         let kinetic = kinetic(body, false);
+        let mean = mean(body, body.state.newest().1);
         let state = body.state.substep();
         let history = &mut implicit.histories[next];
         if let (Some(total), Some(excess), Some(taken)) = (known, excess, taken)
@@ -139,7 +156,12 @@ impl Substep<'_> {
         {
             let left = (excess - taken).max(0.0);
             if left > 0.0 {
-                scale(state.velocities, (1.0 - left / kinetic).sqrt() as f32);
+                let factor = (1.0 - left / kinetic).sqrt();
+                let mean = mean.as_vec3().to_array();
+                for (axis, mean) in state.velocities.axes_mut().into_iter().zip(mean) {
+                    axis.iter_mut()
+                        .for_each(|value| *value = mean + (*value - mean) * factor as f32);
+                }
             }
             history.energy = Some(total.plus(-taken - left));
         } else {
@@ -189,17 +211,20 @@ impl Substep<'_> {
     /// What gravity, forces from outside, tools and other tissue did on these ways, J.
     fn work(&self, body: &System, history: &History) -> f64 {
         let ways = &history.ways;
+        let mean = mean(body, ways);
         let pressed = history.pressing();
         let applied = body.applied.as_ref().filter(|_| body.forces_applied);
-        let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node));
+        let held = |contacts: &Contacts| contacts.holds.work(|node| ways.get(node) - mean.as_vec3());
         let mut work = body.contacts.as_deref().map_or(0.0, held);
         for (axis, ways) in ways.axes().into_iter().enumerate() {
+            let about = mean[axis];
             let gravity = f64::from(self.request.gravity[axis]);
             if gravity != 0.0 {
                 work += gravity
                     * body.kernel.run(Weighted {
                         weights: &body.masses,
                         values: ways,
+                        about,
                         free: &body.inverse_masses,
                     });
             }
@@ -208,6 +233,7 @@ impl Substep<'_> {
                 work += body.kernel.run(Weighted {
                     weights: applied.axes()[axis],
                     values: ways,
+                    about,
                     free,
                 });
             }
@@ -225,6 +251,8 @@ impl Substep<'_> {
 struct Weighted<'a> {
     weights: &'a [f32],
     values: &'a [f32],
+    /// What is taken off each value.
+    about: f64,
     free: &'a [f32],
 }
 
@@ -242,16 +270,10 @@ impl Loops for Weighted<'_> {
         for ((weights, values), free) in chunks {
             for (lane, ((&weight, &value), &free)) in lanes.iter_mut().zip(weights.iter().zip(values).zip(free)) {
                 let weight = if free > 0.0 { f64::from(weight) } else { 0.0 };
-                *lane += weight * f64::from(value);
+                *lane += weight * (f64::from(value) - self.about);
             }
         }
         lanes.into_iter().sum()
-    }
-}
-
-fn scale(vectors: &mut Vectors, factor: f32) {
-    for axis in vectors.axes_mut() {
-        axis.iter_mut().for_each(|value| *value *= factor);
     }
 }
 
@@ -283,14 +305,47 @@ impl Implicit {
     }
 }
 
-/// The kinetic energy of what is free to move, J, before the first substep or now: not of what is led, though it be along some axes alone.
-fn kinetic(body: &mut System, is_first: bool) -> f64 {
-    let state = body.state.substep();
-    let velocities = if is_first {
-        state.first_velocities
-    } else {
-        &*state.velocities
+/// The mass of what is free to move, kg.
+fn total_mass(body: &System) -> f64 {
+    let free = body
+        .masses
+        .iter()
+        .zip(&body.inverse_masses)
+        .filter(|&(_, &inverse)| inverse > 0.0);
+    free.map(|(&mass, _)| f64::from(mass)).sum()
+}
+
+/// The mean of vectors over the mass of a body, along axes along which nothing holds it; none where damping of its nodes does.
+fn mean(body: &System, vectors: &Vectors) -> DVec3 {
+    let held = body.held_axes();
+    if held == BVec3::TRUE || body.damping.is_some() {
+        return DVec3::ZERO;
+    }
+    let sum = |values: &[f32]| {
+        body.kernel.run(Weighted {
+            weights: &body.masses,
+            values,
+            about: 0.0,
+            free: &body.inverse_masses,
+        })
     };
+    let mean = DVec3::from(vectors.axes().map(sum)) / total_mass(body);
+    if mean.is_finite() {
+        DVec3::select(held, DVec3::ZERO, mean)
+    } else {
+        DVec3::ZERO
+    }
+}
+
+/// The kinetic energy of what is free to move, J, before the first substep or now: not of what is led, though it be along some axes alone, nor
+/// that of the motion as a whole.
+fn kinetic(body: &System, is_first: bool) -> f64 {
+    let velocities = if is_first {
+        body.state.velocities()
+    } else {
+        body.state.newest().1
+    };
+    let mean = mean(body, velocities);
     let (masses, inverse_masses) = (&body.masses, &body.inverse_masses);
     let led = body.pins.partial().map(|pin| {
         let node = pin.node as usize;
@@ -301,6 +356,7 @@ fn kinetic(body: &mut System, is_first: bool) -> f64 {
             let nodes = tile_nodes(tile, masses.len());
             body.kernel.run(Kinetic {
                 velocities: velocities.slices(nodes.clone()),
+                mean,
                 masses: &masses[nodes.clone()],
                 inverse_masses: &inverse_masses[nodes],
             })
@@ -311,6 +367,7 @@ fn kinetic(body: &mut System, is_first: bool) -> f64 {
 
 struct Kinetic<'a> {
     velocities: [&'a [f32]; 3],
+    mean: DVec3,
     masses: &'a [f32],
     inverse_masses: &'a [f32],
 }
@@ -321,13 +378,14 @@ impl Loops for Kinetic<'_> {
     #[inline(always)]
     fn run(self) -> f64 {
         let mut lanes = [0.0; LANES];
-        for velocities in self.velocities {
+        for (velocities, mean) in self.velocities.into_iter().zip(self.mean.to_array()) {
             let nodes = velocities.chunks(LANES).zip(self.masses.chunks(LANES));
             for ((velocities, masses), free) in nodes.zip(self.inverse_masses.chunks(LANES)) {
                 for (lane, ((&velocity, &mass), &free)) in lanes.iter_mut().zip(velocities.iter().zip(masses).zip(free))
                 {
                     let mass = if free > 0.0 { f64::from(mass) } else { 0.0 };
-                    *lane += mass * f64::from(velocity) * f64::from(velocity);
+                    let velocity = f64::from(velocity) - mean;
+                    *lane += mass * velocity * velocity;
                 }
             }
         }
