@@ -310,7 +310,6 @@ unsafe impl Versioned for sinew_body_def {
         offset_of!(Self, element_law),
         size_of::<Self>(),
     ];
-    const NAME: &'static str = "sinew_body_def";
 }
 
 impl sinew_body_def {
@@ -621,9 +620,6 @@ unsafe fn values<'a>(name: &str, pointer: *const f32, count: usize, uniform: f32
 }
 
 /// Fills a body definition with its defaults; `struct_size` is sizeof(sinew_body_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_body_def_init(def: *mut sinew_body_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.

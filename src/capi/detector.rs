@@ -135,16 +135,10 @@ pub struct sinew_dvec3_view {
 }
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_detector_def {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_detector_def";
-}
+unsafe impl Versioned for sinew_detector_def {}
 
 // SAFETY: repr(C), begins with struct_size, numbers alone.
-unsafe impl Versioned for sinew_detector_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
-    const NAME: &'static str = "sinew_detector_report";
-}
+unsafe impl Versioned for sinew_detector_report {}
 
 /// Detector of the overlap of two bodies; it applies no forces.
 ///
@@ -199,10 +193,7 @@ impl sinew_detector_def {
         let image = ImageSpaceDefinition::new(0.0);
         Self {
             struct_size: size_of::<Self>(),
-            bodies: [sinew_body_id {
-                index1: 0,
-                generation: 0,
-            }; 2],
+            bodies: [sinew_body_id::default(); 2],
             detection: SINEW_DETECTION_EXACT,
             form: SINEW_IMAGE_FORM_INTERVALS,
             pixel: image.pixel,
@@ -485,9 +476,6 @@ impl Overlaps {
 }
 
 /// Fills a detector definition with its defaults; `struct_size` is sizeof(sinew_detector_def).
-///
-/// # Safety
-/// `def` is NULL or writable for `struct_size` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, struct_size: usize) -> sinew_status {
     // SAFETY: the same contract.
@@ -501,9 +489,6 @@ pub unsafe extern "C" fn sinew_detector_def_init(def: *mut sinew_detector_def, s
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if the bodies are the same, one has no surface, or both are open; with
 /// EXACT also if a closed surface is inverted, self-intersecting or degenerate. SINEW_STATUS_UNSUPPORTED for
 /// SINEW_DETECTION_DISTANCE_FIELD.
-///
-/// # Safety
-/// `world` is NULL or a world nobody changes; `def` is NULL or a definition of the size that it states; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_create(
     world: *const sinew_world,
@@ -529,10 +514,6 @@ pub unsafe extern "C" fn sinew_detector_create(
 ///
 /// Errors: SINEW_STATUS_INVALID_ARGUMENT if a body was destroyed or has another surface; SINEW_STATUS_CAPACITY if
 /// one ray has more than `crossings`.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody else uses; `world` is NULL or a world nobody changes; `report` is NULL or writable for the size
-/// that it states.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_find(
     detector: *mut sinew_detector,
@@ -556,9 +537,6 @@ pub unsafe extern "C" fn sinew_detector_find(
 /// `side` 0 is the first body, 1 the second. The list is empty before the first search and with COUNTED.
 ///
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody changes; `points` and `count` are NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_points(
     detector: *const sinew_detector,
@@ -570,10 +548,7 @@ pub unsafe extern "C" fn sinew_detector_get_points(
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.points[index_of(side)?];
-        let points = memory::output("points", points)?;
-        *memory::output("count", count)? = found.len();
-        *points = found.as_ptr();
-        Ok(())
+        memory::write_both(("points", points, found.as_ptr()), ("count", count, found.len()))
     })
 }
 
@@ -583,9 +558,6 @@ pub unsafe extern "C" fn sinew_detector_get_points(
 /// search.
 ///
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody changes; `edges` and `count` are NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_edges(
     detector: *const sinew_detector,
@@ -597,10 +569,7 @@ pub unsafe extern "C" fn sinew_detector_get_edges(
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let found = &detector.found.edges[index_of(side)?];
-        let edges = memory::output("edges", edges)?;
-        *memory::output("count", count)? = found.len();
-        *edges = found.as_ptr();
-        Ok(())
+        memory::write_both(("edges", edges, found.as_ptr()), ("count", count, found.len()))
     })
 }
 
@@ -610,9 +579,6 @@ pub unsafe extern "C" fn sinew_detector_get_edges(
 /// the first search, with COUNTED or EXACT, and if a body is open.
 ///
 /// Lifetime: until the next sinew_detector_find, or the detector's destruction.
-///
-/// # Safety
-/// `detector` is NULL or a detector nobody changes; `out` is NULL or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_get_gradient(
     detector: *const sinew_detector,
@@ -623,19 +589,19 @@ pub unsafe extern "C" fn sinew_detector_get_gradient(
     guard(|| unsafe {
         let detector = memory::reference("detector", detector)?;
         let gradient = &detector.found.gradients[index_of(side)?];
-        *memory::output("out", out)? = sinew_dvec3_view {
-            data: gradient.as_ptr().cast(),
-            count: gradient.len(),
-            stride: size_of::<DVec3>(),
-        };
-        Ok(())
+        memory::write(
+            "out",
+            out,
+            sinew_dvec3_view {
+                data: gradient.as_ptr().cast(),
+                count: gradient.len(),
+                stride: size_of::<DVec3>(),
+            },
+        )
     })
 }
 
 /// Destroys a detector and ends its lists and views; NULL has no effect.
-///
-/// # Safety
-/// `detector` is NULL or a detector that is not destroyed and that nobody uses any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_detector_destroy(detector: *mut sinew_detector) {
     if !detector.is_null() {
