@@ -1,9 +1,11 @@
 //! What instruments do to tissue, and tissue to them.
 
 mod beside_tissue;
+mod broad_phase;
 mod candidates;
 pub(crate) mod closest;
 mod constraint;
+mod contact_solver;
 mod contacts;
 mod cuboid;
 mod distance;
@@ -19,7 +21,9 @@ pub(crate) mod image_space;
 pub(crate) mod impulses;
 mod limit;
 mod meet;
+mod meeting;
 mod mesh_solid;
+mod narrow_phase;
 mod node_contacts;
 mod path;
 mod press;
@@ -36,10 +40,11 @@ pub(crate) mod sweep;
 mod sweep_tests;
 mod tool;
 
-pub(crate) use contacts::{Contacts, Meeting};
+pub(crate) use contacts::Contacts;
 pub(crate) use driven::DynamicTool;
 pub(crate) use holds::Holds;
 pub(crate) use limit::TRIES;
+pub(crate) use meeting::Meeting;
 pub(crate) use path::{Frame, ToolPath};
 pub use report::{Contact, ContactChange};
 pub use rigid::MassProperties;

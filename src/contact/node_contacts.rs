@@ -6,11 +6,11 @@
 use glam::{BVec3, Vec3};
 
 use super::candidates::NearestPlane;
-use super::contacts::{Meeting, Slice};
 use super::distance::closest_on_segment;
 use super::features::Feature;
 use super::impulses::{Effort, LEVERAGE, Sweep, pushed_out, relax};
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded, mesh_geometry, round_geometry};
+use super::meeting::{Meeting, Slice};
 use super::path::{Motion, Solid};
 use super::sweep::{Corners, FLAT, Segment, Separation, TOUCHING};
 use crate::base::{Result, memory};

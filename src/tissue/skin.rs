@@ -2,10 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
-use super::LEAST_THICKNESS;
 use super::change::Changing;
 use super::flatness::{Flatness, Ridge};
 use super::images::Images;
+use super::narrow_phase::LEAST_THICKNESS;
 use super::nearby::Nearby;
 use super::wound::Wound;
 use crate::base::{Result, memory};
