@@ -16,8 +16,10 @@
 // One contract for all, above.
 #![allow(clippy::missing_safety_doc)]
 
+mod body_definition;
 mod id;
 mod memory;
+mod overlaps;
 
 // The order of functions.md. Units in brackets are no links.
 #[allow(rustdoc::broken_intra_doc_links)]

@@ -1,9 +1,9 @@
 //! What of a body is near tools, and in how many slices a substep is taken there.
 
-use super::candidates::met;
 use super::contacts::Contacts;
 use super::meeting::Meeting;
 use super::path::ToolPath;
+use super::zone::met;
 use crate::base::{Count, Stage, Stopwatch};
 
 /// A substep is cut into at most so many slices.

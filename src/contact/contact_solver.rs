@@ -1,12 +1,13 @@
 //! Solves the contacts of a slice, and moves what they touch.
 
+use glam::Vec3;
+
 use super::constraint::Constraint;
 use super::contacts::Contacts;
 use super::features::Feature;
 use super::impulses::pushed_out;
 use super::meeting::{Meeting, Slice};
 use super::node_contacts::NodeContact;
-use glam::Vec3;
 
 impl Contacts {
     pub(super) fn solve(&mut self, meeting: &mut Meeting, slice: &Slice) {

@@ -1,5 +1,7 @@
 //! A substep of a body near tools, and the slices that it is cut into.
 
+use glam::{BVec3, DVec3, Vec3};
+
 use super::impulses::SWEEPS;
 use super::path::ToolPath;
 use super::supports::{MOST, Supports};
@@ -8,7 +10,6 @@ use crate::geometry::Bounds;
 use crate::nodes::{Bindings, Mobility, Pins};
 use crate::simd::ChosenKernel;
 use crate::soa::Vectors;
-use glam::{BVec3, DVec3, Vec3};
 
 /// One substep of a body near tools.
 pub(crate) struct Meeting<'a> {

@@ -16,6 +16,7 @@ pub(crate) mod exact;
 mod features;
 mod gauge;
 mod grip;
+mod hold;
 mod holds;
 pub(crate) mod image_space;
 pub(crate) mod impulses;
@@ -39,6 +40,7 @@ pub(crate) mod sweep;
 #[cfg(test)]
 mod sweep_tests;
 mod tool;
+mod zone;
 
 pub(crate) use contacts::Contacts;
 pub(crate) use driven::DynamicTool;

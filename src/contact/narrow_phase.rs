@@ -1,6 +1,7 @@
 //! Finds the contacts of what is near tools.
 
-use super::candidates::zone_bit;
+use glam::Vec3A;
+
 use super::contacts::Contacts;
 use super::features::Feature;
 use super::meet::{ContactGeometry, meet_mesh, meet_plane, meet_rounded};
@@ -11,9 +12,9 @@ use super::press::solve_alone;
 use super::press_nodes::{PressNodes, PressingSolid};
 use super::supports::Supports;
 use super::sweep::Corners;
+use super::zone::zone_bit;
 use crate::base::{Count, Stage, Stopwatch};
 use crate::nodes::Bindings;
-use glam::Vec3A;
 
 impl Contacts {
     /// Whether the tool in this place holds a node of the feature. What it holds may lie within it, and edges and faces from there

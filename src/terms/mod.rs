@@ -14,6 +14,7 @@ mod limit;
 mod nonlinear;
 mod parting;
 mod set;
+mod stencil_term;
 mod stencils;
 mod strings;
 

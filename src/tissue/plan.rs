@@ -1,12 +1,13 @@
 //! Which bodies take a step together, and in how many substeps.
 
+use glam::{DVec3, Vec3};
+
 use super::Tissue;
 use super::islands::Reach;
 use super::meet_each_other;
 use super::skin::Skin;
 use crate::geometry::Bounds;
 use crate::solver::{System, Systems};
-use glam::{DVec3, Vec3};
 
 /// It is foreseen that a body becomes so many times as fast in a step; where it is faster, the step is taken again.
 pub(super) const FASTER: f32 = 2.0;

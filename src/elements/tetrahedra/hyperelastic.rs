@@ -7,13 +7,13 @@ use crate::simd::algebra::{Matrix, scaled_matrix, times_upper};
 use crate::simd::{InLanes, Lanes, Record, WithLanes};
 
 /// With the pressures that their nodes have beside their places, or none.
-pub(super) struct Forces<'a, H, const RINGS: bool> {
+pub(super) struct HyperelasticForces<'a, H, const RINGS: bool> {
     pub law: Law,
     pub form: H,
     pub of: Tetrahedra<'a>,
 }
 
-pub(super) struct Changes<'a, H, const RINGS: bool> {
+pub(super) struct HyperelasticChanges<'a, H, const RINGS: bool> {
     pub law: Law,
     pub form: H,
     pub ways: *const Record,
@@ -43,7 +43,7 @@ fn lanes<L: Lanes>([a, b, c]: Columns<InLanes<L>>) -> Matrix<L> {
     ]
 }
 
-impl<H: Hyperelastic, const RINGS: bool> WithLanes for Forces<'_, H, RINGS> {
+impl<H: Hyperelastic, const RINGS: bool> WithLanes for HyperelasticForces<'_, H, RINGS> {
     type Output = f32;
 
     #[inline(always)]
@@ -81,7 +81,7 @@ impl<H: Hyperelastic, const RINGS: bool> WithLanes for Forces<'_, H, RINGS> {
     }
 }
 
-impl<H: Hyperelastic, const RINGS: bool> WithLanes for Changes<'_, H, RINGS> {
+impl<H: Hyperelastic, const RINGS: bool> WithLanes for HyperelasticChanges<'_, H, RINGS> {
     type Output = ();
 
     #[inline(always)]

@@ -8,7 +8,8 @@ use std::marker::PhantomData;
 
 use glam::Vec3;
 
-use super::columns::{Columns, Ends, Material, Run};
+use super::columns::Columns;
+use super::layout::{Ends, Material, Run};
 use super::quantities::{Change, Force, HalfEnergy, Quantity, Spring, Ways, difference};
 use crate::order::LANES;
 use crate::simd::{ChosenKernel, Lanes, WithLanes, prefetch};

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::columns::{Columns, Gather};
+use super::columns::Columns;
+use super::layout::Gather;
 use crate::order::LANES;
 use crate::soa::{MARGIN, TILE};
 

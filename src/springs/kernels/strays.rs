@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::columns::Line;
+use super::layout::Line;
 use crate::base::Result;
 use crate::codec::saved;
 use crate::order::LANES;
